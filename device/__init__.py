@@ -1,0 +1,1 @@
+"""The probe's daemon: light, camera and force in; size, depth and Young's modulus out."""

@@ -1,0 +1,1 @@
+"""Drivers: the only folder that imports smbus2, picamera2 and serial."""

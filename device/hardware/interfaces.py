@@ -1,0 +1,79 @@
+"""What the instrument asks of its hardware: set the light, take a frame, read the force.
+
+Raw and calibrated are different types: a load cell gives counts, and only a `ForceScale` turns counts into newtons.
+All times are seconds of the one monotonic clock (`time.monotonic`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+LED_COUNT = 4
+"""One LED on each side of the waveguide: +x, +y, -x, -y."""
+
+LedRatio = tuple[float, float, float, float]
+"""Brightness of the four sides as a ratio of full scale, 0..1."""
+
+
+@dataclass(frozen=True)
+class CameraFrame:
+    """One exposure, untouched: counts [height_px, width_px], and when and how it was taken."""
+
+    counts: NDArray[np.uint8]
+    exposure_start_s: float
+    exposure_us: float
+    gain: float
+
+
+@dataclass(frozen=True)
+class CellSample:
+    """One reading of the load cell in ADC counts, stamped when its line was complete."""
+
+    t_s: float
+    counts: float
+
+
+@dataclass(frozen=True)
+class ForceScale:
+    """Turns load-cell counts into newtons: (counts - tare) / sensitivity."""
+
+    sensitivity_counts_per_n: float
+    tare_counts: float
+
+    def newtons(self, counts: float) -> float:
+        """Return the normal force in N, positive when the probe is pressed."""
+        return (counts - self.tare_counts) / self.sensitivity_counts_per_n
+
+
+class Lights(Protocol):
+    """The LEDs on the four sides."""
+
+    def set_ratio(self, ratio: LedRatio) -> float:
+        """Set all four sides in one transaction; return the time (s) at which the chip acknowledged it."""
+
+    def close(self) -> None:
+        """Switch all sides off and release the bus."""
+
+
+class Camera(Protocol):
+    """The near-infrared camera below the waveguide."""
+
+    def capture(self, *, begun_after_s: float, timeout_s: float) -> CameraFrame:
+        """Return the next frame whose exposure began after the given time; raise `CameraError` when none comes."""
+
+    def close(self) -> None:
+        """Stop the stream."""
+
+
+class LoadCell(Protocol):
+    """The load cell behind the probe."""
+
+    def read(self, *, timeout_s: float) -> CellSample:
+        """Return the next sample; raise `LoadCellError` when none comes in time."""
+
+    def close(self) -> None:
+        """Release the serial line."""

@@ -1,0 +1,70 @@
+"""Quantities and their refusals: a number outside its bound becomes one clear sentence.
+
+The three unknowns are the *diameter* of the inclusion, the depth of its *top* below the undeformed surface (not of
+its centre), and its Young's modulus (not its stiffness). Source: Lee & Won, IEEE JBHI 17(2), 2013, section II.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+UNKNOWNS = ("size_mm", "depth_mm", "youngs_modulus_kpa")
+"""Order of the unknowns in every array of estimates or truths."""
+
+
+class InvalidQuantity(ValueError):  # noqa: N818 - reads as what it says: this quantity is invalid
+    """A value that cannot be used; says which quantity, its value, the bound and what to do."""
+
+    def __init__(self, quantity: str, value: object, bound: str, action: str) -> None:
+        self.quantity, self.value, self.bound, self.action = quantity, value, bound, action
+        super().__init__(f"{quantity} is {value}, but must be {bound}: {action}.")
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Closed or half-open range of one quantity, with its unit."""
+
+    low: float
+    high: float
+    unit: str
+    low_included: bool = True
+
+    def __str__(self) -> str:
+        low = "at least" if self.low_included else "above"
+        if math.isinf(self.high):
+            return f"{low} {self.low:g} {self.unit}".strip()
+        return f"{low} {self.low:g} and at most {self.high:g} {self.unit}".strip()
+
+    def holds(self, value: float) -> bool:
+        """Return whether a finite value lies inside."""
+        above = value >= self.low if self.low_included else value > self.low
+        return math.isfinite(value) and above and value <= self.high
+
+
+def require(quantity: str, value: object, bound: Bound, action: str) -> float:
+    """Return the value as a float, or raise `InvalidQuantity` when it is no finite number inside the bound."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidQuantity(quantity, repr(value), f"a number {bound}", action)
+    if not bound.holds(float(value)):
+        raise InvalidQuantity(quantity, value, str(bound), action)
+    return float(value)
+
+
+@dataclass(frozen=True)
+class Inclusion:
+    """One stiff sphere below the surface: the truth of a phantom, or a simulated scene's lump."""
+
+    size_mm: float
+    depth_mm: float
+    youngs_modulus_kpa: float
+
+    def __post_init__(self) -> None:
+        action = "give diameter (mm), depth of the top (mm) and Young's modulus (kPa) of a real sphere"
+        require("size_mm", self.size_mm, Bound(0.0, 100.0, "mm"), action)
+        require("depth_mm", self.depth_mm, Bound(0.0, 200.0, "mm", low_included=False), action)
+        require("youngs_modulus_kpa", self.youngs_modulus_kpa, Bound(0.0, 1e9, "kPa", low_included=False), action)
+
+    def as_tuple(self) -> tuple[float, float, float]:
+        """Return (size_mm, depth_mm, youngs_modulus_kpa), the order of `UNKNOWNS`."""
+        return self.size_mm, self.depth_mm, self.youngs_modulus_kpa
