@@ -1,0 +1,65 @@
+# Bare `make` lists the verbs. `run` and `test` set themselves up: they need python3 (3.11 or newer) and a package index.
+PORT ?= 8000
+SCENE ?=
+PY := .venv/bin/python
+HOST_TOOLS := .venv/bin/host_tools
+export OPENBLAS_NUM_THREADS ?= 1
+.DEFAULT_GOAL := help
+.PHONY: help setup run test check bench sweep train evaluate lock clean
+
+help: ## list the verbs
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+.venv/bin/python:
+	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: install python3."; exit 1; }
+	@python3 -m venv .venv || { rm -rf .venv; echo "python3 has no venv module: install it (Debian: python3-venv)."; exit 1; }
+
+# The device's part is a fifth of the whole: `make run` installs only that.
+.venv/device.stamp: requirements/device.lock | .venv/bin/python
+	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/device.lock
+	@touch $@
+
+.venv/all.stamp: requirements/all.lock pyproject.toml .venv/device.stamp
+	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.lock
+	$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+setup: .venv/all.stamp ## make the virtual environment .venv with everything
+
+run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCENE=FILE]
+	@exec $(PY) -m device --simulate --port $(PORT) $(if $(SCENE),--scene $(SCENE))
+
+test: .venv/all.stamp ## run all tests
+	$(PY) -m pytest
+
+check: .venv/all.stamp ## lint, format, types, import arrows, dead links
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	.venv/bin/lint-imports
+	$(PY) tests/dead_links.py
+
+bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute
+	$(PY) tests/bench.py
+
+sweep: .venv/all.stamp ## solve the 134 scenes of the training set into build/sweep.nc
+	$(HOST_TOOLS) sweep --scenes 134 --seed 1 --out build/sweep.nc
+
+train: sweep ## regenerate everything in models/ from nothing
+	rm -rf build/phantoms
+	$(HOST_TOOLS) table --out models/simulated_probe
+	$(HOST_TOOLS) train --data build/sweep.nc --out models/paper
+	$(HOST_TOOLS) phantom --out build/phantoms
+	$(HOST_TOOLS) calibrate build/phantoms/phantom* --out models/simulated_probe/calibration.json
+
+evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
+	$(HOST_TOOLS) evaluate
+
+lock: .venv/all.stamp ## choose and pin newest versions again
+	$(PY) -m pip install --quiet uv
+	$(PY) -m uv pip compile $(LOCK) -o requirements/device.lock pyproject.toml requirements/build.in
+	$(PY) -m uv pip compile $(LOCK) -o requirements/all.lock --extra host --extra dev pyproject.toml requirements/build.in
+LOCK := --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url
+
+clean: ## remove the virtual environment and what was built
+	rm -rf .venv build *.egg-info
