@@ -1,0 +1,1 @@
+"""The workstation toolkit: finite-element sweeps, training and export of the inverse network, calibration, scores."""
