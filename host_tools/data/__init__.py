@@ -1,0 +1,1 @@
+"""Data sets: one row a scene, resumable, failures kept."""
