@@ -1,14 +1,14 @@
 """The daemon's errors: each class one part, each with the fault code the screen and the API show.
 
-    DeviceError
-    ├── ConfigError       E501  a setting is missing, unknown or out of its bound
-    ├── CameraError       E101  no frame, or a frame of the wrong shape
-    ├── LightError        E201  the LED chip does not answer or does not hold what was written
-    ├── LoadCellError     E301  no force, or a line that cannot be read
-    ├── ModelError        E401  a bundle or calibration is missing, tampered with, or not for this probe
-    ├── StorageError      E601  a measurement could not be made durable
-    ├── BusyError         E701  a press is already under way
-    └── UnknownResource   E702  no such press or measurement
+DeviceError
+├── ConfigError       E001  a setting is missing, unknown or out of its bound
+├── CameraError       E101  no frame, or a frame of the wrong shape
+├── LightError        E201  the LED chip does not answer or does not hold what was written
+├── LoadCellError     E301  no force, or a line that cannot be read
+├── ModelError        E401  a bundle or calibration is missing, tampered with, or not for this probe
+├── StorageError      E601  a measurement could not be made durable
+├── BusyError         E801  a press is already under way
+└── UnknownResource   E802  no such press or measurement
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class DeviceError(Exception):
 class ConfigError(DeviceError):
     """A setting is missing, unknown or out of its bound."""
 
-    code = "E501"
+    code = "E001"
 
 
 class CameraError(DeviceError):
@@ -69,12 +69,12 @@ class StorageError(DeviceError):
 class BusyError(DeviceError):
     """A press is already under way."""
 
-    code = "E701"
+    code = "E801"
     status = 409
 
 
 class UnknownResource(DeviceError):  # noqa: N818 - the name is what the caller reads
     """No press or measurement of that id."""
 
-    code = "E702"
+    code = "E802"
     status = 404

@@ -1,0 +1,161 @@
+"""Frames of the near-infrared camera, untouched, each known to have begun after the light was set.
+
+Easy to get wrong: libcamera adjusts what it is asked for without a word, so the configuration is read back; and only
+the raw stream is photometric, main and lores pass black level, gamma and contrast of the image processor.
+Source: picamera2 0.3.38 (Raspberry Pi, "The Picamera2 Library").
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.errors import CameraError
+from device.hardware.interfaces import CameraFrame
+from device.measurement.quantities import Bound, InvalidQuantity, require
+
+if TYPE_CHECKING:
+    from picamera2 import CompletedRequest, Picamera2
+
+RAW_FORMAT = "R8"
+"""libcamera's name of 8-bit monochrome raw."""
+BUFFER_COUNT = 4
+REMEDY = "Check the camera's ribbon cable, then restart the probe."
+
+
+class RawMonoCamera:
+    """A monochrome camera with fixed exposure, gain and frame rate. Implements `Camera`."""
+
+    def __init__(
+        self,
+        picam2: Picamera2,
+        *,
+        width_px: int,
+        height_px: int,
+        exposure_us: int,
+        gain: float,
+        frame_rate_hz: float,
+    ) -> None:
+        """Configure and start the stream; raise `CameraError` when the camera does not do exactly what is asked.
+
+        Raises `InvalidQuantity` when the exposure (us) does not fit into one frame.
+        """
+        frame_us = round(1e6 / require("frame_rate_hz", frame_rate_hz, Bound(0.1, 1000.0, "Hz"), "set a frame rate"))
+        longest = Bound(0.0, frame_us, "us", low_included=False)
+        require("exposure_us", exposure_us, longest, "shorten the exposure or lower the frame rate")
+        self._picam2 = picam2
+        self._shape = (height_px, width_px)
+        controls: dict[str, Any] = {"ExposureTime": exposure_us, "AnalogueGain": gain}
+        controls["FrameDurationLimits"] = (frame_us, frame_us)
+        if "AeEnable" in picam2.camera_controls:
+            controls["AeEnable"] = False
+        try:
+            self._stride_px = self._configure(controls)
+            self._picam2.start()
+        except RuntimeError as error:
+            raise CameraError(f"Camera cannot be started: {error}.", REMEDY) from error
+
+    def _configure(self, controls: dict[str, Any]) -> int:
+        """Configure the raw stream and return its row length (px); raise `CameraError` when anything was adjusted."""
+        size = self._shape[::-1]
+        configuration = self._picam2.create_video_configuration(
+            main={"size": size, "format": "YUV420"},  # libcamera insists on a processed stream beside the raw one
+            raw={"size": size, "format": RAW_FORMAT},
+            controls=controls,
+            buffer_count=BUFFER_COUNT,
+            display=None,
+            encode=None,
+        )
+        self._picam2.configure(configuration)
+        raw = self._picam2.camera_configuration()["raw"] or {}
+        self._refuse_adjustment("format", RAW_FORMAT, raw.get("format"))
+        self._refuse_adjustment("size", size, raw.get("size"))
+        self._refuse_out_of_range(controls)
+        return int(raw["stride"])
+
+    def _refuse_adjustment(self, what: str, asked: object, given: object) -> None:
+        if given != asked:
+            cause = f"Camera gives {what} {given} instead of {asked}."
+            raise CameraError(cause, f"Set a {what} that this camera has in the configuration.")
+
+    def _refuse_out_of_range(self, controls: dict[str, Any]) -> None:
+        """Refuse what libcamera would clamp in silence; the limits are those of the configured sensor mode."""
+        for name, value in controls.items():
+            low, high, _default = self._picam2.camera_controls[name]
+            values = value if isinstance(value, tuple) else (value,)
+            if not all(low <= number <= high for number in values):
+                cause = f"Camera control {name} is set to {value}, but this camera takes {low} to {high}."
+                raise CameraError(cause, "Change exposure, gain or frame rate in the configuration.")
+
+    def capture(self, *, begun_after_s: float, timeout_s: float) -> CameraFrame:
+        """Return the next frame whose exposure began at or after `begun_after_s` (s, monotonic).
+
+        Raises `CameraError` when none comes within `timeout_s`, or when it is of the wrong shape or type.
+        """
+        require("timeout_s", timeout_s, Bound(0.0, 3600.0, "s", low_included=False), "give the frame time to arrive")
+        try:
+            # A flush of 0 would mean "no flush" to picamera2.
+            request = self._picam2.capture_request(flush=max(1, math.ceil(begun_after_s * 1e9)), wait=timeout_s)
+        except TimeoutError as error:
+            # Otherwise the abandoned job takes the next frame and never gives its buffer back.
+            self._picam2.cancel_all_and_flush()
+            raise CameraError(f"Camera gave no frame within {timeout_s:g} s.", REMEDY) from error
+        try:
+            return self._frame(request)
+        finally:
+            request.release()
+
+    def _frame(self, request: CompletedRequest) -> CameraFrame:
+        metadata = request.get_metadata()
+        exposure_us = float(metadata["ExposureTime"])
+        # SensorTimestamp is the end of the exposure on CLOCK_BOOTTIME. It equals CLOCK_MONOTONIC, the clock of the
+        # lights and the load cell, as long as the board was never suspended; the probe never is.
+        exposure_start_s = metadata["SensorTimestamp"] * 1e-9 - exposure_us * 1e-6
+        counts = self._counts(request.make_array("raw"))
+        return CameraFrame(counts, exposure_start_s, exposure_us, float(metadata["AnalogueGain"]))
+
+    def _counts(self, rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the image [height_px, width_px] without the padding of its rows, as a copy: buffers are reused."""
+        height_px, width_px = self._shape
+        if rows.shape != (height_px, self._stride_px) or rows.dtype != np.uint8:
+            cause = (
+                f"Camera gave a frame of shape {rows.shape} and type {rows.dtype} "
+                f"instead of {(height_px, self._stride_px)} and uint8."
+            )
+            raise CameraError(cause, REMEDY)
+        return rows[:, :width_px].copy()
+
+    def close(self) -> None:
+        """Stop the stream and give the camera back."""
+        self._picam2.stop()
+        self._picam2.close()
+
+
+def open_camera(
+    index: int, *, width_px: int, height_px: int, exposure_us: int, gain: float, frame_rate_hz: float
+) -> RawMonoCamera:
+    """Open the board's camera `index` and start it; raise `CameraError` when there is no camera or no picamera2."""
+    try:
+        from picamera2 import Picamera2
+    except ImportError as error:
+        cause = "picamera2 is not installed, so no real camera can be opened."
+        raise CameraError(cause, "Install python3-picamera2 on the probe, or start with --simulate.") from error
+    try:
+        picam2 = Picamera2(index)
+    except RuntimeError as error:
+        raise CameraError(f"Camera {index} cannot be opened: {error}.", REMEDY) from error
+    try:
+        return RawMonoCamera(
+            picam2,
+            width_px=width_px,
+            height_px=height_px,
+            exposure_us=exposure_us,
+            gain=gain,
+            frame_rate_hz=frame_rate_hz,
+        )
+    except (CameraError, InvalidQuantity):
+        picam2.close()
+        raise

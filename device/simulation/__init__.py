@@ -1,0 +1,1 @@
+"""The virtual probe: one scene drives light, image and force."""

@@ -1,0 +1,211 @@
+"""The load-cell driver as a transcript of bytes, through real pyserial on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import tracemalloc
+import tty
+from collections.abc import Iterator
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from device.errors import LoadCellError
+from device.hardware.interfaces import CellSample
+from device.hardware.load_cell import LineBuffer, OpenScale, measure_tare, open_load_cell, parse_counts
+from device.measurement.quantities import InvalidQuantity
+
+BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics\r\nReadings:\r\n"
+
+
+class Line:
+    """The amplifier's end of a serial line."""
+
+    def __init__(self) -> None:
+        self.master, slave = os.openpty()
+        tty.setraw(slave)
+        self.path = os.ttyname(slave)
+        self.cell = open_load_cell(self.path)
+        os.close(slave)
+
+    def send(self, data: bytes) -> None:
+        os.write(self.master, data)
+
+    def unplug(self) -> None:
+        os.close(self.master)
+        self.master = -1
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    yield line
+    line.cell.close()
+    if line.master >= 0:
+        line.unplug()
+
+
+def read_counts(cell: OpenScale, samples: int) -> list[float]:
+    return [cell.read(timeout_s=0.5).counts for _ in range(samples)]
+
+
+def test_whole_lines_give_their_raw_counts_in_order(line):
+    line.send(b"1234,-0.532,kg,-53200,\r\n1246,0.001,kg,8388607,\r\n")
+    assert read_counts(line.cell, 2) == [-53200.0, 8388607.0]
+    assert line.cell.skipped_lines == 0
+
+
+def test_a_partial_line_waits_for_its_rest(line):
+    line.send(b"1234,0.5,kg,12")
+    with pytest.raises(LoadCellError):
+        line.cell.read(timeout_s=0.06)
+    line.send(b"345,\r\n")
+    assert read_counts(line.cell, 1) == [12345.0]
+
+
+def test_a_sample_is_stamped_when_its_line_is_complete(line):
+    before_s = time.monotonic()
+    line.send(b"1,0.5,kg,1,\r\n")
+    sample = line.cell.read(timeout_s=0.5)
+    assert before_s <= sample.t_s <= time.monotonic()
+
+
+def test_the_banner_is_skipped_and_counted(line):
+    line.send(BANNER + b"1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+    assert line.cell.skipped_lines == 4
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        b"\xff\x00\xfe\x80",
+        b"1234,0.5,kg,",
+        b"1234,nan,kg,100,",
+        b"1234,0.5,kg,nan,",
+        b"1234,inf,kg,100,",
+        b"1234,0.5,kg,inf,",
+        b"1234,0.5,kg,100",
+        b"1234,0.5,stone,100,",
+        b"0.5,kg,100,",
+        b"1234,0.5,kg,8388608,",
+        b"1234,0.5,kg,-8388609,",
+        b"1234,0.5,kg,99999999999,",
+        b"12,0.5,kg,1012,0.5,kg,10,",
+    ],
+)
+def test_a_line_without_a_valid_raw_reading_is_never_a_sample(line, bad):
+    line.send(bad + b"\r\n1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+    assert line.cell.skipped_lines == 1
+
+
+def test_an_over_long_line_is_dropped_up_to_its_end(line):
+    line.send(b"1,0.5,kg,9," * 100)
+    line.send(b"1,0.5,kg,9,\r\n1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+    assert line.cell.skipped_lines == 1
+
+
+def test_silence_is_a_load_cell_error_with_a_remedy(line):
+    with pytest.raises(LoadCellError, match=r"has sent nothing for 0.06 s. Check its cable"):
+        line.cell.read(timeout_s=0.06)
+
+
+def test_lines_without_raw_reading_name_the_setting_that_is_missing(line):
+    line.send(b"1234,-0.532,kg,\r\n" * 3)
+    with pytest.raises(LoadCellError, match=r"3 lines skipped, the last b'1234,-0.532,kg,\\r'. Switch on timestamp"):
+        line.cell.read(timeout_s=0.06)
+
+
+def test_unplugging_while_reading_is_a_load_cell_error(line):
+    unplug = threading.Timer(0.02, line.unplug)
+    unplug.start()
+    with pytest.raises(LoadCellError, match="is gone"):
+        line.cell.read(timeout_s=5.0)
+    unplug.join()
+
+
+def test_unplugging_between_reads_is_a_load_cell_error(line):
+    line.unplug()
+    with pytest.raises(LoadCellError, match="is gone"):
+        line.cell.read(timeout_s=5.0)
+
+
+def test_nothing_is_ever_sent_to_the_amplifier(line):
+    """An `x` would open its menu and stop the stream."""
+    line.send(b"1,0.5,kg,7,\r\n")
+    line.cell.read(timeout_s=0.5)
+    os.set_blocking(line.master, False)
+    with pytest.raises(BlockingIOError):
+        os.read(line.master, 1)
+
+
+def test_a_second_program_cannot_open_the_same_port(line):
+    with pytest.raises(LoadCellError, match="cannot be opened"):
+        open_load_cell(line.path)
+
+
+def test_a_missing_port_is_a_load_cell_error_naming_it():
+    with pytest.raises(LoadCellError, match="/dev/no-such-port cannot be opened"):
+        open_load_cell("/dev/no-such-port")
+
+
+@given(
+    lines=st.lists(st.binary(max_size=20).filter(lambda data: b"\n" not in data), max_size=8),
+    cuts=st.lists(st.integers(0, 200), max_size=8),
+)
+def test_lines_do_not_depend_on_how_the_stream_was_cut(lines, cuts):
+    stream = b"".join(line + b"\n" for line in lines)
+    edges = [0, *sorted(min(cut, len(stream)) for cut in cuts), len(stream)]
+    buffer = LineBuffer(max_bytes=10)
+    pieces = [stream[start:end] for start, end in pairwise(edges)]
+    fed = [line for piece in pieces for line in buffer.feed(piece)]
+    assert fed == [line for line in lines if len(line) <= 10]
+    assert buffer.dropped_lines == len(lines) - len(fed)
+
+
+def test_a_stream_without_line_ends_does_not_grow_in_memory():
+    """1 MB of noise into a buffer of 256 bytes."""
+    buffer = LineBuffer()
+    tracemalloc.start()
+    for _ in range(1000):
+        buffer.feed(bytes(1000))
+    _now_bytes, peak_bytes = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak_bytes < 50_000
+
+
+def test_both_ends_of_24_bit_are_readings():
+    assert parse_counts(b"1,0,kg,8388607,") == 2**23 - 1
+    assert parse_counts(b"1,0,lbs,-8388608,\r") == -(2**23)
+
+
+class ScriptedCell:
+    """Gives the counts it was made with, one at a time."""
+
+    def __init__(self, *counts: float) -> None:
+        self._counts = iter(counts)
+
+    def read(self, *, timeout_s: float) -> CellSample:
+        return CellSample(0.0, next(self._counts))
+
+    def close(self) -> None: ...
+
+
+def test_tare_is_the_mean_of_the_readings():
+    assert measure_tare(ScriptedCell(10, 12, 14), samples=3, max_spread_counts=4, timeout_s=1.0) == 12.0
+
+
+def test_tare_is_refused_when_the_probe_is_touched():
+    with pytest.raises(LoadCellError, match="varies by 5 counts during tare, above the 4 allowed"):
+        measure_tare(ScriptedCell(10, 12, 15), samples=3, max_spread_counts=4, timeout_s=1.0)
+
+
+def test_tare_of_no_readings_is_refused():
+    with pytest.raises(InvalidQuantity, match="samples is 0"):
+        measure_tare(ScriptedCell(), samples=0, max_spread_counts=4, timeout_s=1.0)

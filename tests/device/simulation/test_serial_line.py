@@ -1,0 +1,95 @@
+"""The emulated amplifier: what a reader of its line sees."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from device.errors import LoadCellError
+from device.hardware.load_cell import OpenScale, open_load_cell
+from device.simulation.serial_line import BANNER, MAX_UNREAD_BYTES, EmulatedOpenScale
+
+
+def read_bytes(path: str, count: int) -> bytes:
+    """Return the first bytes of a line, as a reader sees them that does not discard what already waits."""
+    line = os.open(path, os.O_RDONLY | os.O_NOCTTY)
+    data = b""
+    while len(data) < count:
+        data += os.read(line, count - len(data))
+    os.close(line)
+    return data
+
+
+def read_for_ever(cell: OpenScale) -> None:
+    while True:
+        cell.read(timeout_s=0.5)
+
+
+def test_the_banner_comes_first_and_ends_in_readings():
+    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1)
+    data = read_bytes(scale.device_path, len(BANNER) + 40)
+    scale.close()
+    assert data.startswith(BANNER)
+    assert data.split(b"Readings:\r\n")[1].split(b"\r\n")[0] == b"0,0.0004,kg,42,"
+
+
+def test_the_driver_reads_the_counts_of_the_load():
+    scale = EmulatedOpenScale(lambda _t_s: -12345.0, rate_hz=400.0, noise_counts=0.0, seed=1)
+    cell = open_load_cell(scale.device_path)
+    samples = [cell.read(timeout_s=1.0) for _ in range(5)]
+    assert [sample.counts for sample in samples] == [-12345.0] * 5
+    assert [sample.t_s for sample in samples] == sorted(sample.t_s for sample in samples)
+    cell.close()
+    scale.close()
+
+
+def test_noise_is_the_same_for_the_same_seed_and_differs_for_another():
+    def counts(seed: int) -> list[bytes]:
+        scale = EmulatedOpenScale(lambda _t_s: 0.0, rate_hz=400.0, noise_counts=1000.0, seed=seed)
+        lines = read_bytes(scale.device_path, len(BANNER) + 120)[len(BANNER) :].split(b"\r\n")[:-1]
+        scale.close()
+        return [line.split(b",")[3] for line in lines]
+
+    first, same, other = counts(1), counts(1), counts(2)
+    common = min(len(first), len(same), len(other))
+    assert first[:common] == same[:common] != other[:common]
+
+
+@pytest.mark.parametrize(("load_counts", "raw24"), [(1e9, 8388607), (-1e9, -8388608)])
+def test_an_overload_saturates_at_24_bit(load_counts, raw24):
+    scale = EmulatedOpenScale(lambda _t_s: load_counts, rate_hz=400.0, noise_counts=0.0, seed=1)
+    cell = open_load_cell(scale.device_path)
+    assert cell.read(timeout_s=1.0).counts == raw24
+    cell.close()
+    scale.close()
+
+
+def test_lines_that_nobody_reads_are_lost_not_kept():
+    enough_sent = threading.Event()
+    asked = iter(range(10_000))
+
+    def count_up(_t_s: float) -> float:
+        number = next(asked)
+        if number == 100:
+            enough_sent.set()
+        return float(number)
+
+    scale = EmulatedOpenScale(count_up, rate_hz=2000.0, noise_counts=0.0, seed=1)
+    assert enough_sent.wait(5.0)
+    line = os.open(scale.device_path, os.O_RDONLY | os.O_NOCTTY)
+    assert len(os.read(line, 65536)) <= MAX_UNREAD_BYTES
+    os.close(line)
+    scale.close()
+
+
+def test_closing_is_unplugging_for_the_reader_and_ends_the_thread():
+    scale = EmulatedOpenScale(lambda _t_s: 0.0, noise_counts=0.0, seed=1)
+    cell = open_load_cell(scale.device_path)
+    scale.close()
+    scale.close()
+    with pytest.raises(LoadCellError, match="is gone"):
+        read_for_ever(cell)
+    cell.close()
+    assert "load cell stream" not in {thread.name for thread in threading.enumerate()}

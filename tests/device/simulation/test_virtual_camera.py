@@ -1,0 +1,153 @@
+"""The virtual picamera2 keeps the rules, and the wording, of the real one."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from device.simulation.virtual_camera import BUFFER_COUNT, ExposureRequest, VirtualPicamera2
+
+FRAME_US, EXPOSURE_US = 10_000, 2_000
+CONTROLS = {"ExposureTime": EXPOSURE_US, "FrameDurationLimits": (FRAME_US, FRAME_US), "AnalogueGain": 1.52}
+
+
+class Scene:
+    """Remembers which exposures were rendered."""
+
+    def __init__(self) -> None:
+        self.exposures: list[ExposureRequest] = []
+
+    def render(self, exposure: ExposureRequest) -> np.ndarray:
+        self.exposures.append(exposure)
+        return np.zeros((32, 64), np.uint8)
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Scene()
+
+
+@pytest.fixture
+def camera(scene: Scene) -> VirtualPicamera2:
+    camera = VirtualPicamera2(
+        scene.render, width_px=64, height_px=32, led_ratio_at=lambda t_s: (t_s, 0.0, 0.0, 0.0), max_frame_rate_hz=120.0
+    )
+    camera.configure(camera.create_video_configuration(raw={"size": (64, 32), "format": "R8"}, controls=CONTROLS))
+    return camera
+
+
+def test_a_flushed_frame_began_at_or_after_the_flush(camera):
+    camera.start()
+    flush_ns = time.monotonic_ns()
+    metadata = camera.capture_request(flush=flush_ns, wait=1.0).get_metadata()
+    start_ns = metadata["SensorTimestamp"] - 1000 * metadata["ExposureTime"]
+    assert start_ns >= flush_ns
+
+
+def test_a_frame_is_delivered_only_when_its_exposure_is_over(camera):
+    camera.start()
+    for _ in range(3):
+        request = camera.capture_request(wait=1.0)
+        assert request.get_metadata()["SensorTimestamp"] <= time.monotonic_ns()
+        request.release()
+
+
+def test_frames_that_nobody_took_are_gone(camera, scene):
+    camera.start()
+    time.sleep(5 * FRAME_US * 1e-6)
+    camera.capture_request(wait=1.0).make_array("raw")
+    assert scene.exposures[0].frame_number >= 4
+
+
+def test_the_exposure_is_rendered_with_the_light_at_its_start_and_the_scene_at_its_middle(camera, scene):
+    camera.start()
+    request = camera.capture_request(wait=1.0)
+    request.make_array("raw")
+    exposure = scene.exposures[0]
+    assert exposure.t_s - exposure.led_ratio[0] == pytest.approx(EXPOSURE_US * 0.5e-6, abs=1e-7)
+    assert exposure.t_s == pytest.approx(1e-9 * request.get_metadata()["SensorTimestamp"] - EXPOSURE_US * 0.5e-6)
+
+
+def test_only_frames_that_are_taken_are_rendered(camera, scene):
+    camera.start()
+    for _ in range(2):
+        request = camera.capture_request(flush=time.monotonic_ns() + 3000 * FRAME_US, wait=1.0)
+        request.make_array("raw")
+        request.release()
+    assert len(scene.exposures) == 2
+    assert scene.exposures[1].frame_number - scene.exposures[0].frame_number >= 3
+
+
+def test_gain_comes_in_steps_of_a_sixteenth(camera):
+    """1.52 * 16 = 24.32, so 24/16."""
+    camera.start()
+    assert camera.capture_request(wait=1.0).get_metadata()["AnalogueGain"] == 1.5
+
+
+def test_an_exposure_cannot_outlast_its_frame(camera):
+    camera.set_controls({"ExposureTime": 500_000})
+    camera.start()
+    assert camera.capture_request(wait=1.0).get_metadata()["ExposureTime"] == FRAME_US
+
+
+def test_requests_that_are_not_released_starve_the_camera_until_one_is(camera):
+    camera.start()
+    requests = [camera.capture_request(wait=1.0) for _ in range(BUFFER_COUNT)]
+    with pytest.raises(TimeoutError):
+        camera.capture_request(wait=0.02)
+    camera.cancel_all_and_flush()
+    requests[0].release()
+    camera.capture_request(wait=1.0)
+
+
+def test_captures_that_timed_out_keep_buffers_until_they_are_cancelled(camera):
+    camera.start()
+    for _ in range(BUFFER_COUNT):
+        with pytest.raises(TimeoutError):
+            camera.capture_request(flush=time.monotonic_ns() + 10**12, wait=0.001)
+    with pytest.raises(TimeoutError):
+        camera.capture_request(wait=0.02)
+    camera.cancel_all_and_flush()
+    camera.capture_request(wait=1.0)
+
+
+def test_a_stopped_camera_delivers_nothing_and_a_restarted_one_does(camera):
+    camera.start()
+    stale = camera.capture_request(wait=1.0)
+    camera.stop()
+    with pytest.raises(TimeoutError):
+        camera.capture_request(wait=0.01)
+    camera.start()
+    stale.release()
+    camera.capture_request(wait=1.0).release()
+
+
+def test_what_the_sensor_does_not_have_is_adjusted_without_a_word(camera):
+    camera.configure(camera.create_video_configuration(raw={"size": (640, 480), "format": "R10"}))
+    configuration = camera.camera_configuration()
+    assert configuration is not None
+    assert configuration["raw"] == {"format": "R8", "size": (64, 32), "stride": 64}
+
+
+def test_errors_are_worded_as_the_real_ones(camera):
+    configuration = camera.create_video_configuration()
+    with pytest.raises(RuntimeError, match=r"^Control AwbEnable is not advertised by libcamera$"):
+        camera.set_controls({"AwbEnable": False})
+    with pytest.raises(RuntimeError, match=r"^Unrecognised raw format GREY$"):
+        camera.configure(camera.create_video_configuration(raw={"format": "GREY"}))
+    with pytest.raises(RuntimeError, match=r"^width and height should be even$"):
+        camera.configure(camera.create_video_configuration(raw={"size": (63, 32)}))
+    camera.start()
+    with pytest.raises(RuntimeError, match=r"^Camera must be stopped before configuring$"):
+        camera.configure(configuration)
+    request = camera.capture_request(wait=1.0)
+    with pytest.raises(RuntimeError, match=r"^Stream 'lores' is not defined$"):
+        request.make_array("lores")
+    request.release()
+    with pytest.raises(RuntimeError, match=r"^CompletedRequest: lock now has negative ref_count$"):
+        request.release()
+    camera.close()
+    with pytest.raises(RuntimeError, match=r"^Camera has not been configured$"):
+        camera.start()
