@@ -1,1 +1,1 @@
-"""Pure numbers in, numbers out: what a press means. Shared by the probe and the workstation; imports nothing else of ours."""
+"""Pure numbers in, numbers out: what a press means. Shared with the workstation; imports nothing else of ours."""

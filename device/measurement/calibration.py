@@ -1,0 +1,96 @@
+"""A calibration certificate: three straight lines from image to deformation features, and how far to trust them.
+
+The lines are fitted on phantoms with known inclusions (`host_tools calibrate`). The certificate is for one probe and
+one model, quotes its own residuals, and carries the held-out scenes that give every estimate its interval.
+Source: Lee & Won 2013, section III: three separate linear regressions O1':O1, O2':O2, O3':O3.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.features import FEATURE_NAMES, FeatureSettings
+from device.measurement.intervals import HeldOut
+from device.measurement.quantities import InvalidQuantity
+
+SCHEMA = "tsis.calibration/1"
+RENEW = "calibrate the probe again"
+
+
+@dataclass(frozen=True)
+class Regression:
+    """One straight line, deformation = slope * image + intercept, and its quality on the phantoms."""
+
+    slope: float
+    intercept: float
+    r_squared: float
+    leave_one_out_std: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What turns this probe's images into the model's features."""
+
+    id: str
+    made_at: str
+    serial: str
+    model_sha256: str
+    settings: FeatureSettings
+    regressions: tuple[Regression, ...]
+    phantoms: int
+    held_out: HeldOut
+    software: str
+    simulated: bool
+
+    def __post_init__(self) -> None:
+        if len(self.regressions) != len(FEATURE_NAMES):
+            found = f"{len(self.regressions)} lines"
+            raise InvalidQuantity("regressions", found, f"one for each of {', '.join(FEATURE_NAMES)}", RENEW)
+        numbers = [value for line in self.regressions for value in asdict(line).values()]
+        if not np.isfinite(numbers).all():
+            raise InvalidQuantity("regressions", "not finite", "finite numbers", RENEW)
+
+    def deformation_features(self, image_features: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map image features [n, 3] to deformation features [n, 3]."""
+        slope = np.array([line.slope for line in self.regressions])
+        intercept = np.array([line.intercept for line in self.regressions])
+        return np.asarray(image_features * slope + intercept)
+
+    def require_for(self, serial: str, model_sha256: str) -> None:
+        """Raise `InvalidQuantity` when the certificate is for another probe or another model."""
+        if self.model_sha256 != model_sha256:
+            found, expected = f"for model {self.model_sha256[:12]}", f"for model {model_sha256[:12]}"
+            raise InvalidQuantity("calibration", found, expected, "calibrate with this model")
+        if self.serial != serial:
+            found, expected = f"for probe {self.serial}", f"for probe {serial}"
+            raise InvalidQuantity("calibration", found, expected, "use the probe's own certificate")
+
+    def to_json(self) -> str:
+        """Return the certificate as JSON text."""
+        record = {"schema": SCHEMA, **asdict(self)}
+        record["held_out"] = {k: np.round(v, 3).tolist() for k, v in record["held_out"].items()}
+        return json.dumps(record, indent=1) + "\n"
+
+
+def read_calibration(path: Path) -> Calibration:
+    """Read a certificate; raise `InvalidQuantity` naming the first thing that is wrong with it."""
+    try:
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidQuantity("calibration", path, "a readable certificate", f"{RENEW} ({error})") from error
+    if record.pop("schema", None) != SCHEMA:
+        raise InvalidQuantity("calibration schema", path, SCHEMA, RENEW)
+    try:
+        record["settings"] = FeatureSettings(**record["settings"])
+        record["regressions"] = tuple(Regression(**line) for line in record["regressions"])
+        held_out = {name: np.array(rows, dtype=float) for name, rows in record["held_out"].items()}
+        record["held_out"] = HeldOut(**held_out)
+        return Calibration(**record)
+    except (KeyError, TypeError) as error:
+        raise InvalidQuantity("calibration", path, "a complete certificate", f"{RENEW} ({error})") from error

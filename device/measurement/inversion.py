@@ -1,0 +1,241 @@
+"""Turns features of a press into size, depth and Young's modulus, with a model bundle that has proved itself.
+
+A bundle is a folder of `model.json` and `model.onnx`. It is used only when the hash, the contract and the golden
+vectors all hold on this very machine: a network that runs is not yet a network that is right.
+Source of the format: the model bundle of DESIGN section 5, schema `tsis.model/1`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
+
+from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
+
+SCHEMA = "tsis.model/1"
+MODEL_FILE, CARD_FILE = "model.onnx", "model.json"
+
+FEATURE_UNITS = {"max_deformation_mm": "mm", "central_deformation_mm3": "mm3", "deformation_area_mm2": "mm2"}
+"""The features the probe can measure: the paper's O1, O2, O3, in this order."""
+
+GOLDEN_TOLERANCE = 1e-4
+"""Relative. Rounding of float32 is 6e-8; processors differ far less than this, wrong weights far more."""
+
+_REMEDY = "Install the bundle again, or train and export it anew."
+_RUNTIME_ERRORS = (
+    runtime_errors.Fail,
+    runtime_errors.InvalidArgument,
+    runtime_errors.InvalidGraph,
+    runtime_errors.InvalidProtobuf,
+    runtime_errors.NotImplemented,
+    runtime_errors.RuntimeException,
+)
+
+
+class BundleRefused(ValueError):  # noqa: N818 - reads as what it says: this bundle was refused
+    """A model bundle that must not be used; says which field, its value, the bound and what to do."""
+
+    def __init__(self, folder: Path, field: str, value: object, bound: str, action: str = _REMEDY) -> None:
+        self.folder, self.field, self.value, self.bound = folder, field, value, bound
+        super().__init__(f"Model bundle {folder}: {field} is {value}, but must be {bound}. {action}")
+
+
+@dataclass(frozen=True, eq=False)
+class Raw:
+    """Answer of the network before any interval: mean and standard deviation over its trials.
+
+    estimate, spread: [n, 3] in the order of `UNKNOWNS`. The spread is no accuracy: all trials learned from one data
+    set. The estimate may lie outside the training box.
+    """
+
+    estimate: NDArray[np.float64]
+    spread: NDArray[np.float64]
+
+
+class ModelBundle:
+    """A verified inverse network.
+
+    name, sha256 (of model.onnx); feature_names: order of the features; feature_range: training range of each, in its
+    own unit; box: training range (low, high) of each unknown in mm, mm, kPa; card: all of model.json.
+    """
+
+    def __init__(self, folder: Path, card: dict[str, Any], network: bytes) -> None:
+        """Use `load`: it alone reads the files. Raises `BundleRefused`."""
+        self.card = card
+        fields = _Fields(folder, card)
+        self.name = str(fields.of("name", str))
+        self.sha256 = _verified_hash(fields, network)
+        self.feature_names = _verified_names(fields)
+        self.feature_range = fields.ranges("features", self.feature_names)
+        self.box = fields.ranges("unknowns", UNKNOWNS)
+        self._session = _open_session(fields, network)
+        _verify_contract(fields, self._session, len(self.feature_names))
+        self._verify_golden(fields)
+
+    @classmethod
+    def load(cls, folder: Path) -> ModelBundle:
+        """Return the bundle in a folder; raises `BundleRefused` when anything in it is missing or does not hold."""
+        return cls(folder, _read_card(folder), _read(folder, MODEL_FILE))
+
+    def estimate(self, features: NDArray[np.floating[Any]]) -> Raw:
+        """Return the raw estimate of features [n, F], in the order and units of `feature_names`.
+
+        Raises `InvalidQuantity` for another shape and for numbers that are not finite. Features outside the training
+        range are answered by extrapolation; see `outside_training_range`.
+        """
+        with np.errstate(over="ignore"):  # what float32 cannot hold becomes inf and is refused below
+            rows = np.asarray(features, dtype=np.float32)
+        columns = len(self.feature_names)
+        if rows.ndim != 2 or rows.shape[1] != columns:
+            bound = f"[n, {columns}] for {', '.join(self.feature_names)}"
+            raise InvalidQuantity("shape of features", list(rows.shape), bound, "give one row of features a frame")
+        for row, column in np.argwhere(~np.isfinite(rows)):
+            name = f"{self.feature_names[column]} of row {row}"
+            raise InvalidQuantity(name, rows[row, column], "a finite number", "discard the frame or press again")
+        return self._run(rows)
+
+    def outside_training_range(self, features: NDArray[np.floating[Any]]) -> list[str]:
+        """Return one sentence for each of the features [F] outside what the network has learned from; [] is good."""
+        sentences = []
+        for (name, (low, high)), value in zip(self.feature_range.items(), features, strict=True):
+            if not low <= value <= high:
+                unit = FEATURE_UNITS[name]
+                spoken = name.rpartition("_")[0].replace("_", " ").capitalize()
+                sentences.append(f"{spoken} is {value:.4g} {unit}, outside the trained {low:.4g} to {high:.4g} {unit}.")
+        return sentences
+
+    def _run(self, rows: NDArray[np.float32]) -> Raw:
+        estimate, spread = self._session.run(["estimate", "spread"], {"features": rows})
+        return Raw(np.asarray(estimate, dtype=np.float64), np.asarray(spread, dtype=np.float64))
+
+    def _verify_golden(self, fields: _Fields) -> None:
+        rows = fields.table("golden.features", len(self.feature_names)).astype(np.float32)
+        found = self._run(rows)
+        for name, values in (("estimate", found.estimate), ("spread", found.spread)):
+            expected = fields.table(f"golden.{name}", len(UNKNOWNS))
+            if expected.shape != values.shape:
+                fields.refuse(f"golden.{name}", f"{len(expected)} rows", f"{len(values)} rows")
+            worst = float(np.max(np.abs(values - expected) / np.abs(expected)))
+            if not worst <= GOLDEN_TOLERANCE:
+                deviation = f"off by {worst:.2g} relative on this machine"
+                fields.refuse(f"golden.{name}", deviation, f"reproduced within {GOLDEN_TOLERANCE:g}")
+
+
+class _Fields:
+    """Reads typed fields of model.json by dotted path, and refuses the bundle when one is missing or wrong."""
+
+    def __init__(self, folder: Path, card: dict[str, Any]) -> None:
+        self.folder, self.card = folder, card
+
+    def refuse(self, field: str, value: object, bound: str) -> NoReturn:
+        raise BundleRefused(self.folder, field, value, bound)
+
+    def of(self, path: str, kind: type) -> Any:
+        value: Any = self.card
+        for key in path.split("."):
+            value = value.get(key) if isinstance(value, dict) else None
+        if not isinstance(value, kind):
+            self.refuse(path, "missing" if value is None else repr(value), f"present and of type {kind.__name__}")
+        return value
+
+    def ranges(self, group: str, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+        """Return (low, high) of each name under training_range."""
+        return {name: self._range(f"training_range.{group}.{name}") for name in names}
+
+    def _range(self, path: str) -> tuple[float, float]:
+        values = self.of(path, list)
+        anywhere = Bound(-np.inf, np.inf, "")
+        if len(values) != 2 or not all(isinstance(v, int | float) and anywhere.holds(v) for v in values):
+            self.refuse(path, values, "two finite numbers")
+        low, high = map(float, values)
+        if not low < high:
+            self.refuse(path, values, "the lower number first")
+        return low, high
+
+    def table(self, path: str, columns: int) -> NDArray[np.float64]:
+        """Return a table [n, columns], n >= 1, of finite numbers."""
+        values = self.of(path, list)
+        try:
+            table = np.array(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            self.refuse(path, "no table of numbers", f"[n, {columns}] numbers")
+        if table.ndim != 2 or table.shape[1] != columns or not len(table) or not np.all(np.isfinite(table)):
+            self.refuse(path, f"of shape {list(table.shape)}", f"[n, {columns}] finite numbers")
+        return table
+
+
+def _read(folder: Path, file: str) -> bytes:
+    try:
+        return (folder / file).read_bytes()
+    except OSError as error:
+        raise BundleRefused(folder, file, f"unreadable ({error.strerror})", "a readable file") from error
+
+
+def _read_card(folder: Path) -> dict[str, Any]:
+    text = _read(folder, CARD_FILE)
+    try:
+        card = json.loads(text)
+    except ValueError as error:
+        raise BundleRefused(folder, CARD_FILE, f"not JSON ({error})", "valid JSON") from error
+    if not isinstance(card, dict) or card.get("schema") != SCHEMA:
+        found = card.get("schema") if isinstance(card, dict) else None
+        raise BundleRefused(folder, "schema", repr(found), repr(SCHEMA), "Use a bundle made for this software version.")
+    return card
+
+
+def _verified_hash(fields: _Fields, network: bytes) -> str:
+    stated, found = fields.of("sha256", str), hashlib.sha256(network).hexdigest()
+    if stated != found:
+        fields.refuse(f"sha256 of {MODEL_FILE}", found, f"{stated} as {CARD_FILE} states")
+    return found
+
+
+def _verified_names(fields: _Fields) -> tuple[str, ...]:
+    known = [{"name": name, "unit": unit} for name, unit in FEATURE_UNITS.items()]
+    features = fields.of("features", list)
+    for feature in features:
+        if feature not in known:
+            fields.refuse("features", feature, f"among {', '.join(FEATURE_UNITS)}, each with its unit")
+    names = tuple(feature["name"] for feature in features)
+    if not names or len(set(names)) != len(names):
+        fields.refuse("features", list(names), "at least one feature, each only once")
+    return names
+
+
+def _open_session(fields: _Fields, network: bytes) -> onnxruntime.InferenceSession:
+    try:
+        return open_session(network)
+    except _RUNTIME_ERRORS as error:
+        raise BundleRefused(
+            fields.folder, MODEL_FILE, f"unusable ({error})", "a network onnxruntime can run"
+        ) from error
+
+
+def open_session(network: bytes) -> onnxruntime.InferenceSession:
+    """Return an onnxruntime session that leaves the probe's other cores alone: one thread, which does not spin."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    return onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
+
+
+def _verify_contract(fields: _Fields, session: onnxruntime.InferenceSession, feature_count: int) -> None:
+    expected = {
+        "inputs": [("features", "tensor(float)", feature_count)],
+        "outputs": [("estimate", "tensor(float)", len(UNKNOWNS)), ("spread", "tensor(float)", len(UNKNOWNS))],
+    }
+    for side, ports in (("inputs", session.get_inputs()), ("outputs", session.get_outputs())):
+        found = [(port.name, port.type, port.shape[-1]) for port in ports if len(port.shape) == 2]
+        if found != expected[side] or any(isinstance(port.shape[0], int) for port in ports):
+            shapes = [(port.name, port.type, port.shape) for port in ports]
+            fields.refuse(
+                f"{side} of {MODEL_FILE}", shapes, f"{expected[side]} (name, type, columns) with any row count"
+            )

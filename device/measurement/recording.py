@@ -1,0 +1,214 @@
+"""A recording: one press on disk, the interchange format of probe, simulator, calibration and tests.
+
+A folder (or .zip of it) with `recording.json` and lossless mono PNGs. What is missing, not finite or contradictory is
+refused with the field's name. A recording is written whole or not at all. Source: DESIGN section 5.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
+from device.measurement.tactile_image import Frame, PixelScale, require_one_shape
+
+SCHEMA = "tsis.recording/1"
+REPAIR = "record the press again, or correct the file"
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """How the frames were taken."""
+
+    width_px: int
+    height_px: int
+    bits: Literal[8, 16]
+    mm_per_px_x: float
+    mm_per_px_y: float
+    exposure_us: float
+    gain: float
+
+    def __post_init__(self) -> None:
+        for name in ("width_px", "height_px"):
+            require(f"camera.{name}", getattr(self, name), Bound(16, 10_000, "px"), REPAIR)
+        if self.bits not in (8, 16):
+            raise InvalidQuantity("camera.bits", self.bits, "8 or 16", REPAIR)
+        require("camera.exposure_us", self.exposure_us, Bound(0.0, 1e7, "us", low_included=False), REPAIR)
+        require("camera.gain", self.gain, Bound(0.0, 1e3, "", low_included=False), REPAIR)
+        self.scale  # noqa: B018 - refuses an impossible pixel size
+
+    @property
+    def scale(self) -> PixelScale:
+        """Size of a pixel on the face."""
+        return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One press: frames of every role with their force, and where it came from. `truth` only for phantoms."""
+
+    id: str
+    serial: str
+    software: str
+    started_at: str
+    camera: CameraSettings
+    frames: tuple[Frame, ...]
+    calibration_id: str | None = None
+    position_mm: tuple[float, float] = (0.0, 0.0)
+    truth: Inclusion | None = None
+    simulated: bool = False
+
+    def __post_init__(self) -> None:
+        require_one_shape(self.frames)
+        for frame in self.frames:
+            shape, expected = frame.counts.shape, (self.camera.height_px, self.camera.width_px)
+            if shape != expected:
+                found = f"{shape[1]} x {shape[0]} px"
+                raise InvalidQuantity("frame shape", found, f"{expected[1]} x {expected[0]} px as in camera", REPAIR)
+
+    def with_role(self, role: str) -> list[Frame]:
+        """Return the frames of one role in order."""
+        return [f for f in self.frames if f.role == role]
+
+
+def write_recording(recording: Recording, folder: Path) -> None:
+    """Write a recording to a new folder; when this returns, it is on the disk."""
+    temporary = folder.with_name(folder.name + ".tmp")
+    shutil.rmtree(temporary, ignore_errors=True)
+    (temporary / "frames").mkdir(parents=True)
+    for i, frame in enumerate(recording.frames):
+        _write_durably(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
+    text = json.dumps(_as_json(recording), indent=1)
+    _write_durably(temporary / "recording.json", text.encode())
+    for directory in (temporary / "frames", temporary):
+        sync_directory(directory)
+    temporary.rename(folder)
+    sync_directory(folder.parent)
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a folder or .zip; raise `InvalidQuantity` naming what is wrong."""
+    with _files(path) as read:
+        try:
+            record = json.loads(read("recording.json"))
+        except (OSError, KeyError, ValueError) as error:
+            raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
+        return _from_json(record, read)
+
+
+def _frame_name(i: int) -> str:
+    return f"frames/{i:03d}.png"
+
+
+def _write_durably(path: Path, content: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def sync_directory(folder: Path) -> None:
+    """Make a folder's entries durable: without it a renamed file may be gone after a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _as_json(recording: Recording) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "id": recording.id,
+        "device": {"serial": recording.serial, "software": recording.software},
+        "started_at": recording.started_at,
+        "simulated": recording.simulated,
+        "camera": asdict(recording.camera),
+        "frames": [
+            {
+                "file": _frame_name(i),
+                "role": frame.role,
+                "t_s": frame.t_s,
+                "force_n": frame.force_n,
+                "led_ratio": frame.led_ratio,
+            }
+            for i, frame in enumerate(recording.frames)
+        ],
+        "calibration_id": recording.calibration_id,
+        "position_mm": recording.position_mm,
+        "truth": asdict(recording.truth) if recording.truth else None,
+    }
+
+
+@contextmanager
+def _files(path: Path) -> Iterator[Callable[[str], bytes]]:
+    if path.suffix == ".zip" and zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            root = next((n.removesuffix("recording.json") for n in names if n.endswith("recording.json")), "")
+            yield lambda name: archive.read(root + name)
+    else:
+        yield lambda name: (path / name).read_bytes()
+
+
+NUMBER = (int, float)
+
+
+def _field(record: Any, name: str, kind: type | tuple[type, ...], where: str = "") -> Any:
+    """Return a field of the right type; JSON's true is a number to Python, but not to us."""
+    value = record.get(name) if isinstance(record, dict) else None
+    if not isinstance(value, kind) or isinstance(value, bool):
+        found = "missing" if value is None else repr(value)
+        expected = "a number" if kind is NUMBER else f"of type {kind.__name__}" if isinstance(kind, type) else str(kind)
+        raise InvalidQuantity(where + name, found, expected, REPAIR)
+    return value
+
+
+def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recording:
+    if _field(record, "schema", str) != SCHEMA:
+        raise InvalidQuantity("schema", record["schema"], SCHEMA, "convert the recording with matching software")
+    device, camera = _field(record, "device", dict), _field(record, "camera", dict)
+    names = CameraSettings.__dataclass_fields__
+    settings = CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names})
+    truth = record.get("truth")
+    return Recording(
+        id=_field(record, "id", str),
+        serial=_field(device, "serial", str, "device."),
+        software=_field(device, "software", str, "device."),
+        started_at=_field(record, "started_at", str),
+        camera=settings,
+        frames=tuple(_frame(entry, i, read) for i, entry in enumerate(_field(record, "frames", list))),
+        calibration_id=record.get("calibration_id"),
+        position_mm=tuple(record.get("position_mm", (0.0, 0.0))),
+        truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth else None,
+        simulated=bool(record.get("simulated", False)),
+    )
+
+
+def _frame(entry: dict[str, Any], i: int, read: Callable[[str], bytes]) -> Frame:
+    where = f"frames[{i}]."
+    name = _field(entry, "file", str, where)
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+        raise InvalidQuantity(where + "file", name, "a path inside the recording", REPAIR)
+    try:
+        counts = cv2.imdecode(np.frombuffer(read(name), np.uint8), cv2.IMREAD_UNCHANGED)
+    except (OSError, KeyError, cv2.error) as error:
+        raise InvalidQuantity(where + "file", name, "a readable PNG", REPAIR) from error
+    if counts is None:
+        raise InvalidQuantity(where + "file", name, "a readable PNG", REPAIR)
+    ratio = _field(entry, "led_ratio", list, where)
+    if len(ratio) != 4:
+        raise InvalidQuantity(where + "led_ratio", ratio, "four numbers, one a side", REPAIR)
+    force_n, t_s = (_field(entry, n, NUMBER, where) for n in ("force_n", "t_s"))
+    require(where + "force_n", force_n, Bound(-1e3, 1e3, "N"), REPAIR)
+    return Frame(counts, _field(entry, "role", str, where), t_s, force_n, tuple(ratio))

@@ -1,0 +1,59 @@
+"""A TOML table to a frozen dataclass: unknown keys and wrong types are refused with the key and what was meant.
+
+A misspelt or mis-united key (`size_cm`) must never fall back to a default in silence. Bounds are checked by the
+dataclass itself.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from device.measurement.quantities import InvalidQuantity
+
+Record = TypeVar("Record")
+
+
+def read_toml(kind: type[Record], path: Path) -> Record:
+    """Return the record in a TOML file; raise `InvalidQuantity` naming the file, key or line that is wrong."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidQuantity("file", path, "readable", f"give the path of a TOML file ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidQuantity("file", path, "valid TOML", f"correct it: {error}") from error
+    return from_table(kind, table)
+
+
+def from_table(kind: type[Record], table: Mapping[str, Any], where: str = "") -> Record:
+    """Return the record of a table; keys that are absent take the dataclass's defaults."""
+    types = get_type_hints(kind)
+    known = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    for key in table:
+        if key not in known:
+            near = get_close_matches(key, known, n=1, cutoff=0.5)
+            hint = f"did you mean {where}{near[0]}" if near else "remove it"
+            raise InvalidQuantity(where + key, repr(table[key]), f"one of {', '.join(known)}", hint)
+    values = {key: _value(types[key], value, where + key) for key, value in table.items()}
+    try:
+        return kind(**values)
+    except TypeError as error:
+        missing = str(error).rpartition(":")[2].strip()
+        raise InvalidQuantity(where.rstrip(".") or "file", "incomplete", f"complete: {missing}", "add it") from error
+
+
+def _value(kind: Any, value: Any, where: str) -> Any:
+    if is_dataclass(kind) and isinstance(kind, type):
+        if not isinstance(value, Mapping):
+            raise InvalidQuantity(where, repr(value), "a table", f"write it as [{where}]")
+        return from_table(kind, value, where + ".")
+    if isinstance(value, list):
+        return tuple(value)
+    expected = {float: (int, float), int: (int,), str: (str,), bool: (bool,), Path: (str,)}.get(kind)
+    if expected and (not isinstance(value, expected) or (isinstance(value, bool) and kind is not bool)):
+        raise InvalidQuantity(where, repr(value), f"of type {kind.__name__}", "correct its type")
+    return Path(value) if kind is Path else value
