@@ -1,0 +1,52 @@
+"""A scenario: which inclusion the virtual probe is pressed on, by which hand, seen by which camera. A TOML file.
+
+Every number has its unit in its name; a key that is not known is refused, never ignored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from device.measurement.quantities import Bound, Inclusion, require
+from device.measurement.toml_record import read_toml
+from device.simulation.hand import HandSettings
+from device.simulation.renderer import LinearOptics
+from device.simulation.sensor import Sensor
+
+DEFAULT_INCLUSION = Inclusion(size_mm=10.0, depth_mm=5.0, youngs_modulus_kpa=80.0)
+
+
+@dataclass(frozen=True)
+class CellSettings:
+    """The emulated load cell: counts per newton, counts at no load, and the noise of one sample."""
+
+    counts_per_n: float = 100_000.0
+    zero_counts: float = 8_200.0
+    noise_counts: float = 40.0
+
+    def __post_init__(self) -> None:
+        action = "use a real cell's data sheet"
+        require("cell.counts_per_n", self.counts_per_n, Bound(1.0, 1e7, "counts/N"), action)
+        require("cell.zero_counts", self.zero_counts, Bound(-8e6, 8e6, "counts"), action)
+        require("cell.noise_counts", self.noise_counts, Bound(0.0, 1e6, "counts"), action)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What the virtual probe is made of and pressed on."""
+
+    inclusion: Inclusion = DEFAULT_INCLUSION
+    hand: HandSettings = field(default_factory=HandSettings)
+    optics: LinearOptics = field(default_factory=LinearOptics)
+    sensor: Sensor = field(default_factory=Sensor)
+    cell: CellSettings = field(default_factory=CellSettings)
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
+
+
+def read_scenario(path: Path) -> Scenario:
+    """Read a scenario file; raise `InvalidQuantity` naming the key and its bound."""
+    return read_toml(Scenario, path)

@@ -1,0 +1,127 @@
+"""Phantom recordings with truth to a calibration certificate.
+
+Three straight lines map image features to deformation features; their leave-one-out residuals say how well. Those
+residuals, put on scenes of the whole box and sent through the network, give the held-out scenes behind every interval.
+Source: Lee & Won 2013, section III (regressions on nine phantoms).
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device import __version__
+from device.measurement.calibration import Calibration, Regression
+from device.measurement.features import FeatureSettings, extract_features
+from device.measurement.intervals import HeldOut
+from device.measurement.inversion import ModelBundle
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from device.measurement.recording import Recording
+from device.measurement.tactile_image import reference, tactile_image
+from device.simulation.surface_table import SurfaceTable
+from host_tools.forward.deformation import Deformation, deformation
+from host_tools.forward.solve import solve
+from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
+
+Array = NDArray[np.float64]
+
+PHANTOMS_NEEDED = 4
+"""A line with a leave-one-out error needs at least this many."""
+HELD_OUT_SCENES = 1000
+WEAKEST_PEAK_MM = 5e-4
+"""Lumps with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
+
+
+def calibrate(
+    recordings: Sequence[Recording], bundle: ModelBundle, table: SurfaceTable, *, force_n: float, seed: int = 1
+) -> Calibration:
+    """Return the certificate of the probe that made the recordings; raises `InvalidQuantity` on what cannot be used."""
+    serial = _require_usable(recordings)
+    settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
+    image = np.array([mean_image_features(recording, settings) for recording in recordings])
+    truths = [recording.truth for recording in recordings if recording.truth]
+    features = np.array([as_row(solve(Scene(truth, Press(force_n=force_n))).lump) for truth in truths])
+    lines, residuals = zip(*(fit_line(image[:, i], features[:, i]) for i in range(features.shape[1])), strict=True)
+    errors = scaled_errors(np.column_stack(residuals), features[:, 0])
+    held_out = held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed)
+    return Calibration(
+        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"{serial} {bundle.sha256} {image.tobytes().hex()}")),
+        made_at=datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
+        serial=serial,
+        model_sha256=bundle.sha256,
+        settings=settings,
+        regressions=lines,
+        phantoms=len(recordings),
+        held_out=held_out,
+        software=__version__,
+        simulated=any(recording.simulated for recording in recordings),
+    )
+
+
+def _require_usable(recordings: Sequence[Recording]) -> str:
+    action = "record more phantoms"
+    require("phantom recordings", len(recordings), Bound(PHANTOMS_NEEDED, 10_000, "recordings"), action)
+    for recording in recordings:
+        if recording.truth is None:
+            raise InvalidQuantity(
+                "truth", f"missing in {recording.id}", "the phantom's inclusion", "add it or leave it out"
+            )
+    serials = sorted({recording.serial for recording in recordings})
+    if len(serials) > 1:
+        raise InvalidQuantity("serial", " and ".join(serials), "one probe", "calibrate each probe on its own")
+    return serials[0]
+
+
+def mean_image_features(recording: Recording, settings: FeatureSettings) -> Array:
+    """Return the image features [3] of a recording, averaged over its press frames."""
+    base, scale = reference(recording.frames), recording.camera.scale
+    images = (tactile_image(frame, base, scale) for frame in recording.with_role("press"))
+    return np.asarray(np.mean([extract_features(image, settings).as_row() for image in images], axis=0))
+
+
+def as_row(lump: Deformation) -> Array:
+    """Return the deformation features in the model's order."""
+    return np.array([lump.max_deformation_mm, lump.central_deformation_mm3, lump.deformation_area_mm2])
+
+
+def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:
+    """Return the least-squares line y = slope x + intercept and its leave-one-out residuals e_i / (1 - h_ii)."""
+    design = np.column_stack([x, np.ones_like(x)])
+    (slope, intercept), *_ = np.linalg.lstsq(design, y, rcond=None)
+    error = y - design @ (slope, intercept)
+    leverage = np.sum(design @ np.linalg.inv(design.T @ design) * design, axis=1)
+    left_out = error / (1 - leverage)
+    r_squared = 1 - float(error @ error) / float(np.sum((y - y.mean()) ** 2))
+    return Regression(float(slope), float(intercept), r_squared, float(left_out.std())), left_out
+
+
+def table_features(table: SurfaceTable, inclusion: Inclusion, force_n: float) -> Array:
+    """Return the deformation features of an inclusion from the table of surfaces."""
+    lump_mm = force_n * table.lump(inclusion)
+    total_mm3 = float(np.trapezoid(2 * np.pi * table.r_mm * lump_mm, table.r_mm))
+    return as_row(deformation(table.r_mm, lump_mm, total_mm3, central_radius_mm=Waveguide().central_radius_mm))
+
+
+def scaled_errors(residuals: Array, peak_mm: Array) -> Array:
+    """Return residuals [n, 3] as errors that do not depend on how strong the lump is.
+
+    A contrast error dc shifts the half-maximum contour by dc / slope, and the slope grows with the peak: so the area's
+    error times the peak is constant, while peak and sum err by the same amount for every lump.
+    """
+    return residuals * np.column_stack([np.ones_like(peak_mm), np.ones_like(peak_mm), peak_mm])
+
+
+def held_out_scenes(
+    bundle: ModelBundle, table: SurfaceTable, errors: Array, *, force_n: float, seed: int, scenes: int = HELD_OUT_SCENES
+) -> HeldOut:
+    """Return estimates of random scenes whose features carry errors like the calibration's own `scaled_errors`."""
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(PAPER_BOX_LOW, PAPER_BOX_HIGH, (scenes, 3))
+    exact = np.array([table_features(table, Inclusion(*map(float, row)), force_n) for row in truth])
+    drawn = rng.multivariate_normal(np.zeros(3), errors.T @ errors / len(errors), scenes)
+    drawn[:, 2] /= np.maximum(exact[:, 0], WEAKEST_PEAK_MM)
+    return HeldOut(estimate=bundle.estimate(exact + drawn).estimate.astype(float), truth=truth)

@@ -1,0 +1,99 @@
+"""Scores of a model: on its nine phantoms noise-free and through the camera, and its intervals on random scenes.
+
+Through the camera means: recordings of the simulated probe with fresh noise, the device's own correction, features,
+regressions and averaging. The intervals are counted on scenes that neither network nor calibration has seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from device.measurement.calibration import Calibration
+from device.measurement.estimate import SPOKEN, Estimate, estimate_recording
+from device.measurement.inversion import ModelBundle
+from device.measurement.quantities import UNKNOWNS, Inclusion
+from device.simulation.surface_table import SurfaceTable
+from host_tools.calibrate import Array, as_row
+from host_tools.forward.solve import solve
+from host_tools.inverse.evaluate import ErrorTable, render
+from host_tools.phantom import phantom_recording
+from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene
+
+SCORED_LOW = (2.0, PAPER_BOX_LOW[1], PAPER_BOX_LOW[2])
+"""Below 2 mm the lump's contrast drowns in the camera's noise and a relative error of the size means nothing."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What turns an inclusion into an estimate: model, calibration, surfaces, and the force pressed with."""
+
+    bundle: ModelBundle
+    calibration: Calibration
+    table: SurfaceTable
+    force_n: float = 0.5
+
+    def noise_free(self, truth: Inclusion) -> Array:
+        """Return the network's answer [3] to exact finite-element features."""
+        lump = solve(Scene(truth, Press(force_n=self.force_n))).lump
+        return np.asarray(self.bundle.estimate(as_row(lump)[None]).estimate[0])
+
+    def through_camera(self, truth: Inclusion, seed: int) -> Estimate:
+        """Return the device's answer to a recording with fresh noise."""
+        return estimate_recording(phantom_recording(truth, self.table, seed=seed), self.bundle, self.calibration)
+
+
+def values(estimates: Sequence[Estimate]) -> Array:
+    """Return the values of estimates [n, 3]; NaN where there is none."""
+    rows = [[getattr(estimate, name).value for name in UNKNOWNS] for estimate in estimates]
+    return np.array([[np.nan if value is None else value for value in row] for row in rows])
+
+
+def print_phantoms(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int, out: Console) -> None:
+    """Print the errors on the model's phantoms, noise-free and through the camera, beside the paper's."""
+    truth = np.array([phantom.as_tuple() for phantom in phantoms])
+    out.print("\n[bold]Nine phantoms, noise-free finite-element features[/bold]")
+    out.print(render(ErrorTable(truth, np.array([rig.noise_free(phantom) for phantom in phantoms]))))
+    seen = [rig.through_camera(phantom, seed + i) for i, phantom in enumerate(phantoms)]
+    answered = np.isfinite(values(seen)).all(axis=1)
+    out.print("\n[bold]Nine phantoms, through the simulated camera with noise[/bold]")
+    out.print(render(ErrorTable(truth[answered], values(seen)[answered])))
+    if not answered.all():
+        out.print(f"{(~answered).sum()} phantoms without an answer are left out.")
+
+
+def print_intervals(rig: Rig, *, scenes: int, seed: int, out: Console) -> None:
+    """Print, for random scenes through the camera, errors, coverage and width of the 90 % intervals."""
+    truths = np.random.default_rng(seed).uniform(SCORED_LOW, PAPER_BOX_HIGH, (scenes, 3))
+    seen = [rig.through_camera(Inclusion(*map(float, row)), seed + 100 + i) for i, row in enumerate(truths)]
+    low, high = (
+        np.array([[getattr(getattr(e, name), end) or np.nan for name in UNKNOWNS] for e in seen], dtype=float)
+        for end in ("low", "high")
+    )
+    known = np.array([[getattr(e, name).identifiable for name in UNKNOWNS] for e in seen])
+    answered = np.isfinite(low).all(axis=1)
+    inside = (low <= truths) & (truths <= high)
+    error = np.abs(values(seen) - truths) / truths
+    table = Table(
+        "", *(SPOKEN[name] for name in UNKNOWNS), title=f"{answered.sum()} of {scenes} random scenes answered"
+    )
+    table.add_row("truth inside the 90 % interval", *_percent(inside[answered].mean(axis=0)))
+    table.add_row("called identifiable", *_percent(known[answered].mean(axis=0)))
+    table.add_row("median error", *_percent(np.median(error[answered], axis=0)))
+    table.add_row("median error where identifiable", *_percent([_median(error[:, i][known[:, i]]) for i in range(3)]))
+    guess = np.abs(truths.mean(axis=0) - truths) / truths
+    table.add_row("median error of a constant guess", *_percent(np.median(guess, axis=0)))
+    out.print("\n[bold]Random scenes (2-15 mm), through the simulated camera with noise[/bold]")
+    out.print(table)
+
+
+def _median(errors: Array) -> float:
+    return float(np.median(errors)) if len(errors) else float("nan")
+
+
+def _percent(ratios: Sequence[float] | Array) -> list[str]:
+    return ["-" if np.isnan(ratio) else f"{100 * ratio:.1f} %" for ratio in ratios]
