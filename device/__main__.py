@@ -1,0 +1,134 @@
+"""`python -m device`: start the daemon, or analyse recordings.
+
+Exit codes: 0 ok, 1 failed, 2 usage, 3 not ready.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import signal
+import socket
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import uvicorn
+
+from device.assembly import StartFailed, open_probe, open_simulated_probe
+from device.config import Config, read_config, simulated_config
+from device.errors import DeviceError
+from device.instrument.procedure import Procedure
+from device.measurement.calibration import read_calibration
+from device.measurement.estimate import estimate_recording
+from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording import read_recording
+from device.simulation.scenario import Scenario, read_scenario
+from device.web.app import create_app
+
+EXAMPLES = """examples:
+  python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
+  python -m device --simulate --scene scene.toml   the same on another inclusion
+  python -m device analyse recording/ press.zip    JSON estimates, one a line
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m device", epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="The probe's daemon: screen and REST API of a tactile probe, real or simulated.",
+    )  # fmt: skip
+    parser.add_argument("--simulate", action="store_true", help="emulate LED chip, load cell and camera")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (TOML)")
+    parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
+    parser.add_argument("--port", type=int, help="port of the screen and the API")
+    commands = parser.add_subparsers(dest="command", metavar="analyse")
+    analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
+    analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line; return its exit code."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.scene and not options.simulate:
+        parser.error("--scene says what the *simulated* probe is pressed on: add --simulate")
+    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    try:
+        config = _config(options)
+        if options.command == "analyse":
+            return _analyse(config, options.recordings)
+        return _serve(config, options)
+    except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def _config(options: argparse.Namespace) -> Config:
+    """Return the settings: a file's, or the simulated probe's own (also those that analyse its recordings)."""
+    config = read_config(options.config) if options.config else simulated_config()
+    if not options.config and not options.simulate and options.command != "analyse":
+        config = Config()
+    if options.port is not None:
+        config = replace(config, server=replace(config.server, port=options.port))
+    return config
+
+
+def _analyse(config: Config, paths: Sequence[Path]) -> int:
+    bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
+    for path in paths:
+        estimate = estimate_recording(read_recording(path), bundle, calibration)
+        print(json.dumps({"recording": str(path), **estimate.as_record()}))
+    return 0
+
+
+def _serve(config: Config, options: argparse.Namespace) -> int:
+    listening = _listen(config)
+    with listening:
+        if options.simulate:
+            scenario = read_scenario(options.scene) if options.scene else Scenario()
+            procedure = open_simulated_probe(config, scenario)
+        else:
+            procedure = open_probe(config)
+        procedure.start()
+        try:
+            _run_server(procedure, listening)
+        finally:
+            procedure.close()
+    return 0
+
+
+def _listen(config: Config) -> socket.socket:
+    """Take the port before any hardware is opened; raise `DeviceError` when it is in use."""
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    host, port = config.server.host, config.server.port
+    try:
+        listening.bind((host, port))
+        listening.listen()
+    except OSError as error:
+        listening.close()
+        raise DeviceError(
+            f"Port {port} of {host} cannot be used: {error.strerror}.", "Choose another with --port."
+        ) from error
+    return listening
+
+
+def _run_server(procedure: Procedure, listening: socket.socket) -> None:
+    host, port = listening.getsockname()
+    kind = "simulated probe" if procedure.is_simulated else "probe"
+    print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{host}:{port}/", flush=True)
+    app = create_app(procedure, procedure.store)
+    # Open event streams never end by themselves; without the limit a stop would wait for them.
+    settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
+    server = uvicorn.Server(settings)
+    signal.signal(signal.SIGTERM, lambda *_: setattr(server, "should_exit", True))
+    server.run(sockets=[listening])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,196 @@
+"""Puts the daemon together: real chips, or emulated ones under the very same drivers.
+
+Every part that fails to open is listed at once, each with its fault code, and what had opened is closed again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from typing import Any, TypeVar
+
+from device.config import Config
+from device.errors import DeviceError, ModelError
+from device.hardware.camera import RawMonoCamera, open_camera
+from device.hardware.interfaces import Camera, ForceScale, Lights, LoadCell
+from device.hardware.led_driver import Tlc59116, open_led_driver
+from device.hardware.load_cell import measure_tare, open_load_cell
+from device.instrument.bench import Bench
+from device.instrument.force_recorder import ForceRecorder
+from device.instrument.guidance import Guidance
+from device.instrument.procedure import Procedure
+from device.measurement.calibration import Calibration, read_calibration
+from device.measurement.estimate import estimate_recording
+from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.quantities import InvalidQuantity
+from device.records.store import Store
+from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
+from device.simulation.scenario import Scenario
+from device.simulation.serial_line import EmulatedOpenScale
+from device.simulation.surface_table import load_surface_table
+from device.simulation.virtual_camera import ExposureRequest, VirtualPicamera2
+from device.simulation.virtual_probe import VirtualProbe
+
+TARE_SAMPLES = 20
+FIRST_SAMPLE_S = 5.0
+"""Opening the port resets the amplifier: its banner may last three seconds."""
+
+Part = TypeVar("Part")
+
+
+class StartFailed(Exception):  # noqa: N818 - reads as what happened
+    """Parts that did not open, each with code, cause and remedy."""
+
+    def __init__(self, faults: list[DeviceError]) -> None:
+        self.faults = faults
+        super().__init__("\n".join(f"{fault.code} {fault}" for fault in faults))
+
+
+class _Parts:
+    """Opens parts one by one, remembers what failed, and closes the others when anything did."""
+
+    def __init__(self) -> None:
+        self.faults: list[DeviceError] = []
+        self.opened = ExitStack()
+
+    def open(self, opener: Callable[[], Part]) -> Part | None:
+        try:
+            part = opener()
+        except DeviceError as error:
+            self.faults.append(error)
+        except (InvalidQuantity, BundleRefused) as error:
+            self.faults.append(ModelError(str(error), "Then start the daemon again."))
+        else:
+            if hasattr(part, "close"):
+                self.opened.callback(part.close)
+            return part
+        return None
+
+    def require_all(self) -> None:
+        if self.faults:
+            self.opened.close()
+            raise StartFailed(self.faults)
+
+
+def _camera_settings(config: Config) -> dict[str, Any]:
+    camera = config.camera
+    return {
+        "width_px": camera.width_px,
+        "height_px": camera.height_px,
+        "exposure_us": camera.exposure_us,
+        "gain": camera.gain,
+        "frame_rate_hz": camera.frame_rate_hz,
+    }
+
+
+def open_probe(config: Config) -> Procedure:
+    """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
+    parts = _Parts()
+    lights = parts.open(lambda: open_led_driver(config.light.bus, address=config.light.address))
+    camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
+    cell = parts.open(lambda: open_load_cell(config.cell.device, config.cell.baud))
+    return _procedure(config, parts, lights, camera, cell)
+
+
+def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
+    """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
+    parts = _Parts()
+    table_folder = config.calibration.parent
+    shape = config.camera.height_px, config.camera.width_px
+    probe = parts.open(lambda: VirtualProbe(scenario, load_surface_table(table_folder), shape, config.camera.scale))
+    parts.require_all()
+    assert probe is not None  # require_all has raised otherwise
+    chip = Tlc59116Chip()
+    picam2 = VirtualPicamera2(
+        partial(_render, probe),
+        width_px=config.camera.width_px,
+        height_px=config.camera.height_px,
+        led_ratio_at=chip.ratio_at,
+    )
+    line = EmulatedOpenScale(probe.cell_counts, noise_counts=scenario.cell.noise_counts, seed=scenario.seed)
+    parts.opened.callback(line.close)
+    bus = EmulatedI2cBus({config.light.address: chip})
+    lights = parts.open(lambda: Tlc59116(bus, address=config.light.address))
+    camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
+    cell = parts.open(lambda: open_load_cell(line.device_path, config.cell.baud))
+    procedure = _procedure(config, parts, lights, camera, cell, scenario)
+    _lead_by_hand(procedure, probe)
+    return procedure
+
+
+def _render(probe: VirtualProbe, exposure: ExposureRequest) -> Any:
+    return probe.frame_counts(
+        force_n=probe.hand.force_n(exposure.t_s),
+        position_mm=probe.hand.position_mm(exposure.t_s),
+        led_ratio=exposure.led_ratio,
+        exposure_us=exposure.exposure_us,
+        gain=exposure.gain,
+        frame_number=exposure.frame_number,
+    )
+
+
+def _lead_by_hand(procedure: Procedure, probe: VirtualProbe) -> None:
+    """Let the virtual hand read the screen: it takes up the probe when a press is requested."""
+
+    def follow(guidance: Guidance) -> None:
+        probe.hand.follow(guidance.code, time.monotonic())
+
+    def begin() -> None:
+        probe.hand.begin()
+        guidance = procedure.board.now.guidance
+        if guidance is Guidance.PRESS_BESIDE:  # shown since before the hand took up the probe
+            follow(guidance)
+
+    procedure.board.on_guidance(follow)
+    procedure.on_request(begin)
+
+
+def _procedure(
+    config: Config,
+    parts: _Parts,
+    lights: Lights | None,
+    camera: Camera | None,
+    cell: LoadCell | None,
+    scenario: Scenario | None = None,
+) -> Procedure:
+    """Tare, load model and calibration, open the store; then nothing is missing."""
+    force = parts.open(lambda: _tared(config, cell)) if cell else None
+    bundle = parts.open(lambda: ModelBundle.load(config.model))
+    calibration = parts.open(lambda: _calibration_for(config, bundle))
+    store = parts.open(lambda: Store(config.data))
+    parts.require_all()
+    # require_all has raised if any of these is missing; the type checker cannot know.
+    assert lights is not None
+    assert camera is not None
+    assert force is not None
+    assert bundle is not None
+    assert calibration is not None
+    assert store is not None
+    return Procedure(
+        config,
+        Bench(lights, camera, force),
+        partial(estimate_recording, bundle=bundle, calibration=calibration),
+        store,
+        calibration_id=calibration.id,
+        simulated_truth=scenario.inclusion if scenario else None,
+    )
+
+
+def _tared(config: Config, cell: LoadCell) -> ForceRecorder:
+    sensitivity = config.cell.sensitivity_counts_per_n
+    tare_counts = measure_tare(
+        cell,
+        samples=TARE_SAMPLES,
+        max_spread_counts=config.cell.tare_spread_n * sensitivity,
+        timeout_s=FIRST_SAMPLE_S,
+    )
+    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts))
+
+
+def _calibration_for(config: Config, bundle: ModelBundle | None) -> Calibration:
+    """Return the certificate; raise `InvalidQuantity` when it is for another probe or another model."""
+    calibration = read_calibration(config.calibration)
+    calibration.require_for(config.serial, bundle.sha256 if bundle else calibration.model_sha256)
+    return calibration

@@ -1,0 +1,142 @@
+"""The daemon's settings: each with default, bound, unit in its name, and one sentence. Read once, from one TOML file.
+
+Out-of-range values are refused, never clipped. Paths are relative to where the daemon is started.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from device.errors import ConfigError
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.tactile_image import PixelScale
+from device.measurement.toml_record import read_toml
+
+MODELS = Path(__file__).resolve().parents[1] / "models"
+ACTION = "correct the setting"
+
+
+@dataclass(frozen=True)
+class CameraSection:
+    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate."""
+
+    width_px: int = 768
+    height_px: int = 492
+    mm_per_px_x: float = 0.03125
+    mm_per_px_y: float = 0.03646
+    exposure_us: int = 4000
+    gain: float = 1.0
+    frame_rate_hz: float = 30.0
+    index: int = 0
+
+    def __post_init__(self) -> None:
+        require("camera.width_px", self.width_px, Bound(64, 4096, "px"), ACTION)
+        require("camera.height_px", self.height_px, Bound(64, 4096, "px"), ACTION)
+        require("camera.frame_rate_hz", self.frame_rate_hz, Bound(1.0, 240.0, "Hz"), ACTION)
+        frame_us = 1e6 / self.frame_rate_hz
+        require("camera.exposure_us", self.exposure_us, Bound(10.0, frame_us, "us, one frame"), ACTION)
+        require("camera.gain", self.gain, Bound(1.0, 16.0, ""), ACTION)
+        self.scale  # noqa: B018 - refuses an impossible pixel size
+
+    @property
+    def scale(self) -> PixelScale:
+        """Size of a pixel on the face."""
+        return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
+
+
+@dataclass(frozen=True)
+class LightSection:
+    """The LED driver: I2C bus and address, and the brightness of the four sides while measuring."""
+
+    bus: int = 1
+    address: int = 0x60
+    ratio: tuple[float, ...] = (0.6, 0.6, 0.6, 0.6)
+
+    def __post_init__(self) -> None:
+        require("light.address", self.address, Bound(0x08, 0x77, ""), ACTION)
+        if len(self.ratio) != 4:
+            raise InvalidQuantity("light.ratio", self.ratio, "four numbers, one a side", ACTION)
+        for value in self.ratio:
+            require("light.ratio", value, Bound(0.0, 1.0, "", low_included=False), ACTION)
+
+
+@dataclass(frozen=True)
+class CellSection:
+    """The load cell: its serial line and its sensitivity."""
+
+    device: str = "/dev/tsis-force"
+    baud: int = 115_200
+    sensitivity_counts_per_n: float = 100_000.0
+    tare_spread_n: float = 0.02
+
+    def __post_init__(self) -> None:
+        bound = Bound(1.0, 1e7, "counts/N")
+        require("cell.sensitivity_counts_per_n", self.sensitivity_counts_per_n, bound, ACTION)
+        require("cell.tare_spread_n", self.tare_spread_n, Bound(0.0001, 1.0, "N"), ACTION)
+
+
+@dataclass(frozen=True)
+class PressSection:
+    """The press: target force and its band, when it counts as contact, as steady, and as too much."""
+
+    target_n: float = 0.5
+    band_ratio: float = 0.05
+    contact_n: float = 0.05
+    steady_n: float = 0.02
+    overload_n: float = 1.0
+    frames: int = 10
+    timeout_s: float = 60.0
+
+    def __post_init__(self) -> None:
+        require("press.target_n", self.target_n, Bound(0.1, 20.0, "N"), ACTION)
+        require("press.band_ratio", self.band_ratio, Bound(0.005, 0.2, ""), ACTION)
+        require("press.contact_n", self.contact_n, Bound(0.005, self.target_n / 2, "N, half the target"), ACTION)
+        require("press.steady_n", self.steady_n, Bound(0.001, 1.0, "N"), ACTION)
+        require("press.overload_n", self.overload_n, Bound(self.target_n * 1.2, 50.0, "N"), ACTION)
+        require("press.frames", self.frames, Bound(1, 200, "frames"), ACTION)
+        require("press.timeout_s", self.timeout_s, Bound(1.0, 3600.0, "s"), ACTION)
+
+    @property
+    def band_n(self) -> tuple[float, float]:
+        """Forces between which frames are taken."""
+        return self.target_n * (1 - self.band_ratio), self.target_n * (1 + self.band_ratio)
+
+
+@dataclass(frozen=True)
+class ServerSection:
+    """Where the screen and the REST API are served; loopback unless told otherwise."""
+
+    host: str = "127.0.0.1"
+    port: int = 8000
+
+    def __post_init__(self) -> None:
+        require("server.port", self.port, Bound(0, 65535, "(0: any free one)"), ACTION)
+
+
+@dataclass(frozen=True)
+class Config:
+    """All settings of the daemon."""
+
+    serial: str = "TSIS-0000"
+    model: Path = MODELS / "paper"
+    calibration: Path = Path("/var/lib/tsis/calibration.json")
+    data: Path = Path("/var/lib/tsis")
+    camera: CameraSection = field(default_factory=CameraSection)
+    light: LightSection = field(default_factory=LightSection)
+    cell: CellSection = field(default_factory=CellSection)
+    press: PressSection = field(default_factory=PressSection)
+    server: ServerSection = field(default_factory=ServerSection)
+
+
+def simulated_config() -> Config:
+    """Return the settings of the simulated probe: its own serial, certificate and data folder."""
+    return Config(serial="SIM-0001", calibration=MODELS / "simulated_probe" / "calibration.json", data=Path("var"))
+
+
+def read_config(path: Path) -> Config:
+    """Read a configuration file; raise `ConfigError` naming the setting, its value and its bound."""
+    try:
+        return read_toml(Config, path)
+    except InvalidQuantity as error:
+        raise ConfigError(f"{path}: {error}", "Then start the daemon again.") from error

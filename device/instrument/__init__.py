@@ -1,0 +1,1 @@
+"""The procedure: from a press that begins to a measurement that is kept."""

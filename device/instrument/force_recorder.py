@@ -1,0 +1,92 @@
+"""The load cell's stream to force over time: newtons on the one clock, interpolated to when a frame was exposed.
+
+One thread owns the serial line. A silent or unplugged cell is a fault that is kept until samples come again.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+
+import numpy as np
+
+from device.errors import LoadCellError
+from device.hardware.interfaces import ForceScale, LoadCell
+
+KEPT_SAMPLES = 1000
+SILENCE_S = 1.0
+RETRY_S = 0.2
+
+
+class ForceRecorder:
+    """Force history of the last seconds."""
+
+    def __init__(self, cell: LoadCell, scale: ForceScale) -> None:
+        """Start recording; there is a sample when this returns. Raises `LoadCellError` when none comes."""
+        self._cell, self._scale = cell, scale
+        self._samples: deque[tuple[float, float]] = deque(maxlen=KEPT_SAMPLES)
+        self._news, self._stopping = threading.Condition(), threading.Event()
+        self.fault: LoadCellError | None = None
+        self._thread = threading.Thread(target=self._run, name="force", daemon=True)
+        self._thread.start()
+        try:
+            self._await_first()
+        except LoadCellError:
+            self.close()
+            raise
+
+    def _await_first(self) -> None:
+        with self._news:
+            if not self._news.wait_for(lambda: self._samples, timeout=2 * SILENCE_S):
+                raise self.fault or LoadCellError("The load cell gives no samples.", "Check its cable and its power.")
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                sample = self._cell.read(timeout_s=SILENCE_S)
+            except LoadCellError as error:
+                self.fault = error
+                self._stopping.wait(RETRY_S)
+                continue
+            with self._news:
+                self._samples.append((sample.t_s, self._scale.newtons(sample.counts)))
+                self.fault = None
+                self._news.notify_all()
+
+    @property
+    def latest_n(self) -> float:
+        """Return the newest force; raise `LoadCellError` when the cell is at fault."""
+        with self._news:
+            if self.fault:
+                raise self.fault
+            return self._samples[-1][1]
+
+    def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> float:
+        """Return the force at a time on the monotonic clock, waiting until a later sample has come.
+
+        Raises `LoadCellError` when none comes, or when the history does not reach back so far.
+        """
+        deadline_s = time.monotonic() + timeout_s
+        with self._news:
+            while not self._samples or self._samples[-1][0] < t_s:
+                if not self._news.wait(max(0.0, deadline_s - time.monotonic())) and time.monotonic() >= deadline_s:
+                    raise self.fault or LoadCellError(
+                        f"The load cell gave no sample for {timeout_s:g} s.", "Check its cable and its power."
+                    )
+            times, forces = np.array(self._samples).T
+        if t_s < times[0]:
+            raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
+        return float(np.interp(t_s, times, forces))
+
+    def range_n(self, t_s: float, *, window_s: float) -> float:
+        """Return by how much the force varied in a window that ends at a time."""
+        with self._news:
+            inside = [force for t, force in self._samples if t_s - window_s <= t <= t_s]
+        return max(inside) - min(inside) if inside else float("inf")
+
+    def close(self) -> None:
+        """Stop the thread and release the cell."""
+        self._stopping.set()
+        self._thread.join(timeout=2 * SILENCE_S)
+        self._cell.close()

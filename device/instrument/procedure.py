@@ -1,0 +1,226 @@
+"""The press procedure: reference press beside the lesion, press on the lesion, estimate, keep.
+
+One thread runs it and owns light and camera. A press begins by a request or by itself, when the force passes the
+contact threshold. Everything that ends a press has a reason that the operator reads.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+from device import __version__
+from device.config import Config
+from device.errors import BusyError, DeviceError, UnknownResource
+from device.instrument.bench import Bench
+from device.instrument.capture import POLL_S, Capture, PressEnded
+from device.instrument.guidance import Guidance
+from device.instrument.status import PressJob, StatusBoard
+from device.measurement.estimate import Estimate
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording import CameraSettings, Recording
+from device.measurement.tactile_image import Frame
+from device.records.store import ENDED, Store
+
+log = logging.getLogger(__name__)
+
+UNLOADED_VALID_S = 30.0
+"""Dark and unloaded frames older than this are taken again before a press."""
+AFTER_FAULT_S = 1.0
+
+Estimator = Callable[[Recording], Estimate]
+
+
+class Procedure:
+    """Runs presses one after the other on a bench."""
+
+    def __init__(
+        self,
+        config: Config,
+        bench: Bench,
+        estimator: Estimator,
+        store: Store,
+        *,
+        calibration_id: str,
+        simulated_truth: Inclusion | None = None,
+    ) -> None:
+        self.config, self.bench, self.store = config, bench, store
+        self.board = StatusBoard()
+        self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
+        self._capture = Capture(bench, config.press, config.light, self.board)
+        self._requested: PressJob | None = None
+        self._on_request: list[Callable[[], None]] = []
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether hand, light and tissue are simulated; everything above the chips is not."""
+        return self._truth is not None
+
+    def require_ready(self) -> None:
+        """Raise the fault that keeps a press from being measured, if there is one."""
+        if self.board.now.fault:
+            raise self.board.now.fault
+        _ = self.bench.force.latest_n
+
+    def start(self) -> None:
+        """Begin to wait for presses."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the press under way, switch the light off and release the hardware."""
+        self._capture.stopping.set()
+        self._thread.join(timeout=5.0)
+        self.bench.close()
+
+    def request(self) -> PressJob:
+        """Ask for a measurement; raise `BusyError` when one is under way, `DeviceError` when the probe is at fault."""
+        with self._lock:
+            status = self.board.now
+            if status.fault:
+                raise status.fault
+            if self._requested or (status.press and status.press.state not in ENDED):
+                raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
+            self._requested = self._new_job()
+            self.store.save_press(self._requested.as_record())
+            job = self._requested
+        for listener in self._on_request:
+            listener()
+        return job
+
+    def on_request(self, listener: Callable[[], None]) -> None:
+        """Call `listener` whenever a press is requested."""
+        self._on_request.append(listener)
+
+    def cancel(self, press_id: str) -> None:
+        """Cancel the press under way; raise `UnknownResource` when it is not that one."""
+        with self._lock:
+            job = self._requested or self.board.now.press
+            if job is None or job.id != press_id or job.state in ENDED:
+                raise UnknownResource(f"Press {press_id} is not under way.", "Only a running press can be cancelled.")
+            self._capture.cancelled.set()
+
+    def _run(self) -> None:
+        while not self._capture.stopping.is_set():
+            try:
+                self._one_press()
+            except DeviceError as error:
+                self._at_fault(error)
+            except Exception as error:
+                log.exception("press failed")
+                self._at_fault(DeviceError(f"The daemon failed: {error!r}.", "Restart it and report the log."))
+
+    def _one_press(self) -> None:
+        unloaded = self._capture.unloaded()
+        status = self.board.now
+        if status.step in ("starting", "fault"):
+            self.board.update(step="ready", guidance=Guidance.PRESS_BESIDE, fault=None)
+        elif status.guidance is Guidance.LIFT:
+            self.board.update(guidance=Guidance.PRESS_BESIDE)
+        job = self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S)
+        if job:
+            self._measure(job, unloaded)
+
+    def _next_job(self, until_s: float) -> PressJob | None:
+        while time.monotonic() < until_s and not self._capture.stopping.is_set():
+            pressed = self.bench.force.latest_n >= self.config.press.contact_n
+            with self._lock:
+                if self._requested or pressed:
+                    job, self._requested = self._requested or self._new_job(), None
+                    self.board.update(press=job)
+                    return job
+            time.sleep(POLL_S)
+        return None
+
+    def _new_job(self) -> PressJob:
+        self._capture.cancelled.clear()  # here and not when the job begins: it may be cancelled before that
+        return PressJob(id=str(uuid.uuid4()))
+
+    def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
+        started_at = _now()
+        try:
+            self._set_job(job, state="capturing", progress=0.1)
+            self.board.update(step="reference", guidance=Guidance.PRESS_BESIDE, frames_taken=0, measurement_id=None)
+            reference = self._capture.loaded("reference", Guidance.PRESS_BESIDE)
+            self.board.update(guidance=Guidance.LIFT)
+            self._capture.until_lifted()
+            self._set_job(job, state="capturing", progress=0.5)
+            self.board.update(step="lesion", guidance=Guidance.PRESS_LESION, frames_taken=0)
+            press = self._capture.loaded("press", Guidance.PRESS_LESION)
+            self.board.update(step="computing", guidance=Guidance.LIFT)
+            self._set_job(job, state="computing", progress=0.9)
+            measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]))
+        except PressEnded as end:
+            self._reject(job, end.state, end.reason)
+        except InvalidQuantity as error:
+            self._reject(job, "rejected", str(error))
+        except DeviceError as error:
+            self._set_job(job, state="failed", reason=str(error))
+            raise
+        else:
+            self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
+            self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
+
+    def _reject(self, job: PressJob, state: str, reason: str) -> None:
+        self._set_job(job, state=state, reason=reason)
+        self.board.update(step="rejected", guidance=Guidance.REJECTED)
+
+    def _set_job(self, job: PressJob, **changes: Any) -> None:
+        changed = replace(self.board.now.press or job, **changes)
+        self.store.save_press(changed.as_record())
+        self.board.update(press=changed)
+
+    def _recording(self, started_at: str, frames: list[Frame]) -> Recording:
+        camera = self.config.camera
+        settings = CameraSettings(
+            width_px=camera.width_px,
+            height_px=camera.height_px,
+            bits=8,
+            mm_per_px_x=camera.mm_per_px_x,
+            mm_per_px_y=camera.mm_per_px_y,
+            exposure_us=camera.exposure_us,
+            gain=camera.gain,
+        )
+        return Recording(
+            id=str(uuid.uuid4()),
+            serial=self.config.serial,
+            software=__version__,
+            started_at=started_at,
+            camera=settings,
+            frames=tuple(frames),
+            calibration_id=self._calibration_id,
+            truth=self._truth,
+            simulated=self.is_simulated,
+        )
+
+    def _keep(self, recording: Recording) -> dict[str, Any]:
+        estimate = self._estimator(recording)
+        press = recording.with_role("press")
+        record = {
+            "id": str(uuid.uuid4()),
+            "taken_at": recording.started_at,
+            "estimate": estimate.as_record(),
+            "features": estimate.features,
+            "force_n": sum(frame.force_n for frame in press) / len(press),
+            "frames": len(press),
+            "recording_id": recording.id,
+            "truth": None if recording.truth is None else vars(recording.truth),
+        }
+        return self.store.add_measurement(record, recording)
+
+    def _at_fault(self, error: DeviceError) -> None:
+        if self.board.now.fault is None:
+            log.error("%s %s", error.code, error)
+        self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
+        self._capture.stopping.wait(AFTER_FAULT_S)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

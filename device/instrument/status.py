@@ -1,0 +1,69 @@
+"""What the procedure is doing, for whoever asks: the screen, the API, the virtual hand."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+from device.errors import DeviceError
+from device.instrument.guidance import Guidance
+
+Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "fault"]
+JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "cancelled", "failed"]
+
+
+@dataclass(frozen=True)
+class PressJob:
+    """One press as a resource: POSTed by a client or begun by the operator's hand."""
+
+    id: str
+    state: JobState = "waiting"
+    progress: float = 0.0
+    reason: str = ""
+    measurement_id: str | None = None
+
+    def as_record(self) -> dict[str, Any]:
+        """Return the job as JSON object."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Status:
+    """One moment of the procedure."""
+
+    step: Step = "starting"
+    guidance: Guidance = Guidance.WAIT
+    frames_taken: int = 0
+    press: PressJob | None = None
+    measurement_id: str | None = None
+    fault: DeviceError | None = None
+
+
+class StatusBoard:
+    """Holds the present status; tells listeners when the guidance changes."""
+
+    def __init__(self) -> None:
+        self._status, self._lock = Status(), threading.Lock()
+        self._listeners: list[Callable[[Guidance], None]] = []
+
+    @property
+    def now(self) -> Status:
+        """Return the present status."""
+        with self._lock:
+            return self._status
+
+    def on_guidance(self, listener: Callable[[Guidance], None]) -> None:
+        """Call `listener` with each new guidance, from the procedure's thread."""
+        self._listeners.append(listener)
+
+    def update(self, **changes: Any) -> Status:
+        """Replace fields of the status."""
+        with self._lock:
+            before, self._status = self._status, replace(self._status, **changes)
+            after = self._status
+        if after.guidance is not before.guidance:
+            for listener in self._listeners:
+                listener(after.guidance)
+        return after

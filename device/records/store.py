@@ -1,0 +1,110 @@
+"""Measurements and press jobs in SQLite, recordings in folders beside it.
+
+A recording is on the disk before its row is, and the row before the press is called done. WAL with synchronous=FULL:
+with NORMAL the last acknowledged row may be gone after a power cut. A job that a restart interrupted says so.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from device.errors import StorageError, UnknownResource
+from device.measurement.recording import Recording, write_recording
+
+Record = dict[str, Any]
+ENDED = ("done", "rejected", "cancelled", "failed")
+TABLES = """
+CREATE TABLE IF NOT EXISTS measurement
+  (seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, record TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS press (id TEXT PRIMARY KEY, ended INTEGER NOT NULL, record TEXT NOT NULL);
+"""
+
+
+class Store:
+    """The device's memory. All methods may be called from any thread."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open or create; raise `StorageError` when the folder cannot be written or the database is damaged."""
+        self.folder, self._lock = folder, threading.Lock()
+        try:
+            (folder / "recordings").mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(folder / "tsis.sqlite", check_same_thread=False)
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = FULL")
+            self._db.executescript(TABLES)
+        except (OSError, sqlite3.Error) as error:
+            remedy = "Free the disk or correct the setting `data`, then start the daemon again."
+            raise StorageError(f"The store {folder} cannot be opened: {error}.", remedy) from error
+        self._end_interrupted()
+
+    def _end_interrupted(self) -> None:
+        for job in self._records("SELECT record FROM press WHERE ended = 0"):
+            self.save_press(
+                job | {"state": "failed", "reason": "The daemon was restarted during the press: press again."}
+            )
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        try:
+            with self._lock, self._db:
+                yield self._db
+        except (OSError, sqlite3.Error) as error:
+            raise StorageError(f"The disk did not take the record: {error}.", "Free space on the disk.") from error
+
+    def _records(self, query: str, *values: object) -> list[Record]:
+        with self._transaction() as db:
+            return [json.loads(row[-1]) for row in db.execute(query, values)]
+
+    def save_press(self, job: Record) -> None:
+        """Keep the state of a press job."""
+        with self._transaction() as db:
+            row = job["id"], job["state"] in ENDED, json.dumps(job)
+            db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
+
+    def press(self, press_id: str) -> Record:
+        """Return a press job; raise `UnknownResource` when there is none of that id."""
+        return self._one("press", press_id)
+
+    def add_measurement(self, record: Record, recording: Recording) -> Record:
+        """Keep a recording and its measurement; return the record with its sequence number."""
+        try:
+            write_recording(recording, self.recording_folder(recording.id))
+        except OSError as error:
+            shutil.rmtree(self.recording_folder(recording.id), ignore_errors=True)
+            raise StorageError(f"The recording could not be written: {error}.", "Free space on the disk.") from error
+        with self._transaction() as db:
+            cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
+            whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
+            db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
+        return whole
+
+    def measurement(self, measurement_id: str) -> Record:
+        """Return a measurement; raise `UnknownResource` when there is none of that id."""
+        return self._one("measurement", measurement_id)
+
+    def measurements(self, *, before_seq: int, limit: int) -> list[Record]:
+        """Return the newest measurements before a sequence number, newest first."""
+        query = "SELECT record FROM measurement WHERE seq < ? ORDER BY seq DESC LIMIT ?"
+        return self._records(query, before_seq, limit)
+
+    def recording_folder(self, recording_id: str) -> Path:
+        """Return where a recording lies."""
+        return self.folder / "recordings" / recording_id
+
+    def _one(self, table: str, identifier: str) -> Record:
+        found = self._records(f"SELECT record FROM {table} WHERE id = ?", identifier)
+        if not found:
+            raise UnknownResource(f"There is no {table} {identifier}.", f"List them at /api/v1/{table}s.")
+        return found[0]
+
+    def close(self) -> None:
+        """Close the database."""
+        with self._lock:
+            self._db.close()

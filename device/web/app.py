@@ -1,0 +1,134 @@
+"""The REST API /api/v1 and the screen. Handlers look up and answer; errors become problem+json elsewhere."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Query, Response
+from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
+from fastapi.staticfiles import StaticFiles
+from pydantic import BaseModel, ConfigDict
+
+from device import __version__
+from device.instrument.procedure import Procedure
+from device.records.store import Store
+from device.web.events import snapshot, status_events
+from device.web.picture import tactile_png
+from device.web.problems import install_problems
+
+API = "/api/v1"
+STATIC = Path(__file__).parent / "static"
+
+
+class PressRequest(BaseModel):
+    """What a client may say when it starts a press: nothing yet. Unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+def create_app(procedure: Procedure, store: Store) -> FastAPI:
+    """Return the web application of a running procedure."""
+    app = FastAPI(
+        title="TSIS probe", version=__version__, openapi_url=f"{API}/openapi.json", docs_url=None, redoc_url=None
+    )
+    install_problems(app)
+    _add_state(app, procedure)
+    _add_presses(app, procedure, store)
+    _add_measurements(app, store)
+    app.mount("/static", StaticFiles(directory=STATIC), name="static")
+
+    @app.get("/", include_in_schema=False)
+    def screen() -> FileResponse:
+        return FileResponse(STATIC / "index.html")
+
+    return app
+
+
+def _add_state(app: FastAPI, procedure: Procedure) -> None:
+    @app.get(f"{API}/device")
+    def device() -> dict[str, Any]:
+        """Say which probe this is."""
+        simulated = procedure.is_simulated
+        return {"serial": procedure.config.serial, "software": __version__, "simulated": simulated}
+
+    @app.get(f"{API}/health/live")
+    def live() -> dict[str, str]:
+        """Answer as long as the daemon runs."""
+        return {"status": "live"}
+
+    @app.get(f"{API}/health/ready")
+    def ready() -> dict[str, str]:
+        """Answer 200 when a press can be measured, else the fault as a problem."""
+        procedure.require_ready()
+        return {"status": "ready"}
+
+    @app.get(f"{API}/status")
+    def status() -> dict[str, Any]:
+        """Return what the event stream sends."""
+        return snapshot(procedure)
+
+    @app.get(f"{API}/events")
+    async def events() -> StreamingResponse:
+        """Stream the status as server-sent events."""
+        return StreamingResponse(status_events(procedure), media_type="text/event-stream")
+
+
+def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
+    @app.post(f"{API}/presses", status_code=202)
+    def start_press(request: PressRequest | None = None) -> JSONResponse:
+        """Start a measurement; on the simulated probe the virtual hand takes up the probe."""
+        job = procedure.request()
+        return JSONResponse(job.as_record(), status_code=202, headers={"Location": f"{API}/presses/{job.id}"})
+
+    @app.get(f"{API}/presses/{{press_id}}")
+    def press(press_id: str) -> dict[str, Any]:
+        """Return the state of a press."""
+        return store.press(press_id)
+
+    @app.delete(f"{API}/presses/{{press_id}}", status_code=202)
+    def cancel_press(press_id: str) -> dict[str, Any]:
+        """Cancel the press under way."""
+        procedure.cancel(press_id)
+        return store.press(press_id)
+
+
+def _add_measurements(app: FastAPI, store: Store) -> None:
+    @app.get(f"{API}/measurements")
+    def measurements(
+        before_seq: int = Query(2**62, ge=1), limit: int = Query(20, ge=1, le=200)
+    ) -> dict[str, list[dict[str, Any]]]:
+        """Return measurements, newest first."""
+        return {"measurements": store.measurements(before_seq=before_seq, limit=limit)}
+
+    @app.get(f"{API}/measurements/{{measurement_id}}")
+    def measurement(measurement_id: str) -> dict[str, Any]:
+        """Return one measurement."""
+        return store.measurement(measurement_id)
+
+    @app.get(f"{API}/measurements/{{measurement_id}}/features")
+    def features(measurement_id: str) -> dict[str, float]:
+        """Return the features of one measurement."""
+        return dict(store.measurement(measurement_id)["features"])
+
+    @app.get(f"{API}/measurements/{{measurement_id}}/image.png")
+    def image(measurement_id: str) -> Response:
+        """Return the tactile image as a picture."""
+        folder = store.recording_folder(store.measurement(measurement_id)["recording_id"])
+        return Response(tactile_png(folder), media_type="image/png")
+
+    @app.get(f"{API}/measurements/{{measurement_id}}/recording.zip")
+    def recording(measurement_id: str) -> Response:
+        """Return the recording that the measurement was computed from."""
+        folder = store.recording_folder(store.measurement(measurement_id)["recording_id"])
+        return Response(_zipped(folder), media_type="application/zip")
+
+
+def _zipped(folder: Path) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:  # PNG is compressed already
+        for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+            archive.write(path, path.relative_to(folder.parent))
+    return content.getvalue()

@@ -1,0 +1,72 @@
+"""Errors to RFC 9457 problem+json, in this one place: title, status, detail, code and remedy."""
+
+from __future__ import annotations
+
+import logging
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from device.errors import DeviceError
+from device.measurement.quantities import InvalidQuantity
+
+log = logging.getLogger(__name__)
+
+
+def problem(status: int, detail: str, *, code: str, remedy: str) -> JSONResponse:
+    """Return a problem document."""
+    body: dict[str, Any] = {
+        "type": "about:blank",
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "detail": detail,
+        "code": code,
+        "remedy": remedy,
+    }
+    return JSONResponse(body, status_code=status, media_type="application/problem+json")
+
+
+def _device_error(request: Request, error: DeviceError) -> JSONResponse:
+    return problem(error.status, error.cause, code=error.code, remedy=error.remedy)
+
+
+def _invalid_quantity(request: Request, error: InvalidQuantity) -> JSONResponse:
+    return problem(
+        422, f"{error.quantity} is {error.value}, but must be {error.bound}.", code="E803", remedy=error.action
+    )
+
+
+def _invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"])
+    remedy = "Correct the field; the API is described at /api/v1/openapi.json."
+    return problem(422, f"{where}: {first['msg']}.", code="E803", remedy=remedy)
+
+
+def _http_error(request: Request, error: HTTPException) -> JSONResponse:
+    remedy = "The API is described at /api/v1/openapi.json."
+    return problem(
+        error.status_code, f"{request.method} {request.url.path}: {error.detail}.", code="E804", remedy=remedy
+    )
+
+
+def _unexpected(request: Request, error: Exception) -> JSONResponse:
+    log.exception("request failed", exc_info=error)
+    return problem(500, "The daemon failed to answer.", code="E000", remedy="Report the daemon's log.")
+
+
+def install_problems(app: FastAPI) -> None:
+    """Make every error of an app a problem document."""
+    handlers: dict[Any, Any] = {
+        DeviceError: _device_error,
+        InvalidQuantity: _invalid_quantity,
+        RequestValidationError: _invalid_request,
+        HTTPException: _http_error,
+        Exception: _unexpected,
+    }
+    for kind, handler in handlers.items():
+        app.add_exception_handler(kind, handler)

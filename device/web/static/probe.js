@@ -1,0 +1,61 @@
+// The probe's REST interface: the stream of statuses, a press, a measurement. Paths and fields: docs of /api/v1.
+
+const API = "/api/v1";
+const SILENCE_MS = 2000; // a status arrives every 50 to 100 ms: after this long the figures are old
+const REOPEN_MS = 3000;
+const WATCH_MS = 250;
+const ANSWER_MS = 5000;
+
+/** Call onStatus with each status, and onSilence again and again while none arrives. */
+export function followStatus(onStatus, onSilence) {
+  let source = null;
+  let openedAt = 0;
+  let heardAt = performance.now();
+
+  function open() {
+    source?.close();
+    openedAt = performance.now();
+    source = new EventSource(`${API}/events`);
+    source.addEventListener("status", (event) => {
+      const status = JSON.parse(event.data);
+      heardAt = performance.now();
+      onStatus(status);
+    });
+  }
+
+  // EventSource gives up for good after an HTTP error and never notices a pulled cable, so the page reopens it itself.
+  function watch() {
+    const now = performance.now();
+    if (now - heardAt <= SILENCE_MS) return;
+    onSilence();
+    if (now - openedAt > REOPEN_MS) open();
+  }
+
+  open();
+  setInterval(watch, WATCH_MS);
+}
+
+/** The sentence of an application/problem+json answer (RFC 9457). */
+async function problemSentence(response) {
+  const problem = await response.json().catch(() => ({}));
+  const cause = problem.detail || problem.title || `The probe answered ${response.status}.`;
+  return [problem.code, cause, problem.remedy].filter(Boolean).join(" ");
+}
+
+async function ask(method, path, body) {
+  const headers = { "Content-Type": "application/json" };
+  const options = { method, body, headers, signal: AbortSignal.timeout(ANSWER_MS) };
+  const response = await fetch(API + path, options).catch(() => {
+    throw new Error("The probe did not answer. Try again.");
+  });
+  if (!response.ok) throw new Error(await problemSentence(response));
+  return response;
+}
+
+export const startPress = () => ask("POST", "/presses", "{}");
+export const cancelPress = (id) => ask("DELETE", `/presses/${encodeURIComponent(id)}`);
+export const imageUrl = (id) => `${API}/measurements/${encodeURIComponent(id)}/image.png`;
+
+export async function fetchMeasurement(id) {
+  return (await ask("GET", `/measurements/${encodeURIComponent(id)}`)).json();
+}

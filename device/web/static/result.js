@@ -1,0 +1,86 @@
+// One measurement as three tiles and its tactile image. A number that the data do not determine gets no headline:
+// the tile says so and shows only the interval.
+
+import { byId, element, setQuantity, setText } from "./dom.js";
+import { imageUrl } from "./probe.js";
+
+const TILES = [
+  { name: "size", key: "size_mm", unit: "mm" },
+  { name: "depth", key: "depth_mm", unit: "mm" },
+  { name: "modulus", key: "youngs_modulus_kpa", unit: "kPa" },
+];
+
+const STATUS_WORDS = {
+  outside_range: "Outside the model's range.",
+  no_contact: "No contact.",
+  saturated: "Image saturated.",
+  not_identifiable: "Not fully determined.",
+  rejected: "Rejected.",
+};
+const WITHOUT_NUMBERS = new Set(["no_contact", "saturated", "rejected"]);
+
+/** Digits that the interval supports: whole units once it is ten units wide. */
+const decimalsFor = (quantity) => (quantity.high - quantity.low >= 10 ? 0 : 1);
+
+/** The smallest round number that is not below x: the right end of a tile's strip. */
+function roundUp(x) {
+  const decade = 10 ** Math.floor(Math.log10(x));
+  return [1, 1.5, 2, 3, 4, 5, 6, 8, 10].map((factor) => factor * decade).find((end) => end >= x * 0.999);
+}
+
+function placed(className, from, width, end) {
+  const node = element("span", className);
+  node.style.setProperty("--from", from / end);
+  node.style.setProperty("--width", width / end);
+  return node;
+}
+
+/** The interval, the value and the truth on one axis from zero, so that a wide interval looks wide. */
+function drawStrip(strip, quantity, truth, determined) {
+  const end = roundUp(Math.max(quantity.high, truth ?? 0));
+  const low = Math.max(quantity.low, 0);
+  const axis = element("span", "strip-axis");
+  axis.append(placed("strip-interval", low, quantity.high - low, end));
+  if (determined) axis.append(placed("strip-value", quantity.value, 0, end));
+  if (truth !== null) axis.append(placed("strip-truth", truth, 0, end));
+  strip.replaceChildren(element("span", "", "0"), axis, element("span", "", String(end)));
+}
+
+function showTile({ name, key, unit }, measurement) {
+  const quantity = measurement.estimate[key];
+  const truth = measurement.truth?.[key] ?? null;
+  const decimals = decimalsFor(quantity);
+  const bounded = Number.isFinite(quantity.low) && Number.isFinite(quantity.high);
+  const usable = !WITHOUT_NUMBERS.has(measurement.estimate.status);
+  const determined = usable && quantity.identifiable === true && Number.isFinite(quantity.value);
+  const tile = byId(`${name}-tile`);
+  tile.dataset.determined = determined;
+  if (determined) setQuantity(byId(`${name}-value`), quantity.value.toFixed(decimals), unit);
+  else setText(byId(`${name}-value`), "not determined");
+  const interval = `${quantity.low?.toFixed(decimals)} – ${quantity.high?.toFixed(decimals)} ${unit}`;
+  setText(byId(`${name}-interval`), usable && bounded ? interval : "none");
+  setText(byId(`truth-${name}`), truth === null ? "" : `${truth.toFixed(1)} ${unit}`);
+  setText(tile.querySelector(".truth-label"), measurement.estimate.simulated ? "simulated truth" : "phantom truth");
+  tile.querySelector(".truth").hidden = truth === null;
+  const strip = tile.querySelector(".strip");
+  if (usable && bounded) drawStrip(strip, quantity, truth, determined);
+  else strip.replaceChildren();
+}
+
+/** Fill the result view from a measurement of GET /api/v1/measurements/{id}. */
+export function showMeasurement(measurement) {
+  for (const tile of TILES) showTile(tile, measurement);
+  const image = byId("image");
+  image.src = imageUrl(measurement.id);
+  image.alt = `Tactile image of measurement ${measurement.seq}`;
+  setText(byId("image-title"), `Measurement ${measurement.seq}`);
+  setText(byId("image-caption"), measurement.taken_at.slice(0, 16).replace("T", " ") + " UTC");
+}
+
+/** The status of an estimate in words, its reason, and whether it is "good" as it stands or a "caution". */
+export function describeEstimate({ status, reason, ...quantities }) {
+  if (status !== "ok") return { word: STATUS_WORDS[status] ?? status, reason, tone: "caution" };
+  const complete = TILES.every(({ key }) => quantities[key].identifiable === true);
+  if (!complete) return { word: "Measured in part.", reason, tone: "caution" };
+  return { word: "Measured.", reason: reason || "Size, depth and Young's modulus are determined.", tone: "good" };
+}

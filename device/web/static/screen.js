@@ -1,0 +1,176 @@
+// The probe's own screen: each status of the event stream becomes one instruction, a gauge, and at the end a result.
+// The probe decides what happens next; this page keeps no procedure of its own and only shows what it is told.
+
+import { byId, element, setAttribute, setText } from "./dom.js";
+import { showGauge } from "./gauge.js";
+import { cancelPress, fetchMeasurement, followStatus, startPress } from "./probe.js";
+import { describeEstimate, showMeasurement } from "./result.js";
+
+const UNDER_WAY = new Set(["waiting", "capturing", "computing"]);
+const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
+const ICONS = {
+  press_beside: "press", press_lesion: "press", press_harder: "harder", press_lighter: "lighter",
+  hold_still: "hold", lift: "lift", done: "done", rejected: "rejected", fault: "fault",
+};
+const WAIT_ICONS = { ready: "press" };
+const TONES = { hold_still: "good", done: "good", rejected: "caution", fault: "bad" };
+const STEP_HINTS = {
+  starting: "The probe starts and checks its parts.",
+  ready: "Two presses make a measurement: one beside the lesion, then one on it.",
+  reference: "Reference press: on plain tissue beside the lesion.",
+  lesion: "Lesion press: on the lesion, with the same force.",
+  computing: "Computing size, depth and Young's modulus.",
+};
+const PRESS_WORDS = { rejected: "Rejected.", cancelled: "Cancelled.", failed: "Failed." };
+const LONG_INSTRUCTION = 40; // characters; more would need a third line
+const RELOAD_MS = 1000;
+
+const panel = byId("panel");
+const button = byId("press-button");
+let status = null;
+let measurement = null;
+let loading = false;
+let sending = false;
+let problem = "";
+let faultsShown = "";
+
+const pressUnderWay = () => UNDER_WAY.has(status?.press?.state);
+
+function resultShown() {
+  // A press that came to nothing must not stand above the figures of the one before it.
+  const wanted = status.step === "result" || (status.step === "ready" && !PRESS_WORDS[status.press?.state]);
+  return wanted && measurement !== null && measurement.id === status.measurement_id;
+}
+
+function showIdentity() {
+  setText(byId("serial"), status.serial);
+  setText(byId("software"), `Software ${status.software}`);
+  byId("simulated-badge").hidden = !(status.simulated || (resultShown() && measurement.estimate.simulated));
+}
+
+function showSteps() {
+  const current = resultShown() ? 2 : STEP_INDEX[status.step] ?? -1;
+  [...byId("steps").children].forEach((item, index) => {
+    item.classList.toggle("step-done", index < current || (index === 2 && resultShown()));
+    if (index === current) setAttribute(item, "aria-current", "step");
+    else item.removeAttribute("aria-current");
+  });
+}
+
+function showInstruction() {
+  const { code, text } = status.guidance;
+  setText(byId("instruction"), text);
+  setAttribute(byId("instruction-icon"), "href", `#icon-${ICONS[code] ?? WAIT_ICONS[status.step] ?? "wait"}`);
+  byId("instruction").classList.toggle("long", text.length > LONG_INSTRUCTION);
+  panel.dataset.tone = TONES[code] ?? "calm";
+}
+
+/** The one sentence under the instruction: a refused command first, then what became of the press, then the result. */
+function describeStatus() {
+  const hint = STEP_HINTS[status.step] ?? "";
+  const pressWord = PRESS_WORDS[status.press?.state];
+  if (problem) return { word: "Not done.", reason: problem, tone: "caution" };
+  if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
+  if (resultShown()) return describeEstimate(measurement.estimate);
+  return { word: "", reason: hint, tone: "calm" };
+}
+
+function showStatusLine() {
+  const { word, reason, tone } = describeStatus();
+  setText(byId("status-word"), word);
+  setText(byId("status-reason"), reason);
+  byId("status-line").dataset.tone = tone;
+}
+
+function showProgress() {
+  const { frames_taken: taken, frames_needed: needed } = status;
+  const cells = byId("frame-cells");
+  panel.style.setProperty("--progress", pressUnderWay() ? status.press.progress : 0);
+  setText(byId("frames"), `${taken} of ${needed} frames`);
+  if (cells.childElementCount !== needed) {
+    cells.replaceChildren(...Array.from({ length: needed }, () => element("span", "")));
+  }
+  [...cells.children].forEach((cell, index) => cell.classList.toggle("taken", index < taken));
+}
+
+function faultItem({ code, cause, remedy }) {
+  const item = element("div", "fault");
+  const words = element("p", "fault-words");
+  words.append(element("strong", "fault-cause", cause), " ", element("span", "fault-remedy", remedy));
+  item.append(element("span", "fault-code", code), words);
+  return item;
+}
+
+function showFaults() {
+  const key = JSON.stringify(status.faults);
+  if (key === faultsShown) return;
+  faultsShown = key;
+  byId("faults").replaceChildren(...status.faults.map(faultItem));
+  byId("faults").hidden = status.faults.length === 0;
+  panel.classList.toggle("with-faults", status.faults.length > 0);
+}
+
+function showButton() {
+  const start = status.simulated ? "Press the simulated probe" : "New measurement";
+  setText(button, pressUnderWay() ? "Cancel" : start);
+  button.classList.toggle("button-cancel", pressUnderWay());
+  button.disabled = sending || status.step === "starting";
+}
+
+function show() {
+  panel.dataset.step = status.step;
+  panel.dataset.view = resultShown() ? "result" : "measure";
+  showIdentity();
+  showSteps();
+  showInstruction();
+  showStatusLine();
+  showProgress();
+  showFaults();
+  showButton();
+  showGauge(status);
+}
+
+async function loadMeasurement(id) {
+  if (loading || id === null || id === measurement?.id) return;
+  loading = true;
+  try {
+    measurement = await fetchMeasurement(id);
+    showMeasurement(measurement);
+    problem = "";
+  } catch (error) {
+    problem = error.message;
+    await new Promise((done) => { setTimeout(done, RELOAD_MS); });
+  } finally {
+    loading = false;
+  }
+}
+
+function showConnection(lost) {
+  byId("connection-lost").hidden = !lost;
+  byId("main").inert = lost;
+}
+
+function receive(next) {
+  // After an update of the probe, the page that is already open must not stay the old one.
+  if (status && status.software !== next.software) location.reload();
+  if (status && status.step !== next.step) problem = "";
+  status = next;
+  showConnection(false);
+  loadMeasurement(status.measurement_id);
+  show();
+}
+
+button.addEventListener("click", async () => {
+  sending = true;
+  problem = "";
+  button.disabled = true;
+  try {
+    await (pressUnderWay() ? cancelPress(status.press.id) : startPress());
+  } catch (error) {
+    problem = error.message;
+  } finally {
+    sending = false;
+  }
+});
+
+followStatus(receive, () => showConnection(true));

@@ -1,0 +1,72 @@
+"""The device's screen in a real headless Chromium: a new user presses the simulated probe and reads the result."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from daemon_process import QUICK_HAND, ROOT, Daemon
+from playwright.sync_api import Page, expect, sync_playwright
+
+pytestmark = pytest.mark.browser
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+SHOTS = ROOT / "build" / "screens"
+
+
+@pytest.fixture(scope="module")
+def page():
+    if CHROMIUM is None:
+        assert not os.environ.get("TSIS_REQUIRE_PEERS"), "Chromium is required here but not installed"
+        pytest.skip("no Chromium on this machine: install it to test the screen")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": 800, "height": 480})
+        page.set_default_timeout(60_000)
+        yield page
+        browser.close()
+
+
+def _shoot(page: Page, name: str) -> None:
+    SHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=str(SHOTS / f"{name}.png"))
+
+
+def _require_fits(page: Page) -> None:
+    """Nothing scrolls on an 800 x 480 panel."""
+    size = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert size == [800, 480]
+
+
+def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, daemon: Daemon):
+    page.goto(daemon.url)
+    expect(page.locator("#simulated-badge")).to_be_visible()
+    expect(page.locator("#simulated-badge")).to_contain_text("simulated", ignore_case=True)
+    button = page.locator("#press-button")
+    expect(button).to_contain_text("simulated probe")
+    _shoot(page, "ready")
+    button.click()
+    expect(page.locator("#instruction")).to_have_text("Press harder")
+    _shoot(page, "press-harder")
+    _require_fits(page)
+    expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
+    _shoot(page, "result")
+    _require_fits(page)
+    newest = daemon.ask("/api/v1/measurements?limit=1").json["measurements"][0]
+    size = newest["estimate"]["size_mm"]
+    expect(page.locator("#size-value")).to_have_text(f"{size['value']:.1f} mm")
+    expect(page.locator("#truth-size")).to_have_text("10.0 mm")
+    expect(page.locator("#modulus-value")).to_have_text("not determined")
+    expect(page.locator("#simulated-badge")).to_be_visible()
+
+
+def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_path: Path):
+    daemon = Daemon(tmp_path, QUICK_HAND)
+    page.goto(daemon.url)
+    expect(page.locator("#simulated-badge")).to_be_visible()
+    expect(page.locator("#connection-lost")).to_be_hidden()
+    daemon.stop()
+    expect(page.locator("#connection-lost")).to_be_visible()
+    _shoot(page, "connection-lost")

@@ -1,0 +1,46 @@
+"""Shared fixtures: the committed model and table, a recording of the simulated probe, and a running daemon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from daemon_process import QUICK_HAND, ROOT, Daemon
+
+from device.measurement.calibration import Calibration, read_calibration
+from device.measurement.inversion import ModelBundle
+from device.measurement.quantities import Inclusion
+from device.measurement.recording import Recording
+from device.simulation.surface_table import SurfaceTable, load_surface_table
+from host_tools.phantom import phantom_recording
+
+MODELS = ROOT / "models"
+
+
+@pytest.fixture(scope="session")
+def bundle() -> ModelBundle:
+    return ModelBundle.load(MODELS / "paper")
+
+
+@pytest.fixture(scope="session")
+def table() -> SurfaceTable:
+    return load_surface_table(MODELS / "simulated_probe")
+
+
+@pytest.fixture(scope="session")
+def calibration() -> Calibration:
+    return read_calibration(MODELS / "simulated_probe" / "calibration.json")
+
+
+@pytest.fixture(scope="session")
+def recording(table: SurfaceTable) -> Recording:
+    """One phantom of 10 mm, 5 mm deep, 80 kPa, three press frames."""
+    return phantom_recording(Inclusion(10.0, 5.0, 80.0), table, seed=3, press_frames=3)
+
+
+@pytest.fixture(scope="session")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A running simulated probe with a quick hand."""
+    running = Daemon(tmp_path_factory.mktemp("daemon"), QUICK_HAND)
+    yield running
+    running.stop()

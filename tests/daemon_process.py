@@ -1,0 +1,84 @@
+"""The daemon as its own process, spoken to over HTTP as a hospital PC would."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Status, headers and body of one HTTP answer."""
+
+    status: int
+    headers: dict[str, str]
+    body: bytes
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.body)
+
+
+class Daemon:
+    """`python -m device --simulate` as its own process on a free port, with an empty data folder."""
+
+    def __init__(self, folder: Path, scene: str = "") -> None:
+        arguments = [sys.executable, "-m", "device", "--simulate", "--port", "0"]
+        if scene:
+            (folder / "scene.toml").write_text(scene)
+            arguments += ["--scene", "scene.toml"]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+        self.log = (folder / "log.txt").open("w")
+        self.process = subprocess.Popen(
+            arguments, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=self.log, text=True
+        )
+        assert self.process.stdout is not None
+        greeting = self.process.stdout.readline()
+        assert "http://" in greeting, (folder / "log.txt").read_text()
+        self.url = greeting.split()[-1].rstrip("/")
+
+    def ask(self, path: str, method: str = "GET", body: object = None) -> Answer:
+        data = None if body is None else json.dumps(body).encode()
+        headers = {"content-type": "application/json"}
+        request = urllib.request.Request(self.url + path, method=method, data=data, headers=headers)
+        try:
+            with urllib.request.urlopen(request, timeout=30) as response:
+                return Answer(response.status, dict(response.headers), response.read())
+        except urllib.error.HTTPError as error:
+            with error:
+                return Answer(error.code, dict(error.headers), error.read())
+
+    def press(self) -> dict[str, Any]:
+        """Start a press and return its job once it has ended."""
+        answer = self.ask("/api/v1/presses", "POST", {})
+        assert answer.status == 202, answer.body
+        return self.ended(answer.headers["location"])
+
+    def ended(self, location: str) -> dict[str, Any]:
+        for _ in range(600):
+            job: dict[str, Any] = self.ask(location).json
+            if job["state"] in ("done", "rejected", "cancelled", "failed"):
+                return job
+            time.sleep(0.1)
+        raise AssertionError(f"the press has not ended: {job}")
+
+    def stop(self) -> int:
+        self.process.terminate()
+        code = self.process.wait(timeout=20)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        self.log.close()
+        return code
+
+
+QUICK_HAND = "[hand]\nrate_n_per_s = 1.5\nreaction_s = 0.05\n"

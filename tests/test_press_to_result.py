@@ -1,0 +1,155 @@
+"""From a press of the simulated probe to a result, through the daemon as a separate process."""
+
+from __future__ import annotations
+
+import io
+import json
+import sqlite3
+import urllib.request
+import zipfile
+
+import pytest
+from daemon_process import QUICK_HAND, Daemon
+
+from device.measurement.estimate import estimate_recording
+from device.measurement.recording import read_recording
+
+
+@pytest.fixture(scope="module")
+def job(daemon):
+    return daemon.press()
+
+
+@pytest.fixture(scope="module")
+def measurement(daemon, job):
+    return daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json
+
+
+def test_a_press_ends_in_a_measurement(job):
+    assert job["state"] == "done"
+    assert job["progress"] == 1.0
+
+
+def test_size_and_depth_are_near_the_truth_and_inside_their_intervals(measurement):
+    """The default inclusion is 10 mm, 5 mm deep: well inside what the probe can see."""
+    estimate, truth = measurement["estimate"], measurement["truth"]
+    assert truth == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
+    for name in ("size_mm", "depth_mm"):
+        assert estimate[name]["value"] == pytest.approx(truth[name], rel=0.1)
+        assert estimate[name]["low"] < estimate[name]["value"] < estimate[name]["high"]
+        assert estimate[name]["identifiable"]
+
+
+def test_a_modulus_that_the_press_does_not_determine_is_said_to_be_so(measurement):
+    modulus = measurement["estimate"]["youngs_modulus_kpa"]
+    assert not modulus["identifiable"]
+    assert modulus["high"] - modulus["low"] > 40
+    assert measurement["estimate"]["status"] == "not_identifiable"
+    assert "Young's modulus" in measurement["estimate"]["reason"]
+
+
+def test_ten_frames_are_taken_in_the_force_band(measurement):
+    assert measurement["frames"] == 10
+    assert 0.475 <= measurement["force_n"] <= 0.525
+
+
+def test_the_recording_gives_the_same_estimate_again(daemon, measurement, tmp_path, bundle, calibration):
+    """What is kept is what was measured: the zip, analysed elsewhere, has the same answer."""
+    content = daemon.ask(f"/api/v1/measurements/{measurement['id']}/recording.zip").body
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(tmp_path)
+    recording = read_recording(tmp_path / measurement["recording_id"])
+    assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 14, 10]
+    again = json.loads(json.dumps(estimate_recording(recording, bundle, calibration).as_record()))
+    assert again == measurement["estimate"]
+
+
+def test_the_tactile_image_is_a_png_in_true_proportions(daemon, measurement):
+    picture = daemon.ask(f"/api/v1/measurements/{measurement['id']}/image.png")
+    assert picture.headers["content-type"] == "image/png"
+    width, height = (int.from_bytes(picture.body[at : at + 4], "big") for at in (16, 20))
+    assert width / height == pytest.approx(768 * 0.03125 / (492 * 0.03646), rel=0.01)
+
+
+def test_the_event_stream_tells_the_status(daemon):
+    with urllib.request.urlopen(daemon.url + "/api/v1/events", timeout=10) as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        assert stream.readline() == b"event: status\n"
+        status = json.loads(stream.readline().removeprefix(b"data: "))
+    assert status["simulated"] is True
+    assert status["target_n"] == 0.5
+
+
+def test_measurements_are_listed_newest_first(daemon, measurement):
+    listed = daemon.ask("/api/v1/measurements").json["measurements"]
+    assert listed[0]["seq"] == max(m["seq"] for m in listed)
+    assert measurement["id"] in [m["id"] for m in listed]
+
+
+@pytest.mark.parametrize(
+    ("path", "method", "body", "status", "code"),
+    [
+        ("/api/v1/measurements/none", "GET", None, 404, "E802"),
+        ("/api/v1/presses/none", "GET", None, 404, "E802"),
+        ("/api/v1/presses/none", "DELETE", None, 404, "E802"),
+        ("/api/v1/nowhere", "GET", None, 404, "E804"),
+        ("/api/v1/measurements?limit=0", "GET", None, 422, "E803"),
+        ("/api/v1/presses", "POST", {"force_newton": 3}, 422, "E803"),
+    ],
+)
+def test_bad_requests_are_problem_documents_with_a_remedy(daemon, path, method, body, status, code):
+    answer = daemon.ask(path, method, body)
+    assert answer.status == status
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json["code"] == code
+    assert answer.json["remedy"]
+
+
+def test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so(daemon):
+    first = daemon.ask("/api/v1/presses", "POST", {})
+    second = daemon.ask("/api/v1/presses", "POST", {})
+    assert second.status == 409
+    assert second.json["code"] == "E801"
+    assert daemon.ask(first.headers["location"], "DELETE").status == 202
+    assert daemon.ended(first.headers["location"])["state"] == "cancelled"
+
+
+def test_a_press_that_is_too_hard_is_rejected_with_both_numbers(tmp_path):
+    daemon = Daemon(tmp_path, QUICK_HAND + "aim_n = 1.4\n")
+    job = daemon.press()
+    assert job["state"] == "rejected"
+    assert "above 1.00 N" in job["reason"]
+    daemon.stop()
+
+
+def test_a_press_interrupted_by_a_stop_is_not_lost(tmp_path):
+    """SIGTERM in the middle of a press: exit 0, and the job says how it ended after the next start."""
+    daemon = Daemon(tmp_path)
+    location = daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
+    assert daemon.stop() == 0
+    again = Daemon(tmp_path)
+    job = again.ask(location).json
+    again.stop()
+    assert job["state"] == "failed"
+    assert "press" in job["reason"]
+
+
+def test_a_kill_loses_no_measurement(tmp_path):
+    daemon = Daemon(tmp_path, QUICK_HAND)
+    job = daemon.press()
+    daemon.process.kill()
+    daemon.stop()
+    with sqlite3.connect(tmp_path / "var" / "tsis.sqlite") as db:
+        kept = db.execute("SELECT id FROM measurement").fetchall()
+    db.close()
+    assert kept == [(job["measurement_id"],)]
+
+
+def test_a_lump_that_cannot_be_seen_gets_no_number(tmp_path):
+    """0.5 mm, 10 mm deep: its contrast is a thousandth of the camera's noise."""
+    daemon = Daemon(tmp_path, "[inclusion]\nsize_mm = 0.5\ndepth_mm = 10.0\nyoungs_modulus_kpa = 80.0\n" + QUICK_HAND)
+    job = daemon.press()
+    estimate = daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json["estimate"]
+    daemon.stop()
+    assert estimate["status"] == "not_identifiable"
+    assert estimate["size_mm"]["value"] is None
