@@ -39,7 +39,7 @@ class SweepPlan:
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
 
     def truths(self) -> NDArray[np.float64]:
-        """Return the drawn (size_mm, depth_mm, youngs_modulus_kpa) [scenes, 3]; a long sweep begins like a short one."""
+        """Return the drawn (size_mm, depth_mm, youngs_modulus_kpa) [scenes, 3]; prefix-stable."""
         return np.random.default_rng(self.seed).uniform(PAPER_BOX_LOW, PAPER_BOX_HIGH, (self.scenes, 3))
 
     def scene(self, truth: NDArray[np.float64]) -> Scene:
