@@ -38,6 +38,9 @@ def _require_fits(page: Page) -> None:
     """Nothing scrolls on an 800 x 480 panel."""
     size = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert size == [800, 480]
+    inner = "tiles => tiles.flatMap(t => [...t.querySelectorAll('*')].filter(e => e.scrollWidth > e.clientWidth + 1"
+    spilling = page.locator(".tile").evaluate_all(inner + " && e.clientWidth > 0 && !e.closest('.strip')).map(e => e.id))")
+    assert spilling == []
 
 
 def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, daemon: Daemon):

@@ -14,7 +14,7 @@ const STATUS_WORDS = {
   outside_range: "Outside the model's range.",
   no_contact: "No contact.",
   saturated: "Image saturated.",
-  not_identifiable: "Not fully determined.",
+  not_identifiable: "Not determined.",
   rejected: "Rejected.",
 };
 const WITHOUT_NUMBERS = new Set(["no_contact", "saturated", "rejected"]);
@@ -79,8 +79,9 @@ export function showMeasurement(measurement) {
 
 /** The status of an estimate in words, its reason, and whether it is "good" as it stands or a "caution". */
 export function describeEstimate({ status, reason, ...quantities }) {
-  if (status !== "ok") return { word: STATUS_WORDS[status] ?? status, reason, tone: "caution" };
-  const complete = TILES.every(({ key }) => quantities[key].identifiable === true);
-  if (!complete) return { word: "Measured in part.", reason, tone: "caution" };
+  const known = TILES.filter(({ key }) => quantities[key].identifiable === true).length;
+  const inPart = known > 0 && known < TILES.length && (status === "ok" || status === "not_identifiable");
+  if (status !== "ok" && !inPart) return { word: STATUS_WORDS[status] ?? status, reason, tone: "caution" };
+  if (inPart) return { word: "Measured in part.", reason, tone: "caution" };
   return { word: "Measured.", reason: reason || "Size, depth and Young's modulus are determined.", tone: "good" };
 }

@@ -1,0 +1,70 @@
+"""Times the work on a frame, a press and a scene, each as a ratio to a fixed piece of NumPy work of the same minute.
+
+Machines are noisy and differ: only the ratios are comparable. The yardstick is one 768 x 492 float32 image put through
+exp and sum, about what any per-pixel step costs.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np
+
+from device.measurement.calibration import read_calibration
+from device.measurement.estimate import estimate_recording
+from device.measurement.features import extract_features
+from device.measurement.inversion import ModelBundle
+from device.measurement.quantities import Inclusion
+from device.measurement.tactile_image import reference, tactile_image
+from device.simulation.surface_table import load_surface_table
+from host_tools.forward.solve import solve
+from host_tools.phantom import phantom_recording
+from host_tools.scene import Scene
+
+MODELS = Path(__file__).resolve().parents[1] / "models"
+REPEATS = 15
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    """Return the median time of one call after a warm-up."""
+    work()
+    times = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))
+
+
+def main() -> None:
+    """Print a table of ratios and the peak memory."""
+    bundle, table = ModelBundle.load(MODELS / "paper"), load_surface_table(MODELS / "simulated_probe")
+    calibration = read_calibration(MODELS / "simulated_probe" / "calibration.json")
+    recording = phantom_recording(Inclusion(10.0, 5.0, 80.0), table, seed=1)
+    base, press = reference(recording.frames), recording.with_role("press")[0]
+    image = tactile_image(press, base, recording.camera.scale)
+    row = np.array([[0.05, 1.7, 57.0]])
+    picture = np.random.default_rng(1).random((492, 768), dtype=np.float32)
+    works: dict[str, Callable[[], object]] = {
+        "yardstick: exp and sum of one image": lambda: np.exp(picture).sum(),
+        "frame: correction": lambda: tactile_image(press, base, recording.camera.scale),
+        "frame: features": lambda: extract_features(image, calibration.settings),
+        "frame: 100 networks (ONNX)": lambda: bundle.estimate(row),
+        "press: ten frames to an estimate": lambda: estimate_recording(recording, bundle, calibration),
+        "scene: finite elements with baseline": lambda: solve(Scene(Inclusion(10.0, 6.0, 80.0))),
+    }
+    seconds = {name: _seconds(work) for name, work in works.items()}
+    yardstick = next(iter(seconds.values()))
+    for name, value in seconds.items():
+        print(f"{name:40} {value / yardstick:10.2f} x   ({1e3 * value:8.2f} ms here)")
+    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+
+
+if __name__ == "__main__":
+    main()

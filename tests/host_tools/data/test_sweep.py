@@ -1,0 +1,115 @@
+"""A sweep can be stopped anywhere and goes on where it was; a scene that fails is a row with its reason."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from daemon_process import ROOT
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.data import sweep as sweep_module
+from host_tools.data.dataset import phantom_index, read_dataset, training_rows
+from host_tools.data.journal import Journal
+from host_tools.data.sweep import SweepPlan, solve_row, sweep
+from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
+
+SCENES = 12
+
+
+def _start(folder, name):
+    command = [sys.executable, "-m", "host_tools", "sweep", "--scenes", str(SCENES), "--seed", "4", "--out", name]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, start_new_session=True)
+
+
+def _wait_for_rows(journal, count):
+    for _ in range(600):
+        if journal.exists() and journal.read_bytes().count(b"\n") > count:
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{journal} has not reached {count} rows")
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    return read_dataset(sweep(SweepPlan(SCENES, 4), tmp_path_factory.mktemp("sweep") / "whole.nc", jobs=1))
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterrupted, stop):
+    journal, out = tmp_path / "s.nc.partial", tmp_path / "s.nc"
+    running = _start(tmp_path, "s.nc")
+    _wait_for_rows(journal, 3)
+    os.killpg(running.pid, stop)
+    _, told = running.communicate(timeout=60)
+    assert running.returncode == (1 if stop == signal.SIGINT else -signal.SIGKILL)
+    assert not out.exists()
+    if stop == signal.SIGINT:
+        assert b"run the same command to go on" in b" ".join(told.split())
+    done = journal.read_bytes().count(b"\n") - 1
+    assert 0 < done < SCENES
+    journal.write_bytes(journal.read_bytes() + b'{"index": 11, "torn by a cra')
+    again = _start(tmp_path, "s.nc")
+    again.communicate(timeout=120)
+    assert again.returncode == 0
+    assert not journal.exists()
+    # Workers may differ from this process in the last bits of their linear algebra.
+    for name, values in read_dataset(out).items():
+        if name != "reason":
+            np.testing.assert_allclose(values, uninterrupted[name], rtol=1e-6, atol=1e-9)
+
+
+def test_a_journal_of_another_sweep_is_not_continued(tmp_path):
+    Journal(tmp_path / "j", SweepPlan(5, 1).as_record()).close()
+    with pytest.raises(InvalidQuantity, match="another one"):
+        Journal(tmp_path / "j", SweepPlan(5, 2).as_record())
+
+
+def test_a_failed_scene_is_kept_with_its_reason_and_left_out_of_training(tmp_path, monkeypatch):
+    solve = sweep_module.solve
+    monkeypatch.setattr(sweep_module, "solve", lambda scene: solve(scene) if scene.inclusion.size_mm > 8 else 1 / 0)
+    plan = SweepPlan(6, 4)
+    path = sweep(plan, tmp_path / "s.nc", jobs=1)
+    small = plan.truths()[:, 0] <= 8
+    dataset, rows = read_dataset(path), training_rows(path)
+    assert 0 < small.sum() < 6
+    assert ["ZeroDivisionError" in reason for reason in dataset["reason"].values] == small.tolist()
+    assert np.isnan(dataset["max_deformation_mm"].values[small]).all()
+    assert rows.excluded_rows == small.sum()
+    assert np.isfinite(rows.features).all()
+
+
+def test_a_scene_that_cannot_be_solved_is_a_row_not_a_crash():
+    row = solve_row(SweepPlan(1, 1), 0, np.array([10.0, 25.0, 80.0]))
+    assert "depth_mm + size_mm" in row["reason"]
+
+
+def test_scenes_fill_the_papers_box_and_a_longer_sweep_begins_like_a_shorter():
+    truths = SweepPlan(2000, 7).truths()
+    filled = np.ptp(truths, axis=0) / np.subtract(PAPER_BOX_HIGH, PAPER_BOX_LOW)
+    assert (truths >= PAPER_BOX_LOW).all()
+    assert (truths <= PAPER_BOX_HIGH).all()
+    assert (filled > 0.99).all()
+    np.testing.assert_array_equal(truths[:10], SweepPlan(10, 7).truths())
+
+
+def test_the_rows_know_the_press_and_the_units(uninterrupted):
+    assert uninterrupted["force_n"].values == pytest.approx(0.5)
+    assert uninterrupted["w_mm"].dims == ("scene", "r_mm")
+    assert uninterrupted["deformation_area_mm2"].attrs["units"] == "mm2"
+
+
+def test_nine_different_rows_are_the_phantoms():
+    chosen = phantom_index(SweepPlan(134, 1).truths())
+    assert len(set(chosen)) == 9
+
+
+@pytest.mark.parametrize("content", [b"", b"not netCDF"])
+def test_a_file_that_is_no_sweep_is_refused(tmp_path, content):
+    (tmp_path / "x.nc").write_bytes(content)
+    with pytest.raises(InvalidQuantity, match="host_tools sweep"):
+        read_dataset(tmp_path / "x.nc")
