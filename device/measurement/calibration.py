@@ -8,6 +8,7 @@ Source: Lee & Won 2013, section III: three separate linear regressions O1':O1, O
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,9 @@ class Calibration:
         """Return the certificate as JSON text."""
         record = {"schema": SCHEMA, **asdict(self)}
         record["held_out"] = {k: np.round(v, 3).tolist() for k, v in record["held_out"].items()}
-        return json.dumps(record, indent=1) + "\n"
+        rows_on_one_line = re.compile(r"\[\s+([-\d.e,\s]+?)\s+\]")
+        text = json.dumps(record, indent=1)
+        return rows_on_one_line.sub(lambda row: f"[{' '.join(row[1].split())}]", text) + "\n"
 
 
 def read_calibration(path: Path) -> Calibration:

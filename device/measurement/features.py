@@ -51,6 +51,7 @@ class Features:
 
 def extract_features(image: TactileImage, settings: FeatureSettings) -> Features:
     """Return the features inside the central window, where the face is not singular and the pixel is valid."""
+    image = _binned(image)
     x, y = image.scale.coordinates_mm(image.contrast.shape)
     window = image.valid & (x**2 + y**2 <= settings.window_radius_mm**2)
     smooth = _smoothed(image, settings.smoothing_mm)
@@ -70,6 +71,16 @@ def extract_features(image: TactileImage, settings: FeatureSettings) -> Features
         centroid_x_mm=centroid_x,
         centroid_y_mm=centroid_y,
     )
+
+
+def _binned(image: TactileImage) -> TactileImage:
+    """Return the image of 2 x 2 pixel means: the blur that follows is wider by far, and costs a seventh on it."""
+    height, width = (side // 2 * 2 for side in image.contrast.shape)
+    size = width // 2, height // 2
+    contrast = cv2.resize(image.contrast[:height, :width], size, interpolation=cv2.INTER_AREA)
+    valid = cv2.resize(image.valid[:height, :width].astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    scale = PixelScale(2 * image.scale.mm_per_px_x, 2 * image.scale.mm_per_px_y)
+    return TactileImage(contrast, valid == 1.0, scale, image.force_n)
 
 
 def _integral(image: TactileImage, window: NDArray[np.bool_]) -> float:
