@@ -1,6 +1,6 @@
 """A scene: the probe, the tissue, the inclusion and the press. Units are mm, kPa and N.
 
-The paper leaves face, layer moduli, slab and press open; the defaults here are ours and named in DESIGN section 2.
+The paper leaves face, layer moduli, slab and press open; the defaults here are ours.
 Layer 1, the hardest, faces the tissue. Source: Lee & Won, IEEE JBHI 17(2), 2013, sections II-III.
 """
 

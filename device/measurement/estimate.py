@@ -63,7 +63,7 @@ class Estimate:
     features: dict[str, float]
 
     def as_record(self) -> dict[str, Any]:
-        """Return the estimate as the JSON object of DESIGN section 5."""
+        """Return the estimate as the JSON object of docs/contracts.md."""
         record = asdict(self)
         del record["features"]
         return record

@@ -1,8 +1,8 @@
 """A tactile image to the paper's three numbers O1'-O3': value at the centroid, sum, and area over a threshold.
 
 Areas are in mm2 and the sum is an integral over mm2, since the camera's pixels are not square. The threshold is half
-of the image's own peak: it then does not move when light or skin do. Source: Lee & Won 2013, section III; DESIGN
-section 2.
+of the image's own peak: it then does not move when light or skin do. Source: Lee & Won 2013, section III;
+docs/measurement.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A bundle is a folder of `model.json` and `model.onnx`. It is used only when the hash, the contract and the golden
 vectors all hold on this very machine: a network that runs is not yet a network that is right.
-Source of the format: the model bundle of DESIGN section 5, schema `tsis.model/1`.
+Source of the format: the model bundle of docs/contracts.md, schema `tsis.model/1`.
 """
 
 from __future__ import annotations

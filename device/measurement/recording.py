@@ -1,7 +1,7 @@
 """A recording: one press on disk, the interchange format of probe, simulator, calibration and tests.
 
 A folder (or .zip of it) with `recording.json` and lossless mono PNGs. What is missing, not finite or contradictory is
-refused with the field's name. A recording is written whole or not at all. Source: DESIGN section 5.
+refused with the field's name. A recording is written whole or not at all. Source: docs/contracts.md.
 """
 
 from __future__ import annotations

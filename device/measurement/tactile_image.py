@@ -2,7 +2,7 @@
 
 The reference is the lump-free press at the *force of the frame*: the hand never holds two presses equally hard, so
 each pixel's reference is a straight line over force through all reference frames (no contact and press beside the
-lesion). Pixels are not square; anything with a length goes through `PixelScale`. Source: DESIGN section 2.
+lesion). Pixels are not square; anything with a length goes through `PixelScale`. Source: docs/measurement.md.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Deformed surface to light: the paper's linear optics, intensity = light field * (a w + b).
 
 It is the paper's own assumption (three straight lines from image to deformation), not a picture of how skin in contact
-scatters light. The light field is uneven, a bright diamond between four LEDs, and dark beyond the face.
-Source: Lee & Won 2013, section III; shape of the field: DESIGN section 2, fact 4.
+scatters light. The light field is uneven, brighter towards each LED, and dark beyond the face.
+Source: Lee & Won 2013, section III.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A profile over the face to the paper's three numbers: largest, summed and how wide (O1, O2, O3).
 
 Used on the lump field (press minus the same press without the inclusion) and, for the paper's literal protocol, on the
-raw field, which peaks at the rim with or without a lump. Source: Lee & Won 2013, section III; DESIGN section 2.
+raw field, which peaks at the rim with or without a lump. Source: Lee & Won 2013, section III; docs/measurement.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Input and output are float32, everything between is float64, so that the seed's scatter is not drowned in rounding.
 The same rows and seed give the same bytes: a bundle carries no time and no path.
-Source of the format: the model bundle of DESIGN section 5; operators: the ONNX standard, opset 17.
+Source of the format: the model bundle of docs/contracts.md; operators: the ONNX standard, opset 17.
 """
 
 from __future__ import annotations

@@ -1,0 +1,40 @@
+"""The README is executed: its commands exist, and what it prints of them is what they print."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+from daemon_process import ROOT
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```console\n\$ (.*)\n((?:.*\n)*?)```", README)
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+@pytest.mark.parametrize(
+    ("command", "shown"), [b for b in BLOCKS if b[0].startswith("host_tools")], ids=lambda v: v[:20]
+)
+def test_a_command_prints_what_the_readme_shows(command, shown):
+    """Word for word, numbers within 2 %: another processor rounds differently, and E amplifies it."""
+    arguments = [sys.executable, "-m", *command.split()]
+    done = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert NUMBER.sub("#", done.stdout).split() == NUMBER.sub("#", shown).split()
+    printed, expected = ([float(n) for n in NUMBER.findall(text)] for text in (done.stdout, shown))
+    assert printed == pytest.approx(expected, rel=0.02, abs=0.06)
+
+
+def test_every_make_verb_of_the_readme_exists():
+    verbs = set(re.findall(r"(?:`|\$ )make ([a-z]+)", README))
+    known = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert {"run", "test", "train"} <= verbs <= known
+
+
+def test_the_greeting_of_make_run_is_the_daemons(daemon):
+    shown = next(text for command, text in BLOCKS if command == "make run")
+    source = (ROOT / "device" / "__main__.py").read_text()
+    assert shown.startswith("TSIS simulated probe SIM-0001: screen and API at http://127.0.0.1:")
+    assert 'f"TSIS {kind} {procedure.config.serial}: screen and API at http://{host}:{port}/"' in source
