@@ -12,7 +12,13 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 pytestmark = pytest.mark.browser
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 SHOTS = ROOT / "build" / "screens"
 
 
@@ -39,7 +45,9 @@ def _require_fits(page: Page) -> None:
     size = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert size == [800, 480]
     inner = "tiles => tiles.flatMap(t => [...t.querySelectorAll('*')].filter(e => e.scrollWidth > e.clientWidth + 1"
-    spilling = page.locator(".tile").evaluate_all(inner + " && e.clientWidth > 0 && !e.closest('.strip')).map(e => e.id))")
+    spilling = page.locator(".tile").evaluate_all(
+        inner + " && e.clientWidth > 0 && !e.closest('.strip')).map(e => e.id))"
+    )
     assert spilling == []
 
 
