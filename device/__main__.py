@@ -1,6 +1,6 @@
 """`python -m device`: start the daemon, or analyse recordings.
 
-Exit codes: 0 ok, 1 failed, 2 usage, 3 not ready.
+Exit codes: 0 ok, 1 failed, 2 usage.
 """
 
 from __future__ import annotations

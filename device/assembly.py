@@ -158,7 +158,7 @@ def _procedure(
     """Tare, load model and calibration, open the store; then nothing is missing."""
     force = parts.open(lambda: _tared(config, cell)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
-    calibration = parts.open(lambda: _calibration_for(config, bundle))
+    calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
     store = parts.open(lambda: Store(config.data))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.
@@ -174,6 +174,7 @@ def _procedure(
         partial(estimate_recording, bundle=bundle, calibration=calibration),
         store,
         calibration_id=calibration.id,
+        opened=parts.opened,
         simulated_truth=scenario.inclusion if scenario else None,
     )
 
@@ -189,8 +190,14 @@ def _tared(config: Config, cell: LoadCell) -> ForceRecorder:
     return ForceRecorder(cell, ForceScale(sensitivity, tare_counts))
 
 
-def _calibration_for(config: Config, bundle: ModelBundle | None) -> Calibration:
-    """Return the certificate; raise `InvalidQuantity` when it is for another probe or another model."""
+def _calibration_for(config: Config, bundle: ModelBundle) -> Calibration:
+    """Return the certificate; raise `InvalidQuantity` when it is not for this probe, model, pixel size and force."""
     calibration = read_calibration(config.calibration)
-    calibration.require_for(config.serial, bundle.sha256 if bundle else calibration.model_sha256)
+    calibration.require_for(config.serial, bundle)
+    calibration.require_scale(config.camera.scale)
+    if not calibration.holds_at(config.press.target_n):
+        bound = f"{calibration.force_n:g} N as calibrated"
+        raise InvalidQuantity(
+            "press.target_n", config.press.target_n, bound, "set that force, or calibrate with this one"
+        )
     return calibration

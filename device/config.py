@@ -71,6 +71,7 @@ class CellSection:
     tare_spread_n: float = 0.02
 
     def __post_init__(self) -> None:
+        require("cell.baud", self.baud, Bound(300, 4_000_000, ""), ACTION)
         bound = Bound(1.0, 1e7, "counts/N")
         require("cell.sensitivity_counts_per_n", self.sensitivity_counts_per_n, bound, ACTION)
         require("cell.tare_spread_n", self.tare_spread_n, Bound(0.0001, 1.0, "N"), ACTION)

@@ -14,15 +14,17 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from device import __version__
 from device.measurement.calibration import read_calibration
+from device.measurement.durable import write_durably
 from device.measurement.features import FEATURE_NAMES
 from device.measurement.inversion import FEATURE_UNITS, BundleRefused, ModelBundle
-from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import read_recording, write_recording
 from device.simulation.renderer import LinearOptics
 from device.simulation.sensor import Sensor
 from device.simulation.surface_table import load_surface_table
 
-MODELS = Path("models")
+MODELS = Path(__file__).resolve().parents[1] / "models"
+PLOTS, PICTURES = (".png", ".pdf", ".svg"), (".png",)
 app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
@@ -55,6 +57,10 @@ def simulate(
     from host_tools.forward.solve import order_difference, solve
     from host_tools.scene import Press, Scene, Tissue
 
+    _require_writable(plot, PLOTS)
+    _require_writable(frame, PICTURES)
+    require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
+    require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
     indentation_mm = 1.0 if indentation_mm is None and force_n is None else indentation_mm
     press = Press(indentation_mm=indentation_mm, force_n=force_n)
     tissue = Tissue(youngs_modulus_kpa=tissue_modulus_kpa)
@@ -75,6 +81,14 @@ def simulate(
         print(json.dumps(record))
     else:
         _print_solution(record)
+
+
+def _require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Refuse a file that could not be written before minutes are spent on what it would hold."""
+    if path and path.suffix.lower() not in suffixes:
+        raise InvalidQuantity("file", path, f"of type {', '.join(suffixes)}", "give it another name")
+    if path and not path.parent.is_dir():
+        raise InvalidQuantity("folder", path.parent, "a folder that exists", "make it first")
 
 
 def _print_solution(record: dict[str, Any]) -> None:
@@ -179,7 +193,10 @@ def phantom(
 
 def _phantoms(model: Path) -> list[Inclusion]:
     """Return the phantom scenes that a bundle was scored on."""
-    return [Inclusion(*row) for row in ModelBundle.load(model).card["phantoms"]]
+    rows = ModelBundle.load(model).card.get("phantoms")
+    if not rows:
+        raise InvalidQuantity("phantoms", "missing in model.json", "the scored scenes", "train the model anew")
+    return [Inclusion(*row) for row in rows]
 
 
 @app.command(epilog="Example: host_tools calibrate build/phantoms/* --out models/simulated_probe/calibration.json")
@@ -199,8 +216,7 @@ def calibrate(
         load_surface_table(table),
         force_n=force_n,
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(certificate.to_json(), encoding="utf-8")
+    write_durably(out, certificate.to_json().encode())
     for image, line, name in zip(FEATURE_NAMES, certificate.regressions, FEATURE_UNITS, strict=True):
         law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"
         print(f"{law:76} R2 {line.r_squared:.5f}  leave-one-out {line.leave_one_out_std:.3g}")

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device import __version__
-from device.measurement.calibration import Calibration, Regression
-from device.measurement.features import FeatureSettings, extract_features
+from device.measurement.calibration import FORCE_TOLERANCE, Calibration, Regression
+from device.measurement.estimate import image_features
+from device.measurement.features import FeatureSettings
 from device.measurement.intervals import HeldOut
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import Recording
-from device.measurement.tactile_image import reference, tactile_image
 from device.simulation.surface_table import SurfaceTable
 from host_tools.forward.deformation import Deformation, deformation
 from host_tools.forward.solve import solve
@@ -40,9 +40,9 @@ def calibrate(
     recordings: Sequence[Recording], bundle: ModelBundle, table: SurfaceTable, *, force_n: float, seed: int = 1
 ) -> Calibration:
     """Return the certificate of the probe that made the recordings; raises `InvalidQuantity` on what cannot be used."""
-    serial = _require_usable(recordings)
+    serial = _require_usable(recordings, force_n)
     settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
-    image = np.array([mean_image_features(recording, settings) for recording in recordings])
+    image = np.array([image_features(recording, settings).mean(axis=0) for recording in recordings])
     truths = [recording.truth for recording in recordings if recording.truth]
     features = np.array([as_row(solve(Scene(truth, Press(force_n=force_n))).lump) for truth in truths])
     lines, residuals = zip(*(fit_line(image[:, i], features[:, i]) for i in range(features.shape[1])), strict=True)
@@ -53,6 +53,9 @@ def calibrate(
         made_at=datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
         serial=serial,
         model_sha256=bundle.sha256,
+        model_card_sha256=bundle.card_sha256,
+        force_n=force_n,
+        scale=recordings[0].camera.scale,
         settings=settings,
         regressions=lines,
         phantoms=len(recordings),
@@ -62,10 +65,17 @@ def calibrate(
     )
 
 
-def _require_usable(recordings: Sequence[Recording]) -> str:
+def _require_usable(recordings: Sequence[Recording], force_n: float) -> str:
     action = "record more phantoms"
     require("phantom recordings", len(recordings), Bound(PHANTOMS_NEEDED, 10_000, "recordings"), action)
     for recording in recordings:
+        presses = len(recording.with_role("press"))
+        require(f"press frames of {recording.id}", presses, Bound(1, 1e6, "frames"), "record the phantom again")
+        mean_n = float(np.mean([frame.force_n for frame in recording.with_role("press")]))
+        bound = Bound(force_n * (1 - FORCE_TOLERANCE), force_n * (1 + FORCE_TOLERANCE), "N")
+        require(f"mean force of {recording.id}", mean_n, bound, "press the phantom with the force of --force-n")
+        if recording.camera.scale != recordings[0].camera.scale:
+            raise InvalidQuantity("pixel size", recording.camera.scale, "the same in all recordings", "record anew")
         if recording.truth is None:
             raise InvalidQuantity(
                 "truth", f"missing in {recording.id}", "the phantom's inclusion", "add it or leave it out"
@@ -76,13 +86,6 @@ def _require_usable(recordings: Sequence[Recording]) -> str:
     return serials[0]
 
 
-def mean_image_features(recording: Recording, settings: FeatureSettings) -> Array:
-    """Return the image features [3] of a recording, averaged over its press frames."""
-    base, scale = reference(recording.frames), recording.camera.scale
-    images = (tactile_image(frame, base, scale) for frame in recording.with_role("press"))
-    return np.asarray(np.mean([extract_features(image, settings).as_row() for image in images], axis=0))
-
-
 def as_row(lump: Deformation) -> Array:
     """Return the deformation features in the model's order."""
     return np.array([lump.max_deformation_mm, lump.central_deformation_mm3, lump.deformation_area_mm2])
@@ -90,13 +93,15 @@ def as_row(lump: Deformation) -> Array:
 
 def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:
     """Return the least-squares line y = slope x + intercept and its leave-one-out residuals e_i / (1 - h_ii)."""
+    if np.ptp(x) <= 1e-9 * np.abs(x).max():
+        raise InvalidQuantity("phantoms' features", "all equal", "different", "use phantoms of different inclusions")
     design = np.column_stack([x, np.ones_like(x)])
     (slope, intercept), *_ = np.linalg.lstsq(design, y, rcond=None)
     error = y - design @ (slope, intercept)
     leverage = np.sum(design @ np.linalg.inv(design.T @ design) * design, axis=1)
     left_out = error / (1 - leverage)
     r_squared = 1 - float(error @ error) / float(np.sum((y - y.mean()) ** 2))
-    return Regression(float(slope), float(intercept), r_squared, float(left_out.std())), left_out
+    return Regression(float(slope), float(intercept), r_squared, float(left_out.std(ddof=1))), left_out
 
 
 def table_features(table: SurfaceTable, inclusion: Inclusion, force_n: float) -> Array:
@@ -124,4 +129,5 @@ def held_out_scenes(
     exact = np.array([table_features(table, Inclusion(*map(float, row)), force_n) for row in truth])
     drawn = rng.multivariate_normal(np.zeros(3), errors.T @ errors / len(errors), scenes)
     drawn[:, 2] /= np.maximum(exact[:, 0], WEAKEST_PEAK_MM)
-    return HeldOut(estimate=bundle.estimate(exact + drawn).estimate.astype(float), truth=truth)
+    estimate = bundle.estimate(exact + drawn).estimate
+    return HeldOut(estimate, truth, box_low=np.array(PAPER_BOX_LOW), box_high=np.array(PAPER_BOX_HIGH))

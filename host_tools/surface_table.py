@@ -1,7 +1,7 @@
 """Builds the virtual probe's table of deformed surfaces from finite-element solves.
 
-Chebyshev points in size (0 included), depth and ln E: 9 x 8 x 5 hold 0.1 % of the peak between the points (measured
-by `tests/host_tools/test_surface_table.py` against fresh solves).
+Chebyshev points in size (0 included), depth and ln E: 9 x 8 x 5 hold 0.5 % of the peak between the points (shown by
+`tests/host_tools/test_surface_table.py` against fresh solves).
 """
 
 from __future__ import annotations

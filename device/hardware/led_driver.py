@@ -40,7 +40,7 @@ SIDES_IN_PWM_MODE = (0b10_10_10_10, 0, 0, 0)
 """LEDOUT0..3 (9.5.6): outputs 0-3 follow their own brightness register, outputs 4-15 are off."""
 FULL_SCALE = 255
 
-REMEDY = "Check the cable and the supply of the LED board, then run the self-test."
+REMEDY = "Check the cable and the supply of the LED board."
 
 
 class I2cBus(Protocol):
@@ -60,6 +60,9 @@ class Tlc59116:
         """Start the chip with all sides dark; raise `LightError` when it does not answer or hold its set-up."""
         self._bus = bus
         self._address = address
+        self._set_up()
+
+    def _set_up(self) -> None:
         self._write(Register.MODE1, [0])
         time.sleep(OSCILLATOR_START_S)
         # Brightness before output mode: whatever the registers held, no side flashes.
@@ -79,7 +82,8 @@ class Tlc59116:
         acknowledged_s = time.monotonic()
         mode1, _mode2, *held = self._read(AUTO_INCREMENT_ALL | Register.MODE1, Register.PWM0 + LED_COUNT)
         if mode1 & OSCILLATOR_OFF:
-            raise LightError(f"LED chip {self._address:#04x} has lost its set-up: its oscillator is off.", REMEDY)
+            self._set_up()
+            raise LightError(f"LED chip {self._address:#04x} had lost its set-up: its supply has dipped.", REMEDY)
         self._require_held("brightness", pwm, held)
         return acknowledged_s
 

@@ -95,7 +95,7 @@ class OpenScale:
             return bytes(self._port.read(self._port.in_waiting or 1))
         except OSError as error:  # SerialException is one; `in_waiting` of an unplugged port raises a plain one
             cause = f"Load cell on {self._port.name} is gone: {error}."
-            raise LoadCellError(cause, "Plug its USB cable in again; the probe then reconnects.") from error
+            raise LoadCellError(cause, "Plug its USB cable in again, then restart the probe.") from error
 
     def _keep(self, line: bytes, t_s: float) -> None:
         try:

@@ -39,9 +39,3 @@ class Bench:
     def is_steady(self, t_s: float, steady_n: float) -> bool:
         """Return whether the force hardly varied just before a time: a ramp through the band is no hold."""
         return self.force.range_n(t_s, window_s=STEADY_WINDOW_S) <= steady_n
-
-    def close(self) -> None:
-        """Dark first, then camera and cell."""
-        self.lights.close()
-        self.camera.close()
-        self.force.close()

@@ -37,7 +37,9 @@ class Capture:
 
     def unloaded(self) -> list[Frame]:
         """Return dark and lit frames of the untouched probe; waits until it is untouched."""
-        self.until_lifted()
+        self.bench.light(DARK)
+        while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
+            time.sleep(POLL_S)
         frames: list[Frame] = []
         lights: tuple[tuple[Role, tuple[float, float, float, float]], ...] = (("dark", DARK), ("reference", self.lit))
         for role, ratio in lights:
@@ -65,11 +67,14 @@ class Capture:
             self.board.update(guidance=guidance, frames_taken=len(taken))
         return taken
 
-    def until_lifted(self) -> None:
-        """Wait until the probe touches nothing, with the light off; the operator is told to lift it."""
+    def lifted(self) -> None:
+        """Return once the probe touches nothing between the two presses; raises `PressEnded` as `loaded` does."""
         self.bench.light(DARK)
-        while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
-            self.board.update(guidance=Guidance.LIFT)
+        deadline_s = time.monotonic() + self.press.timeout_s
+        while self.bench.force.latest_n >= self.press.contact_n:
+            self._require_going_on()
+            if time.monotonic() > deadline_s:
+                raise PressEnded("rejected", f"The probe was not lifted for {self.press.timeout_s:.0f} s: begin again.")
             time.sleep(POLL_S)
 
     def _require_going_on(self) -> None:

@@ -11,6 +11,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -48,9 +49,10 @@ class Procedure:
         store: Store,
         *,
         calibration_id: str,
+        opened: ExitStack,
         simulated_truth: Inclusion | None = None,
     ) -> None:
-        self.config, self.bench, self.store = config, bench, store
+        self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.board = StatusBoard()
         self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
         self._capture = Capture(bench, config.press, config.light, self.board)
@@ -75,10 +77,10 @@ class Procedure:
         self._thread.start()
 
     def close(self) -> None:
-        """End the press under way, switch the light off and release the hardware."""
+        """End the press under way, switch the light off and release every part that was opened."""
         self._capture.stopping.set()
         self._thread.join(timeout=5.0)
-        self.bench.close()
+        self._opened.close()
 
     def request(self) -> PressJob:
         """Ask for a measurement; raise `BusyError` when one is under way, `DeviceError` when the probe is at fault."""
@@ -88,9 +90,9 @@ class Procedure:
                 raise status.fault
             if self._requested or (status.press and status.press.state not in ENDED):
                 raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
-            self._requested = self._new_job()
-            self.store.save_press(self._requested.as_record())
-            job = self._requested
+            job = self._new_job()
+            self.store.save_press(job.as_record())
+            self._requested = job
         for listener in self._on_request:
             listener()
         return job
@@ -105,6 +107,8 @@ class Procedure:
             job = self._requested or self.board.now.press
             if job is None or job.id != press_id or job.state in ENDED:
                 raise UnknownResource(f"Press {press_id} is not under way.", "Only a running press can be cancelled.")
+            if job.state == "computing":
+                raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
             self._capture.cancelled.set()
 
     def _run(self) -> None:
@@ -119,11 +123,8 @@ class Procedure:
 
     def _one_press(self) -> None:
         unloaded = self._capture.unloaded()
-        status = self.board.now
-        if status.step in ("starting", "fault"):
+        if self.board.now.step in ("starting", "fault"):
             self.board.update(step="ready", guidance=Guidance.PRESS_BESIDE, fault=None)
-        elif status.guidance is Guidance.LIFT:
-            self.board.update(guidance=Guidance.PRESS_BESIDE)
         job = self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S)
         if job:
             self._measure(job, unloaded)
@@ -150,7 +151,7 @@ class Procedure:
             self.board.update(step="reference", guidance=Guidance.PRESS_BESIDE, frames_taken=0, measurement_id=None)
             reference = self._capture.loaded("reference", Guidance.PRESS_BESIDE)
             self.board.update(guidance=Guidance.LIFT)
-            self._capture.until_lifted()
+            self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)
             self.board.update(step="lesion", guidance=Guidance.PRESS_LESION, frames_taken=0)
             press = self._capture.loaded("press", Guidance.PRESS_LESION)
@@ -161,9 +162,6 @@ class Procedure:
             self._reject(job, end.state, end.reason)
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
-        except DeviceError as error:
-            self._set_job(job, state="failed", reason=str(error))
-            raise
         else:
             self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
@@ -218,8 +216,21 @@ class Procedure:
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:
             log.error("%s %s", error.code, error)
+        self._fail_press(str(error))
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
         self._capture.stopping.wait(AFTER_FAULT_S)
+
+    def _fail_press(self, reason: str) -> None:
+        """End the press under way, so that the next may begin: also when the store, too, is at fault."""
+        job = self.board.now.press
+        if job is None or job.state in ENDED:
+            return
+        failed = replace(job, state="failed", reason=reason)
+        self.board.update(press=failed)
+        try:
+            self.store.save_press(failed.as_record())
+        except DeviceError as error:
+            log.error("%s %s", error.code, error)
 
 
 def _now() -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,16 @@ from numpy.typing import NDArray
 
 from device.measurement.features import FEATURE_NAMES, FeatureSettings
 from device.measurement.intervals import HeldOut
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.inversion import ModelBundle
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.tactile_image import PixelScale
 
 SCHEMA = "tsis.calibration/1"
 RENEW = "calibrate the probe again"
+
+FORCE_TOLERANCE = 0.06
+"""Relative. Features grow with the force: a press a fifth harder leaves the intervals beside the truth."""
+SCALE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,9 @@ class Calibration:
     made_at: str
     serial: str
     model_sha256: str
+    model_card_sha256: str
+    force_n: float
+    scale: PixelScale
     settings: FeatureSettings
     regressions: tuple[Regression, ...]
     phantoms: int
@@ -53,6 +62,11 @@ class Calibration:
         if len(self.regressions) != len(FEATURE_NAMES):
             found = f"{len(self.regressions)} lines"
             raise InvalidQuantity("regressions", found, f"one for each of {', '.join(FEATURE_NAMES)}", RENEW)
+        for name in ("id", "serial", "model_sha256", "model_card_sha256"):
+            value = getattr(self, name)
+            if not isinstance(value, str):
+                raise InvalidQuantity(name, repr(value), "text", RENEW)
+        require("calibration's force_n", self.force_n, Bound(0.0, 1e3, "N", low_included=False), RENEW)
         numbers = [value for line in self.regressions for value in asdict(line).values()]
         if not np.isfinite(numbers).all():
             raise InvalidQuantity("regressions", "not finite", "finite numbers", RENEW)
@@ -63,14 +77,26 @@ class Calibration:
         intercept = np.array([line.intercept for line in self.regressions])
         return np.asarray(image_features * slope + intercept)
 
-    def require_for(self, serial: str, model_sha256: str) -> None:
+    def require_for(self, serial: str, bundle: ModelBundle) -> None:
         """Raise `InvalidQuantity` when the certificate is for another probe or another model."""
-        if self.model_sha256 != model_sha256:
-            found, expected = f"for model {self.model_sha256[:12]}", f"for model {model_sha256[:12]}"
-            raise InvalidQuantity("calibration", found, expected, "calibrate with this model")
+        pairs = ((self.model_sha256, bundle.sha256), (self.model_card_sha256, bundle.card_sha256))
+        for ours, theirs in pairs:
+            if ours != theirs:
+                found, expected = f"for model {ours[:12]}", f"for model {theirs[:12]}"
+                raise InvalidQuantity("calibration", found, expected, "calibrate with this model")
         if self.serial != serial:
             found, expected = f"for probe {self.serial}", f"for probe {serial}"
             raise InvalidQuantity("calibration", found, expected, "use the probe's own certificate")
+
+    def require_scale(self, scale: PixelScale) -> None:
+        """Raise `InvalidQuantity` when frames are of another pixel size than the certificate's."""
+        ours, theirs = astuple(self.scale), astuple(scale)
+        if not np.allclose(ours, theirs, rtol=SCALE_TOLERANCE):
+            raise InvalidQuantity("mm_per_px_x, mm_per_px_y", theirs, f"{ours} as calibrated", RENEW)
+
+    def holds_at(self, force_n: float) -> bool:
+        """Return whether a press is as hard as those the regressions and the model were made with."""
+        return abs(force_n - self.force_n) <= FORCE_TOLERANCE * self.force_n
 
     def to_json(self) -> str:
         """Return the certificate as JSON text."""
@@ -84,16 +110,19 @@ class Calibration:
 def read_calibration(path: Path) -> Calibration:
     """Read a certificate; raise `InvalidQuantity` naming the first thing that is wrong with it."""
     try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        record: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InvalidQuantity("calibration", path, "a readable certificate", f"{RENEW} ({error})") from error
-    if record.pop("schema", None) != SCHEMA:
+    if not isinstance(record, dict) or record.pop("schema", None) != SCHEMA:
         raise InvalidQuantity("calibration schema", path, SCHEMA, RENEW)
     try:
+        record["scale"] = PixelScale(**record["scale"])
         record["settings"] = FeatureSettings(**record["settings"])
         record["regressions"] = tuple(Regression(**line) for line in record["regressions"])
         held_out = {name: np.array(rows, dtype=float) for name, rows in record["held_out"].items()}
         record["held_out"] = HeldOut(**held_out)
         return Calibration(**record)
-    except (KeyError, TypeError) as error:
+    except InvalidQuantity:
+        raise
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InvalidQuantity("calibration", path, "a complete certificate", f"{RENEW} ({error})") from error

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.calibration import Calibration
-from device.measurement.features import FEATURE_NAMES, extract_features
+from device.measurement.features import FEATURE_NAMES, FeatureSettings, extract_features
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording import Recording
@@ -74,7 +74,8 @@ def estimate_recording(recording: Recording, bundle: ModelBundle, calibration: C
 
     Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe.
     """
-    calibration.require_for(recording.serial, bundle.sha256)
+    calibration.require_for(recording.serial, bundle)
+    calibration.require_scale(recording.camera.scale)
     press = recording.with_role("press")
     if not press:
         raise InvalidQuantity("press frames", 0, "at least one", "record frames while the probe presses the lesion")
@@ -82,11 +83,16 @@ def estimate_recording(recording: Recording, bundle: ModelBundle, calibration: C
     if force_n < CONTACT_N:
         reason = f"The mean force is {force_n:.3f} N, below {CONTACT_N} N: press the lesion."
         return _without_answer("no_contact", reason, recording, bundle, calibration)
+    if not calibration.holds_at(force_n):
+        reason = (
+            f"The mean force is {force_n:.3f} N, not the {calibration.force_n:g} N of the calibration: press again."
+        )
+        return _without_answer("rejected", reason, recording, bundle, calibration)
     saturated = max(saturated_ratio(frame.counts) for frame in press)
     if saturated > SATURATED_RATIO:
         reason = f"{saturated:.1%} of the pixels are saturated, above {SATURATED_RATIO:.1%}: lower the light."
         return _without_answer("saturated", reason, recording, bundle, calibration)
-    image_rows = image_features(recording, calibration)
+    image_rows = image_features(recording, calibration.settings)
     peak = float(image_rows[:, 0].mean())
     if peak < VISIBLE_CONTRAST:
         reason = f"No inclusion stands out: peak contrast {peak:.2%}, below {VISIBLE_CONTRAST:.1%}."
@@ -94,11 +100,11 @@ def estimate_recording(recording: Recording, bundle: ModelBundle, calibration: C
     return _answer(image_rows, recording, bundle, calibration)
 
 
-def image_features(recording: Recording, calibration: Calibration) -> NDArray[np.float64]:
+def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[np.float64]:
     """Return the image features [n, 3] of a recording's press frames."""
     base, scale = reference(recording.frames), recording.camera.scale
     images = (tactile_image(frame, base, scale) for frame in recording.with_role("press"))
-    return np.array([extract_features(image, calibration.settings).as_row() for image in images])
+    return np.array([extract_features(image, settings).as_row() for image in images])
 
 
 def _answer(
@@ -106,15 +112,17 @@ def _answer(
 ) -> Estimate:
     rows = calibration.deformation_features(image_rows)
     estimates = bundle.estimate(rows).estimate.astype(float)
-    mean, std = estimates.mean(axis=0), estimates.std(axis=0)
+    mean, std = estimates.mean(axis=0), _scatter(estimates)
+    outside = bundle.outside_training_range(rows.mean(axis=0))
+    if outside:
+        return _without_answer("outside_range", " ".join(outside), recording, bundle, calibration)
     interval = calibration.held_out.interval(mean)
     value = np.clip(mean, interval.low, interval.high)  # a network may extrapolate; its interval cannot
-    outside = bundle.outside_training_range(rows.mean(axis=0))
-    status, reason = _verdict(outside, interval.identifiable)
+    status, reason = _verdict(interval.identifiable)
     quantities: dict[str, Any] = {
         name: Quantity(
             float(value[i]), float(interval.low[i]), float(interval.high[i]), float(std[i]),
-            bool(interval.identifiable[i]) and not outside,
+            bool(interval.identifiable[i]),
         )
         for i, name in enumerate(UNKNOWNS)
     }  # fmt: skip
@@ -132,9 +140,12 @@ def _named(image_row: NDArray[np.float64], row: NDArray[np.float64], bundle: Mod
     return {name: float(value) for name, value in zip(names, (*image_row, *row), strict=True)}
 
 
-def _verdict(outside: list[str], identifiable: NDArray[np.bool_]) -> tuple[Status, str]:
-    if outside:
-        return "outside_range", " ".join(outside)
+def _scatter(estimates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviation [3] over the frames; of one frame there is none to see."""
+    return np.asarray(estimates.std(axis=0, ddof=1) if len(estimates) > 1 else np.zeros(estimates.shape[1]))
+
+
+def _verdict(identifiable: NDArray[np.bool_]) -> tuple[Status, str]:
     open_ones = [SPOKEN[name] for name, known in zip(UNKNOWNS, identifiable, strict=True) if not known]
     if open_ones:
         return "not_identifiable", f"This press does not determine {' and '.join(open_ones)}."

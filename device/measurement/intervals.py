@@ -33,26 +33,32 @@ class Interval:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Estimates and truths [n, 3] of scenes that neither network nor regression has seen."""
+    """Estimates and truths [n, 3] of scenes that neither network nor regression has seen, drawn from a box [3]."""
 
     estimate: Array
     truth: Array
+    box_low: Array
+    box_high: Array
 
     def __post_init__(self) -> None:
         require("held-out scenes", len(self.truth), Bound(2 * NEIGHBOURS, 1e6, "scenes"), "calibrate anew")
-        if self.estimate.shape != self.truth.shape or self.truth.shape[1] != len(UNKNOWNS):
+        if self.estimate.shape != self.truth.shape or self.truth.shape[1:] != (len(UNKNOWNS),):
             shapes = f"{self.estimate.shape} and {self.truth.shape}"
             raise InvalidQuantity("held-out shapes", shapes, "equal, with three columns", "calibrate anew")
+        if self.box_low.shape != (len(UNKNOWNS),) or not (self.box_low < self.box_high).all():
+            raise InvalidQuantity(
+                "held-out box", f"{self.box_low} to {self.box_high}", "three ranges", "calibrate anew"
+            )
         if not (np.isfinite(self.estimate).all() and np.isfinite(self.truth).all()):
             raise InvalidQuantity("held-out scenes", "not finite", "finite numbers", "calibrate anew")
 
     def interval(self, estimate: Array) -> Interval:
         """Return the interval of one estimate [3]."""
-        scale = np.ptp(self.truth, axis=0)
-        distance = np.linalg.norm((self.estimate - estimate) / scale, axis=1)
+        distance = np.linalg.norm((self.estimate - estimate) / (self.box_high - self.box_low), axis=1)
         near = np.argpartition(distance, NEIGHBOURS)[:NEIGHBOURS]
         tails = (1 - COVERAGE) / 2, (1 + COVERAGE) / 2
-        low, high = estimate + np.quantile((self.truth - self.estimate)[near], tails, axis=0)
-        low, high = (np.clip(end, self.truth.min(axis=0), self.truth.max(axis=0)) for end in (low, high))
-        box_low, box_high = np.quantile(self.truth, tails, axis=0)
-        return Interval(low, high, (high - low) < IDENTIFIABLE_RATIO * (box_high - box_low))
+        # With "weibull", position p (n + 1), the errors of few neighbours cover their share of new ones, not less.
+        low, high = estimate + np.quantile((self.truth - self.estimate)[near], tails, axis=0, method="weibull")
+        low, high = (np.clip(end, self.box_low, self.box_high) for end in (low, high))
+        widest = COVERAGE * (self.box_high - self.box_low)
+        return Interval(low, high, (low < high) & (high - low < IDENTIFIABLE_RATIO * widest))

@@ -63,14 +63,15 @@ class Raw:
 class ModelBundle:
     """A verified inverse network.
 
-    name, sha256 (of model.onnx); feature_names: order of the features; feature_range: training range of each, in its
-    own unit; box: training range (low, high) of each unknown in mm, mm, kPa; card: all of model.json.
+    name; sha256 of model.onnx and card_sha256 of model.json; feature_names: order of the features; feature_range:
+    training range of each, in its own unit; box: training range (low, high) of each unknown in mm, mm, kPa;
+    card: all of model.json.
     """
 
-    def __init__(self, folder: Path, card: dict[str, Any], network: bytes) -> None:
+    def __init__(self, folder: Path, card: bytes, network: bytes) -> None:
         """Use `load`: it alone reads the files. Raises `BundleRefused`."""
-        self.card = card
-        fields = _Fields(folder, card)
+        self.card, self.card_sha256 = _parsed(folder, card), hashlib.sha256(card).hexdigest()
+        fields = _Fields(folder, self.card)
         self.name = str(fields.of("name", str))
         self.sha256 = _verified_hash(fields, network)
         self.feature_names = _verified_names(fields)
@@ -83,7 +84,7 @@ class ModelBundle:
     @classmethod
     def load(cls, folder: Path) -> ModelBundle:
         """Return the bundle in a folder; raises `BundleRefused` when anything in it is missing or does not hold."""
-        return cls(folder, _read_card(folder), _read(folder, MODEL_FILE))
+        return cls(folder, _read(folder, CARD_FILE), _read(folder, MODEL_FILE))
 
     def estimate(self, features: NDArray[np.floating[Any]]) -> Raw:
         """Return the raw estimate of features [n, F], in the order and units of `feature_names`.
@@ -179,10 +180,9 @@ def _read(folder: Path, file: str) -> bytes:
         raise BundleRefused(folder, file, f"unreadable ({error.strerror})", "a readable file") from error
 
 
-def _read_card(folder: Path) -> dict[str, Any]:
-    text = _read(folder, CARD_FILE)
+def _parsed(folder: Path, content: bytes) -> dict[str, Any]:
     try:
-        card = json.loads(text)
+        card = json.loads(content)
     except ValueError as error:
         raise BundleRefused(folder, CARD_FILE, f"not JSON ({error})", "valid JSON") from error
     if not isinstance(card, dict) or card.get("schema") != SCHEMA:
@@ -205,8 +205,8 @@ def _verified_names(fields: _Fields) -> tuple[str, ...]:
         if feature not in known:
             fields.refuse("features", feature, f"among {', '.join(FEATURE_UNITS)}, each with its unit")
     names = tuple(feature["name"] for feature in features)
-    if not names or len(set(names)) != len(names):
-        fields.refuse("features", list(names), "at least one feature, each only once")
+    if names != tuple(FEATURE_UNITS):
+        fields.refuse("features", list(names), f"{', '.join(FEATURE_UNITS)}, in this order")
     return names
 
 

@@ -7,23 +7,27 @@ refused with the field's name. A recording is written whole or not at all. Sourc
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
 import cv2
 import numpy as np
 
+from device.measurement.durable import sync_directory, write_and_sync
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.tactile_image import Frame, PixelScale, require_one_shape
 
 SCHEMA = "tsis.recording/1"
 REPAIR = "record the press again, or correct the file"
+UNREADABLE = (OSError, KeyError, zipfile.BadZipFile, zlib.error)
+"""What reading a file of a folder or .zip raises when it is missing or damaged."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,9 @@ class Recording:
             if shape != expected:
                 found = f"{shape[1]} x {shape[0]} px"
                 raise InvalidQuantity("frame shape", found, f"{expected[1]} x {expected[0]} px as in camera", REPAIR)
+            bits = 8 * frame.counts.itemsize
+            if bits != self.camera.bits:
+                raise InvalidQuantity("camera.bits", self.camera.bits, f"{bits} as the frames have", REPAIR)
 
     def with_role(self, role: str) -> list[Frame]:
         """Return the frames of one role in order."""
@@ -82,18 +89,26 @@ class Recording:
 
 
 def write_recording(recording: Recording, folder: Path) -> None:
-    """Write a recording to a new folder; when this returns, it is on the disk."""
+    """Write a recording to a new folder; when this returns, it is on the disk. After an `OSError` nothing is left."""
     temporary = folder.with_name(folder.name + ".tmp")
     shutil.rmtree(temporary, ignore_errors=True)
+    try:
+        _write_files(recording, temporary)
+        temporary.rename(folder)
+    except OSError:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+    sync_directory(folder.parent)
+
+
+def _write_files(recording: Recording, temporary: Path) -> None:
     (temporary / "frames").mkdir(parents=True)
     for i, frame in enumerate(recording.frames):
-        _write_durably(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
+        write_and_sync(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
     text = json.dumps(_as_json(recording), indent=1)
-    _write_durably(temporary / "recording.json", text.encode())
+    write_and_sync(temporary / "recording.json", text.encode())
     for directory in (temporary / "frames", temporary):
         sync_directory(directory)
-    temporary.rename(folder)
-    sync_directory(folder.parent)
 
 
 def read_recording(path: Path) -> Recording:
@@ -101,29 +116,13 @@ def read_recording(path: Path) -> Recording:
     with _files(path) as read:
         try:
             record = json.loads(read("recording.json"))
-        except (OSError, KeyError, ValueError) as error:
+        except (*UNREADABLE, ValueError) as error:
             raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
         return _from_json(record, read)
 
 
 def _frame_name(i: int) -> str:
     return f"frames/{i:03d}.png"
-
-
-def _write_durably(path: Path, content: bytes) -> None:
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def sync_directory(folder: Path) -> None:
-    """Make a folder's entries durable: without it a renamed file may be gone after a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _as_json(recording: Recording) -> dict[str, Any]:
@@ -152,8 +151,12 @@ def _as_json(recording: Recording) -> dict[str, Any]:
 
 @contextmanager
 def _files(path: Path) -> Iterator[Callable[[str], bytes]]:
-    if path.suffix == ".zip" and zipfile.is_zipfile(path):
-        with zipfile.ZipFile(path) as archive:
+    if path.suffix == ".zip" and path.is_file():
+        try:
+            opened = zipfile.ZipFile(path)
+        except zipfile.BadZipFile as error:
+            raise InvalidQuantity("recording", path, "a readable .zip", REPAIR) from error
+        with opened as archive:
             names = archive.namelist()
             root = next((n.removesuffix("recording.json") for n in names if n.endswith("recording.json")), "")
             yield lambda name: archive.read(root + name)
@@ -185,14 +188,38 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         id=_field(record, "id", str),
         serial=_field(device, "serial", str, "device."),
         software=_field(device, "software", str, "device."),
-        started_at=_field(record, "started_at", str),
+        started_at=_time(record),
         camera=settings,
         frames=tuple(_frame(entry, i, read) for i, entry in enumerate(_field(record, "frames", list))),
-        calibration_id=record.get("calibration_id"),
-        position_mm=tuple(record.get("position_mm", (0.0, 0.0))),
-        truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth else None,
-        simulated=bool(record.get("simulated", False)),
+        calibration_id=_optional(record, "calibration_id", str, None),
+        position_mm=_position_mm(_optional(record, "position_mm", list, [0.0, 0.0])),
+        truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth is not None else None,
+        simulated=_optional(record, "simulated", bool, False),
     )
+
+
+def _time(record: dict[str, Any]) -> str:
+    text = str(_field(record, "started_at", str))
+    try:
+        datetime.fromisoformat(text)
+    except ValueError as error:
+        raise InvalidQuantity("started_at", text, "a time of RFC 3339", REPAIR) from error
+    return text
+
+
+def _optional(record: dict[str, Any], name: str, kind: type, default: Any) -> Any:
+    """Return a field that may be null or absent, then the default."""
+    value = record.get(name)
+    if value is not None and not isinstance(value, kind):
+        raise InvalidQuantity(name, repr(value), f"of type {kind.__name__}", REPAIR)
+    return default if value is None else value
+
+
+def _position_mm(values: list[Any]) -> tuple[float, float]:
+    if len(values) != 2:
+        raise InvalidQuantity("position_mm", values, "two numbers, x and y", REPAIR)
+    x, y = (require("position_mm", value, Bound(-1e3, 1e3, "mm"), REPAIR) for value in values)
+    return x, y
 
 
 def _frame(entry: dict[str, Any], i: int, read: Callable[[str], bytes]) -> Frame:
@@ -202,7 +229,7 @@ def _frame(entry: dict[str, Any], i: int, read: Callable[[str], bytes]) -> Frame
         raise InvalidQuantity(where + "file", name, "a path inside the recording", REPAIR)
     try:
         counts = cv2.imdecode(np.frombuffer(read(name), np.uint8), cv2.IMREAD_UNCHANGED)
-    except (OSError, KeyError, cv2.error) as error:
+    except (*UNREADABLE, cv2.error) as error:
         raise InvalidQuantity(where + "file", name, "a readable PNG", REPAIR) from error
     if counts is None:
         raise InvalidQuantity(where + "file", name, "a readable PNG", REPAIR)

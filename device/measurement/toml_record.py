@@ -11,11 +11,16 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_origin, get_type_hints
 
 from device.measurement.quantities import InvalidQuantity
 
 Record = TypeVar("Record")
+
+ACCEPTED: dict[Any, tuple[type, ...]] = {
+    float: (int, float), int: (int,), str: (str,), bool: (bool,), Path: (str,), tuple: (list,)
+}  # fmt: skip
+"""What TOML must hold for a field of each type."""
 
 
 def read_toml(kind: type[Record], path: Path) -> Record:
@@ -51,9 +56,8 @@ def _value(kind: Any, value: Any, where: str) -> Any:
         if not isinstance(value, Mapping):
             raise InvalidQuantity(where, repr(value), "a table", f"write it as [{where}]")
         return from_table(kind, value, where + ".")
-    if isinstance(value, list):
-        return tuple(value)
-    expected = {float: (int, float), int: (int,), str: (str,), bool: (bool,), Path: (str,)}.get(kind)
-    if expected and (not isinstance(value, expected) or (isinstance(value, bool) and kind is not bool)):
-        raise InvalidQuantity(where, repr(value), f"of type {kind.__name__}", "correct its type")
-    return Path(value) if kind is Path else value
+    plain = get_origin(kind) or kind
+    accepted = ACCEPTED.get(plain)
+    if accepted and (not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool)):
+        raise InvalidQuantity(where, repr(value), f"of type {accepted[-1].__name__}", "correct its type")
+    return plain(value) if plain in (Path, tuple) else value

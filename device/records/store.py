@@ -6,6 +6,7 @@ with NORMAL the last acknowledged row may be gone after a power cut. A job that 
 
 from __future__ import annotations
 
+import fcntl
 import json
 import shutil
 import sqlite3
@@ -35,6 +36,7 @@ class Store:
         self.folder, self._lock = folder, threading.Lock()
         try:
             (folder / "recordings").mkdir(parents=True, exist_ok=True)
+            self._take()
             self._db = sqlite3.connect(folder / "tsis.sqlite", check_same_thread=False)
             self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = FULL")
@@ -43,6 +45,22 @@ class Store:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
             raise StorageError(f"The store {folder} cannot be opened: {error}.", remedy) from error
         self._end_interrupted()
+        self._remove_unfinished()
+
+    def _take(self) -> None:
+        """Hold the folder for this process: a second daemon on it would end the first one's presses."""
+        self._lock_file = (self.folder / "lock").open("w")
+        try:
+            fcntl.flock(self._lock_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._lock_file.close()
+            remedy = "Stop it, or give this one another folder with the setting `data`."
+            raise StorageError(f"The store {self.folder} is in use by another daemon.", remedy) from None
+
+    def _remove_unfinished(self) -> None:
+        """Remove recordings that a power cut left half written; nobody was ever told of them."""
+        for folder in (self.folder / "recordings").glob("*.tmp"):
+            shutil.rmtree(folder, ignore_errors=True)
 
     def _end_interrupted(self) -> None:
         for job in self._records("SELECT record FROM press WHERE ended = 0"):
@@ -56,7 +74,10 @@ class Store:
             with self._lock, self._db:
                 yield self._db
         except (OSError, sqlite3.Error) as error:
-            raise StorageError(f"The disk did not take the record: {error}.", "Free space on the disk.") from error
+            raise StorageError(
+                f"The disk did not take the record: {error}.",
+                "Free the disk, and let no other program hold the database.",
+            ) from error
 
     def _records(self, query: str, *values: object) -> list[Record]:
         with self._transaction() as db:
@@ -74,15 +95,19 @@ class Store:
 
     def add_measurement(self, record: Record, recording: Recording) -> Record:
         """Keep a recording and its measurement; return the record with its sequence number."""
+        folder = self._folder_of(recording.id)
         try:
-            write_recording(recording, self.recording_folder(recording.id))
+            write_recording(recording, folder)
         except OSError as error:
-            shutil.rmtree(self.recording_folder(recording.id), ignore_errors=True)
             raise StorageError(f"The recording could not be written: {error}.", "Free space on the disk.") from error
-        with self._transaction() as db:
-            cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
-            whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
-            db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
+        try:
+            with self._transaction() as db:
+                cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
+                whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
+                db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
+        except StorageError:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
         return whole
 
     def measurement(self, measurement_id: str) -> Record:
@@ -95,16 +120,23 @@ class Store:
         return self._records(query, before_seq, limit)
 
     def recording_folder(self, recording_id: str) -> Path:
-        """Return where a recording lies."""
+        """Return where a recording lies; raise `StorageError` when it is not there any more."""
+        folder = self._folder_of(recording_id)
+        if not (folder / "recording.json").is_file():
+            raise StorageError(f"The recording {recording_id} is missing or damaged.", "Restore it from a backup.")
+        return folder
+
+    def _folder_of(self, recording_id: str) -> Path:
         return self.folder / "recordings" / recording_id
 
     def _one(self, table: str, identifier: str) -> Record:
         found = self._records(f"SELECT record FROM {table} WHERE id = ?", identifier)
         if not found:
-            raise UnknownResource(f"There is no {table} {identifier}.", f"List them at /api/v1/{table}s.")
+            raise UnknownResource(f"There is no {table} {identifier}.", "Use the id that the API gave.")
         return found[0]
 
     def close(self) -> None:
         """Close the database."""
         with self._lock:
             self._db.close()
+        self._lock_file.close()

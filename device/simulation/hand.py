@@ -7,6 +7,7 @@ and load cell can all ask for. Physiological tremor: 8-12 Hz (Elble & Randall, 1
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from threading import Lock
 
@@ -15,6 +16,8 @@ from device.measurement.quantities import Bound, require
 BESIDE_MM = (40.0, 0.0)
 """Where the hand presses for the reference: far enough that the lump is not felt."""
 ON_LESION_MM = (0.0, 0.0)
+REMEMBERED_MOVES = 8
+"""The last motions: light, image and load cell ask about a time that is a little past."""
 ACTION = "describe a human hand"
 
 
@@ -36,14 +39,28 @@ class HandSettings:
         require("hand.drift_n", self.drift_n, Bound(0.0, 1.0, "N"), ACTION)
 
 
+@dataclass(frozen=True)
+class Move:
+    """One motion of the hand: from when, from which force to which, and where."""
+
+    since_s: float
+    from_n: float
+    aim_n: float
+    position_mm: tuple[float, float]
+
+    def steady_n(self, t_s: float, rate_n_per_s: float) -> float:
+        """Return the force on the way from one to the other, at a limited rate."""
+        step_n, gap_n = rate_n_per_s * max(t_s - self.since_s, 0.0), self.aim_n - self.from_n
+        return self.from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
+
+
 class VirtualHand:
     """Force (N) and position (mm) over time."""
 
     def __init__(self, settings: HandSettings) -> None:
         self.settings = settings
         self._lock = Lock()
-        self._since_s, self._from_n, self._aim_n = 0.0, 0.0, 0.0
-        self._position_mm, self._next_position_mm = BESIDE_MM, BESIDE_MM
+        self._moves = deque([Move(0.0, 0.0, 0.0, BESIDE_MM)], maxlen=REMEMBERED_MOVES)
         self._following = False
 
     def begin(self) -> None:
@@ -67,20 +84,19 @@ class VirtualHand:
                 self._following = False
 
     def _aim(self, act_s: float, aim_n: float, position_mm: tuple[float, float] | None) -> None:
-        force_n = self._steady_n(act_s)
+        before = self._move_at(act_s)
+        force_n = before.steady_n(act_s, self.settings.rate_n_per_s)
         with self._lock:
-            self._since_s, self._from_n, self._aim_n = act_s, force_n, aim_n
-            self._position_mm = position_mm or self._position_mm
+            self._moves.append(Move(act_s, force_n, aim_n, position_mm or before.position_mm))
 
-    def _steady_n(self, t_s: float) -> float:
+    def _move_at(self, t_s: float) -> Move:
+        """Return the motion under way at a time: until the reaction time is over, that is still the one before."""
         with self._lock:
-            step_n = self.settings.rate_n_per_s * max(t_s - self._since_s, 0.0)
-            gap_n = self._aim_n - self._from_n
-            return self._from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
+            return next((move for move in reversed(self._moves) if move.since_s <= t_s), self._moves[0])
 
     def force_n(self, t_s: float) -> float:
         """Return the force on the probe: the steady part, and tremor in proportion to how hard it is held."""
-        steady_n = self._steady_n(t_s)
+        steady_n = self._move_at(t_s).steady_n(t_s, self.settings.rate_n_per_s)
         if steady_n <= 0.0:
             return 0.0
         held = min(steady_n / 0.1, 1.0)
@@ -90,4 +106,4 @@ class VirtualHand:
 
     def position_mm(self, t_s: float) -> tuple[float, float]:
         """Return where the probe stands relative to the lesion; it moves only while it is lifted."""
-        return self._position_mm
+        return self._move_at(t_s).position_mm

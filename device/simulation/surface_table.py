@@ -9,6 +9,7 @@ Approximation Practice, chapter 5 (barycentric interpolation).
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.durable import write_durably
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 
 Array = NDArray[np.float64]
@@ -56,7 +58,8 @@ class SurfaceTable:
         for name in UNKNOWNS:
             points: Array = getattr(self, name)
             value = getattr(inclusion, name)
-            require(name, value, Bound(points[0], points[-1], ""), "choose an inclusion inside the table's range")
+            unit = "kPa" if name.endswith("_kpa") else "mm"
+            require(name, value, Bound(points[0], points[-1], unit), "choose an inclusion inside the table's range")
             if name == "youngs_modulus_kpa":
                 points, value = np.log(points), np.log(value)
             field = np.tensordot(barycentric_weights(points, value), field, 1)
@@ -64,13 +67,13 @@ class SurfaceTable:
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write surface_table.npz and its description with the hash."""
-        folder.mkdir(parents=True, exist_ok=True)
         arrays = {name: getattr(self, name).astype(np.float32) for name in self.__dataclass_fields__}
-        with (folder / "surface_table.npz").open("wb") as file:
-            np.savez(file, **arrays)
-        digest = hashlib.sha256((folder / "surface_table.npz").read_bytes()).hexdigest()
+        content = io.BytesIO()
+        np.savez(content, **arrays)
+        digest = hashlib.sha256(content.getvalue()).hexdigest()
         record = {"schema": SCHEMA, "sha256": digest, "command": "host_tools table", **origin}
-        (folder / "surface_table.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        write_durably(folder / "surface_table.npz", content.getvalue())
+        write_durably(folder / "surface_table.json", (json.dumps(record, indent=1) + "\n").encode())
 
 
 def load_surface_table(folder: Path) -> SurfaceTable:
@@ -81,8 +84,9 @@ def load_surface_table(folder: Path) -> SurfaceTable:
         content = (folder / "surface_table.npz").read_bytes()
     except (OSError, ValueError) as error:
         raise InvalidQuantity("surface table", folder, "readable", action) from error
-    if record.get("schema") != SCHEMA:
-        raise InvalidQuantity("surface table's schema", record.get("schema"), SCHEMA, action)
+    schema = record.get("schema") if isinstance(record, dict) else None
+    if schema != SCHEMA:
+        raise InvalidQuantity("surface table's schema", schema, SCHEMA, action)
     digest = hashlib.sha256(content).hexdigest()
     if record.get("sha256") != digest:
         raise InvalidQuantity(

@@ -21,6 +21,8 @@ from device.web.problems import install_problems
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
+NEWEST = 2**63 - 1
+"""Above every sequence number: the largest integer SQLite holds."""
 
 
 class PressRequest(BaseModel):
@@ -98,7 +100,7 @@ def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
 def _add_measurements(app: FastAPI, store: Store) -> None:
     @app.get(f"{API}/measurements")
     def measurements(
-        before_seq: int = Query(2**62, ge=1), limit: int = Query(20, ge=1, le=200)
+        before_seq: int = Query(NEWEST, ge=1, le=NEWEST), limit: int = Query(20, ge=1, le=200)
     ) -> dict[str, list[dict[str, Any]]]:
         """Return measurements, newest first."""
         return {"measurements": store.measurements(before_seq=before_seq, limit=limit)}

@@ -32,8 +32,10 @@ class Journal:
         if not self.path.exists():
             return
         whole = self.path.read_bytes().rpartition(b"\n")[0]
-        os.truncate(self.path, len(whole) + 1 if whole else 0)
-        lines = [json.loads(line) for line in whole.splitlines()]
+        try:
+            lines = [json.loads(line) for line in whole.splitlines()]
+        except ValueError as error:
+            raise InvalidQuantity("journal", self.path, "lines of JSON", "delete it to begin anew") from error
         if lines and lines[0] != json.loads(json.dumps(plan)):
             raise InvalidQuantity(
                 "sweep",
@@ -41,6 +43,7 @@ class Journal:
                 "the same scenes, seed and press",
                 "repeat the first command, or delete that file to begin anew",
             )
+        os.truncate(self.path, len(whole) + 1 if whole else 0)
         yield from lines[1:]
 
     def append(self, row: Row) -> None:

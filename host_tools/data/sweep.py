@@ -17,7 +17,7 @@ from joblib import Parallel, delayed
 from netgen.meshing import NgException
 from numpy.typing import NDArray
 
-from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, require
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from host_tools.data.dataset import write_dataset
 from host_tools.data.journal import Journal, Row
 from host_tools.forward.solve import solve
@@ -74,6 +74,8 @@ def sweep(
 
     `on_row` hears each new row and how many there are. Interrupted, it leaves the journal and no `out`.
     """
+    if jobs == 0:
+        raise InvalidQuantity("jobs", jobs, "a number of processes, or -1 for all cores", "leave the option away")
     out.parent.mkdir(parents=True, exist_ok=True)
     journal = Journal(out.with_suffix(out.suffix + ".partial"), plan.as_record())
     truths = plan.truths()

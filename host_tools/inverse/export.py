@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from device.measurement.durable import sync_directory, write_and_sync
 from device.measurement.inversion import CARD_FILE, FEATURE_UNITS, MODEL_FILE, SCHEMA, open_session
 from device.measurement.quantities import UNKNOWNS
 from host_tools.inverse.evaluate import ErrorTable
@@ -199,19 +199,9 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
         fresh, former = Path(scratch) / "new", Path(scratch) / "old"
         fresh.mkdir()
         for name, content in files.items():
-            with (fresh / name).open("xb") as file:
-                file.write(content)
-                os.fsync(file.fileno())
-        _sync(fresh)
+            write_and_sync(fresh / name, content)
+        sync_directory(fresh)
         if folder.exists():
             folder.rename(former)
         fresh.rename(folder)
-    _sync(folder.parent)
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    sync_directory(folder.parent)
