@@ -7,12 +7,18 @@ import json
 import sqlite3
 import urllib.request
 import zipfile
+from dataclasses import replace
 
 import pytest
 from daemon_process import QUICK_HAND, Daemon
 
+from device.assembly import StartFailed, open_simulated_probe
+from device.config import PressSection, simulated_config
+from device.errors import StorageError
 from device.measurement.estimate import estimate_recording
 from device.measurement.recording import read_recording
+from device.records.store import Store
+from device.simulation.scenario import Scenario
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +100,7 @@ def test_measurements_are_listed_newest_first(daemon, measurement):
         ("/api/v1/presses/none", "DELETE", None, 404, "E802"),
         ("/api/v1/nowhere", "GET", None, 404, "E804"),
         ("/api/v1/measurements?limit=0", "GET", None, 422, "E803"),
+        ("/api/v1/measurements?before_seq=99999999999999999999999", "GET", None, 422, "E803"),
         ("/api/v1/presses", "POST", {"force_newton": 3}, 422, "E803"),
     ],
 )
@@ -153,3 +160,23 @@ def test_a_lump_that_cannot_be_seen_gets_no_number(tmp_path):
     daemon.stop()
     assert estimate["status"] == "not_identifiable"
     assert estimate["size_mm"]["value"] is None
+
+
+def test_a_second_daemon_on_the_same_data_is_refused_and_ends_no_press(tmp_path):
+    daemon = Daemon(tmp_path)
+    location = daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
+    with pytest.raises(StorageError, match="in use by another daemon"):
+        Store(tmp_path / "var")
+    assert daemon.ask(location).json["state"] in ("waiting", "capturing")
+    daemon.stop()
+
+
+def test_a_force_that_the_calibration_does_not_hold_for_is_refused_at_the_start(tmp_path):
+    config = replace(simulated_config(), data=tmp_path, press=PressSection(target_n=0.7))
+    with pytest.raises(StartFailed, match="press.target_n is 0.7"):
+        open_simulated_probe(config, Scenario())
+
+
+def test_the_screen_keeps_saying_done_until_the_next_press(daemon):
+    daemon.press()
+    assert daemon.ask("/api/v1/status").json["guidance"]["code"] == "done"

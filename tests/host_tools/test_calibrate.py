@@ -62,6 +62,10 @@ def test_too_few_phantoms_or_missing_truth_are_refused(recordings, bundle, table
     nameless = [*recordings[:4], type(recordings[4])(**{**vars(recordings[4]), "truth": None})]
     with pytest.raises(InvalidQuantity, match="truth"):
         calibrate(nameless, bundle, table, force_n=0.5)
+    with pytest.raises(InvalidQuantity, match="mean force of"):
+        calibrate(recordings, bundle, table, force_n=0.6)
+    with pytest.raises(InvalidQuantity, match="all equal"):
+        calibrate([recordings[0]] * 4, bundle, table, force_n=0.5)
     foreign = [*recordings[:4], type(recordings[4])(**{**vars(recordings[4]), "serial": "OTHER"})]
     with pytest.raises(InvalidQuantity, match="serial"):
         calibrate(foreign, bundle, table, force_n=0.5)

@@ -132,9 +132,11 @@ def test_output_modes_that_the_chip_does_not_hold_are_refused_at_start():
 
 def test_a_chip_that_lost_its_supply_is_noticed_although_it_holds_the_brightness(chip, lights):
     chip.power_on()
-    with pytest.raises(LightError, match="oscillator is off"):
+    with pytest.raises(LightError, match="had lost its set-up"):
         lights.set_ratio((1.0, 1.0, 1.0, 1.0))
     assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
+    lights.set_ratio((1.0, 1.0, 1.0, 1.0))  # set up again, it lights again
+    assert chip.led_ratio() == (1.0, 1.0, 1.0, 1.0)
 
 
 def test_a_chip_at_another_address_is_a_light_error(bus):

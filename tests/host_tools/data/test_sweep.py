@@ -113,3 +113,10 @@ def test_a_file_that_is_no_sweep_is_refused(tmp_path, content):
     (tmp_path / "x.nc").write_bytes(content)
     with pytest.raises(InvalidQuantity, match="host_tools sweep"):
         read_dataset(tmp_path / "x.nc")
+
+
+def test_a_garbled_journal_is_refused_and_left_as_it_is(tmp_path):
+    (tmp_path / "j").write_bytes(b"no journal\nat all\n")
+    with pytest.raises(InvalidQuantity, match="lines of JSON"):
+        Journal(tmp_path / "j", SweepPlan(5, 1).as_record())
+    assert (tmp_path / "j").read_bytes() == b"no journal\nat all\n"
