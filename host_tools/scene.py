@@ -49,11 +49,6 @@ class Waveguide:
         _poisson("waveguide.poisson_ratio", self.poisson_ratio)
 
     @property
-    def thickness_mm(self) -> float:
-        """Height of all layers together."""
-        return sum(self.layer_thicknesses_mm)
-
-    @property
     def central_radius_mm(self) -> float:
         """Radius of the central window, 0.9 of the face: the rim beyond is singular."""
         return 0.9 * self.radius_mm
