@@ -12,7 +12,7 @@ import shutil
 import sqlite3
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,26 +34,32 @@ class Store:
     def __init__(self, folder: Path) -> None:
         """Open or create; raise `StorageError` when the folder cannot be written or the database is damaged."""
         self.folder, self._lock = folder, threading.Lock()
+        with ExitStack() as opened:
+            self._db = self._open(opened)
+            self._end_interrupted()
+            self._remove_unfinished()
+            self._opened = opened.pop_all()
+
+    def _open(self, opened: ExitStack) -> sqlite3.Connection:
         try:
-            (folder / "recordings").mkdir(parents=True, exist_ok=True)
-            self._take()
-            self._db = sqlite3.connect(folder / "tsis.sqlite", check_same_thread=False)
-            self._db.execute("PRAGMA journal_mode = WAL")
-            self._db.execute("PRAGMA synchronous = FULL")
-            self._db.executescript(TABLES)
+            (self.folder / "recordings").mkdir(parents=True, exist_ok=True)
+            self._take(opened)
+            db = sqlite3.connect(self.folder / "tsis.sqlite", check_same_thread=False)
+            opened.enter_context(closing(db))
+            db.execute("PRAGMA journal_mode = WAL")
+            db.execute("PRAGMA synchronous = FULL")
+            db.executescript(TABLES)
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
-            raise StorageError(f"The store {folder} cannot be opened: {error}.", remedy) from error
-        self._end_interrupted()
-        self._remove_unfinished()
+            raise StorageError(f"The store {self.folder} cannot be opened: {error}.", remedy) from error
+        return db
 
-    def _take(self) -> None:
+    def _take(self, opened: ExitStack) -> None:
         """Hold the folder for this process: a second daemon on it would end the first one's presses."""
-        self._lock_file = (self.folder / "lock").open("w")
+        lock_file = opened.enter_context((self.folder / "lock").open("w"))
         try:
-            fcntl.flock(self._lock_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(lock_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            self._lock_file.close()
             remedy = "Stop it, or give this one another folder with the setting `data`."
             raise StorageError(f"The store {self.folder} is in use by another daemon.", remedy) from None
 
@@ -136,7 +142,6 @@ class Store:
         return found[0]
 
     def close(self) -> None:
-        """Close the database."""
+        """Close the database and let go of the folder."""
         with self._lock:
-            self._db.close()
-        self._lock_file.close()
+            self._opened.close()

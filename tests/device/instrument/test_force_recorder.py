@@ -1,0 +1,136 @@
+"""Force over time, from a cell whose samples are written down here: 1000 counts are 1 N, 500 counts are no load."""
+
+import threading
+from queue import Empty, Queue
+
+import pytest
+
+from device.errors import LoadCellError
+from device.hardware.interfaces import CellSample, ForceScale
+from device.instrument import force_recorder
+from device.instrument.force_recorder import ForceRecorder
+
+SCALE = ForceScale(sensitivity_counts_per_n=1000.0, tare_counts=500.0)
+UNPLUGGED = LoadCellError("The cell is gone.", "Plug it in.")
+
+
+class ScriptedCell:
+    """Gives what was put into its script; silence and what is put as an error are errors."""
+
+    def __init__(self, *samples):
+        self.script, self.is_closed = Queue(), False
+        self.say(*samples)
+
+    def say(self, *samples):
+        for sample in samples:
+            self.script.put(sample)
+
+    def read(self, *, timeout_s):
+        try:
+            sample = self.script.get(timeout=timeout_s)
+        except Empty:
+            raise LoadCellError("The cell is silent.", "Check its cable.") from None
+        if isinstance(sample, Exception):
+            raise sample
+        return CellSample(*sample)
+
+    def close(self):
+        self.is_closed = True
+
+
+@pytest.fixture(autouse=True)
+def _short_waits(monkeypatch):
+    monkeypatch.setattr(force_recorder, "SILENCE_S", 0.5)
+    monkeypatch.setattr(force_recorder, "RETRY_S", 0.005)
+
+
+@pytest.fixture
+def cell():
+    return ScriptedCell((1.0, 500.0), (2.0, 2500.0), (4.0, 1500.0))
+
+
+@pytest.fixture
+def recorder(cell):
+    recorder = ForceRecorder(cell, SCALE)
+    recorder.at(4.0)
+    yield recorder
+    closing = threading.Thread(target=recorder.close)
+    closing.start()
+    cell.say(UNPLUGGED)  # wakes the reading thread
+    closing.join()
+
+
+def reached(condition):
+    """Wait, at most 5 s, until a condition holds."""
+    waiting = threading.Event()
+    return any(condition() or waiting.wait(0.005) for _ in range(1000))
+
+
+@pytest.mark.parametrize(("t_s", "force_n"), [(1.0, 0.0), (1.25, 0.5), (1.5, 1.0), (2.0, 2.0), (3.0, 1.5), (4.0, 1.0)])
+def test_the_force_is_interpolated_between_samples(recorder, t_s, force_n):
+    assert recorder.at(t_s) == pytest.approx(force_n)
+
+
+def test_the_latest_force_is_that_of_the_last_sample(recorder):
+    assert recorder.latest_n == pytest.approx(1.0)
+
+
+def test_a_time_after_the_last_sample_waits_for_the_next(recorder, cell):
+    """4 s: 1 N, 6 s: 3 N. Asked for 5 s before the sample of 6 s has come."""
+    later = threading.Timer(0.05, cell.say, [(6.0, 3500.0)])
+    later.start()
+    assert recorder.at(5.0) == pytest.approx(2.0)
+
+
+def test_a_time_before_the_first_sample_is_refused_not_extrapolated(recorder):
+    with pytest.raises(LoadCellError, match=r"No force is known 0\.250 s before the first sample"):
+        recorder.at(0.75)
+
+
+def test_silence_is_an_error_after_the_time_allowed(recorder):
+    with pytest.raises(LoadCellError, match=r"no sample for 0\.05 s"):
+        recorder.at(5.0, timeout_s=0.05)
+
+
+@pytest.mark.parametrize(
+    ("t_s", "window_s", "range_n"), [(4.0, 3.0, 2.0), (4.0, 2.0, 1.0), (4.0, 0.5, 0.0), (3.0, 1.0, 0.0)]
+)
+def test_the_range_is_largest_minus_smallest_in_the_window(recorder, t_s, window_s, range_n):
+    assert recorder.range_n(t_s, window_s=window_s) == pytest.approx(range_n)
+
+
+def test_a_window_without_a_sample_is_not_steady(recorder):
+    assert recorder.range_n(3.0, window_s=0.5) == float("inf")
+
+
+def test_a_fault_is_kept_until_samples_come_again(recorder, cell):
+    cell.say(UNPLUGGED)
+    assert reached(lambda: recorder.fault)
+    with pytest.raises(LoadCellError, match="The cell is gone"):
+        _ = recorder.latest_n
+    with pytest.raises(LoadCellError, match="The cell is gone"):
+        recorder.at(9.0, timeout_s=0.02)
+    cell.say((9.0, 1250.0))
+    assert recorder.at(9.0) == pytest.approx(0.75)
+    assert recorder.latest_n == pytest.approx(0.75)
+
+
+def test_what_was_recorded_before_a_fault_is_still_known(recorder, cell):
+    cell.say(UNPLUGGED)
+    assert reached(lambda: recorder.fault)
+    assert recorder.at(1.5) == pytest.approx(1.0)
+
+
+def test_a_cell_that_never_speaks_is_refused_at_the_start_and_closed(monkeypatch):
+    monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
+    cell = ScriptedCell()
+    with pytest.raises(LoadCellError, match="silent|no samples"):
+        ForceRecorder(cell, SCALE)
+    assert cell.is_closed
+
+
+def test_closing_releases_the_cell(cell, monkeypatch):
+    monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
+    recorder = ForceRecorder(cell, SCALE)
+    recorder.close()
+    assert cell.is_closed

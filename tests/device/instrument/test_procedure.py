@@ -1,0 +1,280 @@
+"""Presses one after the other, also when something breaks in the middle: every press ends, and the next may begin."""
+
+import threading
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+
+from device.config import CameraSection, Config, PressSection
+from device.errors import BusyError, CameraError, StorageError, UnknownResource
+from device.instrument import procedure as procedure_module
+from device.instrument.guidance import Guidance
+from device.instrument.procedure import Procedure
+from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.tactile_image import Frame
+from device.records.store import Store
+
+CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(frames=2, timeout_s=5.0))
+ANSWER = Estimate(
+    *[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {"total": 1.0}
+)
+
+
+class ObedientBench:
+    """A bench whose operator does at once what the screen says. `breaks` are raised by a press frame each."""
+
+    def __init__(self):
+        self.force, self.board, self.breaks = self, None, []
+        self.is_at_work = self.is_closed = False
+
+    @property
+    def latest_n(self):
+        told_to_press = self.board.now.guidance.code.startswith(("press", "hold"))
+        return 0.5 if self.is_at_work and told_to_press else 0.0
+
+    def light(self, ratio):
+        self.ratio = ratio
+
+    def take(self, role):
+        if role == "press" and self.breaks:
+            raise self.breaks.pop()
+        return Frame(np.zeros((64, 64), np.uint8), role, 0.0, self.latest_n, self.ratio)
+
+    def is_steady(self, t_s, steady_n):
+        return True
+
+    def close(self):
+        self.is_closed = True
+
+
+class Rig:
+    """A procedure on an obedient bench, its estimator, its store and its operator, who may be away."""
+
+    def __init__(self, folder):
+        self.bench, self.store, opened = ObedientBench(), Store(folder), ExitStack()
+        opened.callback(self.bench.close)
+        self.estimator = lambda recording: ANSWER
+        self.procedure = Procedure(
+            CONFIG,
+            self.bench,
+            lambda recording: self.estimator(recording),
+            self.store,
+            calibration_id="c",
+            opened=opened,
+            simulated_truth=Inclusion(10.0, 5.0, 80.0),
+        )
+        self.bench.board = self.board = self.procedure.board
+        self.board.on_guidance(self.put_down)
+        self.procedure.on_request(self.take_up)
+        self.is_away, self.waiting = False, threading.Event()
+        self.procedure.start()
+        self.until(lambda: self.board.now.step == "ready")
+
+    def take_up(self):
+        self.bench.is_at_work = not self.is_away
+
+    def put_down(self, guidance):
+        if guidance in (Guidance.DONE, Guidance.REJECTED, Guidance.FAULT):
+            self.bench.is_at_work = False
+
+    def until(self, condition):
+        assert any(condition() or self.waiting.wait(0.005) for _ in range(2000)), self.board.now
+
+    def press(self):
+        """Request a press and return its job once it has ended."""
+        job = self.procedure.request()
+        self.until(lambda: not self.bench.is_at_work)
+        return self.store.press(job.id)
+
+    def close(self):
+        self.procedure.close()
+        self.store.close()
+
+
+@pytest.fixture
+def rig(tmp_path, monkeypatch):
+    monkeypatch.setattr(procedure_module, "AFTER_FAULT_S", 0.02)
+    monkeypatch.setattr(procedure_module, "POLL_S", 0.002)
+    rig = Rig(tmp_path)
+    yield rig
+    rig.close()
+
+
+def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
+    told = []
+    rig.board.on_guidance(told.append)
+    job = rig.press()
+    assert (job["state"], job["progress"]) == ("done", 1.0)
+    kept = rig.store.measurement(job["measurement_id"])
+    assert (kept["frames"], kept["force_n"]) == (2, 0.5)
+    assert kept["truth"] == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
+    assert kept["estimate"]["reason"] == "A stand-in."
+    assert rig.store.recording_folder(kept["recording_id"]).is_dir()
+    steps = [Guidance.HOLD_STILL, Guidance.LIFT, Guidance.PRESS_LESION, Guidance.HOLD_STILL, Guidance.LIFT]
+    assert [guidance for guidance in told if guidance is not Guidance.PRESS_BESIDE][:6] == [*steps, Guidance.DONE]
+
+
+def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig):
+    seen = []
+    rig.estimator = lambda recording: seen.append(recording) or ANSWER
+    rig.press()
+    [recording] = seen
+    assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 6, 2]
+    assert (recording.serial, recording.calibration_id, recording.simulated) == ("TSIS-0000", "c", True)
+
+
+def test_a_device_error_in_the_middle_fails_the_press_and_the_probe_recovers(rig):
+    shown = []
+    rig.board.on_guidance(lambda guidance: shown.append((guidance, rig.board.now.step, rig.board.now.fault)))
+    error = CameraError("No frame came.", "Check the ribbon cable.")
+    rig.bench.breaks = [error]
+    job = rig.press()
+    assert job["state"] == "failed"
+    assert job["reason"] == "No frame came. Check the ribbon cable."
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert (Guidance.FAULT, "fault", error) in shown
+    assert rig.board.now.fault is None
+    assert rig.press()["state"] == "done"
+
+
+def test_a_press_is_refused_with_the_fault_while_the_probe_is_at_fault(rig, monkeypatch):
+    monkeypatch.setattr(procedure_module, "AFTER_FAULT_S", 30.0)
+    rig.bench.breaks = [CameraError("No frame came.", "Check the ribbon cable.")]
+    rig.press()
+    rig.until(lambda: rig.board.now.fault)
+    for ask in (rig.procedure.request, rig.procedure.require_ready):
+        with pytest.raises(CameraError, match="No frame came"):
+            ask()
+
+
+def test_an_error_that_nobody_foresaw_fails_the_press_and_the_next_one_is_taken(rig, caplog):
+    def stumble(recording):
+        raise ZeroDivisionError("unforeseen")
+
+    rig.estimator = stumble
+    job = rig.press()
+    assert job["state"] == "failed"
+    assert "unforeseen" in job["reason"]
+    rig.until(lambda: rig.board.now.step == "ready")
+    rig.estimator = lambda recording: ANSWER
+    assert rig.press()["state"] == "done"
+
+
+def test_a_measurement_that_the_disk_does_not_take_fails_the_press(rig, monkeypatch):
+    def full(record, recording):
+        raise StorageError("The disk is full.", "Free space.")
+
+    monkeypatch.setattr(rig.store, "add_measurement", full)
+    job = rig.press()
+    assert (job["state"], job["measurement_id"]) == ("failed", None)
+    assert "The disk is full" in job["reason"]
+
+
+def test_a_store_at_fault_does_not_leave_the_press_under_way_for_ever(rig, monkeypatch):
+    """From the middle of a press the store takes nothing: on the board the press still ends."""
+
+    disk_is_full, save = threading.Event(), rig.store.save_press
+
+    def save_if_there_is_space(record):
+        if disk_is_full.is_set():
+            raise StorageError("The disk is full.", "Free space.")
+        save(record)
+
+    def fill_disk(recording):
+        disk_is_full.set()
+        return ANSWER
+
+    monkeypatch.setattr(rig.store, "save_press", save_if_there_is_space)
+    rig.estimator = fill_disk
+    rig.press()
+    assert rig.board.now.press.state == "failed"
+    disk_is_full.clear()
+    rig.estimator = lambda recording: ANSWER
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.press()["state"] == "done"
+
+
+def test_a_request_that_the_store_does_not_take_starts_no_press(rig, monkeypatch):
+    def full(record):
+        raise StorageError("The disk is full.", "Free space.")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(rig.store, "save_press", full)
+        with pytest.raises(StorageError):
+            rig.procedure.request()
+    assert rig.press()["state"] == "done"
+
+
+def test_a_recording_that_cannot_be_estimated_rejects_the_press_with_the_reason(rig):
+    def refuse(recording):
+        raise InvalidQuantity("press frames", 0, "at least one", "press again")
+
+    rig.estimator = refuse
+    job = rig.press()
+    assert job["state"] == "rejected"
+    assert job["reason"] == "press frames is 0, but must be at least one: press again."
+    assert rig.board.now.fault is None
+
+
+def test_only_one_press_at_a_time(rig):
+    held = threading.Event()
+    rig.estimator = lambda recording: (held.wait(5.0), ANSWER)[1]
+    job = rig.procedure.request()
+    with pytest.raises(BusyError):
+        rig.procedure.request()
+    held.set()
+    rig.until(lambda: rig.store.press(job.id)["state"] == "done")
+
+
+def test_a_press_is_cancelled_by_its_own_id_only(rig):
+    rig.is_away = True
+    job = rig.procedure.request()
+    with pytest.raises(UnknownResource, match="Press another is not under way"):
+        rig.procedure.cancel("another")
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.store.press(job.id)["state"] == "cancelled")
+    with pytest.raises(UnknownResource):
+        rig.procedure.cancel(job.id)
+
+
+def test_a_press_whose_result_is_being_computed_is_not_cancelled_any_more(rig):
+    computing, held = threading.Event(), threading.Event()
+
+    def compute(recording):
+        computing.set()
+        held.wait(5.0)
+        return ANSWER
+
+    rig.estimator = compute
+    job = rig.procedure.request()
+    assert computing.wait(5.0)
+    with pytest.raises(BusyError, match="result is being computed"):
+        rig.procedure.cancel(job.id)
+    held.set()
+    rig.until(lambda: rig.store.press(job.id)["state"] == "done")
+
+
+def test_a_press_begins_by_itself_when_the_probe_touches(rig):
+    """No request: the operator just presses."""
+    rig.take_up()
+    rig.until(lambda: rig.board.now.press and rig.board.now.press.state == "done")
+
+
+def test_closing_in_the_middle_of_a_press_says_how_it_ended(tmp_path):
+    rig = Rig(tmp_path)
+    rig.is_away = True
+    job = rig.procedure.request()
+    rig.until(lambda: rig.store.press(job.id)["state"] == "capturing")
+    rig.procedure.close()
+    assert rig.store.press(job.id)["state"] == "failed"
+    assert rig.bench.is_closed
+    rig.store.close()
+
+
+def test_the_settings_of_the_camera_are_in_the_recording(rig):
+    seen = []
+    rig.estimator = lambda recording: seen.append(recording.camera) or ANSWER
+    rig.press()
+    assert (seen[0].width_px, seen[0].height_px, seen[0].exposure_us) == (64, 64, CONFIG.camera.exposure_us)

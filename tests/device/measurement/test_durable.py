@@ -1,0 +1,30 @@
+"""Files that are whole or not there."""
+
+import pytest
+
+from device.measurement import durable
+from device.measurement.durable import write_durably
+
+
+def test_a_file_is_written_with_its_folder_and_nothing_beside_it(tmp_path):
+    write_durably(tmp_path / "new" / "a.json", b"content")
+    assert (tmp_path / "new" / "a.json").read_bytes() == b"content"
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.json"]
+
+
+def test_a_file_is_replaced_as_a_whole(tmp_path):
+    write_durably(tmp_path / "a.json", b"a long first content")
+    write_durably(tmp_path / "a.json", b"second")
+    assert (tmp_path / "a.json").read_bytes() == b"second"
+
+
+def test_when_the_disk_is_full_the_old_file_stays(tmp_path, monkeypatch):
+    def full(path, content):
+        path.write_bytes(content[:3])
+        raise OSError(28, "No space left on device")
+
+    write_durably(tmp_path / "a.json", b"first")
+    monkeypatch.setattr(durable, "write_and_sync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_durably(tmp_path / "a.json", b"second")
+    assert (tmp_path / "a.json").read_bytes() == b"first"

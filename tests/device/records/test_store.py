@@ -1,0 +1,193 @@
+"""What was kept is there again after a restart, and what could not be kept is said so and leaves nothing behind."""
+
+import sqlite3
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.errors import StorageError, UnknownResource
+from device.measurement import recording as recording_module
+from device.measurement.recording import CameraSettings, Recording, read_recording
+from device.measurement.tactile_image import Frame
+from device.records.store import Store
+
+CAMERA = CameraSettings(
+    width_px=32, height_px=24, bits=8, mm_per_px_x=0.03, mm_per_px_y=0.04, exposure_us=4000.0, gain=1.0
+)
+FRAME = Frame(np.arange(768, dtype=np.uint8).reshape(24, 32), "press", 0.0, 0.5, (0.6, 0.6, 0.6, 0.6))
+RECORDING = Recording("r-1", "TSIS-0007", "1.0", "2026-01-02T03:04:05Z", CAMERA, (FRAME, FRAME))
+
+
+@pytest.fixture
+def store(tmp_path):
+    store = Store(tmp_path / "var")
+    yield store
+    store.close()
+
+
+def add(store, number):
+    record = {"id": f"m-{number}", "recording_id": f"r-{number}", "force_n": 0.5}
+    return store.add_measurement(record, replace(RECORDING, id=f"r-{number}"))
+
+
+def job(press_id, state):
+    return {"id": press_id, "state": state, "progress": 0.5, "reason": "", "measurement_id": None}
+
+
+def test_a_measurement_comes_back_with_its_sequence_number(store):
+    kept = add(store, 1)
+    assert kept == {"id": "m-1", "seq": 1, "recording_id": "r-1", "force_n": 0.5}
+    assert store.measurement("m-1") == kept
+
+
+def test_the_recording_is_on_the_disk_beside_its_row(store):
+    add(store, 1)
+    found = read_recording(store.recording_folder("r-1"))
+    np.testing.assert_array_equal(found.frames[1].counts, FRAME.counts)
+
+
+def test_measurements_are_listed_newest_first_in_pages(store):
+    for number in range(1, 6):
+        add(store, number)
+    first = store.measurements(before_seq=2**62, limit=2)
+    assert [m["id"] for m in first] == ["m-5", "m-4"]
+    assert [m["id"] for m in store.measurements(before_seq=first[-1]["seq"], limit=9)] == ["m-3", "m-2", "m-1"]
+    assert store.measurements(before_seq=1, limit=9) == []
+
+
+def test_all_is_there_again_after_a_restart_and_numbers_go_on(tmp_path):
+    first = Store(tmp_path)
+    kept = add(first, 1)
+    first.save_press(job("p-1", "done"))
+    first.close()
+    second = Store(tmp_path)
+    assert second.measurement("m-1") == kept
+    assert second.press("p-1") == job("p-1", "done")
+    assert add(second, 2)["seq"] == 2
+    second.close()
+
+
+@pytest.mark.parametrize("ask", ["measurement", "press"])
+def test_an_unknown_id_is_refused(store, ask):
+    with pytest.raises(UnknownResource, match=f"There is no {ask} none") as refusal:
+        getattr(store, ask)("none")
+    assert (refusal.value.code, refusal.value.status) == ("E802", 404)
+
+
+def test_an_id_is_only_ever_a_value_never_part_of_a_query(store):
+    with pytest.raises(UnknownResource):
+        store.measurement("x' OR '1'='1")
+
+
+def test_the_state_of_a_press_is_replaced_by_the_newer(store):
+    store.save_press(job("p-1", "capturing"))
+    store.save_press(job("p-1", "done"))
+    assert store.press("p-1")["state"] == "done"
+
+
+@pytest.mark.parametrize("state", ["waiting", "capturing", "computing"])
+def test_a_press_that_a_restart_interrupted_has_failed_at_the_next_opening(tmp_path, state):
+    first = Store(tmp_path)
+    first.save_press(job("p-1", state))
+    first.close()
+    second = Store(tmp_path)
+    found = second.press("p-1")
+    second.close()
+    assert found["state"] == "failed"
+    assert found["reason"] == "The daemon was restarted during the press: press again."
+
+
+@pytest.mark.parametrize("state", ["done", "rejected", "cancelled", "failed"])
+def test_a_press_that_had_ended_stays_as_it_ended(tmp_path, state):
+    first = Store(tmp_path)
+    first.save_press(job("p-1", state))
+    first.close()
+    second = Store(tmp_path)
+    assert second.press("p-1") == job("p-1", state)
+    second.close()
+
+
+def test_commits_survive_a_power_cut(store):
+    """FULL is 2: every commit is on the disk before it is acknowledged."""
+    with sqlite3.connect(store.folder / "tsis.sqlite") as other:
+        assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+    other.close()
+    assert store._db.execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+def test_a_folder_that_cannot_be_made_is_a_storage_error_with_its_path(tmp_path):
+    (tmp_path / "var").write_text("a file is in the way")
+    with pytest.raises(StorageError, match="var cannot be opened") as refusal:
+        Store(tmp_path / "var")
+    assert refusal.value.code == "E601"
+    assert "`data`" in refusal.value.remedy
+
+
+def test_a_damaged_database_is_a_storage_error_and_is_left_as_it_is(tmp_path):
+    (tmp_path / "tsis.sqlite").write_bytes(b"no database at all" * 100)
+    with pytest.raises(StorageError, match="cannot be opened"):
+        Store(tmp_path)
+    assert (tmp_path / "tsis.sqlite").read_bytes().startswith(b"no database")
+
+
+def test_a_store_that_could_not_be_opened_does_not_keep_the_folder(tmp_path):
+    (tmp_path / "tsis.sqlite").write_bytes(b"no database at all" * 100)
+    with pytest.raises(StorageError) as refusal:
+        Store(tmp_path)
+    (tmp_path / "tsis.sqlite").unlink()
+    Store(tmp_path).close()
+    assert "cannot be opened" in refusal.value.cause
+
+
+def test_a_recording_that_cannot_be_written_leaves_no_row_and_no_file(store, monkeypatch):
+    def full(path, content):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(recording_module, "write_and_sync", full)
+    with pytest.raises(StorageError, match="No space left"):
+        add(store, 1)
+    assert store.measurements(before_seq=2**62, limit=9) == []
+    assert list((store.folder / "recordings").iterdir()) == []
+
+
+def test_a_recording_that_is_kept_already_is_not_lost_to_a_second_of_its_id(store):
+    add(store, 1)
+    with pytest.raises(StorageError):
+        store.add_measurement({"id": "m-2"}, RECORDING)
+    assert len(read_recording(store.recording_folder("r-1")).frames) == 2
+    assert [m["id"] for m in store.measurements(before_seq=2**62, limit=9)] == ["m-1"]
+
+
+def test_a_row_that_the_database_does_not_take_is_a_storage_error(store):
+    add(store, 1)
+    with pytest.raises(StorageError, match="did not take the record"):
+        store.add_measurement({"id": "m-1"}, replace(RECORDING, id="r-2"))
+    assert store.measurement("m-1")["seq"] == 1
+    assert [folder.name for folder in (store.folder / "recordings").iterdir()] == ["r-1"]
+
+
+def test_a_second_daemon_on_the_same_folder_is_refused_and_ends_no_press(store):
+    store.save_press(job("p-1", "capturing"))
+    with pytest.raises(StorageError, match="in use by another daemon"):
+        Store(store.folder)
+    assert store.press("p-1")["state"] == "capturing"
+
+
+def test_the_folder_is_free_again_once_its_daemon_has_closed(tmp_path):
+    for _ in range(2):
+        Store(tmp_path).close()
+
+
+def test_what_a_power_cut_left_half_written_is_gone_at_the_next_opening(tmp_path):
+    Store(tmp_path).close()
+    (tmp_path / "recordings" / "r-9.tmp" / "frames").mkdir(parents=True)
+    Store(tmp_path).close()
+    assert list((tmp_path / "recordings").iterdir()) == []
+
+
+def test_a_recording_that_has_gone_missing_is_a_storage_error_with_its_id(store):
+    add(store, 1)
+    (store.recording_folder("r-1") / "recording.json").unlink()
+    with pytest.raises(StorageError, match="r-1 is missing or damaged"):
+        store.recording_folder("r-1")

@@ -1,0 +1,126 @@
+"""The virtual hand follows the screen as a person does: late, at a limited rate, and never quite still."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import InvalidQuantity
+from device.simulation.hand import BESIDE_MM, ON_LESION_MM, HandSettings, VirtualHand
+
+STEADY = HandSettings(rate_n_per_s=0.5, reaction_s=0.2, aim_n=0.4, tremor_n=0.0, drift_n=0.0)
+
+
+def hand_at(settings=STEADY, *guidance):
+    """Return a hand that has taken up the probe and read (guidance, time) pairs."""
+    hand = VirtualHand(settings)
+    hand.begin()
+    for code, t_s in guidance:
+        hand.follow(code, t_s)
+    return hand
+
+
+def test_a_hand_that_has_not_taken_up_the_probe_does_nothing():
+    hand = VirtualHand(STEADY)
+    hand.follow("press_beside", 0.0)
+    assert hand.force_n(10.0) == 0.0
+
+
+def test_it_acts_only_after_its_reaction_time():
+    """Read at 1 s, acted upon at 1.2 s, then 0.5 N/s."""
+    hand = hand_at(STEADY, ("press_beside", 1.0))
+    assert [hand.force_n(t_s) for t_s in (0.9, 1.0, 1.2)] == [0.0, 0.0, 0.0]
+    assert hand.force_n(1.3) == pytest.approx(0.05)
+    assert hand.force_n(1.6) == pytest.approx(0.2)
+
+
+def test_it_reaches_its_aim_and_holds_it():
+    hand = hand_at(STEADY, ("press_beside", 1.0))
+    assert hand.force_n(2.0) == pytest.approx(0.4)
+    assert hand.force_n(100.0) == pytest.approx(0.4)
+
+
+def test_it_lifts_to_exactly_nothing():
+    hand = hand_at(HandSettings(), ("press_beside", 0.0), ("lift", 5.0))
+    assert hand.force_n(5.2) > 0.4
+    assert hand.force_n(7.0) == 0.0
+
+
+@pytest.mark.parametrize("next_guidance", ["lift", "rejected", "press_lesion"])
+@pytest.mark.parametrize("read_s", [1.1, 1.5, 1.9, 3.0])
+def test_its_force_never_moves_faster_than_its_rate(next_guidance, read_s):
+    """Also when it is told something else on the way: it goes on until the reaction time is over."""
+    hand = hand_at(STEADY, ("press_beside", 1.0), (next_guidance, read_s))
+    times = np.linspace(0.9, 5.0, 2000)
+    force = np.array([hand.force_n(t_s) for t_s in times])
+    assert np.abs(np.diff(force)).max() <= 0.5 * (times[1] - times[0]) * (1 + 1e-9)
+
+
+def test_it_goes_on_as_it_was_until_the_reaction_time_is_over():
+    hand = hand_at(STEADY, ("press_beside", 1.0), ("lift", 1.4))
+    assert hand.force_n(1.4) == pytest.approx(0.1)
+    assert hand.force_n(1.6) == pytest.approx(0.2)
+    assert hand.force_n(1.7) == pytest.approx(0.15)
+
+
+def test_tremor_and_drift_stay_within_their_sums():
+    """Two sines each: at most 1.5 times the tremor and 1.4 times the drift."""
+    settings = HandSettings(tremor_n=0.002, drift_n=0.006)
+    hand = hand_at(settings, ("press_beside", 0.0))
+    off_n = np.array([hand.force_n(t_s) for t_s in np.linspace(5, 15, 4000)]) - settings.aim_n
+    assert np.abs(off_n).max() <= 1.5 * 0.002 + 1.4 * 0.006
+    assert off_n.std() > 0.004
+
+
+def test_tremor_is_of_eight_to_twelve_hertz():
+    hand = hand_at(HandSettings(tremor_n=0.01, drift_n=0.0), ("press_beside", 0.0))
+    force = np.array([hand.force_n(5 + k / 100) for k in range(1000)])
+    spectrum = np.abs(np.fft.rfft(force - force.mean())) ** 2
+    frequency = np.fft.rfftfreq(1000, 0.01)
+    inside = (frequency >= 8) & (frequency <= 12)
+    assert spectrum[inside].sum() > 0.95 * spectrum.sum()
+
+
+def test_it_presses_beside_first_and_then_on_the_lesion():
+    hand = hand_at(STEADY, ("press_beside", 0.0))
+    assert hand.position_mm(5.0) == BESIDE_MM
+    hand.follow("lift", 5.0)
+    assert hand.position_mm(8.0) == BESIDE_MM
+    hand.follow("press_lesion", 8.0)
+    assert hand.position_mm(8.1) == BESIDE_MM
+    assert hand.position_mm(8.3) == ON_LESION_MM
+
+
+@pytest.mark.parametrize("end", ["done", "rejected", "fault"])
+def test_it_lifts_at_the_end_and_follows_no_longer(end):
+    hand = hand_at(STEADY, ("press_lesion", 0.0), (end, 5.0))
+    hand.follow("press_beside", 6.0)
+    assert hand.force_n(20.0) == 0.0
+    hand.begin()
+    hand.follow("press_beside", 20.0)
+    assert hand.force_n(30.0) == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("code", ["wait", "press_harder", "press_lighter", "hold_still"])
+def test_other_guidance_does_not_change_what_it_aims_at(code):
+    hand = hand_at(STEADY, ("press_beside", 0.0), (code, 1.0))
+    assert hand.force_n(9.0) == pytest.approx(0.4)
+
+
+def test_a_long_session_of_presses_is_followed_to_the_end():
+    hand = hand_at(STEADY)
+    for k, code in zip(range(60), itertools.cycle(["press_beside", "lift", "press_lesion", "lift"]), strict=False):
+        hand.follow(code, 5.0 * k)
+        assert hand.force_n(5.0 * k + 4.0) == pytest.approx(0.0 if code == "lift" else 0.4)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [("rate_n_per_s", 0.01, 10), ("reaction_s", 0, 5), ("aim_n", 0, 5), ("tremor_n", 0, 1), ("drift_n", 0, 1)],
+)
+def test_a_setting_is_taken_at_both_ends_of_its_bound_and_refused_beyond(name, low, high):
+    for value in (low, high):
+        assert getattr(HandSettings(**{name: value}), name) == value
+    for value in (low - 0.001, high + 0.001, float("nan")):
+        with pytest.raises(InvalidQuantity, match=rf"^hand\.{name} is"):
+            HandSettings(**{name: value})

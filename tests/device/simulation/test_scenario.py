@@ -1,0 +1,74 @@
+"""A scene file: its defaults, and what in it is refused."""
+
+import pytest
+
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.simulation.hand import HandSettings
+from device.simulation.renderer import LinearOptics
+from device.simulation.scenario import CellSettings, Scenario, read_scenario
+from device.simulation.sensor import Sensor
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read_text(text):
+        (tmp_path / "scene.toml").write_text(text)
+        return read_scenario(tmp_path / "scene.toml")
+
+    return read_text
+
+
+def test_an_empty_file_is_the_default_scene(read):
+    expected = Scenario(Inclusion(10.0, 5.0, 80.0), HandSettings(), LinearOptics(), Sensor(), CellSettings(), seed=1)
+    assert read("") == Scenario() == expected
+
+
+def test_what_is_written_holds_and_the_rest_stays(read):
+    scenario = read(
+        "seed = 7\n[inclusion]\nsize_mm = 4\ndepth_mm = 6.5\nyoungs_modulus_kpa = 100\n"
+        "[hand]\naim_n = 0.8\n[sensor]\nread_noise_e = 0\n[cell]\nnoise_counts = 0\n[optics]\nintercept = 0.2\n"
+    )
+    assert scenario == Scenario(
+        Inclusion(4.0, 6.5, 100.0),
+        HandSettings(aim_n=0.8),
+        LinearOptics(intercept=0.2),
+        Sensor(read_noise_e=0.0),
+        CellSettings(noise_counts=0.0),
+        seed=7,
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "action"),
+    [
+        ("[inclusion]\nsize_cm = 1.0\n", "inclusion.size_cm", "did you mean inclusion.size_mm"),
+        ("[hands]\naim_n = 0.5\n", "hands", "did you mean hand"),
+        ("[hand]\naim_g = 50\n", "hand.aim_g", "did you mean hand.aim_n"),
+    ],
+)
+def test_an_unknown_key_is_refused_with_what_was_meant(read, text, key, action):
+    with pytest.raises(InvalidQuantity) as refusal:
+        read(text)
+    assert refusal.value.quantity == key
+    assert refusal.value.action == action
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("seed = -1", "seed"),
+        ("seed = 1.5", "seed"),
+        ("[inclusion]\nsize_mm = -1\ndepth_mm = 5\nyoungs_modulus_kpa = 80", "size_mm"),
+        ("[inclusion]\nsize_mm = 10", "inclusion"),
+        ("[hand]\nrate_n_per_s = 0", "hand.rate_n_per_s"),
+        ("[optics]\nled_distance_mm = 5", "optics.led_distance_mm"),
+        ("[sensor]\nfull_well_e = nan", "sensor.full_well_e"),
+        ("[cell]\ncounts_per_n = 0", "cell.counts_per_n"),
+        ("[cell]\nzero_counts = 8_000_001", "cell.zero_counts"),
+        ("[cell]\nnoise_counts = -1", "cell.noise_counts"),
+    ],
+)
+def test_a_value_out_of_its_bound_is_refused_by_its_key(read, text, key):
+    with pytest.raises(InvalidQuantity) as refusal:
+        read(text)
+    assert refusal.value.quantity == key

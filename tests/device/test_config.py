@@ -1,0 +1,150 @@
+"""Settings: the defaults hold, both ends of every bound are taken, and what lies beyond is refused by its name."""
+
+from pathlib import Path
+
+import pytest
+
+from device.config import (
+    CameraSection,
+    CellSection,
+    Config,
+    LightSection,
+    PressSection,
+    ServerSection,
+    read_config,
+    simulated_config,
+)
+from device.errors import ConfigError
+from device.measurement.quantities import InvalidQuantity
+
+SECTIONS = {
+    "camera": CameraSection,
+    "light": LightSection,
+    "cell": CellSection,
+    "press": PressSection,
+    "server": ServerSection,
+}
+BOUNDS = [
+    ("camera.width_px", 64, 4096),
+    ("camera.height_px", 64, 4096),
+    ("camera.exposure_us", 10, 33_333),  # one frame of 30 Hz
+    ("camera.gain", 1.0, 16.0),
+    ("light.address", 0x08, 0x77),
+    ("cell.baud", 300, 4_000_000),
+    ("cell.sensitivity_counts_per_n", 1.0, 1e7),
+    ("cell.tare_spread_n", 0.0001, 1.0),
+    ("press.band_ratio", 0.005, 0.2),
+    ("press.contact_n", 0.005, 0.25),  # half of the target
+    ("press.steady_n", 0.001, 1.0),
+    ("press.overload_n", 0.6, 50.0),  # 1.2 times the target
+    ("press.frames", 1, 200),
+    ("press.timeout_s", 1.0, 3600.0),
+    ("server.port", 0, 65_535),
+]
+
+
+def section_with(name, value):
+    section, _, key = name.partition(".")
+    return getattr(SECTIONS[section](**{key: value}), key)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read_text(text):
+        (tmp_path / "probe.toml").write_text(text)
+        return read_config(tmp_path / "probe.toml")
+
+    return read_text
+
+
+def test_an_empty_file_is_the_defaults_and_they_hold_their_own_bounds(read):
+    assert read("") == Config()
+
+
+def test_the_simulated_probe_has_its_own_serial_certificate_and_data_folder():
+    real, simulated = Config(), simulated_config()
+    assert simulated.serial == "SIM-0001"
+    assert simulated.calibration.is_file()
+    assert simulated.data != real.data
+    assert (simulated.camera, simulated.press) == (real.camera, real.press)
+
+
+def test_only_this_machine_is_served_unless_told_otherwise():
+    assert Config().server.host == "127.0.0.1"
+
+
+def test_the_band_lies_around_the_target_by_its_ratio():
+    assert PressSection(target_n=0.8, band_ratio=0.1).band_n == pytest.approx((0.72, 0.88))
+
+
+def test_what_is_written_holds_and_the_rest_stays(read):
+    config = read('serial = "TSIS-0042"\nmodel = "m"\n[light]\nratio = [0.1, 0.2, 0.3, 1.0]\n[press]\ntarget_n = 2\n'
+                  "overload_n = 4\n")  # fmt: skip
+    assert (config.serial, config.model, config.light.ratio) == ("TSIS-0042", Path("m"), (0.1, 0.2, 0.3, 1.0))
+    assert config.press.target_n == 2
+    assert config.camera == CameraSection()
+
+
+@pytest.mark.parametrize(("name", "low", "high"), BOUNDS)
+def test_both_ends_of_every_bound_are_taken(name, low, high):
+    assert [section_with(name, value) for value in (low, high)] == [low, high]
+
+
+@pytest.mark.parametrize(("name", "low", "high"), BOUNDS)
+def test_beyond_its_bound_every_setting_is_refused_by_its_name(name, low, high):
+    step = 1 if isinstance(low, int) else 1e-6
+    for value in (low - step, high + step, float("nan")):
+        with pytest.raises(InvalidQuantity, match=f"^{name} is"):
+            section_with(name, value)
+
+
+@pytest.mark.parametrize("target_n", [0.1, 20.0])
+def test_both_ends_of_the_targets_bound_are_taken(target_n):
+    assert PressSection(target_n=target_n, contact_n=0.01, overload_n=50.0).target_n == target_n
+
+
+@pytest.mark.parametrize("target_n", [0.09, 20.1])
+def test_a_target_beyond_its_bound_is_refused(target_n):
+    with pytest.raises(InvalidQuantity, match=r"^press\.target_n is"):
+        PressSection(target_n=target_n, contact_n=0.01, overload_n=50.0)
+
+
+@pytest.mark.parametrize("rate_hz", [0.9, 240.1])
+def test_a_frame_rate_beyond_its_bound_is_refused(rate_hz):
+    with pytest.raises(InvalidQuantity, match=r"^camera\.frame_rate_hz is"):
+        CameraSection(frame_rate_hz=rate_hz)
+
+
+def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
+    with pytest.raises(InvalidQuantity, match="at most 10000 us, one frame"):
+        CameraSection(frame_rate_hz=100.0, exposure_us=10_001)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[camera]\nexposure_ms = 4\n", r"camera\.exposure_ms .*did you mean camera\.exposure_us"),
+        ("[pres]\ntarget_n = 0.5\n", "did you mean press"),
+        ("[camera]\nwidth_px = 768.0\n", r"camera\.width_px is 768\.0, but must be of type int"),
+        ("[camera]\nmm_per_px_x = 0.0\n", "mm_per_px_x is 0"),
+        ("[light]\nratio = [0.6, 0.6, 0.6]\n", r"light\.ratio is .*four numbers"),
+        ("[light]\nratio = 0.6\n", r"light\.ratio is 0\.6, but must be of type list"),
+        ("[light]\nratio = [0.6, 0.6, 0.6, 0.0]\n", r"light\.ratio is 0\.0, but must be above 0"),
+        ("[light]\nratio = [0.6, 0.6, 0.6, 1.1]\n", r"light\.ratio is 1\.1"),
+        ("[press]\ntarget_n = nan\n", r"press\.target_n is nan"),
+        ("[press]\noverload_n = 0.59\n", r"press\.overload_n is 0\.59, but must be at least 0\.6"),
+        ("[server]\nport = 65536\n", r"server\.port is 65536"),
+        ("serial = 7\n", "serial is 7"),
+        ("camera = 3\n", r"write it as \[camera\]"),
+        ("[camera\n", "valid TOML"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_with_path_setting_and_fault_code(read, text, words):
+    with pytest.raises(ConfigError, match=rf"probe\.toml: .*{words}") as refusal:
+        read(text)
+    assert refusal.value.code == "E001"
+
+
+def test_a_missing_file_is_refused_by_its_path(tmp_path):
+    with pytest.raises(ConfigError, match=r"none\.toml.*No such file"):
+        read_config(tmp_path / "none.toml")

@@ -1,0 +1,186 @@
+"""`python -m device` as typed: exit codes, one line a fault on stderr, and JSON on stdout."""
+
+import json
+import shutil
+import socket
+
+import pytest
+from daemon_process import ROOT
+
+from device.__main__ import main
+from device.measurement.estimate import estimate_recording
+from device.measurement.recording import write_recording
+
+
+@pytest.fixture
+def run(capsys, tmp_path, monkeypatch):
+    """Run a command line in an empty folder; return its exit code and the lines of stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run_line(*arguments):
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as usage:
+            code = usage.code
+        captured = capsys.readouterr()
+        return code, captured.out.splitlines(), captured.err.splitlines()
+
+    return run_line
+
+
+@pytest.fixture
+def models(tmp_path):
+    """A configuration that points at a copy of the committed models."""
+    shutil.copytree(ROOT / "models", tmp_path / "models")
+    (tmp_path / "probe.toml").write_text(
+        'serial = "SIM-0001"\nmodel = "models/paper"\ncalibration = "models/simulated_probe/calibration.json"\n'
+        'data = "var"\n'
+    )
+    return tmp_path / "models"
+
+
+@pytest.fixture
+def folder(recording, tmp_path):
+    write_recording(recording, tmp_path / "press")
+    return tmp_path / "press"
+
+
+def test_a_port_in_use_is_one_sentence_with_the_port_before_anything_is_opened(run, tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        code, _, errors = run("--simulate", "--port", port)
+    assert code == 1
+    [line] = errors
+    assert f"Port {port} of 127.0.0.1 cannot be used" in line
+    assert "--port" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (None, "scene.toml, but must be readable"),
+        ("[inclusion]\nsize_cm = 1.0\n", "did you mean inclusion.size_mm"),
+        ("[inclusion]\nsize_mm = -1\ndepth_mm = 5\nyoungs_modulus_kpa = 80\n", "size_mm is -1"),
+        ("[inclusion]\n", "inclusion is incomplete"),
+    ],
+)
+def test_a_scene_that_cannot_be_used_is_one_sentence(run, tmp_path, scene, words):
+    if scene:
+        (tmp_path / "scene.toml").write_text(scene)
+    code, _, errors = run("--simulate", "--port", 0, "--scene", "scene.toml")
+    assert code == 1
+    [line] = errors
+    assert words in line
+
+
+def test_an_inclusion_outside_the_table_is_one_sentence(run, tmp_path):
+    (tmp_path / "scene.toml").write_text("[inclusion]\nsize_mm = 50\ndepth_mm = 5\nyoungs_modulus_kpa = 80\n")
+    code, _, errors = run("--simulate", "--port", 0, "--scene", "scene.toml")
+    assert code == 1
+    [line] = errors
+    assert "size_mm is 50" in line
+
+
+def test_a_setting_out_of_its_bound_is_one_sentence_with_file_and_setting(run, tmp_path):
+    (tmp_path / "probe.toml").write_text("[press]\ntarget_n = 99\n")
+    code, _, errors = run("--config", "probe.toml")
+    assert code == 1
+    [line] = errors
+    assert line.startswith("probe.toml: press.target_n is 99")
+
+
+def test_a_tampered_model_keeps_the_simulated_probe_from_starting(run, models):
+    with (models / "paper" / "model.onnx").open("ab") as network:
+        network.write(b"!")
+    code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
+    assert code == 1
+    [line] = errors
+    assert line.startswith("E401 ")
+    assert "sha256 of model.onnx" in line
+
+
+def test_a_certificate_of_another_probe_keeps_the_probe_from_starting(run, models, tmp_path):
+    settings = (tmp_path / "probe.toml").read_text().replace("SIM-0001", "SIM-0002")
+    (tmp_path / "probe.toml").write_text(settings)
+    code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
+    assert code == 1
+    [line] = errors
+    assert line.startswith("E401 ")
+    assert "for probe SIM-0001, but must be for probe SIM-0002" in line
+
+
+def test_a_real_probe_lists_every_part_that_failed_at_once(run, models, tmp_path):
+    """No camera, no LED chip, no load cell on this machine, and the model is gone, too."""
+    (models / "paper" / "model.json").unlink()
+    (tmp_path / "probe.toml").write_text(
+        (tmp_path / "probe.toml").read_text()
+        + f'[light]\nbus = 97\n[camera]\nindex = 97\n[cell]\ndevice = "{tmp_path}/none"\n'
+    )
+    code, _, errors = run("--config", "probe.toml", "--port", 0)
+    assert code == 1
+    assert sorted(line.split()[0] for line in errors) == ["E101", "E201", "E301", "E401"]
+    assert any("bus 97" in line for line in errors)
+    assert any(f"{tmp_path}/none" in line for line in errors)
+
+
+def test_analyse_prints_each_estimate_as_one_line_of_json(run, folder, recording, bundle, calibration):
+    code, out, errors = run("analyse", folder, folder)
+    assert (code, errors) == (0, [])
+    expected = json.loads(json.dumps(estimate_recording(recording, bundle, calibration).as_record()))
+    assert [json.loads(line) for line in out] == [{"recording": str(folder), **expected}] * 2
+
+
+def test_analyse_reads_a_zip_as_it_reads_a_folder(run, folder, tmp_path):
+    shutil.make_archive(str(tmp_path / "press"), "zip", tmp_path, "press")
+    _, [from_folder], _ = run("analyse", folder)
+    _, [from_zip], _ = run("analyse", tmp_path / "press.zip")
+    assert json.loads(from_zip)["size_mm"] == json.loads(from_folder)["size_mm"]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: shutil.rmtree(folder), "recording is"),
+        (lambda folder: (folder / "frames/000.png").unlink(), "frames[0].file is"),
+    ],
+)
+def test_analyse_says_in_one_sentence_what_is_wrong_with_a_recording(run, folder, spoil, words):
+    spoil(folder)
+    code, out, errors = run("analyse", folder)
+    assert (code, out) == (1, [])
+    [line] = errors
+    assert words in line
+
+
+def test_analyse_refuses_a_tampered_model(run, folder, models):
+    with (models / "paper" / "model.onnx").open("ab") as network:
+        network.write(b"!")
+    code, out, errors = run("--config", "probe.toml", "analyse", folder)
+    assert (code, out) == (1, [])
+    assert "sha256 of model.onnx" in errors[0]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--nonsense",), ("analyse",), ("--port", "eight"), ("--scene", "scene.toml"), ("measure", "press")],
+)
+def test_wrong_usage_is_exit_code_2_with_the_usage(run, arguments):
+    code, out, errors = run(*arguments)
+    assert (code, out) == (2, [])
+    assert errors[0].startswith("usage: python -m device")
+
+
+def test_help_has_an_example(run):
+    code, out, _ = run("--help")
+    assert code == 0
+    assert any("python -m device --simulate --port 8000" in line for line in out)
+
+
+def test_a_target_force_that_the_certificate_is_not_for_keeps_the_probe_from_starting(run, models, tmp_path):
+    with (tmp_path / "probe.toml").open("a") as settings:
+        settings.write("[press]\ntarget_n = 0.7\n")
+    code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
+    assert code == 1
+    [line] = errors
+    assert line.startswith("E401 press.target_n is 0.7, but must be 0.5 N as calibrated")
