@@ -163,12 +163,13 @@ class Procedure:
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
         else:
-            self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
+            # The screen first: whoever is told that the press has ended finds its result there.
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
+            self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
 
     def _reject(self, job: PressJob, state: str, reason: str) -> None:
-        self._set_job(job, state=state, reason=reason)
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
+        self._set_job(job, state=state, reason=reason)
 
     def _set_job(self, job: PressJob, **changes: Any) -> None:
         changed = replace(self.board.now.press or job, **changes)

@@ -51,7 +51,8 @@ def _require_fits(page: Page) -> None:
     assert spilling == []
 
 
-def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, daemon: Daemon):
+def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, tmp_path: Path):
+    daemon = Daemon(tmp_path)  # with the default hand: slow enough to see each instruction
     page.goto(daemon.url)
     expect(page.locator("#simulated-badge")).to_be_visible()
     expect(page.locator("#simulated-badge")).to_contain_text("simulated", ignore_case=True)
@@ -71,6 +72,7 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     expect(page.locator("#truth-size")).to_have_text("10.0 mm")
     expect(page.locator("#modulus-value")).to_have_text("not determined")
     expect(page.locator("#simulated-badge")).to_be_visible()
+    daemon.stop()
 
 
 def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_path: Path):
