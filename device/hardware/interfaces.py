@@ -12,11 +12,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.tactile_image import LedRatio
+
 LED_COUNT = 4
 """One LED on each side of the waveguide: +x, +y, -x, -y."""
-
-LedRatio = tuple[float, float, float, float]
-"""Brightness of the four sides as a ratio of full scale, 0..1."""
 
 
 @dataclass(frozen=True)

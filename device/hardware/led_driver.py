@@ -15,8 +15,9 @@ from typing import Protocol
 from smbus2 import SMBus, i2c_msg
 
 from device.errors import LightError
-from device.hardware.interfaces import LED_COUNT, LedRatio
+from device.hardware.interfaces import LED_COUNT
 from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.tactile_image import LedRatio
 
 
 class Register(IntEnum):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from device.hardware.interfaces import Camera, LedRatio, Lights
+from device.hardware.interfaces import Camera, Lights
 from device.instrument.force_recorder import ForceRecorder
-from device.measurement.tactile_image import Frame, Role
+from device.measurement.tactile_image import Frame, LedRatio, Role
 
 DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
 FRAME_TIMEOUT_S = 2.0

@@ -13,7 +13,7 @@ from device.config import LightSection, PressSection
 from device.instrument.bench import DARK, Bench
 from device.instrument.guidance import Guidance, advise
 from device.instrument.status import StatusBoard
-from device.measurement.tactile_image import Frame, Role
+from device.measurement.tactile_image import Frame, LedRatio, Role
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02
@@ -41,7 +41,7 @@ class Capture:
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
             time.sleep(POLL_S)
         frames: list[Frame] = []
-        lights: tuple[tuple[Role, tuple[float, float, float, float]], ...] = (("dark", DARK), ("reference", self.lit))
+        lights: tuple[tuple[Role, LedRatio], ...] = (("dark", DARK), ("reference", self.lit))
         for role, ratio in lights:
             self.bench.light(ratio)
             frames += [self.bench.take(role) for _ in range(UNLOADED_FRAMES)]

@@ -19,6 +19,8 @@ from device.measurement.quantities import Bound, InvalidQuantity, require
 Counts = NDArray[np.uint8] | NDArray[np.uint16]
 Image = NDArray[np.float32]
 Role = Literal["dark", "reference", "press"]
+LedRatio = tuple[float, float, float, float]
+"""Brightness of the sides +x, +y, -x, -y as a ratio of full scale, 0..1."""
 
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark divides noise by noise: the pixel is marked invalid."""
@@ -58,7 +60,7 @@ class Frame:
     role: Role
     t_s: float
     force_n: float
-    led_ratio: tuple[float, float, float, float]
+    led_ratio: LedRatio
 
     def __post_init__(self) -> None:
         if self.counts.ndim != 2 or self.counts.dtype not in (np.uint8, np.uint16):

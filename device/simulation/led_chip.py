@@ -15,8 +15,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-LedRatio = tuple[float, float, float, float]
-"""Light of the sides +x, +y, -x, -y as a ratio of full scale."""
+from device.measurement.tactile_image import LedRatio
 
 MODE1, PWM0, GRPPWM, LEDOUT0, SUBADR1, IREF, EFLAG1 = 0x00, 0x02, 0x12, 0x14, 0x18, 0x1C, 0x1D
 REGISTER_COUNT = 0x20

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, require
-from device.measurement.tactile_image import Image, PixelScale
+from device.measurement.tactile_image import Image, LedRatio, PixelScale
 
-LedRatio = tuple[float, float, float, float]
 ACTION = "use physical optics"
 
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.tactile_image import LedRatio
 from device.simulation.frame_clock import ClockedFrame, FrameClock
-from device.simulation.led_chip import LedRatio
 
 Render = Callable[["ExposureRequest"], NDArray[np.uint8]]
 

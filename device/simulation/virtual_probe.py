@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.tactile_image import Image, PixelScale
+from device.measurement.tactile_image import Image, LedRatio, PixelScale
 from device.simulation.hand import VirtualHand
-from device.simulation.renderer import LedRatio
 from device.simulation.scenario import Scenario
 from device.simulation.surface_table import SurfaceTable
 
