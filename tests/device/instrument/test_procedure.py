@@ -14,7 +14,7 @@ from device.instrument.procedure import Procedure
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Frame
-from device.records.store import Store
+from device.records.store import ENDED, Store
 
 CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(frames=2, timeout_s=5.0))
 ANSWER = Estimate(
@@ -85,7 +85,7 @@ class Rig:
     def press(self):
         """Request a press and return its job once it has ended."""
         job = self.procedure.request()
-        self.until(lambda: not self.bench.is_at_work)
+        self.until(lambda: not self.bench.is_at_work and self.board.now.press.state in ENDED)
         return self.store.press(job.id)
 
     def close(self):
