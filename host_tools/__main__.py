@@ -19,8 +19,6 @@ from device.measurement.features import FEATURE_NAMES
 from device.measurement.inversion import FEATURE_UNITS, BundleRefused, ModelBundle
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import read_recording, write_recording
-from device.simulation.renderer import LinearOptics
-from device.simulation.sensor import Sensor
 from device.simulation.surface_table import load_surface_table
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -72,10 +70,9 @@ def simulate(
 
         plot_solution(solution, plot)
     if frame:
-        from host_tools.frame import FrameSettings, simulated_frame
+        from host_tools.frame import simulated_frame
 
-        settings = FrameSettings(LinearOptics(), Sensor(), exposure_us, gain=1.0, seed=seed)
-        cv2.imwrite(str(frame), simulated_frame(solution, settings))
+        cv2.imwrite(str(frame), simulated_frame(solution, exposure_us=exposure_us, seed=seed))
     record = solution.as_record() | {"stated_error": stated_error}
     if as_json:
         print(json.dumps(record))

@@ -19,7 +19,7 @@ from device.measurement.calibration import FORCE_TOLERANCE, Calibration, Regress
 from device.measurement.estimate import image_features
 from device.measurement.features import FeatureSettings
 from device.measurement.intervals import HeldOut
-from device.measurement.inversion import ModelBundle
+from device.measurement.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import Recording
 from device.simulation.surface_table import SurfaceTable
@@ -88,7 +88,7 @@ def _require_usable(recordings: Sequence[Recording], force_n: float) -> str:
 
 def as_row(lump: Deformation) -> Array:
     """Return the deformation features in the model's order."""
-    return np.array([lump.max_deformation_mm, lump.central_deformation_mm3, lump.deformation_area_mm2])
+    return np.array([getattr(lump, name) for name in FEATURE_UNITS])
 
 
 def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:
@@ -117,7 +117,8 @@ def scaled_errors(residuals: Array, peak_mm: Array) -> Array:
     A contrast error dc shifts the half-maximum contour by dc / slope, and the slope grows with the peak: so the area's
     error times the peak is constant, while peak and sum err by the same amount for every lump.
     """
-    return residuals * np.column_stack([np.ones_like(peak_mm), np.ones_like(peak_mm), peak_mm])
+    peak, total, area = residuals.T
+    return np.column_stack([peak, total, area * peak_mm])
 
 
 def held_out_scenes(

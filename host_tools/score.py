@@ -30,17 +30,19 @@ SCORED_LOW = (2.0, PAPER_BOX_LOW[1], PAPER_BOX_LOW[2])
 
 @dataclass(frozen=True)
 class Rig:
-    """What turns an inclusion into an estimate: model, calibration, surfaces, and the force pressed with."""
+    """What turns an inclusion into an estimate: model, calibration and surfaces."""
 
     bundle: ModelBundle
     calibration: Calibration
     table: SurfaceTable
-    force_n: float = 0.5
 
     def noise_free(self, truth: Inclusion) -> Array:
         """Return the network's answer [3] to exact finite-element features."""
-        lump = solve(Scene(truth, Press(force_n=self.force_n))).lump
-        return np.asarray(self.bundle.estimate(as_row(lump)[None]).estimate[0])
+        return np.asarray(self.bundle.estimate(self.features(truth)[None]).estimate[0])
+
+    def features(self, truth: Inclusion) -> Array:
+        """Return the exact deformation features [3] of a press with the certificate's force."""
+        return as_row(solve(Scene(truth, Press(force_n=self.calibration.force_n))).lump)
 
     def through_camera(self, truth: Inclusion, seed: int) -> Estimate:
         """Return the device's answer to a recording with fresh noise."""
@@ -75,7 +77,7 @@ def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) ->
         for s in (seed, seed + len(phantoms))
     )
     image = np.array([rows.mean(axis=0) for rows in first])
-    exact = np.array([as_row(solve(Scene(p, Press(force_n=rig.force_n))).lump) for p in phantoms])
+    exact = np.array([rig.features(phantom) for phantom in phantoms])
     estimates = []
     for i, rows in enumerate(fresh):
         others = np.arange(len(phantoms)) != i

@@ -18,7 +18,7 @@ from device.measurement.features import FEATURE_NAMES, FeatureSettings, extract_
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording import Recording
-from device.measurement.tactile_image import reference, saturated_ratio, tactile_image
+from device.measurement.tactile_image import saturated_ratio
 
 Status = Literal["ok", "outside_range", "no_contact", "saturated", "not_identifiable", "rejected"]
 
@@ -102,9 +102,7 @@ def estimate_recording(recording: Recording, bundle: ModelBundle, calibration: C
 
 def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[np.float64]:
     """Return the image features [n, 3] of a recording's press frames."""
-    base, scale = reference(recording.frames), recording.camera.scale
-    images = (tactile_image(frame, base, scale) for frame in recording.with_role("press"))
-    return np.array([extract_features(image, settings).as_row() for image in images])
+    return np.array([extract_features(image, settings).as_row() for image in recording.press_images()])
 
 
 def _answer(

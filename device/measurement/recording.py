@@ -22,7 +22,14 @@ import numpy as np
 
 from device.measurement.durable import sync_directory, write_and_sync
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
-from device.measurement.tactile_image import Frame, PixelScale, require_one_shape
+from device.measurement.tactile_image import (
+    Frame,
+    PixelScale,
+    TactileImage,
+    reference,
+    require_one_shape,
+    tactile_image,
+)
 
 SCHEMA = "tsis.recording/1"
 REPAIR = "record the press again, or correct the file"
@@ -86,6 +93,11 @@ class Recording:
     def with_role(self, role: str) -> list[Frame]:
         """Return the frames of one role in order."""
         return [f for f in self.frames if f.role == role]
+
+    def press_images(self) -> Iterator[TactileImage]:
+        """Yield the corrected image of each press frame."""
+        base = reference(self.frames)
+        return (tactile_image(frame, base, self.camera.scale) for frame in self.with_role("press"))
 
 
 def write_recording(recording: Recording, folder: Path) -> None:

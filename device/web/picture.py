@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 
 from device.measurement.recording import read_recording
-from device.measurement.tactile_image import reference, tactile_image
 
 WIDTH_PX = 480
 
@@ -19,8 +18,7 @@ def tactile_png(folder: Path) -> bytes:
     The colours run from no contrast to the picture's own brightest spot; pixels are made square.
     """
     recording = read_recording(folder)
-    base, scale = reference(recording.frames), recording.camera.scale
-    images = [tactile_image(frame, base, scale) for frame in recording.with_role("press")]
+    images, scale = list(recording.press_images()), recording.camera.scale
     contrast = cv2.GaussianBlur(np.mean([image.contrast for image in images], axis=0), (0, 0), 4)
     valid = images[0].valid
     peak = max(float(contrast[valid].max(initial=0.0)), 1e-6)

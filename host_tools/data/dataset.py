@@ -17,13 +17,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from device.measurement.inversion import FEATURE_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.journal import Row
 from host_tools.inverse.train import TrainingRows
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
-FEATURES = ("max_deformation_mm", "central_deformation_mm3", "deformation_area_mm2")
-PROFILES = ("w_mm", "w_baseline_mm", "p_kpa")
+FEATURES = tuple(FEATURE_UNITS)
 SCHEMA = "tsis.sweep/1"
 UNITS = {"_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa", "_n": "N"}
 L9 = np.array([(0, 0, 0), (0, 1, 1), (0, 2, 2), (1, 0, 1), (1, 1, 2), (1, 2, 0), (2, 0, 2), (2, 1, 0), (2, 2, 1)])
