@@ -30,10 +30,10 @@ class Answer:
 
 
 class Daemon:
-    """`python -m device --simulate` as its own process on a free port, with an empty data folder."""
+    """`python -m device --simulate` as its own process on a free port unless told otherwise."""
 
-    def __init__(self, folder: Path, scene: str = "") -> None:
-        arguments = [sys.executable, "-m", "device", "--simulate", "--port", "0"]
+    def __init__(self, folder: Path, scene: str = "", port: int = 0) -> None:
+        arguments = [sys.executable, "-m", "device", "--simulate", "--port", str(port)]
         if scene:
             (folder / "scene.toml").write_text(scene)
             arguments += ["--scene", "scene.toml"]

@@ -83,3 +83,7 @@ def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_pa
     daemon.stop()
     expect(page.locator("#connection-lost")).to_be_visible()
     _shoot(page, "connection-lost")
+    again = Daemon(tmp_path, QUICK_HAND, port=int(daemon.url.rpartition(":")[2]))
+    expect(page.locator("#connection-lost")).to_be_hidden(timeout=30_000)
+    expect(page.locator("#instruction")).to_have_text("Press beside the lesion")
+    again.stop()
