@@ -23,23 +23,26 @@ class InvalidQuantity(ValueError):  # noqa: N818 - reads as what it says: this q
 
 @dataclass(frozen=True)
 class Bound:
-    """Closed or half-open range of one quantity, with its unit."""
+    """Range of one quantity, closed or open at either end, with its unit."""
 
     low: float
     high: float
     unit: str
     low_included: bool = True
+    high_included: bool = True
 
     def __str__(self) -> str:
         low = "at least" if self.low_included else "above"
         if math.isinf(self.high):
             return f"{low} {self.low:g} {self.unit}".strip()
-        return f"{low} {self.low:g} and at most {self.high:g} {self.unit}".strip()
+        high = "at most" if self.high_included else "below"
+        return f"{low} {self.low:g} and {high} {self.high:g} {self.unit}".strip()
 
     def holds(self, value: float) -> bool:
         """Return whether a finite value lies inside."""
         above = value >= self.low if self.low_included else value > self.low
-        return math.isfinite(value) and above and value <= self.high
+        below = value <= self.high if self.high_included else value < self.high
+        return math.isfinite(value) and above and below
 
 
 def require(quantity: str, value: object, bound: Bound, action: str) -> float:

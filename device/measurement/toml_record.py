@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from device.measurement.quantities import InvalidQuantity
 
@@ -52,6 +53,8 @@ def from_table(kind: type[Record], table: Mapping[str, Any], where: str = "") ->
 
 
 def _value(kind: Any, value: Any, where: str) -> Any:
+    if isinstance(kind, UnionType):  # `X | None`: TOML has no null, absence says None
+        kind = next(part for part in get_args(kind) if part is not NoneType)
     if is_dataclass(kind) and isinstance(kind, type):
         if not isinstance(value, Mapping):
             raise InvalidQuantity(where, repr(value), "a table", f"write it as [{where}]")
@@ -60,4 +63,6 @@ def _value(kind: Any, value: Any, where: str) -> Any:
     accepted = ACCEPTED.get(plain)
     if accepted and (not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool)):
         raise InvalidQuantity(where, repr(value), f"of type {accepted[-1].__name__}", "correct its type")
-    return plain(value) if plain in (Path, tuple) else value
+    if plain is tuple:
+        return tuple(_value(get_args(kind)[0], item, f"{where}[{i}]") for i, item in enumerate(value))
+    return plain(value) if plain is Path else value
