@@ -5,7 +5,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test check bench sweep train evaluate lock clean
+.PHONY: help setup run test check bench verify sweep train evaluate lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -41,6 +41,10 @@ check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 
 bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute
 	$(PY) tests/bench.py
+	$(PY) tests/bench_forward.py
+
+verify: .venv/all.stamp ## check the forward model against known answers and write docs/verification.md
+	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md
 
 sweep: .venv/all.stamp ## solve the 134 scenes of the training set into build/sweep.nc
 	$(HOST_TOOLS) sweep --scenes 134 --seed 1 --out build/sweep.nc

@@ -108,7 +108,7 @@ def table_features(table: SurfaceTable, inclusion: Inclusion, force_n: float) ->
     """Return the deformation features of an inclusion from the table of surfaces."""
     lump_mm = force_n * table.lump(inclusion)
     total_mm3 = float(np.trapezoid(2 * np.pi * table.r_mm * lump_mm, table.r_mm))
-    return as_row(deformation(table.r_mm, lump_mm, total_mm3, central_radius_mm=Waveguide().central_radius_mm))
+    return as_row(deformation(table.r_mm, lump_mm, total_mm3))
 
 
 def scaled_errors(residuals: Array, peak_mm: Array) -> Array:

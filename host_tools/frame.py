@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from device.simulation.renderer import LinearOptics
 from device.simulation.sensor import Sensor
-from host_tools.forward.solve import Solution
+from host_tools.forward.solution import Solution
 from host_tools.phantom import CAMERA, LIT
 
 

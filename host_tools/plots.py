@@ -10,7 +10,7 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot as plt
 
-from host_tools.forward.solve import Solution
+from host_tools.forward.solution import Solution
 
 
 def plot_solution(solution: Solution, path: Path) -> None:

@@ -1,7 +1,8 @@
-"""A profile over the face to the paper's three numbers: largest, summed and how wide (O1, O2, O3).
+"""A field over the face to the paper's three numbers: largest, summed and how wide (O1, O2, O3).
 
 Used on the lump field (press minus the same press without the inclusion) and, for the paper's literal protocol, on the
-raw field, which peaks at the rim with or without a lump. Source: Lee & Won 2013, section III; docs/measurement.md.
+raw field, which peaks at the rim with or without a lump. Fields are sampled along rays at even angles; a sum over the
+face is the mean over the angles of a ray's. Source: Lee & Won 2013, section III; docs/measurement.md.
 """
 
 from __future__ import annotations
@@ -9,12 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
-Profile = NDArray[np.float64]
+from host_tools.forward.face_state import FloatArray
 
 HALF_MAXIMUM = 0.5
 """Threshold of O3 as a ratio of O1: unlike a fixed one it does not move when the light or the skin does."""
+
+CENTRAL_RATIO = 0.9
+"""The central window over the face: the rim beyond is singular."""
 
 
 @dataclass(frozen=True)
@@ -32,32 +36,37 @@ class Deformation:
 
 
 def deformation(
-    r_mm: Profile,
-    field_mm: Profile,
-    total_mm3: float,
-    *,
-    central_radius_mm: float,
-    threshold_ratio: float = HALF_MAXIMUM,
+    r_mm: FloatArray, field_mm: FloatArray, total_mm3: float, *, threshold_ratio: float = HALF_MAXIMUM
 ) -> Deformation:
-    """Return O1-O3 of a profile sampled at ascending radii from 0; `total_mm3` is its integral over the whole face."""
-    inside = r_mm <= central_radius_mm * (1 + 1e-12)
-    r, field = r_mm[inside], field_mm[inside]
+    """Return O1-O3 of a field [..., R] sampled on rays that ascend from 0 to the rim, at even angles if several.
+
+    `total_mm3` is the field's integral over the whole face.
+    """
+    rays = np.atleast_2d(r_mm)
+    window = rays[0] <= CENTRAL_RATIO * rays[0, -1] * (1 + 1e-12)  # the same share of every ray
+    r, field = rays[:, window], np.atleast_2d(field_mm)[:, window]
     peak = float(field.max())
     return Deformation(
         max_deformation_mm=peak,
         total_deformation_mm3=total_mm3,
-        central_deformation_mm3=float(np.trapezoid(2 * np.pi * r * field, r)),
+        central_deformation_mm3=float(np.mean(np.trapezoid(2 * np.pi * r * field, r, axis=-1))),
         deformation_area_mm2=area_above(r, field, threshold_ratio * peak) if peak > 0 else 0.0,
     )
 
 
-def area_above(r_mm: Profile, field_mm: Profile, threshold_mm: float) -> float:
-    """Return the projected area (mm2) where a profile exceeds the threshold, linear between samples."""
-    left, right = field_mm[:-1] - threshold_mm, field_mm[1:] - threshold_mm
-    crossing = (left > 0) != (right > 0)
-    fraction = np.divide(left, left - right, out=np.zeros_like(left), where=crossing)
-    r_cross = r_mm[:-1] + fraction * np.diff(r_mm)
-    start = np.where(left > 0, r_mm[:-1], r_cross)
-    stop = np.where(right > 0, r_mm[1:], r_cross)
-    inside = (left > 0) | (right > 0)
-    return float(np.pi * np.sum((stop**2 - start**2)[inside]))
+def area_above(r_mm: FloatArray, field_mm: FloatArray, threshold_mm: float) -> float:
+    """Return the projected area (mm2) where a field [..., R] exceeds the threshold, by a cubic spline along each ray.
+
+    Straight lines between the samples would make the area jitter by 5e-6 as the crossing moves from one to the next.
+    """
+    rays, fields = np.atleast_2d(r_mm), np.atleast_2d(field_mm)
+    return float(np.mean([_area_of_ray(r, field - threshold_mm) for r, field in zip(rays, fields, strict=True)]))
+
+
+def _area_of_ray(r_mm: FloatArray, excess_mm: FloatArray) -> float:
+    """Return the area (mm2) of the rings where the spline through a profile is positive."""
+    spline = CubicSpline(r_mm, excess_mm)
+    crossings = spline.roots(extrapolate=False)
+    edges = np.sort(np.concatenate([r_mm[[0, -1]], crossings[np.isfinite(crossings)]]))
+    inside = spline((edges[:-1] + edges[1:]) / 2) > 0
+    return float(np.pi * np.sum(np.diff(edges**2)[inside]))

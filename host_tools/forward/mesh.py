@@ -1,21 +1,20 @@
-"""A scene to a graded axisymmetric mesh; the half plane r > 0 with the sensing face at z = 0, tissue below.
+"""A centred scene to a graded axisymmetric mesh; the half plane r > 0 with the sensing face at z = 0, tissue below.
 
 Both rims of the face carry a singularity: the contact rim and the bonded back rim. Left ungraded, the back rim alone
-costs 0.3 % of the surface displacement at order 4. The sphere's arc is exact (rational quadratic splines).
+costs 0.3 % of the surface displacement at order 4.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import pairwise
+from math import asin, pi
 from typing import Any
 
-from netgen.geom2d import SplineGeometry
 from ngsolve import Mesh
 
+from host_tools.forward.sketch import OUTSIDE, Arc, Sketch, draw_waveguide
 from host_tools.scene import Scene
-
-TISSUE, INCLUSION, LAYERS = "tissue", "inclusion", "layer.*"
 
 
 @dataclass(frozen=True)
@@ -29,81 +28,108 @@ class Resolution:
     face_mm: float = 1.0
     contact_rim_mm: float = 0.01
     back_rim_mm: float = 0.01
-    per_inclusion: float = 10.0
+    per_inclusion: float = 16.0
     grading: float = 0.4
 
 
-class _Sketch:
-    """Points and lines of the half plane, each with the domains on its left and right."""
-
-    def __init__(self, resolution: Resolution) -> None:
-        self.resolution, self.geometry = resolution, SplineGeometry()
-
-    def point(self, r_mm: float, z_mm: float, size_mm: float | None = None) -> int:
-        return int(self.geometry.AppendPoint(r_mm, z_mm, maxh=size_mm or self.resolution.bulk_mm))
-
-    def line(self, *points: int, left: int, right: int, boundary: str, size_mm: float | None = None) -> None:
-        kind = "line" if len(points) == 2 else "spline3"
-        self.geometry.Append(
-            [kind, *points],
-            leftdomain=left,
-            rightdomain=right,
-            bc=boundary,
-            maxh=size_mm or self.resolution.bulk_mm,
-        )
-
-
-def _draw_tissue(sketch: _Sketch, scene: Scene, centre: int, rim: int) -> None:
-    """Draw the slab (domain 1) and in it the half circle of the inclusion (domain 2), if there is one."""
-    T, R = scene.tissue.thickness_mm, scene.tissue.half_width_mm
-    base, corner, top = sketch.point(0, -T), sketch.point(R, -T), sketch.point(R, 0)
-    sketch.line(base, corner, left=1, right=0, boundary="base")
-    sketch.line(corner, top, left=1, right=0, boundary="side")
-    sketch.line(top, rim, left=1, right=0, boundary="skin")
-    sketch.geometry.SetMaterial(1, TISSUE)
-    face_mm = sketch.resolution.face_mm
-    if not scene.has_inclusion or scene.inclusion is None:
-        sketch.line(centre, base, left=1, right=0, boundary="axis", size_mm=face_mm)
-        return
-    d, h = scene.inclusion.size_mm, scene.inclusion.depth_mm
-    a, size_mm = d / 2, min(face_mm, d / sketch.resolution.per_inclusion)
-    north, south = sketch.point(0, -h, size_mm), sketch.point(0, -h - d, size_mm)
-    east = sketch.point(a, -h - a, size_mm)
-    north_east, south_east = sketch.point(a, -h, size_mm), sketch.point(a, -h - d, size_mm)
-    sketch.line(centre, north, left=1, right=0, boundary="axis", size_mm=face_mm)
-    sketch.line(north, south, left=2, right=0, boundary="axis", size_mm=size_mm)
-    sketch.line(south, base, left=1, right=0, boundary="axis")
-    sketch.line(south, south_east, east, left=2, right=1, boundary="sphere", size_mm=size_mm)
-    sketch.line(east, north_east, north, left=2, right=1, boundary="sphere", size_mm=size_mm)
-    sketch.geometry.SetMaterial(2, INCLUSION)
-
-
-def _draw_waveguide(sketch: _Sketch, scene: Scene, centre: int, rim: int) -> None:
-    """Draw the layers (domains 3, 4, ...) upwards from the face."""
-    heights = list(accumulate(scene.waveguide.layer_thicknesses_mm))
-    inner, outer = centre, rim
-    for i, z_mm in enumerate(heights):
-        domain, last = 3 + i, i == len(heights) - 1
-        up_inner = sketch.point(0, z_mm)
-        up_outer = sketch.point(scene.waveguide.radius_mm, z_mm, sketch.resolution.back_rim_mm if last else None)
-        sketch.line(outer, up_outer, left=domain, right=0, boundary="wall")
-        sketch.line(
-            up_outer, up_inner, left=domain, right=0 if last else domain + 1, boundary="back" if last else "bond"
-        )
-        sketch.line(up_inner, inner, left=domain, right=0, boundary="axis")
-        sketch.geometry.SetMaterial(domain, f"layer{i}")
-        inner, outer = up_inner, up_outer
-
-
 def axisymmetric_mesh(scene: Scene, *, order: int, resolution: Resolution | None = None) -> Any:
-    """Return the curved mesh: materials tissue, inclusion, layer0...; boundaries face, back, base, axis."""
-    sketch = _Sketch(resolution or Resolution())
-    face_mm = sketch.resolution.face_mm
-    centre = sketch.point(0, 0, face_mm)
-    rim = sketch.point(scene.waveguide.radius_mm, 0, sketch.resolution.contact_rim_mm)
-    sketch.line(centre, rim, left=3, right=1, boundary="face", size_mm=face_mm)
-    _draw_tissue(sketch, scene, centre, rim)
-    _draw_waveguide(sketch, scene, centre, rim)
-    mesh = Mesh(sketch.geometry.GenerateMesh(maxh=sketch.resolution.bulk_mm, grading=sketch.resolution.grading))
+    """Return the curved mesh; materials as in `materials.py`, boundaries face, back, base, side, skin, axis, sphere."""
+    size = resolution or Resolution()
+    sketch = Sketch(size.bulk_mm)
+    arc = _arc(scene)
+    above_arc_mm = size.face_mm if arc is None else min(size.face_mm, max(-arc.at(pi / 2)[1], 0.02))
+    centre = sketch.point(0, 0, above_arc_mm)
+    rim = sketch.point(scene.waveguide.radius_mm, 0, size.contact_rim_mm)
+    sketch.line(centre, rim, left="layer0", right="tissue0", boundary="face", size_mm=size.face_mm)
+    _TissueSection(sketch, scene, size, arc).draw(centre, rim)
+    draw_waveguide(sketch, scene.waveguide, centre, rim, size.back_rim_mm)
+    mesh = Mesh(sketch.mesh(size.grading))
     mesh.Curve(order + 1)
     return mesh
+
+
+def _arc(scene: Scene) -> Arc | None:
+    if not scene.has_inclusion or scene.inclusion is None:
+        return None
+    radius_mm = scene.inclusion.size_mm / 2
+    return Arc(-scene.inclusion.depth_mm - radius_mm, radius_mm, scene.placement.width_ratio_x)
+
+
+class _TissueSection:
+    """Draws the slab with its layers and, if there is one, the half spheroid that may cross them."""
+
+    def __init__(self, sketch: Sketch, scene: Scene, size: Resolution, arc: Arc | None) -> None:
+        self.sketch, self.size, self.arc = sketch, size, arc
+        self.half_width_mm = scene.tissue.half_width_mm
+        self.interfaces_mm = [-depth for depth in scene.tissue.interface_depths_mm]
+        self.base_mm = -scene.tissue.thickness_mm
+        self.inclusion_mm = size.face_mm
+        if arc is not None:
+            narrow = 2 * arc.radius_mm * min(1.0, arc.width_ratio)
+            self.inclusion_mm = min(size.face_mm, narrow / size.per_inclusion)
+
+    def draw(self, centre: int, rim: int) -> None:
+        """Draw everything below the face, whose end points are given."""
+        top = self.sketch.point(self.half_width_mm, 0)
+        self.sketch.line(top, rim, left="tissue0", right=OUTSIDE, boundary="skin")
+        on_arc = self._draw_arc()
+        on_axis = {0.0: centre} | {z: point for (r, z), point in on_arc.items() if r == 0}
+        on_side = {0.0: top}
+        for z in [*self.interfaces_mm, self.base_mm]:
+            on_axis.setdefault(z, self.sketch.point(0, z))
+            on_side[z] = self.sketch.point(self.half_width_mm, z)
+            crossing = next((point for (r, z_arc), point in on_arc.items() if r > 0 and z_arc == z), None)
+            self._draw_plane(z, on_axis[z], crossing, on_side[z])
+        self._draw_axis(on_axis)
+        for upper, lower in pairwise(sorted(on_side, reverse=True)):
+            material = self._material("tissue", (upper + lower) / 2)
+            self.sketch.line(on_side[lower], on_side[upper], left=material, right=OUTSIDE, boundary="side")
+
+    def _layer(self, z_mm: float) -> int:
+        return sum(z_mm < interface for interface in self.interfaces_mm)
+
+    def _material(self, kind: str, z_mm: float) -> str:
+        return f"{kind}{self._layer(z_mm)}"
+
+    def _draw_arc(self) -> dict[tuple[float, float], int]:
+        """Draw the inclusion's outline; return its points by (r, z)."""
+        if self.arc is None:
+            return {}
+        arc, a, c = self.arc, self.arc.radius_mm, self.arc.centre_z_mm
+        crossings = {asin((z - c) / a): z for z in self.interfaces_mm if abs(z - c) < a}
+        angles = sorted({-pi / 2, pi / 2, *(crossings or (0.0,))})
+        places = [(arc.at(angle)[0], crossings.get(angle, arc.at(angle)[1])) for angle in angles]
+        points = [self.sketch.point(*place, self.inclusion_mm) for place in places]
+        middles = [arc.at((start + stop) / 2)[1] for start, stop in pairwise(angles)]
+        self.sketch.arc(
+            arc,
+            angles,
+            points,
+            left=[self._material("inclusion", z) for z in middles],
+            right=[self._material("tissue", z) for z in middles],
+            size_mm=self.inclusion_mm,
+        )
+        return dict(zip(places, points, strict=True))
+
+    def _draw_plane(self, z: float, axis: int, crossing: int | None, side: int) -> None:
+        """Draw an interface between layers, or the base, from the axis or the inclusion outwards."""
+        k = self._layer(z)  # the layer above: z itself is not below its own interface
+        below, name = (OUTSIDE, "base") if z == self.base_mm else (f"tissue{k + 1}", "interface")
+        if crossing is None:
+            self.sketch.line(axis, side, left=f"tissue{k}", right=below, boundary=name)
+            return
+        self.sketch.line(axis, crossing, left=f"inclusion{k}", right=f"inclusion{k + 1}", boundary=name)
+        self.sketch.line(crossing, side, left=f"tissue{k}", right=below, boundary=name)
+
+    def _draw_axis(self, on_axis: dict[float, int]) -> None:
+        for upper, lower in pairwise(sorted(on_axis, reverse=True)):
+            middle = (upper + lower) / 2
+            inside = self.arc is not None and abs(middle - self.arc.centre_z_mm) < self.arc.radius_mm
+            self.sketch.line(
+                on_axis[upper],
+                on_axis[lower],
+                left=self._material("inclusion" if inside else "tissue", middle),
+                right=OUTSIDE,
+                boundary="axis",
+                size_mm=self.inclusion_mm if inside else self.size.face_mm if upper == 0.0 else None,
+            )

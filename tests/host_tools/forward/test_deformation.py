@@ -11,7 +11,7 @@ R = np.linspace(0.0, 11.0, 2201)
 def test_a_cone_has_the_known_numbers():
     """w = 1 - r/5: peak 1; integral pi 5^2 / 3; above one half inside r = 2.5."""
     cone = np.maximum(1 - R / 5, 0.0)
-    found = deformation(R, cone, 7.0, central_radius_mm=9.9)
+    found = deformation(R, cone, 7.0)
     assert found.max_deformation_mm == 1.0
     assert found.central_deformation_mm3 == pytest.approx(np.pi * 25 / 3, rel=1e-4)
     assert found.deformation_area_mm2 == pytest.approx(np.pi * 2.5**2, rel=1e-9)
@@ -21,7 +21,7 @@ def test_a_cone_has_the_known_numbers():
 def test_the_rim_is_left_out_of_the_window():
     """A field that rises only beyond 9.9 mm has no peak, integral or area in the window."""
     rim = np.where(R > 9.95, 5.0, 0.0)
-    found = deformation(R, rim, 0.0, central_radius_mm=9.9)
+    found = deformation(R, rim, 0.0)
     assert (found.max_deformation_mm, found.central_deformation_mm3, found.deformation_area_mm2) == (0.0, 0.0, 0.0)
 
 

@@ -1,0 +1,142 @@
+"""`host_tools simulate`: one scene, from options or a TOML file, by the cheapest model that holds a tolerance."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import cv2
+import typer
+
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from host_tools.commands.output import require_writable
+from host_tools.scene import Press, Scene
+
+PLOTS, PICTURES = (".png", ".pdf", ".svg"), (".png",)
+UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
+
+
+def simulate(
+    scene: Annotated[Path | None, typer.Option(help="TOML file of the scene; the options below change it.")] = None,
+    size_mm: Annotated[float | None, typer.Option(help="Diameter of the inclusion; 0 for none.")] = None,
+    depth_mm: Annotated[float | None, typer.Option(help="Surface to the top of the inclusion.")] = None,
+    modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the inclusion.")] = None,
+    tissue_modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the tissue.")] = None,
+    poisson: Annotated[float | None, typer.Option(help="Poisson ratio of probe, tissue and inclusion.")] = None,
+    offset_mm: Annotated[float | None, typer.Option(help="Lump's centre beside the probe's axis.")] = None,
+    indentation_mm: Annotated[float | None, typer.Option(help="Prescribe the indentation (1 mm by default).")] = None,
+    force_n: Annotated[float | None, typer.Option(help="Prescribe the force instead.")] = None,
+    strain: Annotated[
+        Literal["small", "finite", "auto"], typer.Option(help="Strain measure; auto asks the tolerance.")
+    ] = "small",
+    tolerance: Annotated[str, typer.Option(help="Relative error allowed on O1-O3, such as 0.5% or 0.005.")] = "0.5%",
+    explain: Annotated[bool, typer.Option(help="Print which model was chosen, and why.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the whole solution as JSON.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Write a figure (PNG, PDF, SVG).")] = None,
+    frame: Annotated[Path | None, typer.Option(help="Write a camera frame (PNG, 8 bit, linear optics).")] = None,
+    exposure_us: Annotated[float, typer.Option(help="Exposure of the frame.")] = 4000.0,
+    seed: Annotated[int, typer.Option(help="Seed of the frame's noise.")] = 1,
+) -> None:
+    """Solve one scene: deformation of the sensing face, contact pressure, force, and O1-O3 with their errors."""
+    from host_tools.forward.plan import model_plan
+    from host_tools.forward.solve import solve
+
+    require_writable(plot, PLOTS)
+    require_writable(frame, PICTURES)
+    require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
+    require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
+    asked = _scene(
+        scene, (size_mm, depth_mm, modulus_kpa), tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n)
+    )
+    plan = model_plan(asked, tolerance=_ratio(tolerance), strain=strain)
+    solution = solve(asked, plan, estimate_error=True)
+    if plot:
+        from host_tools.plots import plot_solution
+
+        plot_solution(solution, plot)
+    if frame:
+        from host_tools.frame import simulated_frame
+
+        cv2.imwrite(str(frame), simulated_frame(solution, exposure_us=exposure_us, seed=seed))
+    record = solution.as_record()
+    if as_json:
+        print(json.dumps(record))
+        return
+    if explain:
+        _print_plan(record["plan"])
+    _print_solution(record)
+
+
+def _ratio(text: str) -> float:
+    """Return 0.005 for "0.5%" or "0.005"."""
+    try:
+        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        value = -1.0
+    bound = Bound(0.0, 1.0, "", low_included=False)
+    if not bound.holds(value):
+        raise InvalidQuantity("tolerance", repr(text), f"a ratio {bound}, or per cent", "give for example 0.5%")
+    return value
+
+
+def _scene(
+    path: Path | None,
+    unknowns: tuple[float | None, float | None, float | None],
+    tissue_modulus_kpa: float | None,
+    poisson: float | None,
+    offset_mm: float | None,
+    press: tuple[float | None, float | None],
+) -> Scene:
+    """Return the file's scene, or the default one, with what the options say instead."""
+    from host_tools.scene_file import read_scene
+
+    base = read_scene(path) if path else Scene()
+    inclusion = _inclusion(base.inclusion, unknowns, path)
+    tissue, place, probe = base.tissue, base.placement, base.waveguide
+    if tissue_modulus_kpa is not None:
+        tissue = replace(tissue, youngs_modulus_kpa=tissue_modulus_kpa)
+    if poisson is not None:
+        layers = tuple(replace(layer, poisson_ratio=poisson) for layer in tissue.layers)
+        tissue = replace(tissue, poisson_ratio=poisson, layers=layers)
+        place, probe = replace(place, poisson_ratio=poisson), replace(probe, poisson_ratio=poisson)
+    if offset_mm is not None:
+        place = replace(place, offset_x_mm=offset_mm, offset_y_mm=0.0)
+    pressed = base.press if press == (None, None) else Press(*press)
+    return Scene(inclusion, pressed, probe, tissue, place)
+
+
+def _inclusion(
+    base: Inclusion | None, unknowns: tuple[float | None, float | None, float | None], path: Path | None
+) -> Inclusion | None:
+    if base is not None:
+        given = zip(base.as_tuple(), unknowns, strict=True)
+        return Inclusion(*(known if asked is None else asked for known, asked in given))
+    if path is not None and unknowns == (None, None, None):
+        return None
+    missing = [name for name, value in zip(("size", "depth", "modulus"), unknowns, strict=True) if value is None]
+    if missing:
+        raise InvalidQuantity(
+            "inclusion", f"without {', '.join(missing)}", "whole", "give --size-mm, --depth-mm and --modulus-kpa"
+        )
+    return Inclusion(*(float(value) for value in unknowns if value is not None))
+
+
+def _print_plan(plan: dict[str, Any]) -> None:
+    for choice, reason in plan["reasons"].items():
+        value = f"{plan['grading']}, order {plan['order']}" if choice == "level" else plan[choice]
+        print(f"{choice:12} {value:20} {reason}")
+    if plan["predicted_error"]:
+        errors = ", ".join(f"{name} {100 * error:.2g} %" for name, error in plan["predicted_error"].items())
+        print(f"{'predicted':12} {errors}")
+        print(f"{'':12} about {plan['predicted_seconds']:.2g} s where the tables were measured")
+
+
+def _print_solution(record: dict[str, Any]) -> None:
+    for name, value in record.items():
+        unit = UNITS.get("_" + name.rpartition("_")[2])
+        if unit and isinstance(value, float):
+            error = record["stated_error"].get(name)
+            print(f"{name:26} {value:12.6g} {unit:4}" + (f" +- {100 * error:.3f} %" if error else ""))
+    print(f"{'pressure_is_positive':26} {record['pressure_is_positive']!s:>12}")

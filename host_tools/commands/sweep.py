@@ -1,0 +1,49 @@
+"""`host_tools sweep`: random scenes of the paper's box to one data set, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from host_tools.commands.output import note, progress
+
+Strain = Literal["small", "finite"]
+
+
+def sweep(
+    out: Annotated[Path, typer.Option(help="netCDF file to write.")],
+    scenes: Annotated[int, typer.Option(help="Number of random scenes.")] = 134,
+    seed: Annotated[int, typer.Option(help="Seed of the scenes.")] = 1,
+    force_n: Annotated[
+        list[float] | None, typer.Option(help="Force of every press (0.5 N by default); repeat it for rising loads.")
+    ] = None,
+    strain: Annotated[Strain, typer.Option(help="small (linear) or finite.")] = "small",
+    jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Dask cluster to solve on, tcp://HOST:PORT; a worker uses one thread."),
+    ] = None,
+) -> None:
+    """Solve random scenes of the paper's box on all cores or a cluster; interrupted, the same command goes on."""
+    from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan
+    from host_tools.data.sweep import sweep as run_sweep
+
+    forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N
+    plan = SweepPlan(scenes, seed, forces_n, strain)
+    failed = 0
+    with progress("scenes") as bar:
+        task = bar.add_task("", total=scenes)
+
+        def on_row(row: dict[str, Any], done: int) -> None:
+            nonlocal failed
+            failed += bool(row["reason"])
+            bar.update(task, completed=done)
+
+        try:
+            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, on_row=on_row)
+        except KeyboardInterrupt:
+            note.print(f"Interrupted. Solved scenes are kept in {out}.partial: run the same command to go on.")
+            raise typer.Exit(1) from None
+    note.print(f"{out}: {scenes} scenes, {failed} of those solved now failed.")

@@ -1,0 +1,106 @@
+"""`host_tools verify`: the forward model against known answers, on the screen and in docs/verification.md."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.commands.output import note, progress, require_writable
+
+if TYPE_CHECKING:
+    from host_tools.study.benchmark import Chapter
+    from host_tools.study.document import Timed
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLES = ROOT / "host_tools" / "forward" / "accuracy_table.json"
+
+
+def verify(
+    only: Annotated[list[str] | None, typer.Option(help="A chapter, such as hayes; repeat it for several.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Markdown file to write; figures go beside it.")] = None,
+    quick: Annotated[bool, typer.Option(help="Fewer cases, and nothing that takes minutes.")] = False,
+    extremes: Annotated[bool, typer.Option(help="Add scenes at the ends of every range.")] = False,
+    effectivity: Annotated[bool, typer.Option(help="Add how often stated errors hold the true ones.")] = False,
+    tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
+) -> None:
+    """Check the forward model against answers known on paper; exit code 1 when one misses its bound."""
+    require_writable(out, (".md",))
+    extra = [name for name, wanted in (("extremes", extremes), ("effectivity", effectivity)) if wanted]
+    chapters = _chapters(only or [], extra, quick=quick)
+    if tables:
+        _measure_tables()
+    measured = _measure(chapters)
+    failed = sum(_print_chapter(timed) for timed in measured.values())
+    if out:
+        from host_tools.study.document import write_document
+
+        flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
+        flags += ["--quick"] if quick else []
+        write_document(out, measured, command=" ".join(["host_tools verify", *flags, f"--out {_shown(out)}"]))
+        note.print(f"{out} written.")
+    if failed:
+        note.print(f"{failed} benchmarks miss their bound.")
+        raise typer.Exit(1)
+
+
+def _chapters(only: list[str], extra: list[str], *, quick: bool) -> dict[str, Callable[[], Chapter]]:
+    """Return the chapters asked for, all of them without a name; refuse a name that is none."""
+    from host_tools.study.chapters import CHAPTERS
+    from host_tools.study.extra_chapters import EXTRA_CHAPTERS
+
+    unknown = [name for name in only if name not in CHAPTERS]
+    if unknown:
+        raise InvalidQuantity("only", ", ".join(unknown), "a chapter", f"choose from {', '.join(CHAPTERS)}")
+    chosen = {name: partial(chapter, quick) for name, chapter in CHAPTERS.items() if not only or name in only}
+    return {**chosen, **{name: EXTRA_CHAPTERS[name] for name in extra}}
+
+
+def _measure_tables() -> None:
+    from host_tools.study.tables import measure_tables
+
+    measure_tables(TABLES, on_step=lambda what: note.print(f"measuring {what}"))
+    note.print(f"{TABLES} written.")
+
+
+def _measure(chapters: dict[str, Callable[[], Chapter]]) -> dict[str, Timed]:
+    from host_tools.study.document import Timed
+
+    measured = {}
+    with progress("chapters") as bar:
+        task = bar.add_task("", total=len(chapters))
+        for name, chapter in chapters.items():
+            began = time.perf_counter()
+            found = chapter()
+            measured[name] = Timed(found, time.perf_counter() - began)
+            bar.advance(task)
+    return measured
+
+
+def _print_chapter(timed: Timed) -> int:
+    """Print one chapter; return how many of its benchmarks miss their bound."""
+    from host_tools.study.document import BENCHMARK_HEADER, benchmark_row
+
+    chapter, out = timed.chapter, Console(width=140, highlight=False)
+    if chapter.skipped:
+        out.print(f"{chapter.title}: skipped, {chapter.skipped}", markup=False)
+        return 0
+    table = Table(*BENCHMARK_HEADER, title=f"{chapter.title} ({timed.seconds:.1f} s)", title_justify="left")
+    for benchmark in chapter.benchmarks:
+        table.add_row(*map(escape, benchmark_row(benchmark)), style=None if benchmark.passed else "bold red")
+    out.print(table)
+    return sum(not benchmark.passed for benchmark in chapter.benchmarks)
+
+
+def _shown(path: Path) -> str:
+    """Return a path as it would be typed at the root of the repository."""
+    whole = path.resolve()
+    return str(whole.relative_to(ROOT)) if whole.is_relative_to(ROOT) else path.name

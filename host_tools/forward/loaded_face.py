@@ -1,0 +1,89 @@
+"""A pressed contact to what is read off it: face, pressure, reactions, slip and stored energy.
+
+Forces come from residuals, never from sampled stresses: back, face and base then balance to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ngsolve import H1, BilinearForm, GridFunction, InnerProduct, Integrate
+
+from host_tools.forward.closed_contact import AXIAL, ClosedContact
+from host_tools.forward.face_state import FaceState, FloatArray
+from host_tools.forward.sampling import FaceSampler
+from host_tools.forward.symmetry import AXISYMMETRIC, Expression
+
+MN_PER_N = 1e3
+"""kPa times mm2 is mN, and kPa times mm3 is uJ."""
+
+
+@dataclass(frozen=True)
+class LoadedFace:
+    """The face at one load of a path, and how it was got; profiles are [A, R] at the samples of the rays.
+
+    `slip_mm` is the radius of the tissue's material point under a sample minus the sample's own: negative where the
+    tissue has slid outwards. `force_n` of the face is the reaction of the back and must equal `base_force_n`.
+    `newton_iterations` counts every one since the load before. `refined` is the same face after corrections at the
+    next order: its difference estimates the error of discretisation.
+    """
+
+    face: FaceState
+    slip_mm: FloatArray
+    base_force_n: float
+    energy_uj: float
+    newton_iterations: int
+    seconds: float
+    refined: FaceState | None = None
+
+
+def reaction_n(contact: ClosedContact, boundary: str) -> float:
+    """Return the force (N) with which a held boundary pushes its body down (the back) or, negative, up (the base)."""
+    push = GridFunction(contact.u.space)
+    push.components[AXIAL].Set(-1.0, definedon=contact.mesh.Boundaries(boundary))
+    return float(InnerProduct(_gradient(contact.energy, contact.u), push.vec)) / MN_PER_N
+
+
+def face_state(contact: ClosedContact, indentation_mm: float, sampler: FaceSampler) -> FaceState:
+    """Return the face of a contact in equilibrium."""
+    w_mm = contact.u.components[AXIAL] + indentation_mm
+    pressure = contact_pressure_kpa(contact)
+    return FaceState(
+        indentation_mm=indentation_mm,
+        w_mm=sampler(w_mm),
+        p_kpa=sampler(pressure),
+        total_mm3=_over_face(contact.mesh, w_mm),
+        force_n=reaction_n(contact, "back"),
+        contact_force_n=_over_face(contact.mesh, pressure) / MN_PER_N,
+    )
+
+
+def contact_pressure_kpa(contact: ClosedContact) -> Any:
+    """Return the axial force on the face per undeformed area of the probe (kPa, positive in compression).
+
+    It balances the gradient of the probe's energy, int p v dA = dW_probe(v e_z) for every v on the face, so its
+    integral is the reaction; the direction of the traction, normal to the deformed face, does not enter.
+    """
+    mesh = contact.mesh
+    space = H1(mesh, order=contact.order)  # over both bodies: a point of the face may be in either
+    p, v = space.TnT()
+    mass = BilinearForm(space, symmetric=True)
+    mass += p * v * AXISYMMETRIC.weight * AXISYMMETRIC.face
+    mass.Assemble()
+    residual = GridFunction(contact.u.space)
+    residual.vec.data = _gradient(contact.probe_energy, contact.u)
+    pressure = GridFunction(space)
+    on_face = space.GetDofs(mesh.Boundaries("face"))
+    pressure.vec.data = mass.mat.Inverse(on_face, "sparsecholesky") * residual.components[AXIAL].vec
+    return pressure
+
+
+def _gradient(energy: Any, u: Any) -> Any:
+    gradient = u.vec.CreateVector()
+    energy.Apply(u.vec, gradient)
+    return gradient
+
+
+def _over_face(mesh: Any, field: Expression) -> float:
+    return float(Integrate(field * AXISYMMETRIC.weight * AXISYMMETRIC.face, mesh))

@@ -1,0 +1,169 @@
+"""A scene and a tolerance to the cheapest model that holds it, each choice with its reason.
+
+Symmetry, contact and formulation follow from the scene alone. Strain, order and grading follow from measured tables
+(`accuracy.py`), not from taste.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from math import atan2
+from typing import Any, Literal
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.forward.accuracy import Level, cheapest_level, small_strain_departure
+from host_tools.forward.materials import LOCKING_POISSON_RATIO, baseline, with_inclusion
+from host_tools.forward.morph import reaches
+from host_tools.forward.sampling import Sector
+from host_tools.forward.solid_mesh import solid_symmetry
+from host_tools.scene import Scene
+
+Strain = Literal["small", "finite"]
+Contact = Literal["closed_sliding", "unilateral", "true_sliding", "true_sliding_with_edge_force", "paired"]
+
+DEFAULT_TOLERANCE = 0.005
+STANDARD = Level("standard", 3)
+"""The level of every data set: one level for all scenes, or features would jump where the plan changes its mind."""
+BLUNT = Level("blunt", 3)
+"""The level of finite strain: elements at the sharp rims no smaller than the slip, or they fold."""
+
+
+@dataclass(frozen=True)
+class ModelPlan:
+    """Which model a scene is solved by; `reasons` says why, one sentence a choice."""
+
+    symmetry: Sector
+    strain: Strain
+    contact: Contact
+    formulation: Literal["displacement", "mixed"]
+    mesh: Literal["morphed", "remeshed"]
+    grading: str
+    order: int
+    reasons: dict[str, str] = field(default_factory=dict)
+    predicted_error: dict[str, float] = field(default_factory=dict)
+    predicted_seconds: float | None = None
+
+    def as_record(self) -> dict[str, Any]:
+        """Return the plan as the JSON object of `host_tools simulate --json`."""
+        return asdict(self)
+
+
+def model_plan(
+    scene: Scene,
+    *,
+    tolerance: float | None = None,
+    strain: Literal["small", "finite", "auto"] = "small",
+    paired: bool = False,
+) -> ModelPlan:
+    """Return the plan for a relative tolerance on O1-O3; without one, at the level that all data sets share.
+
+    Raise `InvalidQuantity` when no model of ours serves the scene (finite strain off the axis or under a dome).
+    """
+    reasons: dict[str, str] = {}
+    symmetry = _symmetry(scene, reasons)
+    chosen_strain = _strain(scene, symmetry, strain, tolerance or DEFAULT_TOLERANCE, reasons)
+    contact = _contact(scene, chosen_strain, paired, reasons)
+    formulation = _formulation(scene, chosen_strain, reasons)
+    mesh = _mesh(scene, symmetry, reasons)
+    level, error, seconds = _level(scene, symmetry, chosen_strain, tolerance, reasons)
+    return ModelPlan(
+        symmetry, chosen_strain, contact, formulation, mesh, level.grading, level.order, reasons, error, seconds
+    )
+
+
+def _symmetry(scene: Scene, reasons: dict[str, str]) -> Sector:
+    place = scene.placement if scene.has_inclusion else None
+    broken = []
+    if scene.waveguide.face == "square":
+        broken.append("the face is square")
+    if scene.tissue.edge_mm is not None:
+        broken.append("the slab ends in a plane edge")
+    if place is not None and place.offset_mm > 0:
+        broken.append(f"the lump lies {place.offset_mm:g} mm off the axis")
+    if place is not None and not place.is_round:
+        broken.append("the lump is an ellipsoid")
+    if not broken:
+        reasons["symmetry"] = "round probe, and nothing off its axis: every section is the same"
+        return "axisymmetric"
+    sector = solid_symmetry(aligned(scene)[0])
+    planes = {"quarter": "x = 0 and y = 0 are", "half": "y = 0 is", "full": "no plane is"}[sector]
+    reasons["symmetry"] = f"{' and '.join(broken)}; {planes} a plane of symmetry"
+    return sector
+
+
+def aligned(scene: Scene) -> tuple[Scene, float]:
+    """Return the scene turned so that the lump lies on +x, and the angle (rad) it was turned by.
+
+    Only what is round in the face, the slab and the lump can be turned; any other scene comes back as it is.
+    """
+    place = scene.placement
+    round_about = scene.waveguide.face == "round" and scene.tissue.edge_mm is None and place.is_round
+    if not round_about or place.offset_mm == 0 or (place.offset_y_mm == 0 and place.offset_x_mm > 0):
+        return scene, 0.0
+    turned = replace(place, offset_x_mm=place.offset_mm, offset_y_mm=0.0)
+    return replace(scene, placement=turned), atan2(place.offset_y_mm, place.offset_x_mm)
+
+
+def _strain(scene: Scene, symmetry: Sector, asked: str, tolerance: float, reasons: dict[str, str]) -> Strain:
+    departure = small_strain_departure(scene)
+    known = f"small strain departs from finite strain by about {100 * departure:.2g} % here"
+    can_finite = symmetry == "axisymmetric" and scene.waveguide.dome_mm == 0
+    if asked == "finite" and not can_finite:
+        raise InvalidQuantity(
+            "strain", "finite", "small for a scene that is not axisymmetric or has a domed face", "ask for small strain"
+        )
+    if asked == "auto" and departure > tolerance and can_finite:
+        reasons["strain"] = f"{known}, more than the tolerance of {100 * tolerance:g} %"
+        return "finite"
+    if asked == "finite":
+        reasons["strain"] = f"asked for; {known}"
+        return "finite"
+    if asked == "auto" and departure > tolerance:
+        reasons["strain"] = f"{known}, more than the tolerance, but finite strain is axisymmetric and flat-faced only"
+    else:
+        reasons["strain"] = ("asked for; " if asked == "small" else "") + known
+    return "small"
+
+
+def _contact(scene: Scene, strain: Strain, paired: bool, reasons: dict[str, str]) -> Contact:
+    if strain == "finite" and paired:
+        reasons["contact"] = "asked for: slip ignored, the cheap variant of finite strain"
+        return "paired"
+    if strain == "finite":
+        reasons["contact"] = "in finite strain the tissue slips under the face; pairing points would inflate the lump"
+        return "true_sliding"
+    if scene.waveguide.dome_mm > 0:
+        reasons["contact"] = f"the dome of {scene.waveguide.dome_mm:g} mm may lift off the tissue at its rim"
+        return "unilateral"
+    reasons["contact"] = "a flat face in compression stays closed (the pressure is checked)"
+    return "closed_sliding"
+
+
+def _formulation(scene: Scene, strain: Strain, reasons: dict[str, str]) -> Literal["displacement", "mixed"]:
+    locks = with_inclusion(scene).locks or baseline(scene).locks
+    if locks and strain == "finite":
+        raise InvalidQuantity(
+            "poisson_ratio", "above 0.499", f"at most {LOCKING_POISSON_RATIO} in finite strain", "ask for small strain"
+        )
+    if locks:
+        reasons["formulation"] = f"a Poisson ratio above {LOCKING_POISSON_RATIO} locks displacements alone"
+        return "mixed"
+    reasons["formulation"] = f"no Poisson ratio above {LOCKING_POISSON_RATIO}: displacements alone do not lock"
+    return "displacement"
+
+
+def _mesh(scene: Scene, symmetry: Sector, reasons: dict[str, str]) -> Literal["morphed", "remeshed"]:
+    if symmetry == "axisymmetric" and scene.has_inclusion and reaches(scene):
+        reasons["mesh"] = "inside the training box: one mesh of fixed topology, smooth in size and depth"
+        return "morphed"
+    reasons["mesh"] = "outside what the fixed topology reaches: meshed anew (features jump by up to 3e-4)"
+    return "remeshed"
+
+
+def _level(
+    scene: Scene, symmetry: Sector, strain: Strain, tolerance: float | None, reasons: dict[str, str]
+) -> tuple[Level, dict[str, float], float | None]:
+    pinned = BLUNT if strain == "finite" else STANDARD
+    found = cheapest_level(scene, symmetry, strain, tolerance, pinned)
+    reasons["level"] = found.reason
+    return found.level, found.predicted_error, found.seconds

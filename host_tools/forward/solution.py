@@ -1,0 +1,116 @@
+"""The solution of a scene: the face with the inclusion and without it, their difference, and what it is good for."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from host_tools.forward.deformation import Deformation, deformation
+from host_tools.forward.face_state import FaceState, FloatArray, Rays
+from host_tools.forward.plan import ModelPlan
+
+PRESSED_RATIO = 0.95
+"""Where the pressure must be positive, over the face: at the rim itself it is singular and its sign means nothing."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What one scene does to the probe. Rays are those of the face; a single one in axisymmetry.
+
+    `stated_error` is relative and estimated (docs/forward_model.md), empty where no estimate was asked for.
+    """
+
+    rays: Rays
+    pressed: FaceState
+    baseline: FaceState
+    plan: ModelPlan
+    elements: int
+    stated_error: dict[str, float]
+
+    @cached_property
+    def lump(self) -> Deformation:
+        """O1-O3 of the lump field."""
+        total_mm3 = self.pressed.total_mm3 - self.baseline.total_mm3
+        return deformation(self.rays.r_mm, self.pressed.w_mm - self.baseline.w_mm, total_mm3)
+
+    @cached_property
+    def raw(self) -> Deformation:
+        """O1-O3 of the deformation itself, the paper's literal protocol."""
+        return deformation(self.rays.r_mm, self.pressed.w_mm, self.pressed.total_mm3)
+
+    @property
+    def r_mm(self) -> FloatArray:
+        """Radii of the first ray, along +x, where an offset lump lies; so are the four profiles below."""
+        return np.asarray(self.rays.r_mm[0])
+
+    @property
+    def w_mm(self) -> FloatArray:
+        """Deformation of the face along +x."""
+        return np.asarray(self.pressed.w_mm[0])
+
+    @property
+    def w_baseline_mm(self) -> FloatArray:
+        """The same press without the inclusion."""
+        return np.asarray(self.baseline.w_mm[0])
+
+    @property
+    def lump_deformation_mm(self) -> FloatArray:
+        """The lump field along +x: w minus the w of the same press without the inclusion."""
+        return self.w_mm - self.w_baseline_mm
+
+    @property
+    def p_kpa(self) -> FloatArray:
+        """Contact pressure along +x; its last sample, at the rim, grows with the mesh and means nothing."""
+        return np.asarray(self.pressed.p_kpa[0])
+
+    @property
+    def p_baseline_kpa(self) -> FloatArray:
+        """Contact pressure without the inclusion."""
+        return np.asarray(self.baseline.p_kpa[0])
+
+    @property
+    def force_n(self) -> float:
+        """Force on the probe."""
+        return self.pressed.force_n
+
+    @property
+    def indentation_mm(self) -> float:
+        """Displacement of the probe's back."""
+        return self.pressed.indentation_mm
+
+    @property
+    def pressure_is_positive(self) -> bool:
+        """Whether the face is in compression everywhere; if not, closed contact is not the solution."""
+        inner = self.r_mm <= PRESSED_RATIO * self.r_mm[-1]
+        return bool(min(state.p_kpa[:, inner].min() for state in (self.pressed, self.baseline)) > 0)
+
+    def as_record(self) -> dict[str, Any]:
+        """Return the solution as the JSON object that `host_tools simulate --json` prints."""
+        record = {
+            "force_n": self.force_n,
+            "contact_force_n": self.pressed.contact_force_n,
+            "indentation_mm": self.indentation_mm,
+            **asdict(self.lump),
+            "raw": asdict(self.raw),
+            "pressure_is_positive": self.pressure_is_positive,
+            "stated_error": self.stated_error,
+            "plan": self.plan.as_record() | {"elements": self.elements},
+            "r_mm": self.r_mm.tolist(),
+            "w_mm": self.w_mm.tolist(),
+            "w_baseline_mm": self.w_baseline_mm.tolist(),
+            "p_kpa": self.p_kpa.tolist(),
+        }
+        return record if len(self.rays.angle_rad) == 1 else record | self._fields()
+
+    def _fields(self) -> dict[str, Any]:
+        """Return the whole fields, one row a ray."""
+        return {
+            "angle_deg": np.rad2deg(self.rays.angle_rad).tolist(),
+            "r_field_mm": self.rays.r_mm.tolist(),
+            "w_field_mm": self.pressed.w_mm.tolist(),
+            "w_baseline_field_mm": self.baseline.w_mm.tolist(),
+            "p_field_kpa": self.pressed.p_kpa.tolist(),
+        }

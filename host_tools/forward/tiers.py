@@ -1,0 +1,102 @@
+"""A plan to the model that carries it out: the mesh, the tier, and the element sizes of each named level."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from netgen.meshing import NgException
+
+from host_tools.forward.domed_press import DomedModel
+from host_tools.forward.errors import PressFailed
+from host_tools.forward.face_state import Rays
+from host_tools.forward.finite_press import FiniteStrainModel
+from host_tools.forward.linear_press import LinearModel
+from host_tools.forward.load_path import ContactName
+from host_tools.forward.mesh import Resolution, axisymmetric_mesh
+from host_tools.forward.morph import morphed_mesh
+from host_tools.forward.plan import ModelPlan
+from host_tools.forward.press_model import PressModel
+from host_tools.forward.sampling import FaceSampler
+from host_tools.forward.solid_mesh import COARSE, FINE, SolidResolution, solid_mesh
+from host_tools.forward.symmetry import AXISYMMETRIC, SOLID, Symmetry
+from host_tools.scene import Scene
+
+AXISYMMETRIC_SIZES = {
+    "coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=10.0),
+    "standard": Resolution(),
+    "fine": Resolution(bulk_mm=2.0),
+    "finest": Resolution(
+        bulk_mm=1.5, face_mm=0.5, contact_rim_mm=0.005, back_rim_mm=0.005, per_inclusion=20.0, grading=0.3
+    ),
+    "blunt": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.5, per_inclusion=10.0, grading=0.5),
+    "blunt_fine": Resolution(bulk_mm=2.0, face_mm=0.5, contact_rim_mm=0.3, back_rim_mm=0.3, grading=0.4),
+}
+"""Element sizes by the name of the level; "blunt" keeps the rims coarser than the slip of finite strain."""
+
+FINITE_CONTACTS: dict[str, ContactName] = {
+    "true_sliding": "sliding",
+    "true_sliding_with_edge_force": "sliding_with_edge_force",
+    "paired": "paired",
+}
+SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE}
+SOLID_ANGLES = 48
+"""Rays over the face of a 3-D scene: 7.5 degrees apart, a multiple of eight to meet a square's corners."""
+
+
+class Meshed(NamedTuple):
+    """A model ready to be pressed, and what it stands on."""
+
+    model: PressModel
+    mesh: Any
+    symmetry: Symmetry
+    sampler: FaceSampler
+    rays: Rays
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return int(self.mesh.ne)
+
+
+def build(scene: Scene, plan: ModelPlan) -> Meshed:
+    """Mesh a scene (turned so that its lump lies on +x) and return the model of the plan."""
+    axisymmetric = plan.symmetry == "axisymmetric"
+    symmetry, mesh = (AXISYMMETRIC if axisymmetric else SOLID), _mesh(scene, plan)
+    rays = Rays.over(scene.waveguide, 1 if axisymmetric else SOLID_ANGLES)
+    sampler = FaceSampler(mesh, rays, plan.symmetry)
+    probe, other_order = scene.waveguide, plan.order + 1 if axisymmetric else plan.order - 1
+    mixed = plan.formulation == "mixed"
+    model: PressModel
+    if plan.strain == "finite":
+        model = FiniteStrainModel(mesh, plan.order, rays, contact=FINITE_CONTACTS[plan.contact])
+    elif plan.contact == "unilateral":
+        model = DomedModel(
+            mesh,
+            symmetry,
+            sampler,
+            order=plan.order,
+            other_order=other_order,
+            mixed=mixed,
+            curvature_per_mm=probe.dome_mm / probe.radius_mm**2,
+        )
+    else:
+        model = LinearModel(mesh, symmetry, sampler, order=plan.order, other_order=other_order, mixed=mixed)
+    return Meshed(model, mesh, symmetry, sampler, rays)
+
+
+def _mesh(scene: Scene, plan: ModelPlan) -> Any:
+    try:
+        return _generate(scene, plan)
+    except NgException as error:
+        raise PressFailed(
+            f"the scene could not be meshed ({error}): two of its surfaces are all but in touch, move them apart"
+        ) from error
+
+
+def _generate(scene: Scene, plan: ModelPlan) -> Any:
+    if plan.symmetry != "axisymmetric":
+        return solid_mesh(scene, symmetry=plan.symmetry, order=plan.order, resolution=SOLID_SIZES[plan.grading])
+    sizes = AXISYMMETRIC_SIZES[plan.grading]
+    if plan.mesh == "morphed":
+        return morphed_mesh(scene, order=plan.order, resolution=sizes)
+    return axisymmetric_mesh(scene, order=plan.order, resolution=sizes)

@@ -1,0 +1,123 @@
+"""The plan takes the cheapest model that a scene requires, and says why."""
+
+from dataclasses import replace
+
+import pytest
+
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from host_tools.forward.accuracy import accuracy_table
+from host_tools.forward.plan import STANDARD, aligned, model_plan
+from host_tools.forward.solve import solve
+from host_tools.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
+
+LUMP = Inclusion(10.0, 6.0, 80.0)
+SQUARE, DOMED, EDGE = Waveguide(face="square"), Waveguide(dome_mm=0.5), Tissue(edge_mm=20.0)
+
+
+@pytest.mark.parametrize(
+    ("scene", "symmetry", "because"),
+    [
+        (Scene(LUMP), "axisymmetric", "every section is the same"),
+        (Scene(LUMP, placement=Placement(0.0, 0.0, 1.5, 1.5)), "axisymmetric", "every section"),
+        (Scene(LUMP, waveguide=DOMED), "axisymmetric", "every section"),
+        (Scene(Inclusion(0.0, 6.0, 80.0), placement=Placement(6.0)), "axisymmetric", "every section"),
+        (Scene(Inclusion(10.0, 6.0, 5.0), placement=Placement(6.0)), "axisymmetric", "every section"),
+        (Scene(LUMP, waveguide=SQUARE), "quarter", "the face is square"),
+        (Scene(LUMP, placement=Placement(0.0, 0.0, 1.0, 2.0)), "quarter", "ellipsoid"),
+        (Scene(LUMP, placement=Placement(6.0)), "half", "6 mm off the axis"),
+        (Scene(LUMP, placement=Placement(3.0, -4.0)), "half", "5 mm off the axis"),
+        (Scene(LUMP, tissue=EDGE), "half", "plane edge"),
+        (Scene(LUMP, waveguide=SQUARE, placement=Placement(3.0, 4.0)), "full", "no plane"),
+        (Scene(LUMP, tissue=EDGE, placement=Placement(0.0, 4.0)), "full", "no plane"),
+        (Scene(LUMP, placement=Placement(3.0, 4.0, 1.0, 2.0)), "full", "no plane"),
+    ],
+)
+def test_the_symmetry_is_the_largest_that_the_scene_has(scene, symmetry, because):
+    plan = model_plan(scene)
+    assert plan.symmetry == symmetry
+    assert because in plan.reasons["symmetry"]
+
+
+def test_a_lump_anywhere_round_the_axis_is_turned_onto_x():
+    turned, angle_rad = aligned(Scene(LUMP, placement=Placement(0.0, -5.0)))
+    assert (turned.placement.offset_x_mm, turned.placement.offset_y_mm) == (5.0, 0.0)
+    assert angle_rad == pytest.approx(-1.5707963)
+
+
+def test_contact_is_searched_for_only_under_a_dome():
+    assert model_plan(Scene(LUMP)).contact == "closed_sliding"
+    assert model_plan(Scene(LUMP, waveguide=DOMED)).contact == "unilateral"
+
+
+def test_a_pressure_is_solved_for_only_where_displacements_lock():
+    nearly = Scene(LUMP, tissue=Tissue(poisson_ratio=0.4995))
+    assert model_plan(Scene(LUMP)).formulation == "displacement"
+    assert model_plan(nearly).formulation == "mixed"
+
+
+def test_the_topology_is_fixed_over_the_training_box_only():
+    assert model_plan(Scene(Inclusion(2.0, 12.0, 40.0))).mesh == "morphed"
+    assert model_plan(Scene(Inclusion(1.9, 12.0, 40.0))).mesh == "remeshed"
+    layered = Scene(LUMP, tissue=Tissue(layers=(TissueLayer("skin", 1.5, 20.0),)))
+    assert model_plan(layered).mesh == "remeshed"
+
+
+def test_a_looser_tolerance_never_costs_more_and_a_tighter_one_never_promises_less():
+    plans = [model_plan(Scene(LUMP), tolerance=tolerance) for tolerance in (0.05, 0.005, 0.0005)]
+    seconds = [plan.predicted_seconds for plan in plans]
+    promised = [max(plan.predicted_error.values()) for plan in plans]
+    assert seconds == sorted(seconds)
+    assert promised == sorted(promised, reverse=True)
+    assert promised[1] <= 0.005
+
+
+@pytest.mark.parametrize("truth", [(10.0, 6.0, 80.0), (6.0, 9.0, 60.0), (3.0, 5.0, 110.0)])
+def test_what_is_promised_is_kept(truth):
+    """Between the rows of the measured table the finest tier confirms the promise."""
+    scene = Scene(Inclusion(*truth))
+    plan = model_plan(scene, tolerance=0.005)
+    found = solve(scene, plan)
+    finest = solve(scene, replace(plan, mesh="remeshed", grading="finest", order=4))
+    assert found.force_n == pytest.approx(finest.force_n, rel=0.005)
+    assert found.lump.max_deformation_mm == pytest.approx(finest.lump.max_deformation_mm, rel=0.005)
+    assert found.lump.central_deformation_mm3 == pytest.approx(finest.lump.central_deformation_mm3, rel=0.005)
+    assert found.lump.deformation_area_mm2 == pytest.approx(finest.lump.deformation_area_mm2, rel=0.005)
+
+
+def test_without_a_tolerance_every_scene_gets_the_same_level():
+    plans = [model_plan(Scene(Inclusion(size, 6.0, 80.0))) for size in (1.0, 5.0, 20.0)]
+    assert {(plan.grading, plan.order) for plan in plans} == {STANDARD}
+
+
+def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
+    light, deep = Press(indentation_mm=0.05), Press(indentation_mm=3.0)
+    assert model_plan(Scene(LUMP, light), strain="auto", tolerance=0.02).strain == "small"
+    plan = model_plan(Scene(LUMP, deep), strain="auto", tolerance=0.02)
+    assert (plan.strain, plan.contact) == ("finite", "true_sliding")
+    assert "more than the tolerance" in plan.reasons["strain"]
+
+
+def test_off_the_axis_auto_stays_small_and_says_what_that_costs():
+    plan = model_plan(Scene(LUMP, Press(indentation_mm=3.0), placement=Placement(6.0)), strain="auto")
+    assert plan.strain == "small"
+    assert "axisymmetric" in plan.reasons["strain"]
+
+
+@pytest.mark.parametrize(
+    ("scene", "quantity"),
+    [
+        (Scene(LUMP, placement=Placement(6.0)), "strain"),
+        (Scene(LUMP, waveguide=DOMED), "strain"),
+        (Scene(LUMP, tissue=Tissue(poisson_ratio=0.4999)), "poisson_ratio"),
+    ],
+)
+def test_finite_strain_is_refused_where_no_model_has_it(scene, quantity):
+    with pytest.raises(InvalidQuantity) as refused:
+        model_plan(scene, strain="finite")
+    assert refused.value.quantity == quantity
+
+
+def test_the_tables_were_measured_by_the_command_they_name():
+    table = accuracy_table()
+    assert table["command"] == "host_tools verify --tables"
+    assert {"axisymmetric", "solid", "finite", "small_strain_departure"} <= table.keys()

@@ -1,0 +1,36 @@
+"""The documents are executed: their scene files are scenes, and the commands they name exist."""
+
+import re
+import tomllib
+
+import pytest
+import typer
+from daemon_process import ROOT
+
+from device.measurement.toml_record import from_table
+from host_tools.__main__ import app
+from host_tools.scene import Scene
+
+FORWARD_MODEL = (ROOT / "docs" / "forward_model.md").read_text(encoding="utf-8")
+PAGES = sorted((ROOT / "docs").glob("*.md"))
+
+
+def test_the_scene_file_of_the_forward_model_is_a_scene():
+    text = re.search(r"```toml\n(.*?)```", FORWARD_MODEL, re.DOTALL).group(1)
+    scene = from_table(Scene, tomllib.loads(text))
+    assert scene.tissue.layers[0].name == "skin"
+    assert scene.placement.offset_x_mm == 6.0
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_verb_and_option_that_a_page_names_exists(page):
+    group = typer.main.get_command(app)
+    for verb, rest in re.findall(r"`?host_tools ([a-z]+)([^`\n]*)", page.read_text(encoding="utf-8")):
+        command = group.commands[verb]
+        known = {option for parameter in command.params for option in parameter.opts}
+        assert set(re.findall(r"--[a-z-]+", rest)) <= known, f"{page.name}: host_tools {verb}{rest}"
+
+
+def test_every_file_that_the_forward_model_names_exists():
+    for path in re.findall(r"`(forward/[a-z_]+\.py)`", FORWARD_MODEL):
+        assert (ROOT / "host_tools" / path).is_file(), path
