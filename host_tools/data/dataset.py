@@ -1,15 +1,14 @@
-"""Rows of a sweep to one netCDF file with units, and back to what training needs.
+"""The netCDF file of a sweep to what training needs.
 
-A failed scene stays in the file as a row of NaN with its reason. The nine phantom scenes are the rows nearest to an
-orthogonal array over the box, so that calibration sees all of it; the other rows train. Source of 125 + 9: Lee & Won
-2013, section IV; of the array: Taguchi's L9.
+Failed scenes, rows of NaN with their reason, are counted and left out. The nine phantom scenes are the rows nearest to
+an orthogonal array over the box, so that calibration sees all of it; the other rows train. Source of 125 + 9: Lee &
+Won 2013, section IV; of the array: Taguchi's L9.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -19,40 +18,14 @@ from numpy.typing import NDArray
 
 from device.measurement.inversion import FEATURE_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from host_tools.data.journal import Row
+from host_tools.data.plan import SCHEMA, SCHEMA_OF_LOADS
 from host_tools.inverse.train import TrainingRows
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 FEATURES = tuple(FEATURE_UNITS)
-SCHEMA = "tsis.sweep/1"
-UNITS = {"_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa", "_n": "N"}
 L9 = np.array([(0, 0, 0), (0, 1, 1), (0, 2, 2), (1, 0, 1), (1, 1, 2), (1, 2, 0), (2, 0, 2), (2, 1, 0), (2, 2, 1)])
 PHANTOM_LOW, PHANTOM_HIGH = (5.0, 4.5, 50.0), (14.0, 10.0, 110.0)
 """Corners of the phantoms' part of the box: inclusions that can be made and that the probe can see."""
-
-
-def write_dataset(rows: list[Row], origin: Row, path: Path) -> None:
-    """Write rows (one a scene, in order) to a netCDF file, whole or not at all."""
-    solved = next((row for row in rows if not row["reason"]), None)
-    if solved is None:
-        raise InvalidQuantity("scenes solved", 0, "at least one", f"the first reason was: {rows[0]['reason']}")
-    names = [name for name in solved if name not in ("index", "reason", "r_mm")]
-    variables: dict[str, Any] = {name: _column(name, rows, solved) for name in names}
-    variables["reason"] = ("scene", [row["reason"] for row in rows], {"long_name": "why the scene failed, or empty"})
-    dataset = xr.Dataset(variables, coords={"r_mm": ("r_mm", solved["r_mm"], {"units": "mm"})})
-    dataset.attrs = {"schema": SCHEMA, "origin": json.dumps(origin)}
-    temporary = path.with_suffix(path.suffix + ".tmp")
-    dataset.to_netcdf(temporary, engine="h5netcdf")
-    with temporary.open("rb") as file:
-        os.fsync(file.fileno())
-    temporary.replace(path)
-
-
-def _column(name: str, rows: list[Row], solved: Row) -> tuple[tuple[str, ...], NDArray[np.float64], dict[str, str]]:
-    empty = np.full_like(np.asarray(solved[name], dtype=float), np.nan)
-    values = np.array([row.get(name, empty) for row in rows], dtype=float)
-    unit = UNITS["_" + name.rpartition("_")[2]]
-    return ("scene", "r_mm") if values.ndim == 2 else ("scene",), values, {"units": unit}
 
 
 def read_dataset(path: Path) -> xr.Dataset:
@@ -64,14 +37,22 @@ def read_dataset(path: Path) -> xr.Dataset:
         raise InvalidQuantity(
             "data set", path, "a netCDF file made by `host_tools sweep`", f"make it anew ({error})"
         ) from error
-    if loaded.attrs.get("schema") != SCHEMA:
-        raise InvalidQuantity("schema", loaded.attrs.get("schema"), SCHEMA, "make the data set with this version")
+    schema = loaded.attrs.get("schema")
+    if schema not in (SCHEMA, SCHEMA_OF_LOADS):
+        bound = f"{SCHEMA} or {SCHEMA_OF_LOADS}"
+        raise InvalidQuantity("schema", schema, bound, "make the data set with this version")
     return loaded
 
 
 def training_rows(path: Path) -> TrainingRows:
-    """Return the solved rows of a sweep as features and truths, with the nine phantoms marked and failures counted."""
+    """Return the solved rows of a sweep as features and truths, with the nine phantoms marked and failures counted.
+
+    Raise `InvalidQuantity` for a data set of several loads or of finite strain: the three features are of one load.
+    """
     dataset = read_dataset(path)
+    if "load" in dataset.dims:
+        bound = f"{SCHEMA}, of one load in small strain"
+        raise InvalidQuantity("schema", SCHEMA_OF_LOADS, bound, "sweep with one force and `--strain small`")
     solved = dataset.isel(scene=np.flatnonzero(dataset["reason"].values == ""))
     truth = np.column_stack([solved[name].values for name in UNKNOWNS])
     features = np.column_stack([solved[name].values for name in FEATURES])

@@ -1,7 +1,7 @@
 """Rows of a sweep, kept as they are made: a text file of JSON lines that survives Ctrl-C, a crash and a power cut.
 
 The first line says what is being swept, so that a journal is never continued with other parameters. A line torn by a
-crash can only be the last one and is dropped: its row is solved again.
+crash can only be the last one and is dropped: its row is solved again. In memory is only where each row begins.
 """
 
 from __future__ import annotations
@@ -18,43 +18,71 @@ Row = dict[str, Any]
 
 
 class Journal:
-    """Append-only record of finished rows beside the file that they will become."""
+    """Append-only record of finished rows beside the file that they will become; `index in journal` tells which."""
 
     def __init__(self, path: Path, plan: Row) -> None:
         """Open or continue; raise `InvalidQuantity` when the file was begun with another plan."""
-        self.path, self.rows = path, {}
-        self.rows = {row["index"]: row for row in self._continue(plan)}
-        self._file = path.open("a", encoding="utf-8")
-        if not path.stat().st_size:
+        self.path, self.plan = path, plan
+        self._offset_of: dict[int, int] = {}
+        if path.exists():
+            os.truncate(path, self._read_whole_lines())
+        self._file = path.open("ab")
+        if not self._file.tell():
             self._write(plan)
 
-    def _continue(self, plan: Row) -> Iterator[Row]:
-        if not self.path.exists():
-            return
-        whole = self.path.read_bytes().rpartition(b"\n")[0]
+    def _read_whole_lines(self) -> int:
+        """Note where every row begins; return where the last whole line ends, in bytes."""
+        end = 0
+        with self.path.open("rb") as file:
+            for line in file:
+                if not line.endswith(b"\n"):
+                    break
+                self._note(line, end)
+                end += len(line)
+        return end
+
+    def _note(self, line: bytes, offset: int) -> None:
         try:
-            lines = [json.loads(line) for line in whole.splitlines()]
+            record = json.loads(line)
         except ValueError as error:
             raise InvalidQuantity("journal", self.path, "lines of JSON", "delete it to begin anew") from error
-        if lines and lines[0] != json.loads(json.dumps(plan)):
+        if offset:
+            self._offset_of.setdefault(record["index"], offset)
+        elif record != json.loads(json.dumps(self.plan)):
             raise InvalidQuantity(
                 "sweep",
                 f"another one than {self.path} was begun with",
                 "the same scenes, seed and press",
                 "repeat the first command, or delete that file to begin anew",
             )
-        os.truncate(self.path, len(whole) + 1 if whole else 0)
-        yield from lines[1:]
 
-    def append(self, row: Row) -> None:
-        """Keep one finished row; it is on the disk when this returns."""
-        self.rows[row["index"]] = row
-        self._write(row)
+    def __len__(self) -> int:
+        return len(self._offset_of)
 
-    def _write(self, line: Row) -> None:
-        self._file.write(json.dumps(line) + "\n")
+    def __contains__(self, index: int) -> bool:
+        return index in self._offset_of
+
+    def append(self, row: Row) -> bool:
+        """Keep one finished row, on the disk when this returns; return False for a row that is already kept."""
+        if row["index"] in self:
+            return False
+        self._offset_of[row["index"]] = self._write(row)
+        return True
+
+    def _write(self, line: Row) -> int:
+        """Return where the line begins."""
+        offset = self._file.tell()
+        self._file.write(json.dumps(line).encode() + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
+        return offset
+
+    def in_order(self) -> Iterator[Row]:
+        """Read the rows back one by one, by their index."""
+        with self.path.open("rb") as file:
+            for index in sorted(self._offset_of):
+                file.seek(self._offset_of[index])
+                yield json.loads(file.readline())
 
     def close(self) -> None:
         """Close the file; the rows stay."""

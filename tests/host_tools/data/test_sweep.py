@@ -5,19 +5,23 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
+from conftest import SCENES, synthetic_rows
 from daemon_process import ROOT
+from typer.testing import CliRunner
 
 from device.measurement.quantities import InvalidQuantity
+from host_tools.__main__ import app
+from host_tools.data import rows as rows_module
 from host_tools.data import sweep as sweep_module
 from host_tools.data.dataset import phantom_index, read_dataset, training_rows
-from host_tools.data.journal import Journal
-from host_tools.data.sweep import SweepPlan, solve_row, sweep
+from host_tools.data.plan import SweepPlan
+from host_tools.data.rows import solve_row
+from host_tools.data.sweep import sweep
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
-
-SCENES = 12
 
 
 def _start(folder, name):
@@ -32,11 +36,6 @@ def _wait_for_rows(journal, count):
             return
         time.sleep(0.05)
     raise AssertionError(f"{journal} has not reached {count} rows")
-
-
-@pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory):
-    return read_dataset(sweep(SweepPlan(SCENES, 4), tmp_path_factory.mktemp("sweep") / "whole.nc", jobs=1))
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
@@ -63,15 +62,13 @@ def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterr
             np.testing.assert_allclose(values, uninterrupted[name], rtol=1e-6, atol=1e-9)
 
 
-def test_a_journal_of_another_sweep_is_not_continued(tmp_path):
-    Journal(tmp_path / "j", SweepPlan(5, 1).as_record()).close()
-    with pytest.raises(InvalidQuantity, match="another one"):
-        Journal(tmp_path / "j", SweepPlan(5, 2).as_record())
-
-
 def test_a_failed_scene_is_kept_with_its_reason_and_left_out_of_training(tmp_path, monkeypatch):
-    solve = sweep_module.solve
-    monkeypatch.setattr(sweep_module, "solve", lambda scene: solve(scene) if scene.inclusion.size_mm > 8 else 1 / 0)
+    solve = rows_module.solve_ramp
+    monkeypatch.setattr(
+        rows_module,
+        "solve_ramp",
+        lambda scene, *given, **named: solve(scene, *given, **named) if scene.inclusion.size_mm > 8 else 1 / 0,
+    )
     plan = SweepPlan(6, 4)
     path = sweep(plan, tmp_path / "s.nc", jobs=1)
     small = plan.truths()[:, 0] <= 8
@@ -103,6 +100,69 @@ def test_the_rows_know_the_press_and_the_units(uninterrupted):
     assert uninterrupted["deformation_area_mm2"].attrs["units"] == "mm2"
 
 
+def test_several_loads_are_an_axis_and_scale_in_small_strain(tmp_path):
+    dataset = read_dataset(sweep(SweepPlan(2, 4, (0.1, 0.2, 0.5)), tmp_path / "s.nc", jobs=1))
+    assert dataset["w_mm"].dims == ("scene", "load", "r_mm")
+    assert dataset["max_deformation_mm"].dims == ("scene", "load")
+    assert dataset["depth_mm"].dims == ("scene",)
+    np.testing.assert_allclose(dataset["force_n"].values, [[0.1, 0.2, 0.5]] * 2)
+    np.testing.assert_allclose(dataset["w_mm"].sel(load=0.2), 2 * dataset["w_mm"].sel(load=0.1), rtol=1e-9)
+
+
+def test_one_of_several_loads_equals_a_sweep_of_it_alone(tmp_path, uninterrupted):
+    dataset = read_dataset(sweep(SweepPlan(2, 4, (0.1, 0.5)), tmp_path / "s.nc", jobs=1))
+    np.testing.assert_allclose(dataset["p_kpa"].sel(load=0.5), uninterrupted["p_kpa"][:2], rtol=1e-9)
+
+
+def test_several_loads_do_not_train(tmp_path, monkeypatch):
+    def of_two_loads(solve, cases):
+        for row in synthetic_rows(solve, cases):
+            yield row | {name: [row[name]] * 2 for name in ("w_mm", "w_baseline_mm", "p_kpa")}
+
+    monkeypatch.setattr(sweep_module, "executor", lambda **_: nullcontext(of_two_loads))
+    path = sweep(SweepPlan(3, 1, (0.1, 0.5)), tmp_path / "s.nc")
+    with pytest.raises(InvalidQuantity, match="one load in small strain"):
+        training_rows(path)
+
+
+def test_a_row_that_comes_twice_is_written_once(tmp_path, monkeypatch):
+    def doubled(solve, cases):
+        for row in synthetic_rows(solve, cases):
+            yield from (row, row | {"w_mm": [0.0] * 221})
+
+    monkeypatch.setattr(sweep_module, "executor", lambda **_: nullcontext(doubled))
+    heard = []
+    path = sweep(SweepPlan(4, 1), tmp_path / "s.nc", on_row=lambda row, done: heard.append((row["index"], done)))
+    assert heard == [(0, 1), (1, 2), (2, 3), (3, 4)]
+    assert read_dataset(path)["w_mm"].values[:, 0].tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("given", "quantity"),
+    [
+        ({"forces_n": ()}, "forces_n"),
+        ({"forces_n": (0.3, 0.1)}, "forces_n"),
+        ({"forces_n": (0.1, 0.1)}, "forces_n"),
+        ({"forces_n": (0.0,)}, "force_n"),
+        ({"strain": "large"}, "strain"),
+    ],
+)
+def test_loads_that_are_no_ramp_are_refused(given, quantity):
+    with pytest.raises(InvalidQuantity) as refused:
+        SweepPlan(5, 1, **given)
+    assert refused.value.quantity == quantity
+
+
+def test_the_command_hands_over_loads_and_scheduler(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(sweep_module, "sweep", lambda plan, out, **options: asked.append((plan, options["scheduler"])))
+    command = ["sweep", "--out", str(tmp_path / "s.nc"), "--scenes", "3"]
+    ramp = ["--force-n", "0.1", "--force-n", "0.3", "--strain", "finite", "--scheduler", "tcp://there:8786"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert CliRunner().invoke(app, command + ramp).exit_code == 0
+    assert asked == [(SweepPlan(3, 1), None), (SweepPlan(3, 1, (0.1, 0.3), "finite"), "tcp://there:8786")]
+
+
 def test_nine_different_rows_are_the_phantoms():
     chosen = phantom_index(SweepPlan(134, 1).truths())
     assert len(set(chosen)) == 9
@@ -113,10 +173,3 @@ def test_a_file_that_is_no_sweep_is_refused(tmp_path, content):
     (tmp_path / "x.nc").write_bytes(content)
     with pytest.raises(InvalidQuantity, match="host_tools sweep"):
         read_dataset(tmp_path / "x.nc")
-
-
-def test_a_garbled_journal_is_refused_and_left_as_it_is(tmp_path):
-    (tmp_path / "j").write_bytes(b"no journal\nat all\n")
-    with pytest.raises(InvalidQuantity, match="lines of JSON"):
-        Journal(tmp_path / "j", SweepPlan(5, 1).as_record())
-    assert (tmp_path / "j").read_bytes() == b"no journal\nat all\n"

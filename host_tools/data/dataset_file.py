@@ -1,0 +1,82 @@
+"""A journal's rows to one netCDF file with units, in blocks of scenes, so that memory does not grow with their number.
+
+A failed scene stays in the file as a row of NaN with its reason. Columns are those of the first solved row.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from itertools import islice
+from pathlib import Path
+
+import h5netcdf  # type: ignore[import-untyped]
+import h5py  # type: ignore[import-untyped]
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.durable import sync_directory
+from device.measurement.quantities import InvalidQuantity
+from host_tools.data.journal import Journal, Row
+
+UNITS = {"_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa", "_n": "N"}
+NOT_VARIABLES = ("index", "reason", "r_mm")
+BLOCK_SCENES = 64
+"""Some 10 MB of rows with five loads each."""
+
+
+def write_dataset(journal: Journal, path: Path) -> None:
+    """Write the journal's rows by their index to a netCDF file, whole or not at all."""
+    solved = _first_solved(journal)
+    temporary = path.with_suffix(path.suffix + ".tmp")
+    with h5netcdf.File(temporary, "w") as file:
+        empty_of = _lay_out(file, journal, solved)
+        rows, start = journal.in_order(), 0
+        while block := list(islice(rows, BLOCK_SCENES)):
+            stop = start + len(block)
+            for name, empty in empty_of.items():
+                file[name][start:stop] = np.array([row.get(name, empty) for row in block], dtype=float)
+            file["reason"][start:stop] = np.array([row["reason"] for row in block], dtype=object)
+            start = stop
+    with temporary.open("rb") as written:
+        os.fsync(written.fileno())
+    temporary.replace(path)
+    sync_directory(path.parent)
+
+
+def _first_solved(journal: Journal) -> Row:
+    reason = ""
+    for row in journal.in_order():
+        if not row["reason"]:
+            return row
+        reason = reason or row["reason"]
+    raise InvalidQuantity("scenes solved", 0, "at least one", f"the first reason was: {reason}")
+
+
+def _lay_out(file: h5netcdf.File, journal: Journal, solved: Row) -> dict[str, NDArray[np.float64]]:
+    """Create dimensions, coordinates and empty variables; return the value of each variable in a failed row."""
+    file.attrs.update(schema=journal.plan["schema"], origin=json.dumps(journal.plan))
+    coordinates = {"r_mm": (np.asarray(solved["r_mm"], dtype=float), "mm")}
+    if "forces_n" in journal.plan:
+        coordinates = {"load": (np.asarray(journal.plan["forces_n"], dtype=float), "N")} | coordinates
+    file.dimensions = {"scene": len(journal)} | {name: len(values) for name, (values, _) in coordinates.items()}
+    for name, (values, unit) in coordinates.items():
+        _create(file, name, (name,), unit)[...] = values
+    empty_of = {}
+    for name in (name for name in solved if name not in NOT_VARIABLES):
+        empty_of[name] = np.full_like(np.asarray(solved[name], dtype=float), np.nan)
+        _create(file, name, ("scene", *list(coordinates)[: empty_of[name].ndim]), _unit(name))
+    reason = file.create_variable("reason", ("scene",), h5py.string_dtype())
+    reason.attrs["long_name"] = "why the scene failed, or empty"
+    return empty_of
+
+
+def _create(file: h5netcdf.File, name: str, dimensions: tuple[str, ...], unit: str) -> h5netcdf.Variable:
+    variable = file.create_variable(name, dimensions, float, fillvalue=np.nan)
+    variable.attrs["units"] = unit
+    return variable
+
+
+def _unit(name: str) -> str:
+    """Return the unit that a name ends in; stated errors are relative, whatever they are of."""
+    return "1" if name.startswith("stated_error_") else UNITS["_" + name.rpartition("_")[2]]
