@@ -1,0 +1,10 @@
+"""The incompressible limit: with a pressure of its own the solution settles, displacements of order 1 lock."""
+
+from host_tools.study import incompressible
+from host_tools.study.incompressible import Formulation
+
+
+def test_the_mixed_formulation_settles_where_displacements_lock():
+    found = incompressible.measurements((Formulation(1, mixed=False), Formulation(3, mixed=True)))
+    for benchmark in incompressible.benchmarks(found):
+        assert benchmark.passed, benchmark
