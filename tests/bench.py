@@ -31,11 +31,11 @@ MODELS = Path(__file__).resolve().parents[1] / "models"
 REPEATS = 15
 
 
-def _seconds(work: Callable[[], object]) -> float:
+def median_seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
     """Return the median time of one call after a warm-up."""
     work()
     times = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         start = time.perf_counter()
         work()
         times.append(time.perf_counter() - start)
@@ -59,7 +59,7 @@ def main() -> None:
         "press: ten frames to an estimate": lambda: estimate_recording(recording, bundle, calibration),
         "scene: finite elements with baseline": lambda: solve(Scene(Inclusion(10.0, 6.0, 80.0))),
     }
-    seconds = {name: _seconds(work) for name, work in works.items()}
+    seconds = {name: median_seconds(work) for name, work in works.items()}
     yardstick = next(iter(seconds.values()))
     for name, value in seconds.items():
         print(f"{name:40} {value / yardstick:10.2f} x   ({1e3 * value:8.2f} ms here)")

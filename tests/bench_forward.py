@@ -1,0 +1,104 @@
+"""What the forward model's shortcuts save, each as a ratio of two times of the same minute, with the error it costs.
+
+CalculiX stands for the paper's way: a quarter of the body in C3D20 elements (its SOLID95) with a contact pair; it is
+left out where `ccx` is not installed.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np
+from bench import median_seconds
+from joblib import Parallel, delayed
+
+from device.measurement.quantities import Inclusion
+from host_tools.forward.face_state import Rays
+from host_tools.forward.linear_press import LinearPress
+from host_tools.forward.materials import with_inclusion
+from host_tools.forward.plan import model_plan
+from host_tools.forward.reduced_basis import ReducedBasis
+from host_tools.forward.sampling import FaceSampler
+from host_tools.forward.solve import solve
+from host_tools.forward.tiers import build
+from host_tools.peer.calculix import ccx_available, solve_with_calculix
+from host_tools.peer.revolved_mesh import QUARTER
+from host_tools.scene import Scene
+from host_tools.study.tables import finest_plan
+
+SCENE = Scene(Inclusion(10.0, 6.0, 80.0))
+BATCH = 24
+"""Scenes of the two-process race."""
+
+
+def _one_press() -> tuple[float, float]:
+    """Return w in the middle (mm) and force (N) of one press, mesh and all, by the plan for 0.1 %."""
+    plan = model_plan(SCENE, tolerance=0.001)
+    meshed, materials = build(SCENE, plan), with_inclusion(SCENE)
+    press = LinearPress(meshed.mesh, meshed.symmetry, plan.order)
+    sampler = FaceSampler(meshed.mesh, Rays.over(SCENE.waveguide), "axisymmetric")
+    face = press.face_state(press.displacement(materials), materials, sampler)
+    return float(face.w_mm[0, 0]), face.force_n
+
+
+def _against_calculix() -> None:
+    truth = solve(SCENE, finest_plan(SCENE))
+    exact = truth.w_mm[0], truth.force_n
+    ours_s, ours = median_seconds(_one_press), _one_press()
+    _print("one press, axisymmetric, plan for 0.1 %", ours_s, ours, exact)
+    if not ccx_available():
+        print("CalculiX is not installed (Debian: calculix-ccx): its ratio is left out")
+        return
+    began = time.perf_counter()
+    peer = solve_with_calculix(SCENE, [1.0], finite_strain=False, sector=QUARTER)[0]
+    peer_s = time.perf_counter() - began
+    name = f"the same in CalculiX, quarter, {peer.elements} elements"
+    _print(name, peer_s, (peer.w_at_mm(0.0), peer.force_n), exact)
+    print(f"{'CalculiX over ours':48} {peer_s / ours_s:10.0f} x")
+
+
+def _print(name: str, seconds: float, found: tuple[float, float], exact: tuple[float, float]) -> None:
+    w, force = (100 * (a / b - 1) for a, b in zip(found, exact, strict=True))
+    print(f"{name:48} {1e3 * seconds:10.1f} ms here   error of w {w:+.3f} %, of the force {force:+.3f} %")
+
+
+def _reduced_basis() -> None:
+    basis = ReducedBasis(SCENE, 40.0, 120.0)
+    direct_s = median_seconds(lambda: solve(SCENE).lump)
+    online_s = median_seconds(lambda: basis.solution(80.0).lump, repeats=50)
+    print(f"{'direct solve over reduced basis':48} {direct_s / online_s:10.0f} x   ({1e3 * online_s:.3f} ms here)")
+
+
+def _two_processes() -> None:
+    scenes = [replace(SCENE, inclusion=Inclusion(10.0, 6.0, float(E))) for E in np.linspace(40, 120, BATCH)]
+
+    def race(pool: Parallel) -> float:
+        pool(delayed(_force_n)(scene) for scene in scenes[:4])  # workers import and mesh before the clock starts
+        began = time.perf_counter()
+        pool(delayed(_force_n)(scene) for scene in scenes)
+        return time.perf_counter() - began
+
+    with Parallel(n_jobs=1) as alone, Parallel(n_jobs=2) as pair:
+        print(f"{'one process over two, 24 scenes':48} {race(alone) / race(pair):10.2f} x")
+
+
+def _force_n(scene: Scene) -> float:
+    return solve(scene).force_n
+
+
+def main() -> None:
+    """Print the ratios and the peak memory."""
+    _against_calculix()
+    _reduced_basis()
+    _two_processes()
+    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+
+
+if __name__ == "__main__":
+    main()
