@@ -19,6 +19,10 @@ STEP_UP_FACTOR = 2.0
 """Stated error over the step to the next higher order, feature by feature."""
 STEP_DOWN_FACTOR = 0.2
 """Stated error over the largest step, of any feature, from the next lower order."""
+ROUNDING = 1e-12
+"""A step below it is no step: that press was prescribed."""
+CANCELLING = ("total_deformation_mm3", "deformation_area_mm2")
+"""At equal force the total all but cancels, and the area steps when the half maximum leaves the window."""
 
 
 def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, bare: Loaded) -> dict[str, float]:
@@ -29,17 +33,17 @@ def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, bare: Loaded) -> 
     if pressed.other is None or bare.other is None:
         return {}
     found, other = _numbers(rays, pressed.state, bare.state), _numbers(rays, pressed.other, bare.other)
-    steps = {name: abs(value - other[name]) / abs(value) if value else 0.0 for name, value in found.items()}
+    steps = {name: _step(value, other[name]) for name, value in found.items()}
     if plan.symmetry == "axisymmetric":
         return {name: STEP_UP_FACTOR * step for name, step in steps.items()}
-    prescribed = [name for name in ("force_n", "indentation_mm") if steps[name] < ROUNDING]
     largest = max(step for name, step in steps.items() if name not in CANCELLING)
-    return {name: 0.0 if name in prescribed else STEP_DOWN_FACTOR * largest for name in steps}
+    return {name: STEP_DOWN_FACTOR * largest if step else 0.0 for name, step in steps.items()}
 
 
-ROUNDING = 1e-12
-CANCELLING = ("total_deformation_mm3", "deformation_area_mm2")
-"""At equal force the total all but cancels, and the area steps when the half maximum leaves the window."""
+def _step(value: float, other: float) -> float:
+    """Return the relative change from one order to the other; none where rounding alone differs."""
+    step = abs(value - other) / abs(value) if value else 0.0
+    return step if step > ROUNDING else 0.0
 
 
 def _numbers(rays: Rays, pressed: FaceState, bare: FaceState) -> dict[str, float]:
