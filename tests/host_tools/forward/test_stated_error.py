@@ -1,0 +1,49 @@
+"""What a solution states of its error, from two orders whose difference is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import Inclusion
+from host_tools.forward.face_state import FaceState, Rays
+from host_tools.forward.plan import model_plan
+from host_tools.forward.press_model import Loaded
+from host_tools.forward.stated_error import STEP_DOWN_FACTOR, STEP_UP_FACTOR, stated_error
+from host_tools.scene import Scene, Waveguide
+
+PLAN = model_plan(Scene(Inclusion(10.0, 6.0, 80.0)))
+RAYS = Rays.over(Waveguide())
+BUMP_MM = np.exp(-((RAYS.r_mm / 4.0) ** 2))
+
+
+def face(force_n, peak_mm):
+    return FaceState(1.0, peak_mm * BUMP_MM, BUMP_MM, 50.0 * peak_mm, force_n, force_n)
+
+
+PRESSED = Loaded(face(0.200, 0.0200), other=face(0.202, 0.0201))  # 1 % in force, 0.5 % in the lump field
+BARE = Loaded(face(0.19, 0.0), other=face(0.19, 0.0))
+
+
+def test_in_small_strain_each_feature_states_twice_its_own_step():
+    stated = stated_error(PLAN, RAYS, PRESSED, BARE)
+    assert stated["force_n"] == pytest.approx(STEP_UP_FACTOR * 0.01)
+    assert stated["max_deformation_mm"] == pytest.approx(STEP_UP_FACTOR * 0.005)
+    assert stated["deformation_area_mm2"] == 0.0  # the same shape: rounding is no error
+
+
+@pytest.mark.parametrize(
+    ("plan", "factor"),
+    [(replace(PLAN, strain="finite"), STEP_UP_FACTOR), (replace(PLAN, symmetry="half"), STEP_DOWN_FACTOR)],
+)
+def test_elsewhere_every_feature_states_the_largest_step(plan, factor):
+    stated = stated_error(plan, RAYS, PRESSED, BARE)
+    assert stated["force_n"] == stated["max_deformation_mm"] == pytest.approx(factor * 0.01)
+
+
+def test_what_was_prescribed_has_no_error():
+    assert stated_error(PLAN, RAYS, PRESSED, BARE)["indentation_mm"] == 0.0
+
+
+def test_without_another_order_nothing_is_stated():
+    assert stated_error(PLAN, RAYS, PRESSED._replace(other=None), BARE) == {}
