@@ -68,17 +68,23 @@ def contact_pressure_kpa(mesh: Any, symmetry: Symmetry, order: int, probe_stress
     the force exactly; a stress sampled at the face does not, and jumps between elements.
     """
     space = H1(mesh, order=order)  # not only over the probe: points of the face may lie in either side's elements
-    p, v = space.TnT()
+    v = space.TestFunction()
     residual = LinearForm(space)
     axial = symmetry.strain((*(0.0 for _ in symmetry.held), v))
     residual += work(probe_stress, axial) * symmetry.weight * symmetry.volume(LAYERS)
     residual.Assemble()
+    return pressure_of_forces(space, symmetry, residual.vec)
+
+
+def pressure_of_forces(space: Any, symmetry: Symmetry, forces_mn: Any) -> Any:
+    """Return the pressure (kPa, grid function) whose integral against every shape function is the force on its dof."""
+    p, v = space.TnT()
     mass = BilinearForm(space, symmetric=True)
     mass += p * v * symmetry.weight * symmetry.face
     mass.Assemble()
     pressure = GridFunction(space)
-    on_face = space.GetDofs(mesh.Boundaries("face"))
-    pressure.vec.data = mass.mat.Inverse(on_face, "sparsecholesky") * residual.vec
+    on_face = space.GetDofs(space.mesh.Boundaries("face"))
+    pressure.vec.data = mass.mat.Inverse(on_face, "sparsecholesky") * forces_mn
     return pressure
 
 

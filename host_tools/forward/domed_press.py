@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from ngsolve import H1, BilinearForm, GridFunction, IfPos, x, y
 from scipy.optimize import root_scalar
+from scipy.sparse import csr_matrix
 
-from host_tools.forward.contact import integral_over_face
+from host_tools.forward.contact import integral_over_face, pressure_of_forces
 from host_tools.forward.errors import PressFailed
-from host_tools.forward.face_state import FaceState, FloatArray
-from host_tools.forward.linear_press import MN_PER_N, LinearPress
+from host_tools.forward.face_state import MN_PER_N, FaceState, FloatArray
+from host_tools.forward.linear_press import LinearPress
 from host_tools.forward.materials import Elasticity
 from host_tools.forward.press_model import Loaded
 from host_tools.forward.sampling import FaceSampler
@@ -171,9 +172,10 @@ class _Contact:
 
     def _face_state(self, indentation_mm: float) -> FaceState:
         model, forces = self.model, self._forces(indentation_mm)
-        w_mm, pressure = GridFunction(self.face_space), GridFunction(self.face_space)
+        w_mm, on_dofs = GridFunction(self.face_space), GridFunction(self.face_space)
         w_mm.vec.FV().NumPy()[self.dofs] = self.probe @ forces
-        pressure.vec.FV().NumPy()[self.dofs] = self._pressure(forces)
+        on_dofs.vec.FV().NumPy()[self.dofs] = forces
+        pressure = pressure_of_forces(self.face_space, model.symmetry, on_dofs.vec)
         return FaceState(
             indentation_mm=indentation_mm,
             w_mm=model.sampler(w_mm),
@@ -183,18 +185,8 @@ class _Contact:
             contact_force_n=model.sampler.copies * integral_over_face(model.mesh, model.symmetry, pressure) / MN_PER_N,
         )
 
-    def _pressure(self, forces: FloatArray) -> FloatArray:
-        """Return the pressure whose integral against every shape function is the force on its dof."""
-        p, v = self.face_space.TnT()
-        mass = BilinearForm(self.face_space, check_unused=False)
-        mass += p * v * self.model.symmetry.weight * self.model.symmetry.face
-        mass.Assemble()
-        return np.asarray(np.linalg.solve(_dense(mass.mat.CSR(), self.dofs), forces))
-
 
 def _dense(compressed_rows: Any, dofs: Any) -> FloatArray:
     """Return the block of some dofs of a sparse matrix."""
-    from scipy.sparse import csr_matrix
-
     values, columns, starts = (np.asarray(part) for part in compressed_rows)
     return np.asarray(csr_matrix((values, columns, starts))[np.ix_(dofs, dofs)].toarray())

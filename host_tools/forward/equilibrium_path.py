@@ -14,7 +14,8 @@ from ngsolve import InnerProduct
 
 from host_tools.forward.closed_contact import ClosedContact, push_of_back
 from host_tools.forward.errors import PressFailed
-from host_tools.forward.loaded_face import MN_PER_N, reaction_n
+from host_tools.forward.face_state import MN_PER_N
+from host_tools.forward.loaded_face import reaction_n
 from host_tools.forward.newton import EnergyNewton, Status
 
 LONGEST_STEP_MM, SHORTEST_STEP_MM = 1.0, 1 / 128

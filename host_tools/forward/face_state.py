@@ -17,6 +17,9 @@ RADII = 221
 
 FloatArray = NDArray[np.float64]
 
+MN_PER_N = 1e3
+"""kPa times mm2 is mN, and kPa times mm3 is uJ."""
+
 
 @dataclass(frozen=True)
 class Rays:

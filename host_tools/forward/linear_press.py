@@ -12,15 +12,13 @@ from ngsolve import BilinearForm, GridFunction, InnerProduct
 
 from host_tools.forward.contact import Body, ContactSpace, contact_pressure_kpa, integral_over_face
 from host_tools.forward.elasticity import Stress, lame_modulus_kpa, shear_modulus_kpa, stress, work
-from host_tools.forward.face_state import FaceState
+from host_tools.forward.face_state import MN_PER_N, FaceState
 from host_tools.forward.materials import Elasticity
 from host_tools.forward.press_model import Loaded
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.symmetry import Expression, Symmetry
 from host_tools.scene import Press
 
-MN_PER_N = 1e3
-"""kPa times mm2 is mN."""
 INDENTATION_MM = 1.0
 
 

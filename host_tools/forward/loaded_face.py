@@ -8,15 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ngsolve import H1, BilinearForm, GridFunction, InnerProduct, Integrate
+from ngsolve import H1, GridFunction, InnerProduct
 
 from host_tools.forward.closed_contact import AXIAL, ClosedContact
-from host_tools.forward.face_state import FaceState, FloatArray
+from host_tools.forward.contact import integral_over_face, pressure_of_forces
+from host_tools.forward.face_state import MN_PER_N, FaceState, FloatArray
 from host_tools.forward.sampling import FaceSampler
-from host_tools.forward.symmetry import AXISYMMETRIC, Expression
-
-MN_PER_N = 1e3
-"""kPa times mm2 is mN, and kPa times mm3 is uJ."""
+from host_tools.forward.symmetry import AXISYMMETRIC
 
 
 @dataclass(frozen=True)
@@ -53,9 +51,9 @@ def face_state(contact: ClosedContact, indentation_mm: float, sampler: FaceSampl
         indentation_mm=indentation_mm,
         w_mm=sampler(w_mm),
         p_kpa=sampler(pressure),
-        total_mm3=_over_face(contact.mesh, w_mm),
+        total_mm3=integral_over_face(contact.mesh, AXISYMMETRIC, w_mm),
         force_n=reaction_n(contact, "back"),
-        contact_force_n=_over_face(contact.mesh, pressure) / MN_PER_N,
+        contact_force_n=integral_over_face(contact.mesh, AXISYMMETRIC, pressure) / MN_PER_N,
     )
 
 
@@ -65,25 +63,13 @@ def contact_pressure_kpa(contact: ClosedContact) -> Any:
     It balances the gradient of the probe's energy, int p v dA = dW_probe(v e_z) for every v on the face, so its
     integral is the reaction; the direction of the traction, normal to the deformed face, does not enter.
     """
-    mesh = contact.mesh
-    space = H1(mesh, order=contact.order)  # over both bodies: a point of the face may be in either
-    p, v = space.TnT()
-    mass = BilinearForm(space, symmetric=True)
-    mass += p * v * AXISYMMETRIC.weight * AXISYMMETRIC.face
-    mass.Assemble()
     residual = GridFunction(contact.u.space)
     residual.vec.data = _gradient(contact.probe_energy, contact.u)
-    pressure = GridFunction(space)
-    on_face = space.GetDofs(mesh.Boundaries("face"))
-    pressure.vec.data = mass.mat.Inverse(on_face, "sparsecholesky") * residual.components[AXIAL].vec
-    return pressure
+    space = H1(contact.mesh, order=contact.order)  # over both bodies: a point of the face may be in either
+    return pressure_of_forces(space, AXISYMMETRIC, residual.components[AXIAL].vec)
 
 
 def _gradient(energy: Any, u: Any) -> Any:
     gradient = u.vec.CreateVector()
     energy.Apply(u.vec, gradient)
     return gradient
-
-
-def _over_face(mesh: Any, field: Expression) -> float:
-    return float(Integrate(field * AXISYMMETRIC.weight * AXISYMMETRIC.face, mesh))

@@ -143,7 +143,10 @@ def _formulation(scene: Scene, strain: Strain, reasons: dict[str, str]) -> Liter
     locks = with_inclusion(scene).locks or baseline(scene).locks
     if locks and strain == "finite":
         raise InvalidQuantity(
-            "poisson_ratio", "above 0.499", f"at most {LOCKING_POISSON_RATIO} in finite strain", "ask for small strain"
+            "poisson_ratio",
+            _largest_poisson_ratio(scene),
+            f"at most {LOCKING_POISSON_RATIO} in finite strain",
+            "ask for small strain",
         )
     if locks:
         reasons["formulation"] = f"a Poisson ratio above {LOCKING_POISSON_RATIO} locks displacements alone"
@@ -152,11 +155,15 @@ def _formulation(scene: Scene, strain: Strain, reasons: dict[str, str]) -> Liter
     return "displacement"
 
 
+def _largest_poisson_ratio(scene: Scene) -> float:
+    return max(*with_inclusion(scene).poisson_ratio.values(), *baseline(scene).poisson_ratio.values())
+
+
 def _mesh(scene: Scene, symmetry: Sector, reasons: dict[str, str]) -> Literal["morphed", "remeshed"]:
     if symmetry == "axisymmetric" and scene.has_inclusion and reaches(scene):
         reasons["mesh"] = "inside the training box: one mesh of fixed topology, smooth in size and depth"
         return "morphed"
-    reasons["mesh"] = "outside what the fixed topology reaches: meshed anew (features jump by up to 3e-4)"
+    reasons["mesh"] = "outside what the fixed topology reaches: meshed anew (features jump by up to 1e-3)"
     return "remeshed"
 
 

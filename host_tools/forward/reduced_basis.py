@@ -14,8 +14,8 @@ import numpy as np
 from ngsolve import BilinearForm, InnerProduct
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.forward.face_state import FaceState, FloatArray, Rays
-from host_tools.forward.linear_press import MN_PER_N, LinearPress, at_press
+from host_tools.forward.face_state import MN_PER_N, FaceState, FloatArray, Rays
+from host_tools.forward.linear_press import LinearPress, at_press
 from host_tools.forward.materials import Elasticity, baseline, with_inclusion
 from host_tools.forward.plan import ModelPlan, aligned, model_plan
 from host_tools.forward.solution import Solution

@@ -33,7 +33,7 @@ def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, bare: Loaded) -> 
     """
     if pressed.other is None or bare.other is None:
         return {}
-    found, other = _numbers(rays, pressed.state, bare.state), _numbers(rays, pressed.other, bare.other)
+    found, other = numbers(rays, pressed.state, bare.state), numbers(rays, pressed.other, bare.other)
     steps = {name: _step(value, other[name]) for name, value in found.items()}
     factor = STEP_UP_FACTOR if plan.symmetry == "axisymmetric" else STEP_DOWN_FACTOR
     if plan.symmetry == "axisymmetric" and plan.strain == "small":
@@ -48,6 +48,7 @@ def _step(value: float, other: float) -> float:
     return step if step > ROUNDING else 0.0
 
 
-def _numbers(rays: Rays, pressed: FaceState, bare: FaceState) -> dict[str, float]:
+def numbers(rays: Rays, pressed: FaceState, bare: FaceState) -> dict[str, float]:
+    """Return force, indentation and O1-O3 of the lump field by name."""
     lump = deformation(rays.r_mm, pressed.w_mm - bare.w_mm, pressed.total_mm3 - bare.total_mm3)
     return {"force_n": pressed.force_n, "indentation_mm": pressed.indentation_mm, **asdict(lump)}

@@ -10,8 +10,8 @@ import numpy as np
 from ngsolve import BilinearForm, GridFunction, InnerProduct
 
 from device.measurement.quantities import Inclusion
-from host_tools.forward.face_state import Rays
-from host_tools.forward.linear_press import MN_PER_N, LinearPress
+from host_tools.forward.face_state import MN_PER_N, Rays
+from host_tools.forward.linear_press import LinearPress
 from host_tools.forward.load_path import press_along
 from host_tools.forward.loaded_face import LoadedFace
 from host_tools.forward.materials import Elasticity, with_inclusion

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
 
 from device.measurement.quantities import Inclusion
+from host_tools.forward.accuracy import prescribed
 from host_tools.forward.plan import ModelPlan, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
+from host_tools.forward.stated_error import numbers
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Placement, Press, Scene
-from host_tools.study.tables import finest_plan
+from host_tools.study.tables import FEATURES, finest_plan
 
 SMALLEST_SIZE_MM = 1.0
 """Lumps below it move the face by less than a thousandth of what it is pressed: nobody sees them."""
@@ -98,16 +100,12 @@ def _stated_and_true(case: _Case) -> dict[str, tuple[float, float]]:
     solution = solve(case.scene, case.plan, estimate_error=True)
     found, truth = _numbers(solution), _numbers(solve(case.scene, case.truth_plan))
     errors = {name: abs(value - truth[name]) / abs(truth[name]) for name, value in found.items() if truth[name]}
-    prescribed = "indentation_mm" if case.scene.press.indentation_mm is not None else "force_n"
-    return {
-        name: (solution.stated_error[name], error)
-        for name, error in errors.items()
-        if name != prescribed and not (prescribed == "force_n" and name == "total_deformation_mm3")
-    }
+    scored = FEATURES[prescribed(case.scene)]
+    return {name: (solution.stated_error[name], error) for name, error in errors.items() if name in scored}
 
 
 def _numbers(solution: Solution) -> dict[str, float]:
-    return {"force_n": solution.force_n, "indentation_mm": solution.indentation_mm, **asdict(solution.lump)}
+    return numbers(solution.rays, solution.pressed, solution.baseline)
 
 
 def _summary(kind: str, feature: str, pairs: list[tuple[float, float]]) -> Effectivity:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,11 @@ from device.measurement.durable import write_durably
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward import accuracy
 from host_tools.forward.accuracy import Level
-from host_tools.forward.deformation import deformation
 from host_tools.forward.face_state import FloatArray
 from host_tools.forward.plan import BLUNT, ModelPlan, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve, solve_ramp
+from host_tools.forward.stated_error import numbers
 from host_tools.scene import Placement, Press, Scene
 
 SCHEMA = "tsis.accuracy/1"
@@ -71,8 +71,7 @@ def relative_errors(found: Solution, truth: Solution) -> Errors:
 def _features(solution: Solution, *, per: str) -> dict[str, float]:
     """Return force, indentation and O1-O3 of the lump when both presses are scaled to one unit of either."""
     pressed, bare = (state.scaled(1 / getattr(state, per)) for state in (solution.pressed, solution.baseline))
-    lump = deformation(solution.rays.r_mm, pressed.w_mm - bare.w_mm, pressed.total_mm3 - bare.total_mm3)
-    return {"force_n": pressed.force_n, "indentation_mm": pressed.indentation_mm, **asdict(lump)}
+    return numbers(solution.rays, pressed, bare)
 
 
 def _relative(found: float, truth: float) -> float:
@@ -120,9 +119,7 @@ def _score_levels(scene: Scene | None, levels: tuple[Level, ...]) -> list[Scored
 
 def _score(scene: Scene, plan: ModelPlan, truth: Solution) -> Scored:
     solve(scene, plan)  # a first solve may build the reference mesh
-    began = time.perf_counter()
-    found = solve(scene, plan)
-    return relative_errors(found, truth), time.perf_counter() - began
+    return _score_once(scene, plan, truth)
 
 
 def _as_table(
@@ -197,7 +194,7 @@ def _departures(scene: Scene | None) -> FloatArray:
 
 
 def _solid(jobs: int) -> dict[str, Any]:
-    """Score quarters of centred lumps; 3-D solves take both cores, so they run one by one whatever `jobs` says."""
+    """Score quarters of centred lumps; 3-D solves take gigabytes, so they run one by one whatever `jobs` says."""
     rows = [_score_solid(scene) for scene in _scenes(FEW_SIZES_MM, FEW_DEPTHS_MM)]
     table = _as_table(FEW_SIZES_MM, FEW_DEPTHS_MM, SOLID_LEVELS, rows)
     for entry in table["levels"]:

@@ -32,7 +32,7 @@ def test_the_inclusion_is_the_sphere_that_was_asked_for():
 
 @pytest.mark.parametrize(("truth", "varied"), [((10.0, 6.0), 0), ((3.0, 9.0), 0), ((14.8, 4.2), 1)])
 def test_features_are_smooth_in_size_and_depth_to_a_millionth(truth, varied):
-    """Over a fine scan the features leave a polynomial of degree 5 by less than 1e-6: remeshing leaves 3e-4."""
+    """Over a fine scan the features leave a polynomial of degree 5 by less than 1e-6; remeshing leaves 1e-5."""
     scan = np.linspace(-0.1, 0.1, 11)
     features = []
     for shift in scan:
