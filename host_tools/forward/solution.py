@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from host_tools.forward.deformation import Deformation, deformation
-from host_tools.forward.face_state import FaceState, FloatArray, Rays
+from host_tools.forward.face_state import RADII, FaceState, FloatArray, Rays
 from host_tools.forward.plan import ModelPlan
 
 PRESSED_RATIO = 0.95
 """Where the pressure must be positive, over the face: at the rim itself it is singular and its sign means nothing."""
+RING_RATIO = 0.1
+"""Width of the rings whose force must be positive, over the face: as wide as an element at a blunt rim, inside which
+the pressure rings between both signs while its sum is right."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +86,15 @@ class Solution:
 
     @property
     def pressure_is_positive(self) -> bool:
-        """Whether the face is in compression everywhere; if not, closed contact is not the solution."""
+        """Whether no ring of the face is pulled; if one is, closed contact is not the solution.
+
+        Unilateral contact cannot pull, however its sampled pressure rings at the edge of the contact.
+        """
+        if self.plan.contact == "unilateral":
+            return True
         inner = self.r_mm <= PRESSED_RATIO * self.r_mm[-1]
-        return bool(min(state.p_kpa[:, inner].min() for state in (self.pressed, self.baseline)) > 0)
+        states = (self.pressed, self.baseline)
+        return all((_ring_force(self.rays.r_mm[:, inner], state.p_kpa[:, inner]) > 0).all() for state in states)
 
     def as_record(self) -> dict[str, Any]:
         """Return the solution as the JSON object that `host_tools simulate --json` prints."""
@@ -114,3 +123,12 @@ class Solution:
             "w_baseline_field_mm": self.baseline.w_mm.tolist(),
             "p_field_kpa": self.pressed.p_kpa.tolist(),
         }
+
+
+def _ring_force(r_mm: FloatArray, p_kpa: FloatArray) -> FloatArray:
+    """Return the force (mN per radian) on every ring of a face [A, R], each as wide as `RING_RATIO` says."""
+    density = r_mm * p_kpa
+    steps = np.diff(r_mm, axis=-1) * (density[:, 1:] + density[:, :-1]) / 2
+    within = np.pad(np.cumsum(steps, axis=-1), ((0, 0), (1, 0)))
+    width = max(1, round(RING_RATIO * RADII))
+    return np.asarray(within[:, width:] - within[:, :-width])
