@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures import TimeoutError as TooLong
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from functools import partial
 from multiprocessing import get_context
-from typing import Literal, NamedTuple
+from multiprocessing.connection import Connection
+from typing import Literal, NamedTuple, cast
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.errors import PressFailed
@@ -57,16 +55,24 @@ def run_extremes(*, on_step: Callable[[Extreme], None] = lambda case: None) -> l
 
 
 def _in_own_process(name: str, build: Build, strain: StrainName) -> Extreme:
-    with ProcessPoolExecutor(1, mp_context=get_context("forkserver")) as pool:
-        future = pool.submit(attempt, name, build, strain)
-        try:
-            return future.result(TIME_LIMIT_S)
-        except TooLong:
-            for process in list((pool._processes or {}).values()):
-                process.kill()
-            return Extreme(name, "failure", f"no answer after {TIME_LIMIT_S:g} s")
-        except BrokenProcessPool:
-            return Extreme(name, "failure", "the process died")
+    context = get_context("forkserver")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send_attempt, args=(sender, name, build, strain))
+    process.start()
+    sender.close()  # so that the end of the process is the end of the pipe
+    try:
+        if receiver.poll(TIME_LIMIT_S):
+            return cast(Extreme, receiver.recv())
+        return Extreme(name, "failure", f"no answer after {TIME_LIMIT_S:g} s")
+    except EOFError:
+        return Extreme(name, "failure", "the process died")
+    finally:
+        process.kill()
+        process.join()
+
+
+def _send_attempt(sender: Connection, name: str, build: Build, strain: StrainName) -> None:
+    sender.send(attempt(name, build, strain))
 
 
 def attempt(name: str, build: Build, strain: StrainName) -> Extreme:
