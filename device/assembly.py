@@ -18,20 +18,26 @@ from device.hardware.interfaces import Camera, ForceScale, Lights, LoadCell
 from device.hardware.led_driver import Tlc59116, open_led_driver
 from device.hardware.load_cell import measure_tare, open_load_cell
 from device.instrument.bench import Bench
+from device.instrument.clock_watch import ClockWatch
 from device.instrument.force_recorder import ForceRecorder
+from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.estimate import estimate_recording
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.quantities import InvalidQuantity
+from device.records.disk import Disk
 from device.records.store import Store
+from device.simulation.faults import FaultTimeline
+from device.simulation.full_disk import EmulatedDisk
 from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
 from device.simulation.scenario import Scenario
 from device.simulation.serial_line import EmulatedOpenScale
 from device.simulation.surface_table import load_surface_table
-from device.simulation.virtual_camera import ExposureRequest, VirtualPicamera2
+from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_probe import VirtualProbe
+from device.simulation.virtual_request import ExposureRequest
 
 TARE_SAMPLES = 20
 FIRST_SAMPLE_S = 5.0
@@ -91,12 +97,12 @@ def open_probe(config: Config) -> Procedure:
     lights = parts.open(lambda: open_led_driver(config.light.bus, address=config.light.address))
     camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
     cell = parts.open(lambda: open_load_cell(config.cell.device, config.cell.baud))
-    return _procedure(config, parts, lights, camera, cell)
+    return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
 
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
-    parts = _Parts()
+    parts, faults = _Parts(), FaultTimeline(scenario.faults)
     table_folder = config.calibration.parent
     shape = config.camera.height_px, config.camera.width_px
     probe = parts.open(lambda: VirtualProbe(scenario, load_surface_table(table_folder), shape, config.camera.scale))
@@ -104,23 +110,32 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     assert probe is not None  # require_all has raised otherwise
     chip = Tlc59116Chip()
     picam2 = VirtualPicamera2(
-        partial(_render, probe),
+        partial(_render, probe, faults),
         width_px=config.camera.width_px,
         height_px=config.camera.height_px,
-        led_ratio_at=chip.ratio_at,
+        led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
+        faults=faults,
     )
-    line = EmulatedOpenScale(probe.cell_counts, noise_counts=scenario.cell.noise_counts, seed=scenario.seed)
+    line = EmulatedOpenScale(
+        probe.cell_counts,
+        noise_counts=scenario.cell.noise_counts,
+        drift_counts_per_s=scenario.cell.drift_counts_per_s,
+        seed=scenario.seed,
+        faults=faults,
+    )
     parts.opened.callback(line.close)
-    bus = EmulatedI2cBus({config.light.address: chip})
+    bus = EmulatedI2cBus({config.light.address: chip}, faults=faults)
     lights = parts.open(lambda: Tlc59116(bus, address=config.light.address))
     camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
     cell = parts.open(lambda: open_load_cell(line.device_path, config.cell.baud))
-    procedure = _procedure(config, parts, lights, camera, cell, scenario)
+    clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
+    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)
+    procedure.on_request(faults.begin_press)
     _lead_by_hand(procedure, probe)
     return procedure
 
 
-def _render(probe: VirtualProbe, exposure: ExposureRequest) -> Any:
+def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:
     return probe.frame_counts(
         force_n=probe.hand.force_n(exposure.t_s),
         position_mm=probe.hand.position_mm(exposure.t_s),
@@ -128,6 +143,8 @@ def _render(probe: VirtualProbe, exposure: ExposureRequest) -> Any:
         exposure_us=exposure.exposure_us,
         gain=exposure.gain,
         frame_number=exposure.frame_number,
+        wet_ratio=faults.wet_ratio(exposure.t_s),
+        ambient_ratio=faults.ambient_ratio(exposure.t_s),
     )
 
 
@@ -153,13 +170,15 @@ def _procedure(
     lights: Lights | None,
     camera: Camera | None,
     cell: LoadCell | None,
+    clock: ClockWatch,
+    disk: Disk | None = None,
     scenario: Scenario | None = None,
 ) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
     force = parts.open(lambda: _tared(config, cell)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
-    store = parts.open(lambda: Store(config.data))
+    store = parts.open(lambda: Store(config.data, disk))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.
     assert lights is not None
@@ -170,11 +189,12 @@ def _procedure(
     assert store is not None
     return Procedure(
         config,
-        Bench(lights, camera, force),
+        Bench(lights, camera, force, FramePace(config.camera.late_frames / config.camera.frame_rate_hz)),
         partial(estimate_recording, bundle=bundle, calibration=calibration),
         store,
         calibration_id=calibration.id,
         opened=parts.opened,
+        clock=clock,
         simulated_truth=scenario.inclusion if scenario else None,
     )
 

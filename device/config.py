@@ -19,7 +19,11 @@ ACTION = "correct the setting"
 
 @dataclass(frozen=True)
 class CameraSection:
-    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate."""
+    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate.
+
+    `late_frames`: a frame begun more frame times than this after it was asked for is late.
+    `tear_counts`: a step between two rows, compared with the frame before, above which one of the two is torn.
+    """
 
     width_px: int = 768
     height_px: int = 492
@@ -29,6 +33,8 @@ class CameraSection:
     gain: float = 1.0
     frame_rate_hz: float = 30.0
     index: int = 0
+    late_frames: float = 3.0
+    tear_counts: float = 10.0
 
     def __post_init__(self) -> None:
         require("camera.width_px", self.width_px, Bound(64, 4096, "px"), ACTION)
@@ -37,6 +43,8 @@ class CameraSection:
         frame_us = 1e6 / self.frame_rate_hz
         require("camera.exposure_us", self.exposure_us, Bound(10.0, frame_us, "us, one frame"), ACTION)
         require("camera.gain", self.gain, Bound(1.0, 16.0, ""), ACTION)
+        require("camera.late_frames", self.late_frames, Bound(1.5, 100.0, "frame times"), ACTION)
+        require("camera.tear_counts", self.tear_counts, Bound(0.5, 255.0, "counts"), ACTION)
         self.scale  # noqa: B018 - refuses an impossible pixel size
 
     @property
@@ -47,11 +55,23 @@ class CameraSection:
 
 @dataclass(frozen=True)
 class LightSection:
-    """The LED driver: I2C bus and address, and the brightness of the four sides while measuring."""
+    """The LED driver: I2C bus and address, the brightness of the four sides while measuring, and when light is right.
+
+    `max_dark_counts`: mean of a frame without light, black level included, above which something shines.
+    `min_side_ratio`: a side that alone gives less than this part of the brightest one's light is dark.
+    `max_dimming_ratio`: loss of a side's light, against commissioning or the first presses, that is warned of.
+    `commissioned_counts`: mean counts above dark at the target force of each side alone at full brightness.
+    `min_contrast_ratio`: how much of a press's light must have come with the force; gel and sweat leave less.
+    """
 
     bus: int = 1
     address: int = 0x60
     ratio: tuple[float, ...] = (0.6, 0.6, 0.6, 0.6)
+    max_dark_counts: float = 12.0
+    min_side_ratio: float = 0.3
+    max_dimming_ratio: float = 0.07
+    commissioned_counts: tuple[float, ...] | None = None
+    min_contrast_ratio: float = 0.3
 
     def __post_init__(self) -> None:
         require("light.address", self.address, Bound(0x08, 0x77, ""), ACTION)
@@ -59,6 +79,19 @@ class LightSection:
             raise InvalidQuantity("light.ratio", self.ratio, "four numbers, one a side", ACTION)
         for value in self.ratio:
             require("light.ratio", value, Bound(0.0, 1.0, "", low_included=False), ACTION)
+        require("light.max_dark_counts", self.max_dark_counts, Bound(0.0, 100.0, "counts"), ACTION)
+        require("light.min_side_ratio", self.min_side_ratio, Bound(0.01, 0.9, ""), ACTION)
+        require("light.max_dimming_ratio", self.max_dimming_ratio, Bound(0.01, 0.9, ""), ACTION)
+        require("light.min_contrast_ratio", self.min_contrast_ratio, Bound(0.01, 0.9, ""), ACTION)
+        self._require_commissioned()
+
+    def _require_commissioned(self) -> None:
+        if self.commissioned_counts is None:
+            return
+        if len(self.commissioned_counts) != 4:
+            raise InvalidQuantity("light.commissioned_counts", self.commissioned_counts, "four numbers", ACTION)
+        for value in self.commissioned_counts:
+            require("light.commissioned_counts", value, Bound(1.0, 255.0, "counts"), ACTION)
 
 
 @dataclass(frozen=True)
@@ -105,6 +138,26 @@ class PressSection:
 
 
 @dataclass(frozen=True)
+class StoreSection:
+    """The disk: how much must be left before a press is taken."""
+
+    min_free_mb: float = 50.0
+
+    def __post_init__(self) -> None:
+        require("store.min_free_mb", self.min_free_mb, Bound(1.0, 1e6, "MB"), ACTION)
+
+
+@dataclass(frozen=True)
+class ClockSection:
+    """The wall clock: by how much it may be set before `taken_at` is doubted."""
+
+    max_jump_s: float = 2.0
+
+    def __post_init__(self) -> None:
+        require("clock.max_jump_s", self.max_jump_s, Bound(0.1, 3600.0, "s"), ACTION)
+
+
+@dataclass(frozen=True)
 class ServerSection:
     """Where the screen and the REST API are served; loopback unless told otherwise."""
 
@@ -127,6 +180,8 @@ class Config:
     light: LightSection = field(default_factory=LightSection)
     cell: CellSection = field(default_factory=CellSection)
     press: PressSection = field(default_factory=PressSection)
+    store: StoreSection = field(default_factory=StoreSection)
+    clock: ClockSection = field(default_factory=ClockSection)
     server: ServerSection = field(default_factory=ServerSection)
 
 

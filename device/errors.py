@@ -1,17 +1,35 @@
-"""The daemon's errors: each class one part, each with the fault code the screen and the API show.
+"""The daemon's errors: each class one fault, each with the code that the screen and the API show.
+
+The hundreds are the part: 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request.
+docs/simulated_probe.md lists how each fault is provoked and seen.
 
 DeviceError
-├── ConfigError       E001  a setting is missing, unknown or out of its bound
-├── CameraError       E101  no frame, or a frame of the wrong shape
-├── LightError        E201  the LED chip does not answer or does not hold what was written
-├── LoadCellError     E301  no force, or a line that cannot be read
-├── ModelError        E401  a bundle or calibration is missing, tampered with, or not for this probe
-├── StorageError      E601  a measurement could not be made durable
-├── BusyError         E801  a press is already under way
-└── UnknownResource   E802  no such press or measurement
+├── ConfigError              E001  a setting is missing, unknown or out of its bound
+├── CameraError              E101  no frame, or a frame of the wrong shape
+│   ├── LateFrameError       E102  the camera leaves out most of its frames
+│   └── TornFrameError       E103  frames are put together from two exposures
+├── LightError               E201  the LED chip does not answer or does not hold what was written
+│   ├── LightBusError        E202  the I2C bus is stuck
+│   ├── DarkSideError        E203  a side gives no light although its register is set
+│   ├── StuckLightError      E204  a side cannot be switched off
+│   ├── AmbientLightError    E205  foreign light reaches the camera
+│   └── DimLightError        E206  a side is dimmer than it was (a warning)
+├── LoadCellError            E301  no force
+│   ├── UnreadableCellError  E302  lines come, but none that can be read
+│   ├── SaturatedCellError   E303  the amplifier is at the end of its range
+│   └── UnpluggedCellError   E304  the serial line is gone
+├── ModelError               E401  a bundle or calibration is missing, tampered with, or not for this probe
+├── NoContrastError          E501  pressing does not change the image: gel, or a wet face
+├── StorageError             E601  a measurement could not be made durable
+│   └── DiskFullError        E602  there is no space left
+├── ClockJumpError           E701  the wall clock was set (a warning)
+├── BusyError                E801  a press is already under way
+└── UnknownResource          E802  no such press or measurement
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 
 class DeviceError(Exception):
@@ -19,10 +37,15 @@ class DeviceError(Exception):
 
     code = "E000"
     status = 500
+    severity: Literal["fault", "warning"] = "fault"
 
     def __init__(self, cause: str, remedy: str) -> None:
         self.cause, self.remedy = cause, remedy
         super().__init__(f"{cause} {remedy}")
+
+    def as_record(self) -> dict[str, str]:
+        """Return the error as the JSON object of the status and of a press."""
+        return {"code": self.code, "severity": self.severity, "cause": self.cause, "remedy": self.remedy}
 
 
 class ConfigError(DeviceError):
@@ -38,6 +61,18 @@ class CameraError(DeviceError):
     status = 503
 
 
+class LateFrameError(CameraError):
+    """The camera leaves out most of its frames."""
+
+    code = "E102"
+
+
+class TornFrameError(CameraError):
+    """Frames are put together from two exposures, again and again."""
+
+    code = "E103"
+
+
 class LightError(DeviceError):
     """The LED chip does not answer, or does not hold what was written."""
 
@@ -45,11 +80,60 @@ class LightError(DeviceError):
     status = 503
 
 
+class LightBusError(LightError):
+    """The I2C bus is stuck: a line is held low."""
+
+    code = "E202"
+
+
+class DarkSideError(LightError):
+    """A side gives no light although its register is set."""
+
+    code = "E203"
+
+
+class StuckLightError(LightError):
+    """A side shines although its register is off."""
+
+    code = "E204"
+
+
+class AmbientLightError(LightError):
+    """Foreign light reaches the camera."""
+
+    code = "E205"
+
+
+class DimLightError(LightError):
+    """A side is dimmer than it was; the measurement stands, since its reference is dimmer by the same ratio."""
+
+    code = "E206"
+    severity = "warning"
+
+
 class LoadCellError(DeviceError):
-    """The load cell is silent, or its lines cannot be read."""
+    """The load cell is silent."""
 
     code = "E301"
     status = 503
+
+
+class UnreadableCellError(LoadCellError):
+    """The load cell's lines cannot be read."""
+
+    code = "E302"
+
+
+class SaturatedCellError(LoadCellError):
+    """The load cell's amplifier is at the end of its range: too much force, or a wire is off."""
+
+    code = "E303"
+
+
+class UnpluggedCellError(LoadCellError):
+    """The load cell's serial line is gone, or was never there."""
+
+    code = "E304"
 
 
 class ModelError(DeviceError):
@@ -59,11 +143,31 @@ class ModelError(DeviceError):
     status = 503
 
 
+class NoContrastError(DeviceError):
+    """Pressing does not change the image; it ends this press, not the probe's readiness."""
+
+    code = "E501"
+    status = 422
+
+
 class StorageError(DeviceError):
     """A measurement could not be made durable."""
 
     code = "E601"
     status = 507
+
+
+class DiskFullError(StorageError):
+    """There is no space left for a measurement."""
+
+    code = "E602"
+
+
+class ClockJumpError(DeviceError):
+    """The wall clock was set; what is measured runs on the monotonic clock, but `taken_at` may be wrong."""
+
+    code = "E701"
+    severity = "warning"
 
 
 class BusyError(DeviceError):

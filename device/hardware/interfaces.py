@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from device.measurement.tactile_image import LedRatio
 
-LED_COUNT = 4
-"""One LED on each side of the waveguide: +x, +y, -x, -y."""
+SIDES = ("+x", "+y", "-x", "-y")
+"""The sides of the waveguide in the order of every `LedRatio`; each has one LED."""
+LED_COUNT = len(SIDES)
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Camera(Protocol):
     """The near-infrared camera below the waveguide."""
 
     def capture(self, *, begun_after_s: float, timeout_s: float) -> CameraFrame:
-        """Return the next frame whose exposure began after the given time; raise `CameraError` when none comes."""
+        """Return the next frame whose exposure began at or after a time; raise `CameraError` when none comes."""
 
     def close(self) -> None:
         """Stop the stream."""

@@ -7,6 +7,7 @@ Source: Texas Instruments TLC59116 datasheet SLDS157E, section 9.5 "Register Map
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Sequence
 from enum import IntEnum
@@ -14,7 +15,7 @@ from typing import Protocol
 
 from smbus2 import SMBus, i2c_msg
 
-from device.errors import LightError
+from device.errors import LightBusError, LightError
 from device.hardware.interfaces import LED_COUNT
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.tactile_image import LedRatio
@@ -42,6 +43,8 @@ SIDES_IN_PWM_MODE = (0b10_10_10_10, 0, 0, 0)
 FULL_SCALE = 255
 
 REMEDY = "Check the cable and the supply of the LED board."
+STUCK_ERRNO = (errno.ETIMEDOUT, errno.EBUSY, errno.EAGAIN)
+"""A line held low: the kernel's driver waits in vain, finds the bus busy, or loses the arbitration."""
 
 
 class I2cBus(Protocol):
@@ -76,7 +79,8 @@ class Tlc59116:
         """Set the four sides (each 0..1 of full scale) at one instant; return when they changed (s, monotonic).
 
         Outputs change together at the STOP of the write (9.5.2, OCH = 0), which ends before the returned time.
-        Raises `InvalidQuantity` before the bus is touched, `LightError` when the chip does not answer or hold it.
+        Raises `InvalidQuantity` before the bus is touched, `LightError` when the chip does not answer or hold it,
+        `LightBusError` when the bus is stuck.
         """
         pwm = _pwm_counts(ratio)
         self._write(AUTO_INCREMENT_PWM | Register.PWM0, pwm)
@@ -107,8 +111,11 @@ class Tlc59116:
         try:
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
-            cause = f"LED chip {self._address:#04x} does not answer: {error.strerror} (errno {error.errno})."
-            raise LightError(cause, REMEDY) from error
+            words = f"{error.strerror} (errno {error.errno})."
+            if error.errno in STUCK_ERRNO:
+                remedy = "Switch the probe off and on; if it stays, a chip on the bus or its cable is broken."
+                raise LightBusError(f"The I2C bus of the LED chip is stuck: {words}", remedy) from error
+            raise LightError(f"LED chip {self._address:#04x} does not answer: {words}", REMEDY) from error
 
     def _require_held(self, what: str, written: Sequence[int], held: Sequence[int]) -> None:
         if list(held) != list(written):

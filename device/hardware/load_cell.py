@@ -3,19 +3,21 @@
 The amplifier streams `millis,reading,kg,raw24,` and CR LF, with "timestamp" and "raw reading" switched on in its menu.
 Only raw24 is used: `reading` is in the amplifier's own calibration. Opening the port resets the amplifier, so the
 first two or three seconds are a banner. 9600 baud carries about 30 such lines a second. Nothing is ever sent:
-an `x` would open the menu and stop the stream.
+an `x` would open the menu and stop the stream. A line that went is opened again when it is back.
 Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement).
 """
 
 from __future__ import annotations
 
 import re
+import termios
 import time
 from collections import deque
+from collections.abc import Callable
 
 import serial
 
-from device.errors import LoadCellError
+from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
 from device.hardware.interfaces import CellSample, LoadCell
 from device.measurement.quantities import Bound, require
 
@@ -59,9 +61,10 @@ def parse_counts(line: bytes) -> float:
 class OpenScale:
     """Reads an OpenScale-like stream from a serial port. Implements `LoadCell`."""
 
-    def __init__(self, port: serial.Serial) -> None:
-        self._port = port
-        self._port.timeout = POLL_S
+    def __init__(self, name: str, open_port: Callable[[], serial.Serial]) -> None:
+        """Open the port; raise `UnpluggedCellError` when it is missing or in use."""
+        self._name, self._open_port = name, open_port
+        self._port: serial.Serial | None = self._opened()
         self._buffer = LineBuffer()
         self._samples: deque[CellSample] = deque()
         self._unreadable_lines = 0
@@ -75,8 +78,11 @@ class OpenScale:
     def read(self, *, timeout_s: float) -> CellSample:
         """Return the next reading (counts), waiting at most `timeout_s` for it.
 
-        Raises `LoadCellError` when the line stays silent, holds only unreadable lines, or is unplugged.
+        Raises `LoadCellError` when the line stays silent, `UnreadableCellError` when it holds only unreadable lines,
+        `SaturatedCellError` when the reading is an end of the range, `UnpluggedCellError` when the line is gone;
+        the next call then tries to open it again.
         """
+        self._port = self._port or self._opened()
         skipped_before = self.skipped_lines
         deadline_s = time.monotonic() + timeout_s
         while not self._samples:
@@ -84,18 +90,39 @@ class OpenScale:
                 raise self._no_reading(timeout_s, self.skipped_lines - skipped_before)
             for line in self._buffer.feed(self._receive()):
                 self._keep(line, time.monotonic())
-        return self._samples.popleft()
+        sample = self._samples.popleft()
+        if sample.counts in (RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS):
+            self._samples.clear()  # those behind it are as old as the wait for them will be long
+            cause = f"Load cell on {self._name} reads {sample.counts:.0f} counts, the end of its range."
+            raise SaturatedCellError(cause, "Take the load off the probe; if it stays, check the cell's four wires.")
+        return sample
 
     def close(self) -> None:
         """Release the serial line."""
-        self._port.close()
+        if self._port:
+            self._port.close()
+            self._port = None
+
+    def _opened(self) -> serial.Serial:
+        try:
+            port = self._open_port()
+            port.timeout = POLL_S
+        except (OSError, termios.error) as error:  # the latter when it goes again while it is being opened
+            cause = f"Load cell port {self._name} cannot be opened: {error}."
+            remedy = "Plug in the load cell and check its device path in the configuration."
+            raise UnpluggedCellError(cause, remedy) from error
+        return port
 
     def _receive(self) -> bytes:
+        assert self._port  # read() has opened it
         try:
             return bytes(self._port.read(self._port.in_waiting or 1))
         except OSError as error:  # SerialException is one; `in_waiting` of an unplugged port raises a plain one
-            cause = f"Load cell on {self._port.name} is gone: {error}."
-            raise LoadCellError(cause, "Plug its USB cable in again, then restart the probe.") from error
+            self.close()
+            self._buffer = LineBuffer()
+            raise UnpluggedCellError(
+                f"Load cell on {self._name} is gone: {error}.", "Plug its USB cable in again."
+            ) from error
 
     def _keep(self, line: bytes, t_s: float) -> None:
         try:
@@ -106,24 +133,20 @@ class OpenScale:
 
     def _no_reading(self, timeout_s: float, skipped: int) -> LoadCellError:
         if skipped == 0:
-            cause = f"Load cell on {self._port.name} has sent nothing for {timeout_s:g} s."
+            cause = f"Load cell on {self._name} has sent nothing for {timeout_s:g} s."
             return LoadCellError(cause, "Check its cable and supply, and that its menu is closed.")
         cause = (
-            f"Load cell on {self._port.name} gave no reading for {timeout_s:g} s: {skipped} lines skipped, "
+            f"Load cell on {self._name} gave no reading for {timeout_s:g} s: {skipped} lines skipped, "
             f"the last {self._last_unreadable!r}."
         )
-        return LoadCellError(
+        return UnreadableCellError(
             cause, "Switch on timestamp and raw reading in its menu, and set the configured baud rate."
         )
 
 
 def open_load_cell(device: str, baud: int = 9600) -> OpenScale:
-    """Open the serial port for this program alone; raise `LoadCellError` when it is missing or in use."""
-    try:
-        return OpenScale(serial.Serial(device, baudrate=baud, exclusive=True))
-    except OSError as error:
-        cause = f"Load cell port {device} cannot be opened: {error}."
-        raise LoadCellError(cause, "Plug in the load cell and check its device path in the configuration.") from error
+    """Open the serial port for this program alone; raise `UnpluggedCellError` when it is missing or in use."""
+    return OpenScale(device, lambda: serial.Serial(device, baudrate=baud, exclusive=True))
 
 
 def measure_tare(cell: LoadCell, *, samples: int, max_spread_counts: float, timeout_s: float) -> float:

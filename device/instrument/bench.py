@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 
 from device.hardware.interfaces import Camera, Lights
 from device.instrument.force_recorder import ForceRecorder
+from device.instrument.frame_check import FramePace
 from device.measurement.tactile_image import Frame, LedRatio, Role
 
 DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
-FRAME_TIMEOUT_S = 2.0
+FRAME_TIMEOUT_S = 1.0
+LATE_S = 0.1
+"""Three frames of 30 Hz."""
 STEADY_WINDOW_S = 0.15
 
 
@@ -20,18 +24,28 @@ class Bench:
     lights: Lights
     camera: Camera
     force: ForceRecorder
+    pace: FramePace = field(default_factory=lambda: FramePace(LATE_S))
     _light: LedRatio = DARK
     _not_before_s: float = 0.0
 
     def light(self, ratio: LedRatio) -> None:
-        """Set the four sides; frames begun before the chip acknowledged it are not taken."""
+        """Set the four sides; frames begun before the chip acknowledged it are not taken.
+
+        After a `LightError` nobody knows what the light is: it is set again at the next call, whatever it asks for.
+        """
         if ratio != self._light or not self._not_before_s:
+            self._not_before_s = 0.0
             self._not_before_s = self.lights.set_ratio(ratio)
             self._light = ratio
 
     def take(self, role: Role) -> Frame:
-        """Return the next frame under the present light, with the force in the middle of its exposure."""
+        """Return the next frame under the present light, with the force in the middle of its exposure.
+
+        Raises `CameraError` when none comes or most are left out, `LoadCellError` when its force is not known.
+        """
+        asked_s = max(time.monotonic(), self._not_before_s)
         taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
+        self.pace.saw(asked_s, taken.exposure_start_s)
         self._not_before_s = taken.exposure_start_s + 1e-6
         middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
         return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)

@@ -13,15 +13,16 @@ import uuid
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import Any
 
 from device import __version__
 from device.config import Config
-from device.errors import BusyError, DeviceError, UnknownResource
+from device.errors import BusyError, DeviceError, NoContrastError, UnknownResource
 from device.instrument.bench import Bench
 from device.instrument.capture import POLL_S, Capture, PressEnded
+from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance
+from device.instrument.light_check import DimmingWatch
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
@@ -50,12 +51,15 @@ class Procedure:
         *,
         calibration_id: str,
         opened: ExitStack,
+        clock: ClockWatch | None = None,
         simulated_truth: Inclusion | None = None,
     ) -> None:
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.board = StatusBoard()
         self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
-        self._capture = Capture(bench, config.press, config.light, self.board)
+        self._capture = Capture(bench, config, self.board)
+        self._clock = clock or ClockWatch(config.clock.max_jump_s)
+        self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._requested: PressJob | None = None
         self._on_request: list[Callable[[], None]] = []
         self._lock = threading.Lock()
@@ -122,6 +126,8 @@ class Procedure:
                 self._at_fault(DeviceError(f"The daemon failed: {error!r}.", "Restart it and report the log."))
 
     def _one_press(self) -> None:
+        self.store.require_space(self.config.store.min_free_mb)
+        self._warn(self._clock.warning())
         unloaded = self._capture.unloaded()
         if self.board.now.step in ("starting", "fault"):
             self.board.update(step="ready", guidance=Guidance.PRESS_BESIDE, fault=None)
@@ -135,7 +141,7 @@ class Procedure:
             with self._lock:
                 if self._requested or pressed:
                     job, self._requested = self._requested or self._new_job(), None
-                    self.board.update(press=job)
+                    self.board.update(press=job, warnings=())
                     return job
             time.sleep(POLL_S)
         return None
@@ -145,21 +151,25 @@ class Procedure:
         return PressJob(id=str(uuid.uuid4()))
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
-        started_at = _now()
+        started_at = self._clock.now()
         try:
             self._set_job(job, state="capturing", progress=0.1)
             self.board.update(step="reference", guidance=Guidance.PRESS_BESIDE, frames_taken=0, measurement_id=None)
             reference = self._capture.loaded("reference", Guidance.PRESS_BESIDE)
+            self._warn(self._dimming.warning(self._capture.side_levels()))
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)
             self.board.update(step="lesion", guidance=Guidance.PRESS_LESION, frames_taken=0)
             press = self._capture.loaded("press", Guidance.PRESS_LESION)
             self.board.update(step="computing", guidance=Guidance.LIFT)
+            self._warn(self._clock.warning())
             self._set_job(job, state="computing", progress=0.9)
             measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]))
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
+        except NoContrastError as error:
+            self._reject(job, "rejected", str(error), error.code)
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
         else:
@@ -167,12 +177,19 @@ class Procedure:
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
             self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
 
-    def _reject(self, job: PressJob, state: str, reason: str) -> None:
+    def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
-        self._set_job(job, state=state, reason=reason)
+        self._set_job(job, state=state, reason=reason, code=code)
+
+    def _warn(self, warning: DeviceError | None) -> None:
+        """Show what does not end a press; the next change of its job keeps it with the press."""
+        if warning:
+            log.warning("%s %s", warning.code, warning)
+            self.board.update(warnings=(*self.board.now.warnings, warning))
 
     def _set_job(self, job: PressJob, **changes: Any) -> None:
-        changed = replace(self.board.now.press or job, **changes)
+        warnings = tuple(warning.as_record() for warning in self.board.now.warnings)
+        changed = replace(self.board.now.press or job, warnings=warnings, **changes)
         self.store.save_press(changed.as_record())
         self.board.update(press=changed)
 
@@ -211,28 +228,27 @@ class Procedure:
             "frames": len(press),
             "recording_id": recording.id,
             "truth": None if recording.truth is None else vars(recording.truth),
+            "warnings": [warning.as_record() for warning in self.board.now.warnings],
         }
         return self.store.add_measurement(record, recording)
 
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:
             log.error("%s %s", error.code, error)
-        self._fail_press(str(error))
+        # The fault first: whoever is told that the press has ended finds out why.
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
+        self._fail_press(error)
         self._capture.stopping.wait(AFTER_FAULT_S)
 
-    def _fail_press(self, reason: str) -> None:
-        """End the press under way, so that the next may begin: also when the store, too, is at fault."""
-        job = self.board.now.press
+    def _fail_press(self, end: DeviceError) -> None:
+        """End the press that is under way or asked for, so that the next may begin: also when the store is at fault."""
+        with self._lock:
+            job, self._requested = self._requested or self.board.now.press, None
         if job is None or job.state in ENDED:
             return
-        failed = replace(job, state="failed", reason=reason)
+        failed = replace(job, state="failed", reason=str(end), code=end.code)
         self.board.update(press=failed)
         try:
             self.store.save_press(failed.as_record())
         except DeviceError as error:
             log.error("%s %s", error.code, error)
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -16,13 +16,18 @@ JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "can
 
 @dataclass(frozen=True)
 class PressJob:
-    """One press as a resource: POSTed by a client or begun by the operator's hand."""
+    """One press as a resource: POSTed by a client or begun by the operator's hand.
+
+    `code` is that of the fault that ended it; `warnings` are the records of errors that did not.
+    """
 
     id: str
     state: JobState = "waiting"
     progress: float = 0.0
     reason: str = ""
+    code: str | None = None
     measurement_id: str | None = None
+    warnings: tuple[dict[str, str], ...] = ()
 
     def as_record(self) -> dict[str, Any]:
         """Return the job as JSON object."""
@@ -31,7 +36,7 @@ class PressJob:
 
 @dataclass(frozen=True)
 class Status:
-    """One moment of the procedure."""
+    """One moment of the procedure. `warnings` are those of the last press, or of the time since."""
 
     step: Step = "starting"
     guidance: Guidance = Guidance.WAIT
@@ -39,6 +44,7 @@ class Status:
     press: PressJob | None = None
     measurement_id: str | None = None
     fault: DeviceError | None = None
+    warnings: tuple[DeviceError, ...] = ()
 
 
 class StatusBoard:

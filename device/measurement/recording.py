@@ -100,12 +100,16 @@ class Recording:
         return (tactile_image(frame, base, self.camera.scale) for frame in self.with_role("press"))
 
 
-def write_recording(recording: Recording, folder: Path) -> None:
+FileWriter = Callable[[Path, bytes], None]
+"""Writes a file; when it returns, the content is on the disk."""
+
+
+def write_recording(recording: Recording, folder: Path, *, write: FileWriter = write_and_sync) -> None:
     """Write a recording to a new folder; when this returns, it is on the disk. After an `OSError` nothing is left."""
     temporary = folder.with_name(folder.name + ".tmp")
     shutil.rmtree(temporary, ignore_errors=True)
     try:
-        _write_files(recording, temporary)
+        _write_files(recording, temporary, write)
         temporary.rename(folder)
     except OSError:
         shutil.rmtree(temporary, ignore_errors=True)
@@ -113,12 +117,12 @@ def write_recording(recording: Recording, folder: Path) -> None:
     sync_directory(folder.parent)
 
 
-def _write_files(recording: Recording, temporary: Path) -> None:
+def _write_files(recording: Recording, temporary: Path, write: FileWriter) -> None:
     (temporary / "frames").mkdir(parents=True)
     for i, frame in enumerate(recording.frames):
-        write_and_sync(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
+        write(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
     text = json.dumps(_as_json(recording), indent=1)
-    write_and_sync(temporary / "recording.json", text.encode())
+    write(temporary / "recording.json", text.encode())
     for directory in (temporary / "frames", temporary):
         sync_directory(directory)
 

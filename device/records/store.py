@@ -6,6 +6,7 @@ with NORMAL the last acknowledged row may be gone after a power cut. A job that 
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import shutil
@@ -16,8 +17,9 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from device.errors import StorageError, UnknownResource
+from device.errors import DiskFullError, StorageError, UnknownResource
 from device.measurement.recording import Recording, write_recording
+from device.records.disk import Disk, LocalDisk
 
 Record = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
@@ -31,9 +33,9 @@ CREATE TABLE IF NOT EXISTS press (id TEXT PRIMARY KEY, ended INTEGER NOT NULL, r
 class Store:
     """The device's memory. All methods may be called from any thread."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, disk: Disk | None = None) -> None:
         """Open or create; raise `StorageError` when the folder cannot be written or the database is damaged."""
-        self.folder, self._lock = folder, threading.Lock()
+        self.folder, self._disk, self._lock = folder, disk or LocalDisk(), threading.Lock()
         with ExitStack() as opened:
             self._db = self._open(opened)
             self._end_interrupted()
@@ -80,14 +82,23 @@ class Store:
             with self._lock, self._db:
                 yield self._db
         except (OSError, sqlite3.Error) as error:
-            raise StorageError(
-                f"The disk did not take the record: {error}.",
-                "Free the disk, and let no other program hold the database.",
-            ) from error
+            kind = DiskFullError if _is_full(error) else StorageError
+            remedy = "Free the disk, and let no other program hold the database."
+            raise kind(f"The disk did not take the record: {error}.", remedy) from error
 
     def _records(self, query: str, *values: object) -> list[Record]:
         with self._transaction() as db:
             return [json.loads(row[-1]) for row in db.execute(query, values)]
+
+    def require_space(self, free_mb: float) -> None:
+        """Raise `DiskFullError` when less than `free_mb` (1e6 bytes) is left, `StorageError` when nobody can say."""
+        try:
+            left_mb = self._disk.free_bytes(self.folder) / 1e6
+        except OSError as error:
+            raise StorageError(f"The disk of {self.folder} is gone: {error}.", "Check the disk.") from error
+        if left_mb < free_mb:
+            cause = f"The disk of {self.folder} has {left_mb:.0f} MB left, below {free_mb:g} MB."
+            raise DiskFullError(cause, "Copy recordings away and delete them there.")
 
     def save_press(self, job: Record) -> None:
         """Keep the state of a press job."""
@@ -103,9 +114,10 @@ class Store:
         """Keep a recording and its measurement; return the record with its sequence number."""
         folder = self._folder_of(recording.id)
         try:
-            write_recording(recording, folder)
+            write_recording(recording, folder, write=self._disk.write)
         except OSError as error:
-            raise StorageError(f"The recording could not be written: {error}.", "Free space on the disk.") from error
+            kind = DiskFullError if _is_full(error) else StorageError
+            raise kind(f"The recording could not be written: {error}.", "Free space on the disk.") from error
         try:
             with self._transaction() as db:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
@@ -145,3 +157,10 @@ class Store:
         """Close the database and let go of the folder."""
         with self._lock:
             self._opened.close()
+
+
+def _is_full(error: Exception) -> bool:
+    """Return whether an error of the file system or of SQLite says that no space is left."""
+    if isinstance(error, OSError):
+        return error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from device.measurement.tactile_image import LedRatio
+from device.simulation.faults import NO_FAULTS, FaultTimeline
 
 MODE1, PWM0, GRPPWM, LEDOUT0, SUBADR1, IREF, EFLAG1 = 0x00, 0x02, 0x12, 0x14, 0x18, 0x1C, 0x1D
 REGISTER_COUNT = 0x20
@@ -120,15 +121,18 @@ I2C_M_RD = 0x0001
 class EmulatedI2cBus:
     """Stands where `smbus2.SMBus` stands: takes genuine messages and carries them to the chips."""
 
-    def __init__(self, chips: Mapping[int, Tlc59116Chip], *, log_length: int = 1000) -> None:
-        self._chips = dict(chips)
+    def __init__(
+        self, chips: Mapping[int, Tlc59116Chip], *, faults: FaultTimeline = NO_FAULTS, log_length: int = 1000
+    ) -> None:
+        self._chips, self._faults = dict(chips), faults
         self.log: deque[tuple[int, bytes]] = deque(maxlen=log_length)
         self.is_closed = False
 
     def i2c_rdwr(self, *i2c_msgs: I2cMessage) -> None:
-        """Carry out one transaction; raise `OSError` 121, as the kernel does, when no chip acknowledges."""
-        if self.is_closed:
-            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        """Carry out one transaction; raise `OSError` as the kernel does: 121 not acknowledged, 110 stuck bus."""
+        error = errno.EBADF if self.is_closed else self._faults.i2c_errno()
+        if error is not None:
+            raise OSError(error, os.strerror(error))
         for message in i2c_msgs:
             self._carry(message, self._acknowledging(message.addr))
         for address in {message.addr for message in i2c_msgs}:

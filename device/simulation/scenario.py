@@ -10,6 +10,7 @@ from pathlib import Path
 
 from device.measurement.quantities import Bound, Inclusion, require
 from device.measurement.toml_record import read_toml
+from device.simulation.faults import Fault
 from device.simulation.hand import HandSettings
 from device.simulation.renderer import LinearOptics
 from device.simulation.sensor import Sensor
@@ -19,22 +20,24 @@ DEFAULT_INCLUSION = Inclusion(size_mm=10.0, depth_mm=5.0, youngs_modulus_kpa=80.
 
 @dataclass(frozen=True)
 class CellSettings:
-    """The emulated load cell: counts per newton, counts at no load, and the noise of one sample."""
+    """The emulated load cell: counts per newton, counts at no load, noise of one sample, and drift of the zero."""
 
     counts_per_n: float = 100_000.0
     zero_counts: float = 8_200.0
     noise_counts: float = 40.0
+    drift_counts_per_s: float = 0.0
 
     def __post_init__(self) -> None:
         action = "use a real cell's data sheet"
         require("cell.counts_per_n", self.counts_per_n, Bound(1.0, 1e7, "counts/N"), action)
         require("cell.zero_counts", self.zero_counts, Bound(-8e6, 8e6, "counts"), action)
         require("cell.noise_counts", self.noise_counts, Bound(0.0, 1e6, "counts"), action)
+        require("cell.drift_counts_per_s", self.drift_counts_per_s, Bound(-1e4, 1e4, "counts/s"), action)
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """What the virtual probe is made of and pressed on."""
+    """What the virtual probe is made of and pressed on, what goes wrong, and the fault code the device must raise."""
 
     inclusion: Inclusion = DEFAULT_INCLUSION
     hand: HandSettings = field(default_factory=HandSettings)
@@ -42,6 +45,8 @@ class Scenario:
     sensor: Sensor = field(default_factory=Sensor)
     cell: CellSettings = field(default_factory=CellSettings)
     seed: int = 1
+    faults: tuple[Fault, ...] = ()
+    expects: str = ""
 
     def __post_init__(self) -> None:
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")

@@ -11,16 +11,17 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.tactile_image import LedRatio
+from device.simulation.faults import NO_FAULTS, FaultTimeline
 from device.simulation.frame_clock import ClockedFrame, FrameClock
+from device.simulation.virtual_request import ExposureRequest, VirtualRequest
 
-Render = Callable[["ExposureRequest"], NDArray[np.uint8]]
+Render = Callable[[ExposureRequest], NDArray[np.uint8]]
 
 Stream = dict[str, Any]
 """Format, size, stride ... of one stream, or a whole camera configuration, as picamera2 passes them about."""
@@ -30,51 +31,8 @@ BUFFER_COUNT = 4
 STRIDE_ALIGNMENT = 64
 GAIN_STEP = 1 / 16
 LONGEST_FRAME_US = 1_000_000
-
-
-@dataclass(frozen=True)
-class ExposureRequest:
-    """One exposure to render: mid-exposure time (s, monotonic), its settings, and the light at its start."""
-
-    t_s: float
-    exposure_us: int
-    gain: float
-    led_ratio: LedRatio
-    frame_number: int
-
-
-class VirtualRequest:
-    """One delivered frame: picamera2's `CompletedRequest`. It holds a buffer until it is released."""
-
-    def __init__(self, camera: VirtualPicamera2, exposure: ExposureRequest, frame: ClockedFrame) -> None:
-        self._camera = camera
-        self._exposure = exposure
-        self._frame = frame
-        self._is_released = False
-
-    def make_array(self, name: str) -> NDArray[np.uint8]:
-        """Render and return the rows of the raw stream, padded to its stride: counts [height_px, stride]."""
-        if name != "raw":
-            raise RuntimeError(f"Stream {name!r} is not defined")
-        if self._is_released:
-            raise RuntimeError("CompletedRequest: used after release")
-        return self._camera.render_rows(self._exposure)
-
-    def get_metadata(self) -> dict[str, Any]:
-        """Return what the camera really did: end of the exposure (ns), exposure (us), gain, frame duration (us)."""
-        return {
-            "SensorTimestamp": self._frame.exposure_end_ns,
-            "ExposureTime": self._exposure.exposure_us,
-            "AnalogueGain": self._exposure.gain,
-            "FrameDuration": self._frame.clock.frame_ns // 1000,
-        }
-
-    def release(self) -> None:
-        """Give the buffer back to the camera."""
-        if self._is_released:
-            raise RuntimeError("CompletedRequest: lock now has negative ref_count")
-        self._is_released = True
-        self._camera.take_back(self._frame.clock)
+LATE_CAMERA_KEEPS_EVERY = 10
+"""A camera that leaves out frames delivers those whose number is a multiple of this."""
 
 
 class VirtualPicamera2:
@@ -82,7 +40,7 @@ class VirtualPicamera2:
 
     `render` makes the image of one exposure; `led_ratio_at` is the light at a time (s, monotonic). The sensor has one
     mode, R8 of width_px x height_px: anything else that is asked for is silently adjusted to it.
-    Controls act from the next start.
+    Controls act from the next start. `faults` says which frames do not come, and which come torn.
     """
 
     def __init__(
@@ -93,11 +51,12 @@ class VirtualPicamera2:
         height_px: int,
         led_ratio_at: Callable[[float], LedRatio],
         max_frame_rate_hz: float = 120.0,
+        faults: FaultTimeline = NO_FAULTS,
     ) -> None:
         self._render = render
         self._size = (width_px, height_px)
         self._stride = -(-width_px // STRIDE_ALIGNMENT) * STRIDE_ALIGNMENT
-        self._led_ratio_at = led_ratio_at
+        self._led_ratio_at, self._faults = led_ratio_at, faults
         shortest_us = round(1e6 / max_frame_rate_hz)
         # A monochrome sensor advertises no white balance and no colour controls.
         self.camera_controls: dict[str, tuple[Any, Any, Any]] = {
@@ -192,7 +151,7 @@ class VirtualPicamera2:
             with self._changed:
                 self._abandoned_jobs += 1
             raise TimeoutError
-        return VirtualRequest(self, self._exposure(frame), frame)
+        return VirtualRequest(self, self._exposure(frame), frame, self._torn_into(frame))
 
     def cancel_all_and_flush(self) -> None:
         """Drop the jobs that timed-out captures left behind."""
@@ -221,10 +180,24 @@ class VirtualPicamera2:
         assert self._clock is not None
         finished = self._clock.last_ended_before(time.monotonic_ns())
         frame = self._clock.frame(max(self._next_number, finished, self._clock.first_begun_after(flush_ns)))
+        while frame.exposure_end_ns <= deadline_ns and not self._is_delivered(frame):
+            frame = self._clock.frame(frame.number + 1)
         if frame.exposure_end_ns > deadline_ns:
             return None
         self._next_number = frame.number + 1
         return frame
+
+    def _is_delivered(self, frame: ClockedFrame) -> bool:
+        start_s = 1e-9 * frame.exposure_start_ns
+        if self._faults.is_active("camera_late", start_s) and frame.number % LATE_CAMERA_KEEPS_EVERY:
+            return False
+        return not self._faults.is_active("camera_stall", start_s)
+
+    def _torn_into(self, frame: ClockedFrame) -> ExposureRequest | None:
+        """Return the exposure that the lower rows of a torn frame show, or None when it is whole."""
+        if frame.number == 0 or not self._faults.is_active("camera_torn", 1e-9 * frame.exposure_start_ns):
+            return None
+        return self._exposure(frame.clock.frame(frame.number - 1))
 
     def _exposure(self, frame: ClockedFrame) -> ExposureRequest:
         start_s, exposure_s = 1e-9 * frame.exposure_start_ns, 1e-9 * frame.clock.exposure_ns

@@ -14,6 +14,9 @@ from device.simulation.hand import VirtualHand
 from device.simulation.scenario import Scenario
 from device.simulation.surface_table import SurfaceTable
 
+WET_FACE_MM = 0.3
+"""A wet face looks as if it were pressed in this far everywhere, however hard it is pressed."""
+
 
 class VirtualProbe:
     """The physics below the chips: hand to force, force and lump to surface, surface and LEDs to counts."""
@@ -51,9 +54,12 @@ class VirtualProbe:
         exposure_us: float,
         gain: float,
         frame_number: int,
+        wet_ratio: float = 0.0,
+        ambient_ratio: float = 0.0,
     ) -> NDArray[np.uint8]:
-        """Return the counts of one exposure."""
+        """Return the counts of one exposure; a wet face shows full contact, foreign light falls on every pixel."""
         w_mm = np.float32(force_n) * self.surface_mm_per_n(position_mm)
-        intensity = self.scenario.optics.intensity(self._led_fields, led_ratio, w_mm)
+        w_mm += np.float32(wet_ratio) * (np.float32(WET_FACE_MM) - w_mm)
+        intensity = self.scenario.optics.intensity(self._led_fields, led_ratio, w_mm) + np.float32(ambient_ratio)
         seed = self.scenario.seed, frame_number
         return self.scenario.sensor.expose(intensity, exposure_us=exposure_us, gain=gain, seed=seed)

@@ -23,6 +23,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     except LoadCellError as error:
         force_n = None
         faults = faults or [error]
+    faults += status.warnings
     return {
         "simulated": procedure.is_simulated,
         "serial": procedure.config.serial,
@@ -37,7 +38,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "frames_needed": press.frames,
         "press": status.press.as_record() if status.press else None,
         "measurement_id": status.measurement_id,
-        "faults": [{"code": f.code, "cause": f.cause, "remedy": f.remedy} for f in faults],
+        "faults": [fault.as_record() for fault in faults],
     }
 
 

@@ -7,10 +7,12 @@ import pytest
 from device.config import (
     CameraSection,
     CellSection,
+    ClockSection,
     Config,
     LightSection,
     PressSection,
     ServerSection,
+    StoreSection,
     read_config,
     simulated_config,
 )
@@ -22,6 +24,8 @@ SECTIONS = {
     "light": LightSection,
     "cell": CellSection,
     "press": PressSection,
+    "store": StoreSection,
+    "clock": ClockSection,
     "server": ServerSection,
 }
 BOUNDS = [
@@ -29,7 +33,13 @@ BOUNDS = [
     ("camera.height_px", 64, 4096),
     ("camera.exposure_us", 10, 33_333),  # one frame of 30 Hz
     ("camera.gain", 1.0, 16.0),
+    ("camera.late_frames", 1.5, 100.0),
+    ("camera.tear_counts", 0.5, 255.0),
     ("light.address", 0x08, 0x77),
+    ("light.max_dark_counts", 0.0, 100.0),
+    ("light.min_side_ratio", 0.01, 0.9),
+    ("light.max_dimming_ratio", 0.01, 0.9),
+    ("light.min_contrast_ratio", 0.01, 0.9),
     ("cell.baud", 300, 4_000_000),
     ("cell.sensitivity_counts_per_n", 1.0, 1e7),
     ("cell.tare_spread_n", 0.0001, 1.0),
@@ -39,6 +49,8 @@ BOUNDS = [
     ("press.overload_n", 0.6, 50.0),  # 1.2 times the target
     ("press.frames", 1, 200),
     ("press.timeout_s", 1.0, 3600.0),
+    ("store.min_free_mb", 1.0, 1e6),
+    ("clock.max_jump_s", 0.1, 3600.0),
     ("server.port", 0, 65_535),
 ]
 
@@ -131,6 +143,8 @@ def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
         ("[light]\nratio = 0.6\n", r"light\.ratio is 0\.6, but must be of type list"),
         ("[light]\nratio = [0.6, 0.6, 0.6, 0.0]\n", r"light\.ratio is 0\.0, but must be above 0"),
         ("[light]\nratio = [0.6, 0.6, 0.6, 1.1]\n", r"light\.ratio is 1\.1"),
+        ("[light]\ncommissioned_counts = [50, 50, 50]\n", r"light\.commissioned_counts is .*four numbers"),
+        ("[light]\ncommissioned_counts = [50, 50, 50, 0.9]\n", r"light\.commissioned_counts is 0\.9"),
         ("[press]\ntarget_n = nan\n", r"press\.target_n is nan"),
         ("[press]\noverload_n = 0.59\n", r"press\.overload_n is 0\.59, but must be at least 0\.6"),
         ("[server]\nport = 65536\n", r"server\.port is 65536"),

@@ -15,7 +15,8 @@ from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.led_driver import Tlc59116
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.led_chip import EmulatedI2cBus, LedRatio, Tlc59116Chip
-from device.simulation.virtual_camera import ExposureRequest, VirtualPicamera2
+from device.simulation.virtual_camera import VirtualPicamera2
+from device.simulation.virtual_request import ExposureRequest
 
 WIDTH_PX, HEIGHT_PX = 96, 64
 SETTINGS = {"width_px": WIDTH_PX, "height_px": HEIGHT_PX, "exposure_us": 2000, "gain": 2.0, "frame_rate_hz": 100.0}

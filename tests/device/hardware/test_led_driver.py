@@ -98,13 +98,17 @@ def test_a_nack_is_a_light_error_with_address_and_errno_and_the_next_set_works(c
     assert chip.led_ratio() == (1.0, 0.0, 0.0, 0.0)
 
 
-def test_a_stuck_bus_is_a_light_error(bus, lights, monkeypatch):
-    def time_out(*_messages):
-        raise TimeoutError(110, "Connection timed out")
+@pytest.mark.parametrize(("number", "code"), [(110, "E202"), (16, "E202"), (11, "E202"), (121, "E201"), (5, "E201")])
+def test_a_stuck_bus_is_told_from_a_chip_that_does_not_answer(bus, lights, monkeypatch, number, code):
+    """ETIMEDOUT, EBUSY and EAGAIN are the bus; EREMOTEIO and EIO are the chip."""
 
-    monkeypatch.setattr(bus, "i2c_rdwr", time_out)
-    with pytest.raises(LightError, match="errno 110"):
+    def fail(*_messages):
+        raise OSError(number, "I2C")
+
+    monkeypatch.setattr(bus, "i2c_rdwr", fail)
+    with pytest.raises(LightError, match=f"errno {number}") as error:
         lights.set_ratio((1.0, 0.0, 0.0, 0.0))
+    assert error.value.code == code
 
 
 class ChipWithStuckRegister(Tlc59116Chip):

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from device.errors import LoadCellError
+from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
 from device.hardware.interfaces import CellSample
 from device.hardware.load_cell import LineBuffer, OpenScale, measure_tare, open_load_cell, parse_counts
 from device.measurement.quantities import InvalidQuantity
@@ -54,8 +54,8 @@ def read_counts(cell: OpenScale, samples: int) -> list[float]:
 
 
 def test_whole_lines_give_their_raw_counts_in_order(line):
-    line.send(b"1234,-0.532,kg,-53200,\r\n1246,0.001,kg,8388607,\r\n")
-    assert read_counts(line.cell, 2) == [-53200.0, 8388607.0]
+    line.send(b"1234,-0.532,kg,-53200,\r\n1246,0.001,kg,8388606,\r\n")
+    assert read_counts(line.cell, 2) == [-53200.0, 8388606.0]
     assert line.cell.skipped_lines == 0
 
 
@@ -134,6 +134,55 @@ def test_unplugging_between_reads_is_a_load_cell_error(line):
     line.unplug()
     with pytest.raises(LoadCellError, match="is gone"):
         line.cell.read(timeout_s=5.0)
+
+
+def test_a_line_that_was_plugged_in_again_is_read_on_without_what_was_half_sent(line, tmp_path):
+    """The path stays, as udev's link does; the half line of before must not be glued to the first one after."""
+    link, again = tmp_path / "force", Line()
+    for amplifier in (line, again):
+        amplifier.cell.close()
+    link.symlink_to(line.path)
+    cell = open_load_cell(str(link))
+    line.send(b"1,0.5,kg,7,\r\n2,0.5,kg,8")
+    assert read_counts(cell, 1) == [7.0]
+    with pytest.raises(LoadCellError):
+        cell.read(timeout_s=0.06)
+    line.unplug()
+    link.unlink()
+    for words in ("is gone", "force cannot be opened"):
+        with pytest.raises(UnpluggedCellError, match=words) as error:
+            cell.read(timeout_s=0.5)
+        assert error.value.code == "E304"
+    link.symlink_to(again.path)
+    assert reads_again(cell)
+    again.send(b"8,0.5,kg,9,\r\n")
+    assert read_counts(cell, 1) == [9.0]
+    cell.close()
+    again.unplug()
+
+
+def reads_again(cell: OpenScale) -> bool:
+    """Return whether the port can be opened: then the error is that nothing has been sent yet."""
+    with pytest.raises(LoadCellError) as error:
+        cell.read(timeout_s=0.05)
+    return error.value.code == "E301"
+
+
+@pytest.mark.parametrize("end", [b"8388607", b"-8388608"])
+def test_a_reading_at_the_end_of_the_range_is_an_error_and_those_behind_it_are_not_waited_for(line, end):
+    line.send((b"1,0.5,kg," + end + b",\r\n") * 5)
+    with pytest.raises(SaturatedCellError, match="the end of its range") as error:
+        line.cell.read(timeout_s=0.5)
+    assert error.value.code == "E303"
+    line.send(b"1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+
+
+def test_lines_that_cannot_be_read_have_a_code_of_their_own(line):
+    line.send(b"\xff\x00\n" * 5)
+    with pytest.raises(UnreadableCellError) as error:
+        line.cell.read(timeout_s=0.1)
+    assert error.value.code == "E302"
 
 
 def test_nothing_is_ever_sent_to_the_amplifier(line):

@@ -1,10 +1,15 @@
 """Light, camera and force together: a frame knows under which light and force it was taken."""
 
+import itertools
+
 import numpy as np
 import pytest
 
+from device.errors import LateFrameError, LightError
 from device.hardware.interfaces import CameraFrame
+from device.instrument import bench as bench_module
 from device.instrument.bench import DARK, Bench
+from device.instrument.frame_check import LATE_FRAMES, FramePace
 
 LIT = (0.6, 0.6, 0.6, 0.6)
 
@@ -72,3 +77,30 @@ def test_light_that_is_on_already_is_not_set_again(bench, hardware):
 def test_a_force_that_varied_more_than_allowed_is_not_steady(bench, hardware, range_n, is_steady):
     hardware.range = range_n
     assert bench.is_steady(10.0, 0.02) is is_steady
+
+
+def test_after_an_error_of_the_light_it_is_set_again_even_to_what_it_was(bench, hardware, monkeypatch):
+    """Nobody knows whether the chip had taken the brightness before it failed."""
+    bench.light(DARK)
+    with monkeypatch.context() as broken:
+        broken.setattr(hardware, "set_ratio", lambda ratio: (_ for _ in ()).throw(LightError("No answer.", "Mend it.")))
+        with pytest.raises(LightError):
+            bench.light(LIT)
+    bench.light(DARK)
+    assert hardware.log == [DARK, DARK]
+
+
+def test_a_camera_that_leaves_out_frames_is_at_fault(hardware, monkeypatch):
+    """The bench looks at its watch at 9.0 s, 10.0 s ...; the frames begin half a second after the light is set."""
+    watch = itertools.count(9.0)
+    monkeypatch.setattr(bench_module.time, "monotonic", lambda: next(watch))
+    slow = Bench(hardware, hardware, hardware, FramePace(0.05))
+    monkeypatch.setattr(hardware, "capture", lambda *, begun_after_s, timeout_s: late_frame(next(watch) + 0.5))
+    for _ in range(LATE_FRAMES - 1):
+        slow.take("press")
+    with pytest.raises(LateFrameError):
+        slow.take("press")
+
+
+def late_frame(start_s):
+    return CameraFrame(np.zeros((16, 16), np.uint8), start_s, 4000.0, 1.0)

@@ -5,7 +5,8 @@ import types
 import numpy as np
 import pytest
 
-from device.config import LightSection, PressSection
+from device.config import Config, LightSection, PressSection
+from device.errors import AmbientLightError, DarkSideError, NoContrastError, TornFrameError
 from device.instrument import capture as capture_module
 from device.instrument.bench import DARK
 from device.instrument.capture import UNLOADED_FRAMES, Capture, PressEnded
@@ -15,14 +16,22 @@ from device.measurement.tactile_image import Frame
 
 PRESS = PressSection(target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, frames=3, timeout_s=10.0)
 LIGHT = LightSection(ratio=(0.1, 0.2, 0.3, 0.4))
+CONFIG = Config(press=PRESS, light=LIGHT)
+BLACK_COUNTS, COUNTS_PER_N = 4, 200
+"""Of the scripted image: black, and what a newton adds under full light of all sides."""
 FRAME_S = 0.5
 
 
 class ScriptedBench:
-    """Gives one frame for each force of a script; a force of 'shaking' frames is not steady."""
+    """Gives one frame for each force of a script; a force of 'shaking' frames is not steady.
 
-    def __init__(self, forces, shaking=()):
-        self.forces, self.shaking = list(forces), set(shaking)
+    The image is as bright as light times force, each side alike; `dead` sides give none, `glow` counts come on top.
+    The lower half of a frame whose number is in `torn` shows the light of the frame before.
+    """
+
+    def __init__(self, forces, shaking=(), torn=(), dead=(), glow=0):
+        self.forces, self.shaking, self.torn = list(forces), set(shaking), set(torn)
+        self.dead, self.glow, self.image_before = dead, glow, None
         self.taken, self.lights, self.now_s = 0, [], 0.0
         self.force = self
 
@@ -31,9 +40,17 @@ class ScriptedBench:
 
     def take(self, role):
         self.now_s += FRAME_S
-        force_n = self.forces[min(self.taken, len(self.forces) - 1)]
+        force_n, before = self.forces[min(self.taken, len(self.forces) - 1)], self.image_before
         self.taken += 1
-        return Frame(np.zeros((16, 16), np.uint8), role, float(self.taken), force_n, self.lights[-1])
+        image = self.image(force_n)
+        counts, self.image_before = image.copy(), image
+        if self.taken in self.torn:
+            counts[8:] = before[8:]
+        return Frame(counts, role, float(self.taken), force_n, self.lights[-1])
+
+    def image(self, force_n):
+        light = sum(ratio for side, ratio in enumerate(self.lights[-1]) if side not in self.dead)
+        return np.full((16, 16), BLACK_COUNTS + self.glow + round(light * force_n * COUNTS_PER_N), np.uint8)
 
     def is_steady(self, t_s, steady_n):
         return t_s not in self.shaking
@@ -48,11 +65,11 @@ class ScriptedBench:
 
 @pytest.fixture
 def capture_of(monkeypatch):
-    def capture(*forces, shaking=()):
-        bench = ScriptedBench(forces, shaking)
+    def capture(*forces, **troubles):
+        bench = ScriptedBench(forces, **troubles)
         clock = types.SimpleNamespace(monotonic=lambda: bench.now_s, sleep=bench.pass_time)
         monkeypatch.setattr(capture_module, "time", clock)
-        return Capture(bench, PRESS, LIGHT, StatusBoard())
+        return Capture(bench, CONFIG, StatusBoard())
 
     return capture
 
@@ -179,3 +196,67 @@ def test_a_press_can_be_cancelled_or_stopped_before_the_probe_is_lifted(capture_
     with pytest.raises(PressEnded) as end:
         capture.lifted()
     assert end.value.state == state
+
+
+HELD = (0.5,)
+"""A hand that holds the target."""
+
+
+def test_each_side_is_lit_alone_after_a_dark_frame_while_the_hand_holds(capture_of):
+    capture = capture_of(*HELD)
+    capture.side_levels()
+    alone = [tuple(ratio if side == number else 0.0 for side, ratio in enumerate(LIGHT.ratio)) for number in range(4)]
+    assert capture.bench.lights == [DARK, *alone]
+
+
+def test_a_sides_level_is_that_of_full_brightness_at_the_target_force(capture_of):
+    """0.1 of 1.0 at 0.5 N are 10 counts above dark: 100 at full brightness; at 0.4 N 8 counts say the same."""
+    assert capture_of(0.5).side_levels() == pytest.approx((100.0,) * 4)
+    assert capture_of(0.4).side_levels() == pytest.approx((100.0,) * 4)
+
+
+def test_a_dead_side_is_named(capture_of):
+    with pytest.raises(DarkSideError, match=r"No light from -x although"):
+        capture_of(*HELD, dead=(2,)).side_levels()
+
+
+def test_light_that_is_there_while_all_sides_are_off_is_seen_untouched_and_under_load(capture_of):
+    with pytest.raises(AmbientLightError):
+        capture_of(0.0, 0.0, glow=20).unloaded()
+    with pytest.raises(AmbientLightError):
+        capture_of(*HELD, glow=20).side_levels()
+
+
+def test_a_hand_that_lifts_before_the_light_is_checked_is_told_to_hold(capture_of):
+    with pytest.raises(PressEnded, match="lifted too early") as end:
+        capture_of(0.5, 0.5, 0.3).side_levels()
+    assert end.value.state == "rejected"
+
+
+def test_an_image_that_is_as_bright_at_a_touch_as_in_the_hold_ends_the_press(capture_of, monkeypatch):
+    """As with gel: 0.1 N looks like 0.5 N."""
+    capture = capture_of(0.1, 0.5)
+    dry = capture.bench.image
+    monkeypatch.setattr(capture.bench, "image", lambda force_n: dry(0.5))
+    with pytest.raises(NoContrastError):
+        capture.loaded("press", Guidance.PRESS_LESION)
+
+
+def test_a_press_whose_way_to_the_hold_was_not_seen_is_not_judged_by_its_contrast(capture_of, monkeypatch):
+    """0.4 N is above 0.7 of the target: too near to the hold to tell."""
+    capture = capture_of(0.4, 0.5)
+    monkeypatch.setattr(capture.bench, "image", lambda force_n: np.full((16, 16), 90, np.uint8))
+    assert len(capture.loaded("press", Guidance.PRESS_LESION)) == 3
+
+
+def test_a_torn_frame_and_its_neighbour_are_taken_again(capture_of):
+    """Frame 5 is the first with light, and half of it is still dark."""
+    capture = capture_of(0.0, 0.1, torn=(5,))
+    frames = capture.unloaded()
+    assert [frame.t_s for frame in frames if frame.role == "reference"] == [7, 8, 9, 10]
+    assert {frame.counts.min() for frame in frames if frame.role == "reference"} == {24}
+
+
+def test_a_camera_whose_every_frame_is_torn_is_at_fault(capture_of):
+    with pytest.raises(TornFrameError):
+        capture_of(0.9, torn=range(2, 100)).side_levels()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from device.config import CameraSection, Config, PressSection
-from device.errors import BusyError, CameraError, StorageError, UnknownResource
+from device.errors import BusyError, CameraError, ClockJumpError, DiskFullError, StorageError, UnknownResource
 from device.instrument import procedure as procedure_module
 from device.instrument.guidance import Guidance
 from device.instrument.procedure import Procedure
@@ -26,7 +26,7 @@ class ObedientBench:
     """A bench whose operator does at once what the screen says. `breaks` are raised by a press frame each."""
 
     def __init__(self):
-        self.force, self.board, self.breaks = self, None, []
+        self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work = self.is_closed = False
 
     @property
@@ -40,7 +40,8 @@ class ObedientBench:
     def take(self, role):
         if role == "press" and self.breaks:
             raise self.breaks.pop()
-        return Frame(np.zeros((64, 64), np.uint8), role, 0.0, self.latest_n, self.ratio)
+        light = sum(self.ratio) * self.brightness if self.latest_n else 0.0
+        return Frame(np.full((64, 64), 4 + round(100 * light), np.uint8), role, 0.0, self.latest_n, self.ratio)
 
     def is_steady(self, t_s, steady_n):
         return True
@@ -133,6 +134,7 @@ def test_a_device_error_in_the_middle_fails_the_press_and_the_probe_recovers(rig
     job = rig.press()
     assert job["state"] == "failed"
     assert job["reason"] == "No frame came. Check the ribbon cable."
+    assert job["code"] == "E101"
     rig.until(lambda: rig.board.now.step == "ready")
     assert (Guidance.FAULT, "fault", error) in shown
     assert rig.board.now.fault is None
@@ -168,7 +170,7 @@ def test_a_measurement_that_the_disk_does_not_take_fails_the_press(rig, monkeypa
 
     monkeypatch.setattr(rig.store, "add_measurement", full)
     job = rig.press()
-    assert (job["state"], job["measurement_id"]) == ("failed", None)
+    assert (job["state"], job["measurement_id"], job["code"]) == ("failed", None, "E601")
     assert "The disk is full" in job["reason"]
 
 
@@ -278,3 +280,51 @@ def test_the_settings_of_the_camera_are_in_the_recording(rig):
     rig.estimator = lambda recording: seen.append(recording.camera) or ANSWER
     rig.press()
     assert (seen[0].width_px, seen[0].height_px, seen[0].exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+
+
+def test_a_press_that_is_asked_for_while_the_probe_fails_ends_with_the_fault(rig, monkeypatch):
+    """The fault comes between the request and the press: nobody waits for it in vain."""
+    broken = pytest.MonkeyPatch()
+
+    def fail_when_asked():
+        rig.until(lambda: rig.procedure._requested)
+        broken.undo()
+        raise CameraError("No frame came.", "Check the ribbon cable.")
+
+    broken.setattr(rig.procedure._capture, "unloaded", fail_when_asked)
+    assert rig.press()["state"] == "done"  # its unloaded frames were taken before
+    job = rig.procedure.request()
+    rig.until(lambda: rig.store.press(job.id)["state"] in ENDED)
+    assert rig.store.press(job.id)["code"] == "E101"
+    rig.until(lambda: rig.board.now.step == "ready")
+
+
+def test_a_full_disk_is_a_fault_before_a_press_and_over_when_there_is_space(rig, monkeypatch):
+    def full(free_mb):
+        raise DiskFullError("The disk is full.", "Free space.")
+
+    with monkeypatch.context() as filled:
+        filled.setattr(rig.store, "require_space", full)
+        rig.press()
+        rig.until(lambda: rig.board.now.fault and rig.board.now.fault.code == "E602")
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.press()["state"] == "done"
+
+
+def test_a_warning_stays_with_the_press_and_its_measurement_and_is_gone_with_the_next(rig, monkeypatch):
+    warning = ClockJumpError("The clock was set by +3600.0 s.", "Check it.")
+    with monkeypatch.context() as jumped:
+        jumped.setattr(rig.procedure._clock, "warning", lambda: warning if rig.bench.is_at_work else None)
+        job = rig.press()
+    assert job["state"] == "done"
+    assert job["warnings"] == rig.store.measurement(job["measurement_id"])["warnings"] == [warning.as_record()]
+    assert rig.board.now.warnings == (warning,)
+    assert rig.press()["warnings"] == []
+
+
+def test_light_that_lost_a_tenth_between_two_presses_is_warned_of(rig):
+    assert rig.press()["warnings"] == []
+    rig.bench.brightness = 0.4
+    job = rig.press()
+    assert job["state"] == "done"
+    assert [warning["code"] for warning in job["warnings"]] == ["E206"]

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from device.measurement import recording as recording_module
+from device.measurement.durable import write_and_sync
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import CameraSettings, Recording, read_recording, write_recording
 from device.measurement.tactile_image import Frame
@@ -255,23 +255,22 @@ def test_a_zip_with_a_damaged_file_is_refused(folder, file, quantity):
 
 def fail_at(call):
     """Return a stand-in for the durable write that fails at its n-th call, as a full disk does."""
-    calls, original = [], recording_module.write_and_sync
+    calls = []
 
     def write(path, content):
         calls.append(path)
         if len(calls) == call:
             raise OSError(28, "No space left on device")
-        original(path, content)
+        write_and_sync(path, content)
 
     return write
 
 
 @pytest.mark.parametrize("call", [1, 3, 5])
-def test_a_failing_disk_leaves_nothing_half_written(tmp_path, monkeypatch, call):
+def test_a_failing_disk_leaves_nothing_half_written(tmp_path, call):
     """The first frame, a later one, and the description after all four frames."""
-    monkeypatch.setattr(recording_module, "write_and_sync", fail_at(call))
     with pytest.raises(OSError, match="No space left"):
-        write_recording(small_recording(), tmp_path / "press")
+        write_recording(small_recording(), tmp_path / "press", write=fail_at(call))
     assert list(tmp_path.iterdir()) == []
 
 

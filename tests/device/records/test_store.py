@@ -1,13 +1,14 @@
 """What was kept is there again after a restart, and what could not be kept is said so and leaves nothing behind."""
 
+import errno
+import os
 import sqlite3
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from device.errors import StorageError, UnknownResource
-from device.measurement import recording as recording_module
+from device.errors import DiskFullError, StorageError, UnknownResource
 from device.measurement.recording import CameraSettings, Recording, read_recording
 from device.measurement.tactile_image import Frame
 from device.records.store import Store
@@ -140,15 +141,52 @@ def test_a_store_that_could_not_be_opened_does_not_keep_the_folder(tmp_path):
     assert "cannot be opened" in refusal.value.cause
 
 
-def test_a_recording_that_cannot_be_written_leaves_no_row_and_no_file(store, monkeypatch):
-    def full(path, content):
-        raise OSError(28, "No space left on device")
+class BrokenDisk:
+    """Takes nothing, and says why with an error number; has 30 MB left."""
 
-    monkeypatch.setattr(recording_module, "write_and_sync", full)
-    with pytest.raises(StorageError, match="No space left"):
+    def __init__(self, number):
+        self.number = number
+
+    def free_bytes(self, folder):
+        return 30_000_000
+
+    def write(self, path, content):
+        raise OSError(self.number, os.strerror(self.number))
+
+
+@pytest.mark.parametrize(
+    ("number", "kind", "code"), [(errno.ENOSPC, DiskFullError, "E602"), (errno.EIO, StorageError, "E601")]
+)
+def test_a_recording_that_cannot_be_written_leaves_no_row_and_no_file(tmp_path, number, kind, code):
+    store = Store(tmp_path, BrokenDisk(number))
+    with pytest.raises(kind, match=os.strerror(number)) as refusal:
         add(store, 1)
+    assert refusal.value.code == code
     assert store.measurements(before_seq=2**62, limit=9) == []
     assert list((store.folder / "recordings").iterdir()) == []
+    store.close()
+
+
+def test_less_space_than_asked_for_is_a_full_disk_with_both_numbers(tmp_path):
+    store = Store(tmp_path, BrokenDisk(errno.EIO))
+    store.require_space(30.0)
+    with pytest.raises(DiskFullError, match="has 30 MB left, below 31 MB"):
+        store.require_space(31.0)
+    store.close()
+
+
+def test_space_that_nobody_can_tell_is_no_space(store):
+    store.folder = store.folder / "gone"
+    with pytest.raises(StorageError, match="is gone"):
+        store.require_space(1.0)
+
+
+def test_a_database_that_cannot_grow_is_a_full_disk(store):
+    """SQLite's own SQLITE_FULL: the database may not have one page more than it has."""
+    store._db.execute("PRAGMA max_page_count = 1")
+    with pytest.raises(DiskFullError, match="full") as refusal:
+        store.save_press(job("p-1", "done") | {"reason": "x" * 100_000})
+    assert refusal.value.code == "E602"
 
 
 def test_a_recording_that_is_kept_already_is_not_lost_to_a_second_of_its_id(store):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from smbus2 import i2c_msg
 
+from device.simulation.faults import Fault, FaultTimeline
 from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
 
 DARK = (0.0, 0.0, 0.0, 0.0)
@@ -90,6 +91,22 @@ def test_an_injected_nack_happens_once_and_changes_nothing(chip):
     assert not bus.log
     bus.i2c_rdwr(i2c_msg.write(0x60, [0x02, 0xFF]))
     assert bus.log
+
+
+@pytest.mark.parametrize(("kind", "number"), [("i2c_nack", 121), ("i2c_stuck", 110)])
+def test_a_faulty_bus_answers_as_the_kernel_does_and_leaves_the_registers_alone(chip, kind, number):
+    now_s = [0.0]
+    faults = FaultTimeline([Fault(kind, from_s=1.0, until_s=2.0)], clock=lambda: now_s[0])
+    bus = EmulatedI2cBus({0x60: chip}, faults=faults)
+    send(chip, "00 00", "14 aa", "02 ff")
+    now_s[0] = 1.0
+    with pytest.raises(OSError, match=r".") as caught:
+        bus.i2c_rdwr(i2c_msg.write(0x60, [0x02, 0]))
+    assert caught.value.errno == number
+    assert chip.led_ratio() == (1.0, 0.0, 0.0, 0.0)
+    now_s[0] = 2.0
+    bus.i2c_rdwr(i2c_msg.write(0x60, [0x02, 0]))
+    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_a_closed_bus_carries_nothing_and_leaves_the_light_as_it_is(chip):

@@ -3,6 +3,7 @@
 import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.simulation.faults import Fault
 from device.simulation.hand import HandSettings
 from device.simulation.renderer import LinearOptics
 from device.simulation.scenario import CellSettings, Scenario, read_scenario
@@ -38,6 +39,16 @@ def test_what_is_written_holds_and_the_rest_stays(read):
     )
 
 
+def test_faults_are_a_list_with_the_code_that_is_expected(read):
+    scenario = read(
+        'expects = "E203"\n[[faults]]\nkind = "led_dead"\nside = "+y"\nfrom_s = 1\nuntil_s = 2.5\n'
+        '[[faults]]\nkind = "camera_stall"\nfrom_press = 2\n[cell]\ndrift_counts_per_s = -5\n'
+    )
+    assert scenario.faults == (Fault("led_dead", 1, 2.5, side="+y"), Fault("camera_stall", from_press=2))
+    assert scenario.expects == "E203"
+    assert scenario.cell.drift_counts_per_s == -5
+
+
 @pytest.mark.parametrize(
     ("text", "key", "action"),
     [
@@ -66,6 +77,8 @@ def test_an_unknown_key_is_refused_with_what_was_meant(read, text, key, action):
         ("[cell]\ncounts_per_n = 0", "cell.counts_per_n"),
         ("[cell]\nzero_counts = 8_000_001", "cell.zero_counts"),
         ("[cell]\nnoise_counts = -1", "cell.noise_counts"),
+        ("[cell]\ndrift_counts_per_s = 10_001", "cell.drift_counts_per_s"),
+        ('[[faults]]\nkind = "gremlin"', "faults.kind"),
     ],
 )
 def test_a_value_out_of_its_bound_is_refused_by_its_key(read, text, key):

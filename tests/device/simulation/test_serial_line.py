@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
+from collections.abc import Callable
 
+import numpy as np
 import pytest
 
-from device.errors import LoadCellError
+from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
 from device.hardware.load_cell import OpenScale, open_load_cell
 from device.simulation.serial_line import BANNER, MAX_UNREAD_BYTES, EmulatedOpenScale
 
@@ -22,9 +25,32 @@ def read_bytes(path: str, count: int) -> bytes:
     return data
 
 
+def readings(data: bytes) -> list[bytes]:
+    return data.split(b"Readings:\r\n")[1].split(b"\r\n")
+
+
 def read_for_ever(cell: OpenScale) -> None:
     while True:
-        cell.read(timeout_s=0.5)
+        cell.read(timeout_s=0.1)
+
+
+def reached(condition: Callable[[], bool]) -> bool:
+    """Wait, at most 5 s, until a condition holds."""
+    waiting = threading.Event()
+    return any(condition() or waiting.wait(0.005) for _ in range(1000))
+
+
+def first_reading(cell: OpenScale) -> float:
+    """Return the first reading once the line works again: it may take a moment to be back."""
+    found: list[float] = []
+
+    def read() -> bool:
+        with contextlib.suppress(LoadCellError):
+            found.append(cell.read(timeout_s=0.1).counts)
+        return bool(found)
+
+    assert reached(read)
+    return found[0]
 
 
 def test_the_banner_comes_first_and_ends_in_readings():
@@ -60,9 +86,64 @@ def test_noise_is_the_same_for_the_same_seed_and_differs_for_another():
 @pytest.mark.parametrize(("load_counts", "raw24"), [(1e9, 8388607), (-1e9, -8388608)])
 def test_an_overload_saturates_at_24_bit(load_counts, raw24):
     scale = EmulatedOpenScale(lambda _t_s: load_counts, rate_hz=400.0, noise_counts=0.0, seed=1)
+    data = read_bytes(scale.device_path, len(BANNER) + 40)
+    scale.close()
+    assert readings(data)[0].split(b",")[3] == str(raw24).encode()
+
+
+def test_the_zero_drifts_from_the_start_on():
+    """10 counts a millisecond, by the amplifier's own time, which its lines round to whole milliseconds."""
+    scale = EmulatedOpenScale(lambda _t_s: 1000.0, rate_hz=200.0, noise_counts=0.0, drift_counts_per_s=10_000.0, seed=1)
+    lines = readings(read_bytes(scale.device_path, len(BANNER) + 120))[:-1]
+    scale.close()
+    since_power_ms, counts = (np.array([int(line.split(b",")[field]) for line in lines]) for field in (0, 3))
+    assert counts[-1] - counts[0] > 100
+    np.testing.assert_allclose(counts - counts[0], 10 * (since_power_ms - since_power_ms[0]), atol=11)
+    assert counts[0] >= 1000
+
+
+class Switch:
+    """A fault that a test switches on and off."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind, self.is_on = kind, False
+
+    def is_active(self, kind: str, t_s: float | None = None) -> bool:
+        return self.is_on and kind == self.kind
+
+
+@pytest.mark.parametrize(
+    ("kind", "error"),
+    [
+        ("cell_silent", LoadCellError),
+        ("cell_garbage", UnreadableCellError),
+        ("cell_saturated", SaturatedCellError),
+        ("cell_unplugged", UnpluggedCellError),
+    ],
+)
+def test_a_fault_shows_in_the_bytes_and_is_over_when_it_is_over(kind, error):
+    fault = Switch(kind)
+    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
     cell = open_load_cell(scale.device_path)
-    assert cell.read(timeout_s=1.0).counts == raw24
+    assert cell.read(timeout_s=1.0).counts == 42.0
+    fault.is_on = True
+    with pytest.raises(error) as caught:
+        read_for_ever(cell)
+    assert type(caught.value) is error
+    fault.is_on = False
+    assert first_reading(cell) == 42.0
     cell.close()
+    scale.close()
+
+
+def test_unplugging_takes_the_path_away_and_plugging_in_again_brings_a_banner():
+    fault = Switch("cell_unplugged")
+    fault.is_on = True
+    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
+    assert reached(lambda: not os.path.exists(scale.device_path))
+    fault.is_on = False
+    assert reached(lambda: os.path.exists(scale.device_path))
+    assert read_bytes(scale.device_path, len(BANNER)).startswith(BANNER)
     scale.close()
 
 

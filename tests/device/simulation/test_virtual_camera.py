@@ -7,7 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from device.simulation.virtual_camera import BUFFER_COUNT, ExposureRequest, VirtualPicamera2
+from device.simulation.faults import Fault, FaultTimeline
+from device.simulation.virtual_camera import BUFFER_COUNT, LATE_CAMERA_KEEPS_EVERY, VirtualPicamera2
+from device.simulation.virtual_request import ExposureRequest
 
 FRAME_US, EXPOSURE_US = 10_000, 2_000
 CONTROLS = {"ExposureTime": EXPOSURE_US, "FrameDurationLimits": (FRAME_US, FRAME_US), "AnalogueGain": 1.52}
@@ -151,3 +153,46 @@ def test_errors_are_worded_as_the_real_ones(camera):
     camera.close()
     with pytest.raises(RuntimeError, match=r"^Camera has not been configured$"):
         camera.start()
+
+
+def camera_with(fault: Fault, render=lambda exposure: np.zeros((32, 64), np.uint8)) -> VirtualPicamera2:
+    """A running camera with one fault; the light is the time, so that rows can tell when they were exposed."""
+    camera = VirtualPicamera2(
+        render, width_px=64, height_px=32, led_ratio_at=lambda t_s: (t_s, 0.0, 0.0, 0.0), faults=FaultTimeline([fault])
+    )
+    camera.configure(camera.create_video_configuration(raw={"size": (64, 32), "format": "R8"}, controls=CONTROLS))
+    camera.start()
+    return camera
+
+
+def test_a_stalled_camera_delivers_nothing_until_it_goes_on():
+    start_s = time.monotonic()
+    camera = camera_with(Fault("camera_stall", until_s=0.1))
+    with pytest.raises(TimeoutError):
+        camera.capture_request(wait=0.03)
+    camera.cancel_all_and_flush()
+    metadata = camera.capture_request(wait=1.0).get_metadata()
+    assert metadata["SensorTimestamp"] * 1e-9 >= start_s + 0.1
+
+
+def test_the_time_stamps_of_a_late_camera_skip_frames():
+    camera = camera_with(Fault("camera_late"))
+    stamps_ns = []
+    for _ in range(3):
+        request = camera.capture_request(wait=1.0)
+        stamps_ns.append(request.get_metadata()["SensorTimestamp"])
+        request.release()
+    skipped = np.diff(stamps_ns) / (1000 * FRAME_US)
+    assert (skipped % LATE_CAMERA_KEEPS_EVERY == 0).all()
+    assert (skipped > 0).all()
+
+
+def test_the_lower_half_of_a_torn_frame_is_the_exposure_before():
+    def frame_number(exposure: ExposureRequest) -> np.ndarray:
+        return np.full((32, 64), exposure.frame_number, np.uint8)
+
+    camera = camera_with(Fault("camera_torn"), frame_number)
+    rows = camera.capture_request(flush=time.monotonic_ns() + 3000 * FRAME_US, wait=1.0).make_array("raw")
+    upper, lower = rows[:16], rows[16:]
+    assert (upper[:, :64] == upper[0, 0]).all()
+    assert (lower[:, :64] == upper[0, 0] - 1).all()

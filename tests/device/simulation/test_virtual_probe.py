@@ -22,7 +22,7 @@ def probe(table):
     return VirtualProbe(Scenario(), table, SHAPE, SCALE)
 
 
-def frame(probe, *, force_n=0.5, position_mm=ON_LESION_MM, led_ratio=LIT, frame_number=1):
+def frame(probe, *, force_n=0.5, position_mm=ON_LESION_MM, led_ratio=LIT, frame_number=1, **faults):
     return probe.frame_counts(
         force_n=force_n,
         position_mm=position_mm,
@@ -30,6 +30,7 @@ def frame(probe, *, force_n=0.5, position_mm=ON_LESION_MM, led_ratio=LIT, frame_
         exposure_us=4000.0,
         gain=1.0,
         frame_number=frame_number,
+        **faults,
     )
 
 
@@ -93,3 +94,19 @@ def test_the_cell_counts_are_zero_point_plus_force(table):
 def test_an_inclusion_outside_the_table_is_refused(table, inclusion):
     with pytest.raises(InvalidQuantity, match="inside the table's range"):
         VirtualProbe(Scenario(inclusion=Inclusion(*inclusion)), table, SHAPE, SCALE)
+
+
+def test_a_wet_face_looks_the_same_however_hard_it_is_pressed(probe):
+    dry, wet = (
+        [light(frame(probe, force_n=force_n, wet_ratio=wet_ratio)) for force_n in (0.1, 0.5)] for wet_ratio in (0, 1)
+    )
+    assert dry[1] > 1.5 * dry[0]
+    assert wet[1] == pytest.approx(wet[0], rel=0.01)
+    assert wet[0] > 1.5 * dry[0]
+
+
+def test_foreign_light_is_there_without_leds_and_on_every_pixel(probe):
+    """0.05 of full light: 0.05 * 5 e-/us * 4000 us of 10 000 e- are 25.5 counts."""
+    counts = frame(probe, led_ratio=(0.0, 0.0, 0.0, 0.0), ambient_ratio=0.05)
+    for corner in (counts[:10, :10], counts[-10:, -10:], counts[51:72, 86:107]):
+        assert corner.mean() - 4 == pytest.approx(25.5, abs=1.0)

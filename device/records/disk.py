@@ -1,0 +1,31 @@
+"""The disk below the store: how much is left, and files that are on it when the call returns."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Protocol
+
+from device.measurement.durable import write_and_sync
+
+
+class Disk(Protocol):
+    """What the store asks of the file system."""
+
+    def free_bytes(self, folder: Path) -> int:
+        """Return the space that is left for a folder."""
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write and synchronise a file; raise `OSError` when that fails."""
+
+
+class LocalDisk:
+    """The board's own file system. Implements `Disk`."""
+
+    def free_bytes(self, folder: Path) -> int:
+        """Return the space that is left for a folder; raise `OSError` when it cannot be asked."""
+        return shutil.disk_usage(folder).free
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write and synchronise a file; raise `OSError` when that fails."""
+        write_and_sync(path, content)

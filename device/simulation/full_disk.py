@@ -1,0 +1,30 @@
+"""A disk that fills up: the kernel's own "no space left", from /dev/full.
+
+Only what goes through the store's `Disk` is refused; the database beside it is on the real disk. Linux only.
+Source: full(4).
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from device.measurement.durable import write_and_sync
+from device.simulation.faults import FaultTimeline
+
+FULL = Path("/dev/full")
+
+
+class EmulatedDisk:
+    """The disk of a scenario: full while it says so, else the real one. Implements the store's `Disk`."""
+
+    def __init__(self, faults: FaultTimeline) -> None:
+        self._faults = faults
+
+    def free_bytes(self, folder: Path) -> int:
+        """Return the space that is left for a folder."""
+        return 0 if self._faults.is_active("disk_full") else shutil.disk_usage(folder).free
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write and synchronise a file; raise `OSError` ENOSPC while the disk is full."""
+        write_and_sync(FULL if self._faults.is_active("disk_full") else path, content)

@@ -1,0 +1,22 @@
+"""A disk that is full for a while: the kernel says so itself."""
+
+import errno
+
+import pytest
+
+from device.simulation.faults import Fault, FaultTimeline
+from device.simulation.full_disk import EmulatedDisk
+
+
+def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_again(tmp_path):
+    now_s = [0.0]
+    disk = EmulatedDisk(FaultTimeline([Fault("disk_full", until_s=1.0)], clock=lambda: now_s[0]))
+    assert disk.free_bytes(tmp_path) == 0
+    with pytest.raises(OSError, match="No space left") as full:
+        disk.write(tmp_path / "frame", b"counts")
+    assert full.value.errno == errno.ENOSPC
+    assert list(tmp_path.iterdir()) == []
+    now_s[0] = 1.0
+    disk.write(tmp_path / "frame", b"counts")
+    assert (tmp_path / "frame").read_bytes() == b"counts"
+    assert disk.free_bytes(tmp_path) > 0

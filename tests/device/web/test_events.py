@@ -1,0 +1,60 @@
+"""The status as the screen gets it: faults and warnings with code, severity, cause and remedy."""
+
+import types
+
+import pytest
+
+from device.config import PressSection
+from device.errors import ClockJumpError, LightBusError, UnpluggedCellError
+from device.instrument.status import PressJob, Status
+from device.web.events import snapshot
+
+
+class Force:
+    """A load cell at 0.25 N, or at fault."""
+
+    def __init__(self, fault=None):
+        self.fault = fault
+
+    @property
+    def latest_n(self):
+        if self.fault:
+            raise self.fault
+        return 0.25
+
+
+@pytest.fixture
+def told():
+    """Return the snapshot of a procedure with a status and a force."""
+
+    def tell(status, force):
+        config = types.SimpleNamespace(serial="SIM-0001", press=PressSection())
+        board, bench = types.SimpleNamespace(now=status), types.SimpleNamespace(force=force)
+        return snapshot(types.SimpleNamespace(config=config, board=board, bench=bench, is_simulated=True))
+
+    return tell
+
+
+def test_a_probe_without_a_fault_tells_its_force_and_no_fault(told):
+    status = told(Status(), Force())
+    assert (status["force_n"], status["faults"]) == (0.25, [])
+
+
+def test_a_fault_comes_before_the_warnings_and_each_says_what_it_is(told):
+    fault, warning = LightBusError("The bus is stuck.", "Switch off."), ClockJumpError("It was set.", "Check it.")
+    status = told(Status(fault=fault, warnings=(warning,)), Force())
+    assert status["faults"] == [
+        {"code": "E202", "severity": "fault", "cause": "The bus is stuck.", "remedy": "Switch off."},
+        {"code": "E701", "severity": "warning", "cause": "It was set.", "remedy": "Check it."},
+    ]
+
+
+def test_a_load_cell_at_fault_is_told_at_once_and_has_no_force(told):
+    status = told(Status(), Force(UnpluggedCellError("It is gone.", "Plug it in.")))
+    assert status["force_n"] is None
+    assert [fault["code"] for fault in status["faults"]] == ["E304"]
+
+
+def test_a_press_that_failed_has_its_code(told):
+    status = told(Status(press=PressJob("p-1", "failed", code="E203", reason="No light.")), Force())
+    assert (status["press"]["code"], status["press"]["warnings"]) == ("E203", ())
