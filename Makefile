@@ -43,8 +43,9 @@ bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to someth
 	$(PY) tests/bench.py
 	$(PY) tests/bench_forward.py
 
-verify: .venv/all.stamp ## check the forward model against known answers and write docs/verification.md
+verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md
 	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md
+	$(HOST_TOOLS) optics verify --out docs/optics.md
 
 sweep: .venv/all.stamp ## solve the 134 scenes of the training set into build/sweep.nc
 	$(HOST_TOOLS) sweep --scenes 134 --seed 1 --out build/sweep.nc

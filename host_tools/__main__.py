@@ -9,6 +9,7 @@ import typer
 from device.measurement.inversion import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.model import calibrate, evaluate, phantom, table, train
+from host_tools.commands.optics import optics
 from host_tools.commands.output import note
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
@@ -29,6 +30,7 @@ app.command(epilog="Example: host_tools table --out models/simulated_probe")(tab
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
+app.add_typer(optics, name="optics")
 
 
 def main() -> None:

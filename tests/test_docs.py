@@ -27,6 +27,8 @@ def test_every_verb_and_option_that_a_page_names_exists(page):
     group = typer.main.get_command(app)
     for verb, rest in re.findall(r"`?host_tools ([a-z]+)([^`\n]*)", page.read_text(encoding="utf-8")):
         command = group.commands[verb]
+        if hasattr(command, "commands"):
+            command = command.commands[rest.split()[0]]
         known = {option for parameter in command.params for option in parameter.opts}
         assert set(re.findall(r"--[a-z-]+", rest)) <= known, f"{page.name}: host_tools {verb}{rest}"
 

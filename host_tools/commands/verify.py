@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.output import note, progress, require_writable
+from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
+from host_tools.commands.output import note, require_writable
 
 if TYPE_CHECKING:
     from host_tools.study.benchmark import Chapter
-    from host_tools.study.document import Timed
 
-ROOT = Path(__file__).resolve().parents[2]
 TABLES = ROOT / "host_tools" / "forward" / "accuracy_table.json"
 
 
@@ -38,14 +33,14 @@ def verify(
     chapters = _chapters(only or [], extra, quick=quick)
     if tables:
         _measure_tables()
-    measured = _measure(chapters)
-    failed = sum(_print_chapter(timed) for timed in measured.values())
+    measured = measure_chapters(chapters)
+    failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         from host_tools.study.document import write_document
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
         flags += ["--quick"] if quick else []
-        write_document(out, measured, command=" ".join(["host_tools verify", *flags, f"--out {_shown(out)}"]))
+        write_document(out, measured, command=" ".join(["host_tools verify", *flags, f"--out {shown(out)}"]))
         note.print(f"{out} written.")
     if failed:
         note.print(f"{failed} benchmarks miss their bound.")
@@ -69,38 +64,3 @@ def _measure_tables() -> None:
 
     measure_tables(TABLES, on_step=lambda what: note.print(f"measuring {what}"))
     note.print(f"{TABLES} written.")
-
-
-def _measure(chapters: dict[str, Callable[[], Chapter]]) -> dict[str, Timed]:
-    from host_tools.study.document import Timed
-
-    measured = {}
-    with progress("chapters") as bar:
-        task = bar.add_task("", total=len(chapters))
-        for name, chapter in chapters.items():
-            began = time.perf_counter()
-            found = chapter()
-            measured[name] = Timed(found, time.perf_counter() - began)
-            bar.advance(task)
-    return measured
-
-
-def _print_chapter(timed: Timed) -> int:
-    """Print one chapter; return how many of its benchmarks miss their bound."""
-    from host_tools.study.document import BENCHMARK_HEADER, benchmark_row
-
-    chapter, out = timed.chapter, Console(width=140, highlight=False)
-    if chapter.skipped:
-        out.print(f"{chapter.title}: skipped, {chapter.skipped}", markup=False)
-        return 0
-    table = Table(*BENCHMARK_HEADER, title=f"{chapter.title} ({timed.seconds:.1f} s)", title_justify="left")
-    for benchmark in chapter.benchmarks:
-        table.add_row(*map(escape, benchmark_row(benchmark)), style=None if benchmark.passed else "bold red")
-    out.print(table)
-    return sum(not benchmark.passed for benchmark in chapter.benchmarks)
-
-
-def _shown(path: Path) -> str:
-    """Return a path as it would be typed at the root of the repository."""
-    whole = path.resolve()
-    return str(whole.relative_to(ROOT)) if whole.is_relative_to(ROOT) else path.name

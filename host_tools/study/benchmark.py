@@ -64,6 +64,7 @@ class Figure:
     name: str
     caption: str
     draw: Callable[[Any], None]
+    size_in: tuple[float, float] = (8.0, 3.6)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,56 @@
+"""Chapters of a verification: measured behind a progress bar, and printed as tables that show what failed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from host_tools.commands.output import progress
+
+if TYPE_CHECKING:
+    from host_tools.study.benchmark import Chapter
+    from host_tools.study.document import Timed
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def measure_chapters(chapters: Mapping[str, Callable[[], Chapter]]) -> dict[str, Timed]:
+    """Measure every chapter, one after the other, each with the wall time it took."""
+    from host_tools.study.document import Timed
+
+    measured = {}
+    with progress("chapters") as bar:
+        task = bar.add_task("", total=len(chapters))
+        for name, chapter in chapters.items():
+            began = time.perf_counter()
+            found = chapter()
+            measured[name] = Timed(found, time.perf_counter() - began)
+            bar.advance(task)
+    return measured
+
+
+def print_chapter(timed: Timed) -> int:
+    """Print one chapter; return how many of its benchmarks miss their bound."""
+    from host_tools.study.document import BENCHMARK_HEADER, benchmark_row
+
+    chapter, out = timed.chapter, Console(width=140, highlight=False)
+    if chapter.skipped:
+        out.print(f"{chapter.title}: skipped, {chapter.skipped}", markup=False)
+        return 0
+    table = Table(*BENCHMARK_HEADER, title=f"{chapter.title} ({timed.seconds:.1f} s)", title_justify="left")
+    for benchmark in chapter.benchmarks:
+        table.add_row(*map(escape, benchmark_row(benchmark)), style=None if benchmark.passed else "bold red")
+    out.print(table)
+    return sum(not benchmark.passed for benchmark in chapter.benchmarks)
+
+
+def shown(path: Path) -> str:
+    """Return a path as it would be typed at the root of the repository."""
+    whole = path.resolve()
+    return str(whole.relative_to(ROOT)) if whole.is_relative_to(ROOT) else path.name

@@ -1,0 +1,61 @@
+"""`host_tools optics`: trace the light into the virtual probe's table, and verify what the light does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from device.measurement.quantities import Bound, require
+from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
+from host_tools.commands.output import note, progress, require_writable
+
+MODELS = ROOT / "models"
+DEFAULT_RAYS = 2_000_000
+optics = typer.Typer(no_args_is_help=True, help="The light in the block: its table, and its verification.")
+
+
+@optics.command(epilog="Example: host_tools optics build --out models/simulated_probe")
+def build(
+    out: Annotated[Path, typer.Option(help="Folder of the table.")] = MODELS / "simulated_probe",
+    rays: Annotated[int, typer.Option(help="Rays for the light of one LED; minutes for the default.")] = 100_000_000,
+    seed: Annotated[int, typer.Option(help="Seed of the rays; the same seed gives the same table.")] = 1,
+) -> None:
+    """Trace the light of the block and write the table that the virtual probe's images come from."""
+    from host_tools.optics.build_lookup import STEPS, write_light_table
+
+    with progress("parts") as bar:
+        task = bar.add_task("", total=len(STEPS))
+        write_light_table(out, rays=rays, seed=seed, on_step=lambda step: bar.update(task, completed=STEPS.index(step)))
+        bar.update(task, completed=len(STEPS))
+    print(f"{out}: light of {rays} rays.")
+
+
+@optics.command(epilog="Example: host_tools optics verify --mitsuba --out docs/optics.md")
+def verify(
+    out: Annotated[Path | None, typer.Option(help="Markdown file to write; figures go beside it.")] = None,
+    rays: Annotated[int, typer.Option(help="Rays a scene; bounds are meant for 2 million.")] = DEFAULT_RAYS,
+    mitsuba: Annotated[bool, typer.Option(help="Compare with Mitsuba 3, where it is installed.")] = False,
+    mitsuba_python: Annotated[
+        Path | None, typer.Option(help="Interpreter that has Mitsuba; else TSIS_MITSUBA_PYTHON names it.")
+    ] = None,
+) -> None:
+    """Check the light against answers on paper and against Mitsuba 3; exit code 1 when one misses its bound."""
+    from host_tools.study.optics_chapters import cover, optics_chapters
+
+    require_writable(out, (".md",))
+    require("rays", rays, Bound(10_000, 1e10, ""), "trace enough rays to see anything")
+    measured = measure_chapters(optics_chapters(rays, mitsuba=mitsuba, mitsuba_python=mitsuba_python))
+    failed = sum(print_chapter(timed) for timed in measured.values())
+    if out:
+        from host_tools.study.document import write_document
+
+        flags = [f"--rays {rays}"] if rays != DEFAULT_RAYS else []
+        flags += ["--mitsuba"] if mitsuba else []
+        command = " ".join(["host_tools optics verify", *flags, f"--out {shown(out)}"])
+        write_document(out, measured, command=command, cover=cover(rays))
+        note.print(f"{out} written.")
+    if failed:
+        note.print(f"{failed} benchmarks miss their bound.")
+        raise typer.Exit(1)

@@ -1,0 +1,87 @@
+"""`host_tools optics`: what is asked of the tracer, what is written, and the exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.__main__ import app
+from host_tools.optics import build_lookup
+from host_tools.study import optics_chapters
+from host_tools.study.benchmark import Chapter, at_most
+from host_tools.study.document import Cover
+
+Asked = list[dict[str, object]]
+
+
+def run(*words: object) -> Any:
+    return CliRunner().invoke(app, ["optics", *map(str, words)])
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
+    """One chapter whose error is a millionth of the rays; holds up to a million."""
+    calls: Asked = []
+
+    def fake(rays: int, **options: object) -> dict[str, Callable[[], Chapter]]:
+        calls.append({"rays": rays, **options})
+        return {"one": lambda: Chapter("One", "", "", (at_most("case", "noise", rays / 1e6, 1.0),))}
+
+    monkeypatch.setattr(optics_chapters, "optics_chapters", fake)
+    monkeypatch.setattr(optics_chapters, "cover", lambda rays: Cover("Light", (f"{rays} rays",), ("nothing",)))
+    return calls
+
+
+def test_a_missed_bound_is_exit_code_1(asked: Asked) -> None:
+    assert run("verify", "--rays", 100_000).exit_code == 0
+    assert run("verify").exit_code == 1
+    assert [call["rays"] for call in asked] == [100_000, 2_000_000]
+
+
+def test_mitsuba_and_its_interpreter_are_passed_on(asked: Asked) -> None:
+    run("verify", "--mitsuba", "--mitsuba-python", "/there/python")
+    assert asked == [{"rays": 2_000_000, "mitsuba": True, "mitsuba_python": Path("/there/python")}]
+
+
+def test_the_page_repeats_the_command_without_paths_of_the_machine(asked: Asked, tmp_path: Path) -> None:
+    page = tmp_path / "optics.md"
+    run("verify", "--rays", 50_000, "--mitsuba", "--mitsuba-python", "/there/python", "--out", page)
+    text = page.read_text()
+    assert "`host_tools optics verify --rays 50000 --mitsuba --out optics.md`" in text
+    assert "/there" not in text
+    assert text.startswith("# Light\n\n50000 rays\n")
+
+
+@pytest.mark.parametrize(("words", "sentence"), [(("--rays", 5), "rays is 5"), (("--out", "page.txt"), "page.txt")])
+def test_what_cannot_be_done_is_refused_before_anything_runs(
+    words: tuple[object, ...], sentence: str, asked: Asked
+) -> None:
+    result = run("verify", *words)
+    assert isinstance(result.exception, InvalidQuantity)
+    assert sentence in str(result.exception)
+    assert asked == []
+
+
+def test_build_writes_the_table_of_the_rays_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    calls: list[tuple[Path, int, int]] = []
+
+    def fake(folder: Path, rays: int, seed: int, on_step: Callable[[str], None]) -> None:
+        for step in build_lookup.STEPS:
+            on_step(step)
+        calls.append((folder, rays, seed))
+
+    monkeypatch.setattr(build_lookup, "write_light_table", fake)
+    result = run("build", "--out", tmp_path, "--rays", 20_000, "--seed", 3)
+    assert result.exit_code == 0
+    assert calls == [(tmp_path, 20_000, 3)]
+    assert "20000 rays" in result.stdout
+
+
+@pytest.mark.parametrize("verb", ["build", "verify"])
+def test_every_verb_has_help_with_an_example(verb: str) -> None:
+    assert f"Example: host_tools optics {verb}" in run(verb, "--help").stdout
