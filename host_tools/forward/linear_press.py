@@ -30,8 +30,8 @@ class LinearPress:
         self.mesh, self.symmetry, self.order = mesh, symmetry, order
         self.contact = ContactSpace(mesh, symmetry, order, mixed=mixed, closed=closed)
 
-    def displacement(self, elasticity: Elasticity) -> Any:
-        """Return the grid function that solves a(u, v) = 0 for every admissible v."""
+    def displacement(self, elasticity: Elasticity, sinking_mm: Expression = INDENTATION_MM) -> Any:
+        """Return the grid function that solves a(u, v) = 0 for every admissible v, the back sunk by a field (mm)."""
         space = self.contact.space
         trial, test = space.TnT()
         a = BilinearForm(space, symmetric=True, condense=True)
@@ -40,7 +40,7 @@ class LinearPress:
         a.Assemble()
         u = GridFunction(space)
         back = self.mesh.Boundaries("back")
-        u.components[self.contact.normal_indices[0]].Set(-INDENTATION_MM, definedon=back)
+        u.components[self.contact.normal_indices[0]].Set(-sinking_mm, definedon=back)
         inverse = a.mat.Inverse(space.FreeDofs(True), "sparsecholesky")
         rest = u.vec.CreateVector()
         rest.data = -a.mat * u.vec
@@ -74,8 +74,7 @@ class LinearPress:
     def face_state(self, u: Any, elasticity: Elasticity, sampler: FaceSampler) -> FaceState:
         """Return what a solved displacement does to the face."""
         probe, _ = self.contact.bodies(u.components)
-        stress_kpa = self._stress(elasticity, probe, self.contact.pressure(u.components))
-        pressure = contact_pressure_kpa(self.mesh, self.symmetry, self.order, stress_kpa)
+        pressure = contact_pressure_kpa(self.mesh, self.symmetry, self.order, self.stress_of_probe(u, elasticity))
         w_mm = probe.u[-1] + INDENTATION_MM
         return FaceState(
             indentation_mm=INDENTATION_MM,
@@ -85,6 +84,11 @@ class LinearPress:
             force_n=sampler.copies * self._reaction_mn(u, elasticity) / MN_PER_N,
             contact_force_n=sampler.copies * integral_over_face(self.mesh, self.symmetry, pressure) / MN_PER_N,
         )
+
+    def stress_of_probe(self, u: Any, elasticity: Elasticity) -> Stress:
+        """Return the probe's stress (kPa) under a solved displacement."""
+        probe, _ = self.contact.bodies(u.components)
+        return self._stress(elasticity, probe, self.contact.pressure(u.components))
 
     def _reaction_mn(self, u: Any, elasticity: Elasticity) -> float:
         """Return the force of the back on the modelled part: the work of the stress on a unit push of the back."""
