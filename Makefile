@@ -53,9 +53,12 @@ sweep: .venv/all.stamp ## solve the 134 scenes of the training set into build/sw
 train: sweep ## regenerate everything in models/ from nothing
 	rm -rf build/phantoms
 	$(HOST_TOOLS) table --out models/simulated_probe
+	$(HOST_TOOLS) optics build --out models/simulated_probe
 	$(HOST_TOOLS) train --data build/sweep.nc --out models/paper
-	$(HOST_TOOLS) phantom --out build/phantoms
-	$(HOST_TOOLS) calibrate build/phantoms/phantom* --out models/simulated_probe/calibration.json
+	$(HOST_TOOLS) phantom --out build/phantoms/physical
+	$(HOST_TOOLS) calibrate build/phantoms/physical/* --out models/simulated_probe/calibration.json
+	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
+	$(HOST_TOOLS) calibrate build/phantoms/linear/* --out models/simulated_probe/calibration_linear.json
 
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
 	$(HOST_TOOLS) evaluate

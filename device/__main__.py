@@ -59,41 +59,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("--scene says what the *simulated* probe is pressed on: add --simulate")
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     try:
-        config = _config(options)
         if options.command == "analyse":
-            return _analyse(config, options.recordings)
-        return _serve(config, options)
+            return _analyse(options)
+        return _serve(options)
     except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
         print(error, file=sys.stderr)
         return 1
 
 
-def _config(options: argparse.Namespace) -> Config:
-    """Return the settings: a file's, or the simulated probe's own (also those that analyse its recordings)."""
-    config = read_config(options.config) if options.config else simulated_config()
-    if not options.config and not options.simulate and options.command != "analyse":
-        config = Config()
+def _config(options: argparse.Namespace, scenario: Scenario | None) -> Config:
+    """Return the settings: a file's, or the simulated probe's own."""
+    config = simulated_config(scenario.serial) if scenario else Config()
+    if options.config:
+        config = read_config(options.config)
     if options.port is not None:
         config = replace(config, server=replace(config.server, port=options.port))
     return config
 
 
-def _analyse(config: Config, paths: Sequence[Path]) -> int:
-    bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
-    for path in paths:
-        estimate = estimate_recording(read_recording(path), bundle, calibration)
+def _analyse(options: argparse.Namespace) -> int:
+    """Estimate recordings by the settings of a file, or those of the simulated probe that made them."""
+    stated = read_config(options.config) if options.config else None
+    for path in options.recordings:
+        recording = read_recording(path)
+        config = stated or simulated_config(recording.serial)
+        bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
+        estimate = estimate_recording(recording, bundle, calibration)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))
     return 0
 
 
-def _serve(config: Config, options: argparse.Namespace) -> int:
+def _serve(options: argparse.Namespace) -> int:
+    scenario = None
+    if options.simulate:
+        scenario = read_scenario(options.scene) if options.scene else Scenario()
+    config = _config(options, scenario)
     listening = _listen(config)
     with listening:
-        if options.simulate:
-            scenario = read_scenario(options.scene) if options.scene else Scenario()
-            procedure = open_simulated_probe(config, scenario)
-        else:
-            procedure = open_probe(config)
+        procedure = open_simulated_probe(config, scenario) if scenario else open_probe(config)
         procedure.start()
         try:
             _run_server(procedure, listening)

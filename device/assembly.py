@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from device.config import Config
-from device.errors import DeviceError, ModelError
+from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.interfaces import Camera, ForceScale, Lights, LoadCell
 from device.hardware.led_driver import Tlc59116, open_led_driver
@@ -34,9 +34,8 @@ from device.simulation.full_disk import EmulatedDisk
 from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
 from device.simulation.scenario import Scenario
 from device.simulation.serial_line import EmulatedOpenScale
-from device.simulation.surface_table import load_surface_table
 from device.simulation.virtual_camera import VirtualPicamera2
-from device.simulation.virtual_probe import VirtualProbe
+from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from device.simulation.virtual_request import ExposureRequest
 
 TARE_SAMPLES = 20
@@ -103,9 +102,10 @@ def open_probe(config: Config) -> Procedure:
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
+    parts.open(lambda: _require_own_serial(config, scenario))
     table_folder = config.calibration.parent
     shape = config.camera.height_px, config.camera.width_px
-    probe = parts.open(lambda: VirtualProbe(scenario, load_surface_table(table_folder), shape, config.camera.scale))
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, config.camera.scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     chip = Tlc59116Chip()
@@ -135,10 +135,19 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     return procedure
 
 
+def _require_own_serial(config: Config, scenario: Scenario) -> None:
+    """Refuse settings of another probe: a certificate made under one light is wrong under the other."""
+    if config.serial != scenario.serial:
+        raise ConfigError(
+            f"serial is {config.serial}, but the simulated probe with {scenario.light} light is {scenario.serial}.",
+            "Correct the setting, and its calibration with it.",
+        )
+
+
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:
     return probe.frame_counts(
         force_n=probe.hand.force_n(exposure.t_s),
-        position_mm=probe.hand.position_mm(exposure.t_s),
+        place=probe.hand.place(exposure.t_s),
         led_ratio=exposure.led_ratio,
         exposure_us=exposure.exposure_us,
         gain=exposure.gain,

@@ -185,9 +185,10 @@ class Config:
     server: ServerSection = field(default_factory=ServerSection)
 
 
-def simulated_config() -> Config:
-    """Return the settings of the simulated probe: its own serial, certificate and data folder."""
-    return Config(serial="SIM-0001", calibration=MODELS / "simulated_probe" / "calibration.json", data=Path("var"))
+def simulated_config(serial: str = "SIM-0001") -> Config:
+    """Return the settings of a simulated probe: its certificate and data folder. Each kind of light has a serial."""
+    certificate = "calibration_linear.json" if serial == "SIM-LINEAR" else "calibration.json"
+    return Config(serial=serial, calibration=MODELS / "simulated_probe" / certificate, data=Path("var"))
 
 
 def read_config(path: Path) -> Config:

@@ -105,8 +105,8 @@ def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:
 
 
 def table_features(table: SurfaceTable, inclusion: Inclusion, force_n: float) -> Array:
-    """Return the deformation features of an inclusion from the table of surfaces."""
-    lump_mm = force_n * table.lump(inclusion)
+    """Return the deformation features of an inclusion in small strain, the network's own, from the table of faces."""
+    lump_mm = table.lump(inclusion).at_small_strain(force_n).w_mm
     total_mm3 = float(np.trapezoid(2 * np.pi * table.r_mm * lump_mm, table.r_mm))
     return as_row(deformation(table.r_mm, lump_mm, total_mm3))
 

@@ -1,20 +1,29 @@
-"""A solution to one camera frame, through the linear optics and the camera of the virtual probe."""
+"""A solution to one camera frame, through the light, lens and camera of the virtual probe."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from pathlib import Path
 
-from device.simulation.renderer import LinearOptics
+import numpy as np
+
+from device.measurement.tactile_image import Counts
+from device.simulation.image_formation import ScatteredImage
+from device.simulation.lens import Lens
+from device.simulation.lookup_optics import LookupOptics
 from device.simulation.sensor import Sensor
+from device.simulation.skin import Skin
 from host_tools.forward.solution import Solution
 from host_tools.phantom import CAMERA, LIT
 
+TABLES = Path(__file__).resolve().parents[1] / "models" / "simulated_probe"
 
-def simulated_frame(solution: Solution, *, exposure_us: float, seed: int) -> NDArray[np.uint8]:
-    """Return the 768 x 492 frame (8 bit) of the deformed face under four equal LEDs, default optics and sensor."""
-    optics, shape = LinearOptics(), (CAMERA.height_px, CAMERA.width_px)
-    x_mm, y_mm = CAMERA.scale.coordinates_mm(shape)
-    w_mm = np.interp(np.hypot(x_mm, y_mm), solution.r_mm, solution.w_mm).astype(np.float32)
-    intensity = optics.intensity(optics.led_fields(shape, CAMERA.scale), LIT, w_mm)
+
+def simulated_frame(solution: Solution, *, exposure_us: float, seed: int) -> Counts:
+    """Return the 768 x 492 frame (8 bit) of the pressed face under four equal LEDs, default skin, lens and sensor."""
+    shape = CAMERA.height_px, CAMERA.width_px
+    image = ScatteredImage(LookupOptics.load(TABLES), Skin(), Lens(), shape, CAMERA.scale)
+    r_mm = np.hypot(image.x_mm, image.y_mm)
+    w_mm = np.interp(r_mm, solution.r_mm, solution.w_mm).astype(np.float32)
+    p_kpa = np.interp(r_mm, solution.r_mm, np.maximum(solution.p_kpa, 0), right=0.0).astype(np.float32)
+    intensity = image.intensity(w_mm, p_kpa, LIT)
     return Sensor().expose(intensity, exposure_us=exposure_us, gain=CAMERA.gain, seed=(seed, 0))

@@ -17,7 +17,9 @@ from device.measurement.calibration import Calibration
 from device.measurement.estimate import SPOKEN, Estimate, estimate_recording, image_features
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import UNKNOWNS, Inclusion
-from device.simulation.surface_table import SurfaceTable
+from device.measurement.recording import Recording
+from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibrate import Array, as_row, fit_line
 from host_tools.forward.solve import solve
 from host_tools.inverse.evaluate import ErrorTable, render
@@ -30,11 +32,12 @@ SCORED_LOW = (2.0, PAPER_BOX_LOW[1], PAPER_BOX_LOW[2])
 
 @dataclass(frozen=True)
 class Rig:
-    """What turns an inclusion into an estimate: model, calibration and surfaces."""
+    """What turns an inclusion into an estimate: model, calibration, and what the virtual probe is made of."""
 
     bundle: ModelBundle
     calibration: Calibration
-    table: SurfaceTable
+    tables: ProbeTables
+    scenario: Scenario
 
     def noise_free(self, truth: Inclusion) -> Array:
         """Return the network's answer [3] to exact finite-element features."""
@@ -46,7 +49,11 @@ class Rig:
 
     def through_camera(self, truth: Inclusion, seed: int) -> Estimate:
         """Return the device's answer to a recording with fresh noise."""
-        return estimate_recording(phantom_recording(truth, self.table, seed=seed), self.bundle, self.calibration)
+        return estimate_recording(self.recording(truth, seed), self.bundle, self.calibration)
+
+    def recording(self, truth: Inclusion, seed: int) -> Recording:
+        """Return a recording of one phantom with fresh noise."""
+        return phantom_recording(truth, self.tables, seed=seed, scenario=self.scenario)
 
 
 def values(estimates: Sequence[Estimate], part: str = "value") -> Array:
@@ -73,7 +80,7 @@ def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) ->
     """
     settings = rig.calibration.settings
     first, fresh = (
-        [image_features(phantom_recording(p, rig.table, seed=s + i), settings) for i, p in enumerate(phantoms)]
+        [image_features(rig.recording(p, s + i), settings) for i, p in enumerate(phantoms)]
         for s in (seed, seed + len(phantoms))
     )
     image = np.array([rows.mean(axis=0) for rows in first])

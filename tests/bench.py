@@ -22,7 +22,7 @@ from device.measurement.features import extract_features
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
 from device.measurement.tactile_image import reference, tactile_image
-from device.simulation.surface_table import load_surface_table
+from device.simulation.virtual_probe import ProbeTables
 from host_tools.forward.solve import solve
 from host_tools.phantom import phantom_recording
 from host_tools.scene import Scene
@@ -44,9 +44,9 @@ def median_seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 def main() -> None:
     """Print a table of ratios and the peak memory."""
-    bundle, table = ModelBundle.load(MODELS / "paper"), load_surface_table(MODELS / "simulated_probe")
+    bundle, tables = ModelBundle.load(MODELS / "paper"), ProbeTables.load(MODELS / "simulated_probe")
     calibration = read_calibration(MODELS / "simulated_probe" / "calibration.json")
-    recording = phantom_recording(Inclusion(10.0, 5.0, 80.0), table, seed=1)
+    recording = phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=1)
     base, press = reference(recording.frames), recording.with_role("press")[0]
     image = tactile_image(press, base, recording.camera.scale)
     row = np.array([[0.05, 1.7, 57.0]])

@@ -11,8 +11,9 @@ from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
 from device.measurement.recording import Recording
-from device.simulation.surface_table import SurfaceTable, load_surface_table
-from host_tools.phantom import phantom_recording
+from device.simulation.surface_table import SurfaceTable
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.phantom import Protocol, phantom_recording
 
 MODELS = ROOT / "models"
 
@@ -23,8 +24,13 @@ def bundle() -> ModelBundle:
 
 
 @pytest.fixture(scope="session")
-def table() -> SurfaceTable:
-    return load_surface_table(MODELS / "simulated_probe")
+def tables() -> ProbeTables:
+    return ProbeTables.load(MODELS / "simulated_probe")
+
+
+@pytest.fixture(scope="session")
+def table(tables: ProbeTables) -> SurfaceTable:
+    return tables.centred
 
 
 @pytest.fixture(scope="session")
@@ -33,9 +39,9 @@ def calibration() -> Calibration:
 
 
 @pytest.fixture(scope="session")
-def recording(table: SurfaceTable) -> Recording:
-    """One phantom of 10 mm, 5 mm deep, 80 kPa, three press frames."""
-    return phantom_recording(Inclusion(10.0, 5.0, 80.0), table, seed=3, press_frames=3)
+def recording(tables: ProbeTables) -> Recording:
+    """One phantom of 12 mm, 6 mm deep, 60 kPa, three press frames."""
+    return phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=3, protocol=Protocol(frames=3))
 
 
 @pytest.fixture(scope="session")

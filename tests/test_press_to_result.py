@@ -37,9 +37,9 @@ def test_a_press_ends_in_a_measurement(job):
 
 
 def test_size_and_depth_are_near_the_truth_and_inside_their_intervals(measurement):
-    """The default inclusion is 10 mm, 5 mm deep: well inside what the probe can see."""
+    """The default inclusion is 12 mm, 6 mm deep: well inside what the probe can see."""
     estimate, truth = measurement["estimate"], measurement["truth"]
-    assert truth == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
+    assert truth == {"size_mm": 12.0, "depth_mm": 6.0, "youngs_modulus_kpa": 60.0}
     for name in ("size_mm", "depth_mm"):
         assert estimate[name]["value"] == pytest.approx(truth[name], rel=0.1)
         assert estimate[name]["low"] < estimate[name]["value"] < estimate[name]["high"]

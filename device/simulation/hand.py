@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from threading import Lock
 
 from device.measurement.quantities import Bound, require
+from device.simulation.pressed_face import Placement
 
 BESIDE_MM = (40.0, 0.0)
 """Where the hand presses for the reference: far enough that the lump is not felt."""
-ON_LESION_MM = (0.0, 0.0)
 REMEMBERED_MOVES = 8
 """The last motions: light, image and load cell ask about a time that is a little past."""
 ACTION = "describe a human hand"
@@ -23,13 +23,17 @@ ACTION = "describe a human hand"
 
 @dataclass(frozen=True)
 class HandSettings:
-    """How this operator presses."""
+    """How this operator presses; `miss` is where the lesion is pressed beside its middle, `tilt` how it leans."""
 
     rate_n_per_s: float = 0.45
     reaction_s: float = 0.25
     aim_n: float = 0.5
     tremor_n: float = 0.002
     drift_n: float = 0.006
+    miss_x_mm: float = 0.0
+    miss_y_mm: float = 0.0
+    tilt_x_deg: float = 0.0
+    tilt_y_deg: float = 0.0
 
     def __post_init__(self) -> None:
         require("hand.rate_n_per_s", self.rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
@@ -37,6 +41,15 @@ class HandSettings:
         require("hand.aim_n", self.aim_n, Bound(0.0, 5.0, "N"), ACTION)
         require("hand.tremor_n", self.tremor_n, Bound(0.0, 1.0, "N"), ACTION)
         require("hand.drift_n", self.drift_n, Bound(0.0, 1.0, "N"), ACTION)
+        for name in ("miss_x_mm", "miss_y_mm"):
+            require(f"hand.{name}", getattr(self, name), Bound(-30.0, 30.0, "mm"), ACTION)
+        for name in ("tilt_x_deg", "tilt_y_deg"):
+            require(f"hand.{name}", getattr(self, name), Bound(-10.0, 10.0, "deg"), ACTION)
+
+    @property
+    def on_lesion_mm(self) -> tuple[float, float]:
+        """Where this hand presses for the lesion."""
+        return self.miss_x_mm, self.miss_y_mm
 
 
 @dataclass(frozen=True)
@@ -76,7 +89,7 @@ class VirtualHand:
             case "press_beside":
                 self._aim(act_s, self.settings.aim_n, BESIDE_MM)
             case "press_lesion":
-                self._aim(act_s, self.settings.aim_n, ON_LESION_MM)
+                self._aim(act_s, self.settings.aim_n, self.settings.on_lesion_mm)
             case "lift":
                 self._aim(act_s, 0.0, None)
             case "done" | "rejected" | "fault":
@@ -104,6 +117,6 @@ class VirtualHand:
         drift = math.sin(2 * math.pi * 0.4 * t_s) + 0.4 * math.sin(2 * math.pi * 1.1 * t_s + 2.0)
         return max(0.0, steady_n + held * (self.settings.tremor_n * tremor + self.settings.drift_n * drift))
 
-    def position_mm(self, t_s: float) -> tuple[float, float]:
-        """Return where the probe stands relative to the lesion; it moves only while it is lifted."""
-        return self._move_at(t_s).position_mm
+    def place(self, t_s: float) -> Placement:
+        """Return where the probe stands relative to the lesion and how it leans; it moves only while it is lifted."""
+        return Placement(*self._move_at(t_s).position_mm, self.settings.tilt_x_deg, self.settings.tilt_y_deg)

@@ -8,14 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from device.measurement.quantities import Bound, Inclusion, require
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.toml_record import read_toml
 from device.simulation.faults import Fault
 from device.simulation.hand import HandSettings
+from device.simulation.lens import Lens
 from device.simulation.renderer import LinearOptics
 from device.simulation.sensor import Sensor
+from device.simulation.skin import Skin
 
-DEFAULT_INCLUSION = Inclusion(size_mm=10.0, depth_mm=5.0, youngs_modulus_kpa=80.0)
+SERIALS = {"physical": "SIM-0001", "linear": "SIM-LINEAR"}
+DEFAULT_INCLUSION = Inclusion(size_mm=12.0, depth_mm=6.0, youngs_modulus_kpa=60.0)
 
 
 @dataclass(frozen=True)
@@ -37,10 +40,16 @@ class CellSettings:
 
 @dataclass(frozen=True)
 class Scenario:
-    """What the virtual probe is made of and pressed on, what goes wrong, and the fault code the device must raise."""
+    """What the virtual probe is made of and pressed on, what goes wrong, and the fault code the device must raise.
+
+    `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
+    """
 
     inclusion: Inclusion = DEFAULT_INCLUSION
     hand: HandSettings = field(default_factory=HandSettings)
+    light: str = "physical"
+    skin: Skin = field(default_factory=Skin)
+    lens: Lens = field(default_factory=Lens)
     optics: LinearOptics = field(default_factory=LinearOptics)
     sensor: Sensor = field(default_factory=Sensor)
     cell: CellSettings = field(default_factory=CellSettings)
@@ -49,7 +58,14 @@ class Scenario:
     expects: str = ""
 
     def __post_init__(self) -> None:
+        if self.light not in SERIALS:
+            raise InvalidQuantity("light", repr(self.light), "physical or linear", "choose one of them")
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the virtual probe: one a light, since a calibration holds for one of them only."""
+        return SERIALS[self.light]
 
 
 def read_scenario(path: Path) -> Scenario:

@@ -1,65 +1,88 @@
 """One scene drives light, image and force together: what the emulated chips ask when they are asked.
 
-The camera's frame shows the surface under the force that the load cell reports at that time, lit as the LED chip's
-registers say. A lump off the axis is the centred one's field moved, good for a small offset and for "far beside".
+The camera's frame shows the face under the force that the load cell reports at that time, lit as the LED chip's
+registers say.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
+from pathlib import Path
 
-from device.measurement.tactile_image import Image, LedRatio, PixelScale
+from device.measurement.tactile_image import Counts, LedRatio, PixelScale
 from device.simulation.hand import VirtualHand
+from device.simulation.image_formation import ImageFormation, LinearImage, ScatteredImage
+from device.simulation.lookup_optics import LookupOptics
+from device.simulation.off_axis_table import OffAxisTable, load_off_axis_table
+from device.simulation.pressed_face import Placement, PressedFace
 from device.simulation.scenario import Scenario
-from device.simulation.surface_table import SurfaceTable
+from device.simulation.surface_table import PressRamps, SurfaceTable, load_surface_table
 
-WET_FACE_MM = 0.3
-"""A wet face looks as if it were pressed in this far everywhere, however hard it is pressed."""
+
+@dataclass(frozen=True)
+class ProbeTables:
+    """What stands in for finite elements and ray tracing on the device."""
+
+    centred: SurfaceTable
+    off_axis: OffAxisTable
+    light: LookupOptics
+
+    @classmethod
+    def load(cls, folder: Path) -> ProbeTables:
+        """Read the three tables of a folder; raise `InvalidQuantity` for one that is missing or not what it says."""
+        return cls(load_surface_table(folder), load_off_axis_table(folder), LookupOptics.load(folder))
 
 
 class VirtualProbe:
-    """The physics below the chips: hand to force, force and lump to surface, surface and LEDs to counts."""
+    """The physics below the chips: hand to force, force and lump to face, face and LEDs to counts."""
 
-    def __init__(self, scenario: Scenario, table: SurfaceTable, shape: tuple[int, int], scale: PixelScale) -> None:
-        """Prepare for frames of [height, width]; raise `InvalidQuantity` when the table does not hold the inclusion."""
+    def __init__(
+        self,
+        scenario: Scenario,
+        tables: ProbeTables,
+        shape: tuple[int, int],
+        scale: PixelScale,
+        *,
+        ramps: PressRamps | None = None,
+    ) -> None:
+        """Prepare for frames of [height, width], pressed as `ramps` say or else the table.
+
+        Raises `InvalidQuantity` when the table does not hold the inclusion.
+        """
         self.scenario, self.hand = scenario, VirtualHand(scenario.hand)
-        self._table, self._lump_mm_per_n = table, table.lump(scenario.inclusion)
-        self._x_mm, self._y_mm = scale.coordinates_mm(shape)
-        self._led_fields = scenario.optics.led_fields(shape, scale)
-        self._surfaces: dict[tuple[float, float], Image] = {}
+        self._image = _image_formation(scenario, tables, shape, scale)
+        solved = ramps or tables.centred.ramps(scenario.inclusion)
+        self._face = PressedFace(solved, tables.off_axis, scenario.inclusion, self._image.x_mm, self._image.y_mm)
 
     def cell_counts(self, t_s: float) -> float:
         """Return the noise-free load-cell counts at a time."""
         cell = self.scenario.cell
         return cell.zero_counts + cell.counts_per_n * self.hand.force_n(t_s)
 
-    def surface_mm_per_n(self, position_mm: tuple[float, float]) -> Image:
-        """Return the surface deformation for 1 N [height, width] with the probe at a position."""
-        if position_mm not in self._surfaces:
-            from_axis = np.hypot(self._x_mm, self._y_mm)
-            from_lump = np.hypot(self._x_mm + position_mm[0], self._y_mm + position_mm[1])
-            r_mm = self._table.r_mm
-            surface = np.interp(from_axis, r_mm, self._table.w_mm_per_n)
-            surface += np.interp(from_lump, r_mm, self._lump_mm_per_n, right=0.0)
-            self._surfaces[position_mm] = surface.astype(np.float32)
-        return self._surfaces[position_mm]
-
     def frame_counts(
         self,
         *,
         force_n: float,
-        position_mm: tuple[float, float],
+        place: Placement,
         led_ratio: LedRatio,
         exposure_us: float,
         gain: float,
         frame_number: int,
         wet_ratio: float = 0.0,
         ambient_ratio: float = 0.0,
-    ) -> NDArray[np.uint8]:
+    ) -> Counts:
         """Return the counts of one exposure; a wet face shows full contact, foreign light falls on every pixel."""
-        w_mm = np.float32(force_n) * self.surface_mm_per_n(position_mm)
-        w_mm += np.float32(wet_ratio) * (np.float32(WET_FACE_MM) - w_mm)
-        intensity = self.scenario.optics.intensity(self._led_fields, led_ratio, w_mm) + np.float32(ambient_ratio)
+        w_mm, p_kpa = self._face.at(force_n, place)
+        intensity = self._image.intensity(w_mm, p_kpa, led_ratio, wet_ratio=wet_ratio)
+        if ambient_ratio:
+            intensity = intensity + intensity.dtype.type(ambient_ratio)
         seed = self.scenario.seed, frame_number
         return self.scenario.sensor.expose(intensity, exposure_us=exposure_us, gain=gain, seed=seed)
+
+
+def _image_formation(
+    scenario: Scenario, tables: ProbeTables, shape: tuple[int, int], scale: PixelScale
+) -> ImageFormation:
+    if scenario.light == "linear":
+        return LinearImage(scenario.optics, shape, scale)
+    return ScatteredImage(tables.light, scenario.skin, scenario.lens, shape, scale)

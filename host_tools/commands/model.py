@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -13,11 +14,18 @@ from device.measurement.calibration import read_calibration
 from device.measurement.durable import write_durably
 from device.measurement.features import FEATURE_NAMES
 from device.measurement.inversion import FEATURE_UNITS, ModelBundle
-from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import read_recording, write_recording
+from device.simulation.pressed_face import Placement
+from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.surface_table import load_surface_table
+from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.output import note, progress
 
+if TYPE_CHECKING:
+    from host_tools.phantom_sets import Phantom
+
+CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 MODELS = Path(__file__).resolve().parents[2] / "models"
 
 
@@ -53,30 +61,68 @@ def train(
             print(f"{unknown:20} " + "  ".join(f"{name} {value:6.2f} %" for name, value in errors.items()))
 
 
-def table(out: Annotated[Path, typer.Option(help="Folder of the table.")] = MODELS / "simulated_probe") -> None:
-    """Build the virtual probe's table of deformed surfaces."""
+def table(
+    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = MODELS / "simulated_probe",
+    part: Annotated[str, typer.Option(help="centred, off-axis or all.")] = "all",
+) -> None:
+    """Build the virtual probe's tables of the pressed face: force ramps of centred lumps, and lumps off the axis."""
+    from host_tools.off_axis_table import build_off_axis_table, write_off_axis_table
     from host_tools.surface_table import build_surface_table, write_surface_table
 
+    if part not in ("centred", "off-axis", "all"):
+        raise InvalidQuantity("part", part, "centred, off-axis or all", "name one of them")
     with progress("solves") as bar:
         task = bar.add_task("")
-        built = build_surface_table(on_point=lambda done, n: bar.update(task, completed=done, total=n))
-    write_surface_table(built, out)
+
+        def on_point(done: int, n: int) -> None:
+            bar.update(task, completed=done, total=n)
+
+        if part != "off-axis":
+            write_surface_table(build_surface_table(on_point=on_point), out)
+        if part != "centred":
+            write_off_axis_table(build_off_axis_table(on_point=on_point), out)
 
 
 def phantom(
     out: Annotated[Path, typer.Option(help="Folder of the recordings.")],
+    which: Annotated[str, typer.Option("--set", help="calibration, breast-imager or random.")] = "calibration",
+    scenes: Annotated[int, typer.Option(help="How many random phantoms.")] = 20,
+    scenario: Annotated[Path | None, typer.Option(help="Scenario file: what the probe is made of.")] = None,
+    force_n: Annotated[list[float] | None, typer.Option(help="Force of the press; repeat for a ramp.")] = None,
+    offset_mm: Annotated[float, typer.Option(help="How far beside the lesion's middle it is pressed.")] = 0.0,
     model: Annotated[Path, typer.Option(help="Bundle whose phantom scenes to record.")] = MODELS / "paper",
-    table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = MODELS / "simulated_probe",
-    seed: Annotated[int, typer.Option(help="Seed of camera, force and hand.")] = 100,
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
+    seed: Annotated[int, typer.Option(help="Seed of scenes, camera, force and hand.")] = 100,
 ) -> None:
-    """Record the simulated probe on the model's nine phantom scenes."""
-    from host_tools.phantom import phantom_recording
+    """Record the simulated probe on phantoms: the model's nine, eight published ones, or random ones.
 
-    surfaces = load_surface_table(table)
-    for i, truth in enumerate(_phantoms(model)):
-        write_recording(phantom_recording(truth, surfaces, seed=seed + i), out / f"phantom{i + 1}")
-        d, h, E = truth.as_tuple()
-        note.print(f"{out / f'phantom{i + 1}'}: size {d:.2f} mm, depth {h:.2f} mm, Young's modulus {E:.1f} kPa")
+    Example: host_tools phantom --set random --scenes 5 --force-n 0.2 --force-n 0.4 --out build/random
+    """
+    from host_tools.phantom import TARGET_N, Protocol, phantom_recording
+
+    made_of = read_scenario(scenario) if scenario else Scenario()
+    protocol = Protocol(tuple(force_n or [TARGET_N]), place=Placement(x_mm=offset_mm))
+    tables = ProbeTables.load(table)
+    for i, one in enumerate(_phantom_set(which, model, scenes, seed)):
+        recording = phantom_recording(
+            one.inclusion, tables, seed=seed + i, protocol=protocol, scenario=made_of, ramps=one.ramps()
+        )
+        write_recording(recording, out / one.name)
+        d, h, E = one.inclusion.as_tuple()
+        note.print(f"{out / one.name}: size {d:.2f} mm, depth {h:.2f} mm, Young's modulus {E:.1f} kPa")
+
+
+def _phantom_set(which: str, model: Path, scenes: int, seed: int) -> Iterator[Phantom]:
+    from host_tools.phantom_sets import Phantom, breast_imager, random_set
+
+    require("scenes", scenes, Bound(1, 100_000, "phantoms"), "record at least one")
+    if which == "breast-imager":
+        return breast_imager()
+    if which == "random":
+        return random_set(scenes, seed)
+    if which != "calibration":
+        raise InvalidQuantity("set", repr(which), "calibration, breast-imager or random", "choose one of them")
+    return (Phantom(f"phantom{i}", truth) for i, truth in enumerate(_phantoms(model), start=1))
 
 
 def _phantoms(model: Path) -> list[Inclusion]:
@@ -112,13 +158,16 @@ def calibrate(
 def evaluate(
     model: Annotated[Path, typer.Option(help="Bundle to score.")] = MODELS / "paper",
     table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = MODELS / "simulated_probe",
+    light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
     scenes: Annotated[int, typer.Option(help="Random scenes for the coverage of the intervals.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of scenes, camera and hand.")] = 1000,
 ) -> None:
     """Score the model on its nine phantoms, noise-free and through the camera, and its intervals on random scenes."""
     from host_tools.score import Rig, print_intervals, print_phantoms
 
-    rig = Rig(ModelBundle.load(model), read_calibration(table / "calibration.json"), load_surface_table(table))
+    scenario = Scenario(light=light)
+    certificate = read_calibration(table / CERTIFICATES[light])
+    rig = Rig(ModelBundle.load(model), certificate, ProbeTables.load(table), scenario)
     out = Console(width=110, highlight=False)
     print_phantoms(rig, _phantoms(model), seed=seed, out=out)
     if scenes:

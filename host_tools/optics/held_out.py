@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from device.measurement.quantities import Inclusion
 from device.simulation.lookup_optics import LookupOptics
+from device.simulation.pressed_face import RadialProfiles
 from device.simulation.skin import Skin
 from device.simulation.surface_table import SurfaceTable
 from host_tools.optics.light_block import LightBlock
@@ -23,9 +24,6 @@ from host_tools.optics.tracer import trace
 Array = NDArray[np.float64]
 CELL_MM = 0.5
 PRESS_N = 0.5
-MEAN_PRESSURE_KPA = 1.3
-"""Contact pressure of the press of `PRESS_N` on the round face of 11 mm radius."""
-FACE_RADIUS_MM = 11.0
 
 
 @dataclass(frozen=True)
@@ -33,8 +31,8 @@ class HeldOutScene:
     """A face to compare on: `w_mm` and `p_kpa` [ny, nx] on the lookup's render grid, LEDs and skin."""
 
     name: str
-    w_mm: Array
-    p_kpa: Array
+    w_mm: NDArray[np.floating]
+    p_kpa: NDArray[np.floating]
     led_ratio: tuple[float, float, float, float]
     skin: Skin
 
@@ -77,30 +75,24 @@ def dimple_scenes(lookup: LookupOptics, count: int = 7, seed: int = 20) -> Itera
 def pressed_scenes(lookup: LookupOptics, table: SurfaceTable, seed: int = 21) -> Iterator[HeldOutScene]:
     """Yield faces of a round probe pressed with 0.5 N: without a lump, and over lumps of several sizes and depths.
 
-    Displacement from the finite-element table; the pressure is a smooth stand-in with its mean: a rigid punch's rise
-    to the rim (Johnson, Contact Mechanics, eq. 3.34, capped) and a rise over the lump.
+    Deformation and pressure are the finite-element table's; what a lump adds is moved off the middle.
     """
     random = np.random.default_rng(seed)
     x, y = np.meshgrid(lookup.x_mm.astype(float), lookup.y_mm.astype(float))
-    r = np.hypot(x, y)
-    w_bare = np.asarray(PRESS_N * np.interp(r, table.r_mm, table.w_mm_per_n))
-    p_bare = _punch_pressure_kpa(r)
+    round_the_middle = RadialProfiles(table.r_mm, np.hypot(x, y))
+    bare = table.ramps(Inclusion(0.0, 6.0, 80.0)).bare.at(PRESS_N)
+    w_bare, p_bare = (round_the_middle(field) for field in bare)
+    p_bare = p_bare * round_the_middle.inside
     yield HeldOutScene("press, no inclusion", w_bare, p_bare, (1.0, 1.0, 1.0, 1.0), Skin())
     for size, depth, modulus in ((15.0, 4.0, 120.0), (8.0, 4.0, 80.0), (10.0, 8.0, 60.0), (15.0, 5.0, 40.0)):
         at_x, at_y = random.uniform(-3.5, 3.5, 2)
-        aside = np.hypot(x - at_x, y - at_y)
-        lump = PRESS_N * np.interp(aside, table.r_mm, table.lump(Inclusion(size, depth, modulus)))
-        p = p_bare * (1 + np.exp(-((aside / (0.5 * size + 1)) ** 2)) * 6.0 / depth)
+        round_the_lump = RadialProfiles(table.r_mm, np.hypot(x - at_x, y - at_y))
+        lump = table.lump(Inclusion(size, depth, modulus)).at(PRESS_N)
+        w_lump, p_lump = (round_the_lump(field) for field in lump)
+        p = np.maximum(p_bare + p_lump * round_the_middle.inside, 0)
         leds = tuple(random.uniform(0.6, 1.0, 4).tolist())
         name = f"press, inclusion {size:g} mm, {depth:g} mm deep, {modulus:g} kPa"
-        yield HeldOutScene(name, w_bare + lump, p, leds, Skin())
-
-
-def _punch_pressure_kpa(r_mm: Array) -> Array:
-    """Return a rigid punch's pressure at radii, capped at 5 times its middle, with the mean of the press."""
-    inside = r_mm < FACE_RADIUS_MM
-    shape = np.where(inside, 1 / np.sqrt(np.maximum(1 - (r_mm / FACE_RADIUS_MM) ** 2, 0.04)), 0.0)
-    return np.asarray(shape * MEAN_PRESSURE_KPA / shape[inside].mean())
+        yield HeldOutScene(name, w_bare + w_lump, p, leds, Skin())
 
 
 def cell_means(fine_mm: Array, half_width_mm: float, cells: int) -> Array:
@@ -122,7 +114,7 @@ def held_out_errors(
 
 def _compare(lookup: LookupOptics, block: LightBlock, scene: HeldOutScene, rays: int, seed: int) -> HeldOutRow:
     x, y = lookup.x_mm.astype(float), lookup.y_mm.astype(float)
-    face = Face(x, y, scene.w_mm, scene.skin.contact_ratio(scene.p_kpa).astype(float))
+    face = Face(x, y, scene.w_mm.astype(float), scene.skin.contact_ratio(scene.p_kpa).astype(float))
     traced = trace(block, face, scene.skin, led_ratio=scene.led_ratio, rays=rays, seed=seed, cell_mm=CELL_MM)
     true = traced.radiance * (sum(scene.led_ratio) / 4)
     means = cell_means(x, block.half_width_mm, true.shape[0])

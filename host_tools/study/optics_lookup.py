@@ -64,7 +64,7 @@ def _row(row: HeldOutRow) -> tuple[str, ...]:
 def _draw(figure: Any, lookup: LookupOptics, block: LightBlock, scenes: tuple[HeldOutScene, ...], rays: int) -> None:
     """Draw the middle profiles of a few scenes, looked up and traced."""
     for panel, scene in zip(figure.subplots(1, len(scenes), sharey=True, squeeze=False)[0], scenes, strict=True):
-        face = Face(lookup.x_mm.astype(float), lookup.y_mm.astype(float), scene.w_mm, _contact(scene))
+        face = Face(lookup.x_mm.astype(float), lookup.y_mm.astype(float), scene.w_mm.astype(float), _contact(scene))
         traced = trace(block, face, scene.skin, led_ratio=scene.led_ratio, rays=rays, cell_mm=CELL_MM)
         w, p = scene.w_mm.astype(np.float32), scene.p_kpa.astype(np.float32)
         means = cell_means(lookup.x_mm.astype(float), block.half_width_mm, len(traced.x_mm))

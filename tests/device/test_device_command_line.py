@@ -101,13 +101,24 @@ def test_a_tampered_model_keeps_the_simulated_probe_from_starting(run, models):
 
 
 def test_a_certificate_of_another_probe_keeps_the_probe_from_starting(run, models, tmp_path):
-    settings = (tmp_path / "probe.toml").read_text().replace("SIM-0001", "SIM-0002")
+    settings = (tmp_path / "probe.toml").read_text().replace("calibration.json", "calibration_linear.json")
     (tmp_path / "probe.toml").write_text(settings)
     code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
     assert code == 1
     [line] = errors
     assert line.startswith("E401 ")
-    assert "for probe SIM-0001, but must be for probe SIM-0002" in line
+    assert "for probe SIM-LINEAR, but must be for probe SIM-0001" in line
+
+
+def test_the_settings_of_another_probe_are_refused_for_the_simulated_one(run, models, tmp_path):
+    settings = (tmp_path / "probe.toml").read_text().replace("SIM-0001", "SIM-0002")
+    (tmp_path / "probe.toml").write_text(settings)
+    code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
+    assert code == 1
+    assert errors == [
+        "E001 serial is SIM-0002, but the simulated probe with physical light is SIM-0001. "
+        "Correct the setting, and its calibration with it."
+    ]
 
 
 def test_a_real_probe_lists_every_part_that_failed_at_once(run, models, tmp_path):

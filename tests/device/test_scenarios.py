@@ -29,7 +29,7 @@ from device.simulation.faults import PARAMETERS, Fault
 from device.simulation.hand import HandSettings
 from device.simulation.scenario import Scenario, read_scenario
 
-FILES = sorted((ROOT / "scenarios").glob("*.toml"))
+FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).expects]
 TIME_RATIO = 0.4
 QUICK_HAND = HandSettings(rate_n_per_s=1.5, reaction_s=0.05)
 LONGEST_WAIT_S = 20.0

@@ -29,10 +29,10 @@ def assert_no_number(estimate):
 
 
 def test_an_ordinary_press_is_answered_near_the_truth(estimated, recording):
-    """10 mm, 5 mm deep; the modulus of a sphere that deep is not determined."""
+    """12 mm, 6 mm deep; the modulus of a sphere that deep is not determined."""
     estimate = estimated(recording)
-    assert estimate.size_mm.value == pytest.approx(10.0, rel=0.1)
-    assert estimate.depth_mm.value == pytest.approx(5.0, rel=0.1)
+    assert estimate.size_mm.value == pytest.approx(12.0, rel=0.1)
+    assert estimate.depth_mm.value == pytest.approx(6.0, rel=0.1)
     assert (estimate.size_mm.identifiable, estimate.youngs_modulus_kpa.identifiable) == (True, False)
     assert estimate.status == "not_identifiable"
     assert estimate.reason == "This press does not determine Young's modulus."
@@ -75,10 +75,10 @@ def test_a_single_frame_has_no_scatter(estimated, recording):
 
 
 def test_the_features_are_named_and_the_peak_is_that_of_the_lump(estimated, recording, bundle, table):
-    """The table's lump field in the middle, at 0.5 N."""
+    """The table's lump field in the middle, at 0.5 N; light is no straight line of it, and R2 is 0.98."""
     features = estimated(recording).features
     assert list(features) == ["centroid_intensity", "total_intensity", "bright_area_mm2", *bundle.feature_names]
-    assert features["max_deformation_mm"] == pytest.approx(0.5 * table.lump(recording.truth)[0], rel=0.02)
+    assert features["max_deformation_mm"] == pytest.approx(table.lump(recording.truth).at(0.5).w_mm[0], rel=0.1)
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.99])

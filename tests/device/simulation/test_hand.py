@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.hand import BESIDE_MM, ON_LESION_MM, HandSettings, VirtualHand
+from device.simulation.hand import BESIDE_MM, HandSettings, VirtualHand
+from device.simulation.pressed_face import Placement
 
 STEADY = HandSettings(rate_n_per_s=0.5, reaction_s=0.2, aim_n=0.4, tremor_n=0.0, drift_n=0.0)
 
@@ -83,12 +84,12 @@ def test_tremor_is_of_eight_to_twelve_hertz():
 
 def test_it_presses_beside_first_and_then_on_the_lesion():
     hand = hand_at(STEADY, ("press_beside", 0.0))
-    assert hand.position_mm(5.0) == BESIDE_MM
+    assert hand.place(5.0) == Placement(*BESIDE_MM)
     hand.follow("lift", 5.0)
-    assert hand.position_mm(8.0) == BESIDE_MM
+    assert hand.place(8.0) == Placement(*BESIDE_MM)
     hand.follow("press_lesion", 8.0)
-    assert hand.position_mm(8.1) == BESIDE_MM
-    assert hand.position_mm(8.3) == ON_LESION_MM
+    assert hand.place(8.1) == Placement(*BESIDE_MM)
+    assert hand.place(8.3) == Placement()
 
 
 @pytest.mark.parametrize("end", ["done", "rejected", "fault"])
@@ -124,3 +125,10 @@ def test_a_setting_is_taken_at_both_ends_of_its_bound_and_refused_beyond(name, l
     for value in (low - 0.001, high + 0.001, float("nan")):
         with pytest.raises(InvalidQuantity, match=rf"^hand\.{name} is"):
             HandSettings(**{name: value})
+
+
+def test_a_hand_that_misses_and_leans_presses_beside_the_middle_at_an_angle():
+    hand = VirtualHand(HandSettings(miss_x_mm=3.0, miss_y_mm=-1.0, tilt_y_deg=2.0))
+    hand.begin()
+    hand.follow("press_lesion", 0.0)
+    assert hand.place(1.0) == Placement(3.0, -1.0, 0.0, 2.0)

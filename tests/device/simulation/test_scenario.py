@@ -5,9 +5,11 @@ import pytest
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.faults import Fault
 from device.simulation.hand import HandSettings
+from device.simulation.lens import Lens
 from device.simulation.renderer import LinearOptics
 from device.simulation.scenario import CellSettings, Scenario, read_scenario
 from device.simulation.sensor import Sensor
+from device.simulation.skin import Skin
 
 
 @pytest.fixture
@@ -20,7 +22,7 @@ def read(tmp_path):
 
 
 def test_an_empty_file_is_the_default_scene(read):
-    expected = Scenario(Inclusion(10.0, 5.0, 80.0), HandSettings(), LinearOptics(), Sensor(), CellSettings(), seed=1)
+    expected = Scenario(Inclusion(12.0, 6.0, 60.0), HandSettings(), "physical", Skin(), Lens(), seed=1)
     assert read("") == Scenario() == expected
 
 
@@ -32,9 +34,9 @@ def test_what_is_written_holds_and_the_rest_stays(read):
     assert scenario == Scenario(
         Inclusion(4.0, 6.5, 100.0),
         HandSettings(aim_n=0.8),
-        LinearOptics(intercept=0.2),
-        Sensor(read_noise_e=0.0),
-        CellSettings(noise_counts=0.0),
+        optics=LinearOptics(intercept=0.2),
+        sensor=Sensor(read_noise_e=0.0),
+        cell=CellSettings(noise_counts=0.0),
         seed=7,
     )
 
@@ -85,3 +87,15 @@ def test_a_value_out_of_its_bound_is_refused_by_its_key(read, text, key):
     with pytest.raises(InvalidQuantity) as refusal:
         read(text)
     assert refusal.value.quantity == key
+
+
+@pytest.mark.parametrize(
+    ("text", "named"), [('light = "laser"', "light is 'laser'"), ("[skin]\nalbedo = -0.1", "skin.albedo")]
+)
+def test_light_that_cannot_be_is_refused_by_name(read, text, named):
+    with pytest.raises(InvalidQuantity, match=named):
+        read(text)
+
+
+def test_each_light_has_a_probe_of_its_own(read):
+    assert (read("").serial, read('light = "linear"').serial) == ("SIM-0001", "SIM-LINEAR")

@@ -1,4 +1,4 @@
-"""The table of surfaces: exact for polynomials, and refused when it is not what its description says."""
+"""The table of faces: exact for polynomials, and refused when it is not what its description says."""
 
 import json
 
@@ -6,60 +6,58 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.simulation.surface_table import (
-    SurfaceTable,
-    barycentric_weights,
-    chebyshev_points,
-    load_surface_table,
-)
+from device.simulation.chebyshev import points_inside, points_with_ends
+from device.simulation.surface_table import SurfaceTable, load_surface_table
 
 R_MM = np.linspace(0.0, 11.0, 12)
+FORCE_N = points_inside(0.0, 0.8, 3)
 
 
-def polynomial(size_mm, depth_mm, log_modulus):
-    """A polynomial of degree 4, 3 and 2 in size, depth and ln E, different at every radius."""
+def polynomial(size_mm, depth_mm, log_modulus, force_n):
+    """A polynomial of degree 4, 3, 2 and 2 in size, depth, ln E and force, different at every radius."""
     smooth = (1 + size_mm - 0.1 * size_mm**4) * (2 - depth_mm**3 / 50) * (log_modulus**2 - 3 * log_modulus)
-    return np.multiply.outer(smooth, 1 + R_MM)
+    return np.multiply.outer(smooth * (1 + force_n - 2 * force_n**2), 1 + R_MM)
+
+
+def pressure(*of):
+    return polynomial(*of) * 3
 
 
 @pytest.fixture
 def small_table():
-    size, depth = chebyshev_points(0.0, 15.0, 5), chebyshev_points(4.0, 12.0, 4)
+    size, depth = points_with_ends(1.0, 15.0, 5), points_with_ends(4.0, 12.0, 4)
     modulus = np.array([40.0, np.sqrt(40.0 * 120.0), 120.0])  # Chebyshev points in the logarithm
-    grid = np.meshgrid(size, depth, np.log(modulus), indexing="ij")
-    return SurfaceTable(size, depth, modulus, R_MM, 0.4 + R_MM / 20, polynomial(*grid))
+    grid = np.meshgrid(size, depth, np.log(modulus), FORCE_N, indexing="ij")
+    bare = np.stack([0.4 + R_MM / 20, 2 + R_MM]) * np.ones((3, 1, 1))
+    lump = np.stack([polynomial(*grid), pressure(*grid)])
+    return SurfaceTable(size, depth, modulus, FORCE_N, R_MM, np.swapaxes(bare, 0, 1), lump)
 
 
-def test_chebyshev_points_ascend_from_end_to_end():
-    """-cos(k pi / 4) on -1..1: -1, -0.7071, 0, 0.7071, 1."""
-    half = np.sqrt(0.5)
-    np.testing.assert_allclose(chebyshev_points(-1.0, 1.0, 5), [-1, -half, 0, half, 1], atol=1e-15)
-    points = chebyshev_points(4.0, 12.0, 6)
-    assert (points[0], points[-1]) == (4.0, 12.0)
-    assert (np.diff(points) > 0).all()
-
-
-@pytest.mark.parametrize("count", [2, 5, 8])
-def test_interpolation_reproduces_polynomials_exactly(count):
-    """n points carry any polynomial of degree n - 1."""
-    points = chebyshev_points(-2.0, 3.0, count)
-    coefficients = np.random.default_rng(count).normal(size=count)
-    for at in np.linspace(-2.0, 3.0, 37):
-        found = barycentric_weights(points, at) @ np.polyval(coefficients, points)
-        assert found == pytest.approx(np.polyval(coefficients, at), rel=1e-10, abs=1e-10)
-
-
-def test_weights_add_up_to_one_and_hit_a_point_exactly():
-    points = chebyshev_points(0.0, 1.0, 6)
-    assert barycentric_weights(points, 0.3).sum() == pytest.approx(1.0)
-    np.testing.assert_array_equal(barycentric_weights(points, points[2]), np.eye(6)[2])
-
-
-@pytest.mark.parametrize("inclusion", [(3.3, 7.7, 55.0), (15.0, 4.0, 120.0), (0.0, 12.0, 40.0), (9.0, 5.0, 99.0)])
-def test_a_lump_field_is_interpolated_in_size_depth_and_log_modulus(small_table, inclusion):
+@pytest.mark.parametrize("inclusion", [(3.3, 7.7, 55.0), (15.0, 4.0, 120.0), (1.0, 12.0, 40.0), (9.0, 5.0, 99.0)])
+def test_a_lump_field_is_interpolated_in_size_depth_modulus_and_force(small_table, inclusion):
     size, depth, modulus = inclusion
-    expected = polynomial(size, depth, np.log(modulus))
-    np.testing.assert_allclose(small_table.lump(Inclusion(*inclusion)), expected, rtol=1e-9, atol=1e-9)
+    face = small_table.lump(Inclusion(*inclusion)).at(0.37)
+    scale = 0.37 * size**3
+    np.testing.assert_allclose(face.w_mm, scale * polynomial(size, depth, np.log(modulus), 0.37), rtol=1e-9)
+    np.testing.assert_allclose(face.p_kpa, scale * pressure(size, depth, np.log(modulus), 0.37), rtol=1e-9)
+
+
+def test_a_lump_smaller_than_the_tables_smallest_shrinks_with_its_volume(small_table):
+    small, smallest = (small_table.lump(Inclusion(d, 6.0, 80.0)).at(0.5).w_mm for d in (0.5, 1.0))
+    np.testing.assert_allclose(small, smallest / 8, rtol=1e-9)
+    assert not small_table.lump(Inclusion(0.0, 6.0, 80.0)).at(0.5).w_mm.any()
+
+
+def test_beyond_the_largest_force_the_face_grows_in_proportion(small_table):
+    ramp = small_table.lump(Inclusion(5.0, 6.0, 80.0))
+    last = float(FORCE_N[-1])
+    np.testing.assert_allclose(ramp.at(2 * last).w_mm, 2 * ramp.at(last).w_mm, rtol=1e-9)
+
+
+def test_small_strain_is_the_smallest_force_in_proportion(small_table):
+    ramp = small_table.lump(Inclusion(5.0, 6.0, 80.0))
+    first = float(FORCE_N[0])
+    np.testing.assert_allclose(ramp.at_small_strain(0.5).p_kpa, 0.5 / first * ramp.at(first).p_kpa, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +79,8 @@ def test_the_committed_table_holds_every_corner_of_the_papers_box(table):
     for size_mm in (0.0, 15.0):
         for depth_mm in (4.0, 12.0):
             for modulus_kpa in (40.0, 120.0):
-                assert np.isfinite(table.lump(Inclusion(size_mm, depth_mm, modulus_kpa))).all()
+                face = table.lump(Inclusion(size_mm, depth_mm, modulus_kpa)).at(0.5)
+                assert np.isfinite(face).all()
 
 
 def test_a_table_comes_back_as_it_was_saved(small_table, tmp_path):
@@ -109,7 +108,7 @@ def test_a_missing_file_is_refused_with_the_command_that_makes_it(small_table, t
         load_surface_table(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"schema": "tsis.surface_table/2"}'])
+@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"schema": "tsis.surface_table/1"}'])
 def test_a_description_that_is_none_is_refused(small_table, tmp_path, text):
     small_table.save(tmp_path, {})
     (tmp_path / "surface_table.json").write_text(text)
