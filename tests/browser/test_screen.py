@@ -69,7 +69,7 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     newest = daemon.ask("/api/v1/measurements?limit=1").json["measurements"][0]
     size = newest["estimate"]["size_mm"]
     expect(page.locator("#size-value")).to_have_text(f"{size['value']:.1f} mm")
-    expect(page.locator("#truth-size")).to_have_text("10.0 mm")
+    expect(page.locator("#truth-size")).to_have_text("12.0 mm")
     expect(page.locator("#modulus-value")).to_have_text("not determined")
     expect(page.locator("#simulated-badge")).to_be_visible()
     daemon.stop()
