@@ -6,6 +6,7 @@ exp and sum, about what any per-pixel step costs.
 
 from __future__ import annotations
 
+import os
 import resource
 import sys
 import time
@@ -13,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads make small products slower on a busy machine
 
 import numpy as np
 
@@ -22,9 +24,11 @@ from device.measurement.features import extract_features
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
 from device.measurement.tactile_image import reference, tactile_image
-from device.simulation.virtual_probe import ProbeTables
+from device.simulation.pressed_face import Placement
+from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from host_tools.forward.solve import solve
-from host_tools.phantom import phantom_recording
+from host_tools.phantom import CAMERA, LIT, phantom_recording
 from host_tools.scene import Scene
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -42,6 +46,25 @@ def median_seconds(work: Callable[[], object], repeats: int = REPEATS) -> float:
     return float(np.median(times))
 
 
+def _next_frame(light: str, tables: ProbeTables) -> Callable[[], object]:
+    """Return what renders one frame after the other, each under a force of its own."""
+    shape = CAMERA.height_px, CAMERA.width_px
+    probe = VirtualProbe(Scenario(light=light), tables, shape, CAMERA.scale)
+    forces_n = iter(np.linspace(0.3, 0.6, 10 * REPEATS))
+
+    def render() -> object:
+        return probe.frame_counts(
+            force_n=float(next(forces_n)),
+            place=Placement(),
+            led_ratio=LIT,
+            exposure_us=CAMERA.exposure_us,
+            gain=CAMERA.gain,
+            frame_number=1,
+        )
+
+    return render
+
+
 def main() -> None:
     """Print a table of ratios and the peak memory."""
     bundle, tables = ModelBundle.load(MODELS / "paper"), ProbeTables.load(MODELS / "simulated_probe")
@@ -57,6 +80,8 @@ def main() -> None:
         "frame: features": lambda: extract_features(image, calibration.settings),
         "frame: 100 networks (ONNX)": lambda: bundle.estimate(row),
         "press: ten frames to an estimate": lambda: estimate_recording(recording, bundle, calibration),
+        "simulated frame: physical light, camera": _next_frame("physical", tables),
+        "simulated frame: linear light, camera": _next_frame("linear", tables),
         "scene: finite elements with baseline": lambda: solve(Scene(Inclusion(10.0, 6.0, 80.0))),
     }
     seconds = {name: median_seconds(work) for name, work in works.items()}
