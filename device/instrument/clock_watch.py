@@ -35,5 +35,5 @@ class ClockWatch:
         jump_s, self._offset_s = offset_s - self._offset_s, offset_s
         if abs(jump_s) <= self._max_jump_s:
             return None
-        cause = f"The clock was set by {jump_s:+.1f} s: the time of this press may be wrong, its forces are not."
+        cause = f"The clock was set by {jump_s:+.1f} s: the time of this press may be wrong."
         return ClockJumpError(cause, "Check the board's clock and its time server.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -72,6 +73,22 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     expect(page.locator("#truth-size")).to_have_text("12.0 mm")
     expect(page.locator("#modulus-value")).to_have_text("not determined")
     expect(page.locator("#simulated-badge")).to_be_visible()
+    daemon.stop()
+
+
+def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: Page, tmp_path: Path):
+    """The wall clock is set forward in the middle of a press: the measurement stands, the operator is told."""
+    scene = '[[faults]]\nkind = "clock_jump"\nstep_s = 3600.0\nfrom_press = 1\n' + QUICK_HAND
+    daemon = Daemon(tmp_path, scene)
+    page.goto(daemon.url)
+    page.locator("#press-button").click()
+    warning = page.locator('.fault[data-severity="warning"]')
+    expect(warning.locator(".fault-code")).to_have_text("E701")
+    expect(warning.locator(".fault-code")).to_have_css("background-color", "rgb(255, 190, 61)")
+    expect(page.locator("#size-value")).to_be_visible()
+    expect(page.locator("#size-value")).to_have_text(re.compile(r"\d+\.\d mm"))
+    _shoot(page, "warning")
+    _require_fits(page)
     daemon.stop()
 
 

@@ -93,8 +93,9 @@ function showProgress() {
   [...cells.children].forEach((cell, index) => cell.classList.toggle("taken", index < taken));
 }
 
-function faultItem({ code, cause, remedy }) {
+function faultItem({ code, severity, cause, remedy }) {
   const item = element("div", "fault");
+  item.dataset.severity = severity;
   const words = element("p", "fault-words");
   words.append(element("strong", "fault-cause", cause), " ", element("span", "fault-remedy", remedy));
   item.append(element("span", "fault-code", code), words);
