@@ -94,11 +94,11 @@ class SurfaceTable:
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write surface_table.npz and its description with the hash."""
-        arrays = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        arrays = {name: getattr(self, name).astype(np.float32) for name in self.__dataclass_fields__}
         save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table", **origin})
 
 
 def load_surface_table(folder: Path) -> SurfaceTable:
     """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
     arrays, _ = load_table(folder, NAME, SCHEMA, tuple(SurfaceTable.__dataclass_fields__), ACTION)
-    return SurfaceTable(**arrays)
+    return SurfaceTable(**{name: values.astype(np.float64) for name, values in arrays.items()})

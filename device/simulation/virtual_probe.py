@@ -6,9 +6,11 @@ registers say.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from device.measurement.quantities import InvalidQuantity
 from device.measurement.tactile_image import Counts, LedRatio, PixelScale
 from device.simulation.hand import VirtualHand
 from device.simulation.image_formation import ImageFormation, LinearImage, ScatteredImage
@@ -17,6 +19,8 @@ from device.simulation.off_axis_table import OffAxisTable, load_off_axis_table
 from device.simulation.pressed_face import Placement, PressedFace
 from device.simulation.scenario import Scenario
 from device.simulation.surface_table import PressRamps, SurfaceTable, load_surface_table
+
+ACTION = "run `host_tools table` to make both again"
 
 
 @dataclass(frozen=True)
@@ -29,8 +33,18 @@ class ProbeTables:
 
     @classmethod
     def load(cls, folder: Path) -> ProbeTables:
-        """Read the three tables of a folder; raise `InvalidQuantity` for one that is missing or not what it says."""
-        return cls(load_surface_table(folder), load_off_axis_table(folder), LookupOptics.load(folder))
+        """Read the three tables of a folder.
+
+        Raises `InvalidQuantity` for one that is missing or not what it says, or when they are not of one probe.
+        """
+        tables = cls(load_surface_table(folder), load_off_axis_table(folder), LookupOptics.load(folder))
+        scenes = [
+            json.loads((folder / f"{name}.json").read_text(encoding="utf-8")).get("scene_defaults")
+            for name in ("surface_table", "off_axis_table")
+        ]
+        if scenes[0] != scenes[1]:
+            raise InvalidQuantity("off axis table's scene", scenes[1], f"{scenes[0]} as the surface table's", ACTION)
+        return tables
 
 
 class VirtualProbe:
