@@ -45,8 +45,12 @@ class OffAxisTable:
     lump_per_n_mm3: Array
     tilt_per_deg: Array
 
-    def departure(self, inclusion: Inclusion, offset_mm: float, centred_per_n: Array) -> Array:
-        """Return the modes [2, K, R] for 1 N by which the lump off the axis departs from the centred one [2, R].
+    def centred_share(self, offset_mm: float) -> float:
+        """Return how much of the mean over the angle is still the centred lump's: from 1 on the axis to 0."""
+        return 1 - min(offset_mm / float(self.offset_mm[0]), 1.0) ** 2
+
+    def modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
+        """Return the modes [2, K, R] for 1 N of a lump off the axis, but for the centred lump's share.
 
         Nearer than the first offset of the table the k-th mode grows with the k-th power of the offset, as it must for
         a smooth field (the mean over the angle with the second). Beyond the last the lump's field fades.
@@ -55,10 +59,8 @@ class OffAxisTable:
         first_mm, last_mm = float(self.offset_mm[0]), float(self.offset_mm[-1])
         fading = np.exp(-max(offset_mm - last_mm, 0.0) / FADING_MM)
         if fading < FORGOTTEN:
-            modes = np.zeros((2, *np.shape(self.lump_per_n_mm3)[-2:]))
-        else:
-            modes = fading * self._modes(inclusion, min(max(offset_mm, first_mm), last_mm))
-        modes[:, 0] -= centred_per_n
+            return np.zeros((2, *np.shape(self.lump_per_n_mm3)[-2:]))
+        modes = fading * self._modes(inclusion, min(max(offset_mm, first_mm), last_mm))
         power = np.arange(modes.shape[1])
         power[0] = 2
         return np.asarray(modes * (min(offset_mm / first_mm, 1.0) ** power)[:, None])
@@ -79,11 +81,11 @@ class OffAxisTable:
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write off_axis_table.npz and its description with the hash."""
-        arrays = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        arrays = {name: getattr(self, name).astype(np.float32) for name in self.__dataclass_fields__}
         save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table", **origin})
 
 
 def load_off_axis_table(folder: Path) -> OffAxisTable:
     """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
     arrays, _ = load_table(folder, NAME, SCHEMA, tuple(OffAxisTable.__dataclass_fields__), ACTION)
-    return OffAxisTable(**arrays)
+    return OffAxisTable(**{name: values.astype(np.float64) for name, values in arrays.items()})

@@ -1,9 +1,9 @@
 """Force, position and tilt to the deformation and pressure of the whole face, on one grid of points.
 
-What a lump off the axis changes against the centred one is solved in small strain and grows with the force as the
-centred field grows; moving the centred field would be wrong by 17 % of its peak at 2 mm, because a probe that cannot
-turn answers with a moment. A tilt adds its own fields; where the pressure would pull the face has lifted, and the rest
-carries the force. What each costs in accuracy: docs/simulated_probe.md.
+A lump off the axis is solved in small strain and grows with the force as the centred one grows; moving the centred
+field instead would be wrong, because a probe that cannot turn answers with a moment. A tilt adds its own fields; where
+the pressure would pull the face has lifted, and the rest carries the force. What each costs in accuracy:
+docs/simulated_probe.md.
 """
 
 from __future__ import annotations
@@ -45,33 +45,32 @@ class PressedFace:
         self._x_mm, self._y_mm = np.broadcast_arrays(x_mm, y_mm)
         self._from_axis = RadialProfiles(self._r_mm, np.hypot(self._x_mm, self._y_mm))
         self._tilt = [self._tilt_field(axis) for axis in (self._x_mm, self._y_mm)]
-        self._departure = lru_cache(maxsize=8)(self._departure_per_n)
+        self._aside = lru_cache(maxsize=8)(self._aside_per_n)
 
     def at(self, force_n: float, place: Placement) -> tuple[Image, Image]:
         """Return w_mm and p_kpa [ny, nx]; the pressure is never negative and carries the force."""
         if force_n <= 0:
             return np.zeros(self._x_mm.shape, np.float32), np.zeros(self._x_mm.shape, np.float32)
         bare, lump = self._bare.at(force_n), self._lump.at(force_n)
-        w_mm, p_kpa = (self._from_axis(b + extra) for b, extra in zip(bare, lump, strict=True))
-        if place.x_mm or place.y_mm:
-            grown = np.float32(force_n * self._growth(lump, force_n))
-            further_w, further_p = self._departure(place.x_mm, place.y_mm)
-            w_mm, p_kpa = w_mm + grown * further_w, p_kpa + grown * further_p
+        share = self._off_axis.centred_share(float(np.hypot(place.x_mm, place.y_mm)))
+        w_mm, p_kpa = (self._from_axis(b + share * extra) for b, extra in zip(bare, lump, strict=True))
+        if share < 1:
+            grown_w, grown_p = (np.float32(force_n * growth) for growth in self._growth(lump, force_n))
+            further_w, further_p = self._aside(place.x_mm, place.y_mm)
+            w_mm, p_kpa = w_mm + grown_w * further_w, p_kpa + grown_p * further_p
         return self._tilted(w_mm, p_kpa, place)
 
-    def _growth(self, lump: Face, force_n: float) -> float:
-        """Return how much larger the centred lump field is, over the force, than in small strain."""
+    def _growth(self, lump: Face, force_n: float) -> list[float]:
+        """Return how much larger the centred lump's w and p are, at their largest, than in small strain."""
         small = self._lump.at_small_strain(force_n)
-        peak = float(np.abs(small.w_mm).max())
-        return float(np.abs(lump.w_mm).max()) / peak if peak > 0 else 1.0
+        peaks = [(np.abs(now).max(), np.abs(before).max()) for now, before in zip(lump, small, strict=True)]
+        return [float(now / before) if before > 0 else 1.0 for now, before in peaks]
 
-    def _departure_per_n(self, x_mm: float, y_mm: float) -> list[Image]:
-        """Return w and p for 1 N by which a lump at -(x, y) from the axis departs from the centred one."""
-        r_mm = self._off_axis.r_mm
-        centred = np.array([np.interp(r_mm, self._r_mm, field) for field in self._lump.at_small_strain(1.0)])
-        modes = self._off_axis.departure(self.inclusion, float(np.hypot(x_mm, y_mm)), centred)
+    def _aside_per_n(self, x_mm: float, y_mm: float) -> list[Image]:
+        """Return w and p for 1 N of a lump at -(x, y) from the axis, but for the centred lump's share."""
+        modes = self._off_axis.modes(self.inclusion, float(np.hypot(x_mm, y_mm)))
         angle = np.arctan2(self._y_mm, self._x_mm) - np.arctan2(-y_mm, -x_mm)
-        radial = RadialProfiles(r_mm, np.hypot(self._x_mm, self._y_mm))
+        radial = RadialProfiles(self._off_axis.r_mm, np.hypot(self._x_mm, self._y_mm))
         return [
             np.asarray(sum(radial(mode) * np.cos(k * angle) for k, mode in enumerate(field)), np.float32)
             for field in modes

@@ -45,7 +45,7 @@ class Skin:
     def contact_ratio(self, p_kpa: NDArray[np.floating]) -> NDArray[np.float32]:
         """Return the share of each place in optical contact, 0..1, of the shape of the contact pressure (kPa, >= 0).
 
-        Where the probe touches anything, sweat or gel raise it to phi + wet (1 - phi); without any pressure it is 0.
+        Where there is any pressure, sweat or gel raise it to phi + wet (1 - phi); in the air it is 0.
         Raises `InvalidQuantity` for a pressure that is negative or no number.
         """
         lowest = float(np.min(p_kpa, initial=0.0))
@@ -55,6 +55,7 @@ class Skin:
         dry = np.float32(self.largest_contact_ratio) * (
             1 - np.exp(pressure * np.float32(-1 / self.contact_pressure_kpa))
         )
-        if self.wet_ratio == 0.0 or not pressure.any():
+        if self.wet_ratio == 0.0:
             return np.asarray(dry, dtype=np.float32)
-        return np.asarray(dry + np.float32(self.wet_ratio) * (1 - dry), dtype=np.float32)
+        touched = np.float32(self.wet_ratio) * (pressure > 0)
+        return np.asarray(dry + touched * (1 - dry), dtype=np.float32)

@@ -23,6 +23,17 @@ def beside(face):
     return face.at(0.5, Placement(40.0, 0.0))
 
 
+@pytest.mark.parametrize("truth", [(12.0, 6.0, 60.0), (15.0, 4.0, 120.0), (5.0, 5.0, 80.0)])
+@pytest.mark.parametrize("force_n", [0.05, 0.5])
+def test_beside_the_lesion_nothing_of_the_lump_is_left(tables, truth, force_n):
+    lump, none = (
+        PressedFace(tables.centred.ramps(one), tables.off_axis, one, X_MM, Y_MM).at(force_n, Placement(40.0, 0.0))
+        for one in (Inclusion(*truth), Inclusion(0.0, 6.0, 80.0))
+    )
+    for found, expected in zip(lump, none, strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7)
+
+
 def test_centred_the_fields_are_the_tables(face, tables):
     w_mm, p_kpa = face.at(0.5, Placement())
     bare, lump = (ramp.at(0.5) for ramp in tables.centred.ramps(INCLUSION)[1:])
