@@ -1,8 +1,9 @@
 """Frames to a tactile image: (I - dark) / (reference - dark) - 1, how much brighter the lump makes each pixel.
 
-The reference is the lump-free press at the *force of the frame*: the hand never holds two presses equally hard, so
-each pixel's reference is a straight line over force through all reference frames (no contact and press beside the
-lesion). Pixels are not square; anything with a length goes through `PixelScale`. Source: docs/measurement.md.
+The reference is the lump-free press at the *force of the frame*: the hand never holds two presses equally hard, and
+1 % of force is several per cent of a lump's contrast. Light grows more slowly than force, as contact fills up, so the
+reference follows a power of the force, whose exponent the reference press itself shows while the hand trembles.
+Pixels are not square; anything with a length goes through `PixelScale`. Source: docs/measurement.md.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ LedRatio = tuple[float, float, float, float]
 
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark divides noise by noise: the pixel is marked invalid."""
-FORCE_SPAN_N = 0.05
-"""Reference forces closer together than this do not carry a slope; their mean is the reference."""
+LOADED_RATIO = 0.5
+"""Reference frames above this part of the largest reference force are the press; the others show an untouched face."""
+EXPONENT, EXPONENT_SPREAD, LIGHT_NOISE = 0.65, 0.3, 1e-3
+"""d ln(light) / d ln(force) before a frame is seen, how far off that may be, and how exact a frame's light is."""
 
 
 @dataclass(frozen=True)
@@ -76,15 +79,18 @@ class Frame:
 
 @dataclass(frozen=True)
 class Reference:
-    """What each pixel shows without a lump: dark, and a straight line over force (all in counts)."""
+    """The lump-free press: dark, its light above dark at `force_n`, and the power of the force with which it grows."""
 
     dark: Image
-    at_zero: Image
-    per_newton: Image
+    light: Image
+    force_n: float
+    exponent: float
 
     def above_dark(self, force_n: float) -> Image:
-        """Return reference minus dark at a force."""
-        return self.at_zero + np.float32(force_n) * self.per_newton - self.dark
+        """Return reference minus dark at a force (counts)."""
+        if self.exponent == 0.0 or force_n <= 0.0:
+            return self.light
+        return self.light * np.float32((force_n / self.force_n) ** self.exponent)
 
 
 @dataclass(frozen=True)
@@ -111,13 +117,25 @@ def reference(frames: Sequence[Frame]) -> Reference:
         if not found:
             raise InvalidQuantity(f"{role} frames", 0, "at least one", f"record {role} frames before the press")
     require_one_shape(frames)
-    lit = by_role["reference"]
-    force = np.array([f.force_n for f in lit], dtype=np.float32)
-    level, offset = _mean(lit), force - force.mean()
-    slope = np.zeros_like(level)
-    if np.ptp(force) >= FORCE_SPAN_N:
-        slope = np.tensordot(offset, np.array([f.counts for f in lit], dtype=np.float32), 1) / np.sum(offset**2)
-    return Reference(dark=_mean(by_role["dark"]), at_zero=level - force.mean() * slope, per_newton=slope)
+    dark, lit = _mean(by_role["dark"]), by_role["reference"]
+    largest_n = max(frame.force_n for frame in lit)
+    loaded = [frame for frame in lit if frame.force_n >= LOADED_RATIO * largest_n]
+    light = _mean(loaded) - dark
+    if largest_n <= 0.0:
+        return Reference(dark, light, force_n=0.0, exponent=0.0)
+    log_force = np.log([frame.force_n for frame in loaded])
+    return Reference(dark, light, float(np.exp(log_force.mean())), _exponent(log_force, light, dark, loaded))
+
+
+def _exponent(log_force: NDArray[np.float64], light: Image, dark: Image, frames: Sequence[Frame]) -> float:
+    """Return d ln(light) / d ln(force) by least squares, held near `EXPONENT` as far as the frames do not tell."""
+    seen = light >= FLOOR_COUNTS
+    if not seen.any():
+        return EXPONENT
+    log_light = np.log([max(float((frame.counts[seen] - dark[seen]).mean()), 1e-3) for frame in frames])
+    x, y = log_force - log_force.mean(), log_light - log_light.mean()
+    hold = (LIGHT_NOISE / EXPONENT_SPREAD) ** 2
+    return float((x @ y + hold * EXPONENT) / (x @ x + hold))
 
 
 def require_one_shape(frames: Sequence[Frame]) -> None:
@@ -141,5 +159,5 @@ def tactile_image(frame: Frame, reference: Reference, scale: PixelScale) -> Tact
 
 
 def saturated_ratio(counts: Counts) -> float:
-    """Return the part of the pixels that are at full scale of their type."""
-    return float(np.mean(counts == np.iinfo(counts.dtype).max))
+    """Return the part of the pixels at full scale: 255, or in 16 bits what 10 bits can say at most, 1023 x 64."""
+    return float(np.mean(counts >= (255 if counts.dtype == np.uint8 else 1023 << 6)))

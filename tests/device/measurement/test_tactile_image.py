@@ -5,6 +5,8 @@ import pytest
 
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.tactile_image import (
+    EXPONENT,
+    EXPONENT_SPREAD,
     FLOOR_COUNTS,
     Frame,
     PixelScale,
@@ -66,26 +68,46 @@ def test_dark_and_reference_are_means_of_their_frames():
     np.testing.assert_allclose(tactile_image(frame("press", 206), reference(frames), SCALE).contrast, 1.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("force_n", [0.0, 0.25, 0.5, 0.6])
-def test_the_reference_is_a_straight_line_over_force(force_n):
-    """104 counts at 0 N and 154 at 0.5 N: 100 counts above dark at no force, and 100 counts more for every newton."""
-    base = reference([frame("dark", 4), frame("reference", 104, 0.0), frame("reference", 154, 0.5)])
-    np.testing.assert_allclose(base.above_dark(force_n), 100 + 100 * force_n, rtol=1e-6)
+def pressed(forces_n, exponent, full=40_000):
+    """Reference frames of 16 bit whose light is a power of the force."""
+    levels = (full * np.asarray(forces_n) ** exponent).round().astype(int)
+    return [frame("reference", level, force, dtype=np.uint16) for level, force in zip(levels, forces_n, strict=True)]
 
 
-def test_many_reference_forces_give_the_least_squares_line():
-    forces, counts = np.array([0.0, 0.1, 0.3, 0.5]), np.array([100, 112, 127, 151])
-    lit = [frame("reference", count, force) for force, count in zip(forces, counts, strict=True)]
-    base = reference([frame("dark", 0), *lit])
-    slope, intercept = np.polyfit(forces, counts, 1)
-    np.testing.assert_allclose(base.per_newton, slope, rtol=1e-5)
-    np.testing.assert_allclose(base.above_dark(0.0), intercept, rtol=1e-5)
+@pytest.mark.parametrize("exponent", [0.4, 0.65, 1.0])
+def test_light_that_grows_with_a_power_of_the_force_is_followed_by_that_power(exponent):
+    """A trembling hand, 0.47 to 0.53 N, shows the power; at 0.4 and 0.6 N the reference is right to 0.1 %."""
+    base = reference([frame("dark", 0, dtype=np.uint16), *pressed(np.linspace(0.47, 0.53, 10), exponent)])
+    assert base.exponent == pytest.approx(exponent, abs=2e-3)
+    for force_n in (0.4, 0.5, 0.6):
+        np.testing.assert_allclose(base.above_dark(force_n), 40_000 * force_n**exponent, rtol=1e-3)
 
 
-def test_reference_forces_close_together_carry_no_slope():
-    """0.04 N apart: the mean of both, (100 + 120) / 2 - 4, at every force."""
-    base = reference([frame("dark", 4), frame("reference", 100, 0.48), frame("reference", 120, 0.52)])
-    for force_n in (0.0, 0.5, 1.0):
+def test_a_hand_that_does_not_tremble_leaves_the_power_that_was_expected():
+    base = reference([frame("dark", 4), frame("reference", 104, 0.5), frame("reference", 104, 0.5)])
+    assert base.exponent == EXPONENT
+    np.testing.assert_allclose(base.above_dark(0.51), 100 * (0.51 / 0.5) ** EXPONENT, rtol=1e-6)
+
+
+def test_noise_of_the_light_hardly_moves_the_power_of_a_steady_hand():
+    """Force holds to 0.02 %, light to 0.1 %: five times what a power of 1 would show, and the power hardly moves."""
+    random = np.random.default_rng(3)
+    forces = 0.5 * (1 + 2e-4 * random.standard_normal(10))
+    levels = (20_000 * (1 + 1e-3 * random.standard_normal(10))).round().astype(int)
+    lit = [frame("reference", level, force, dtype=np.uint16) for level, force in zip(levels, forces, strict=True)]
+    assert reference([frame("dark", 0, dtype=np.uint16), *lit]).exponent == pytest.approx(
+        EXPONENT, abs=EXPONENT_SPREAD / 3
+    )
+
+
+def test_frames_of_the_untouched_face_are_no_part_of_the_press():
+    base = reference([frame("dark", 4), frame("reference", 5, 0.0), frame("reference", 104, 0.5)])
+    np.testing.assert_allclose(base.above_dark(0.5), 100, rtol=1e-6)
+
+
+def test_without_a_press_the_reference_is_the_same_at_every_force():
+    base = reference([frame("dark", 4), frame("reference", 100, 0.0), frame("reference", 120, 0.0)])
+    for force_n in (0.0, 0.5):
         np.testing.assert_allclose(base.above_dark(force_n), 106, rtol=1e-6)
 
 
@@ -147,8 +169,8 @@ def test_a_brightness_outside_its_scale_is_refused(ratio):
         Frame(np.zeros(SHAPE, np.uint8), "press", 0.0, 0.5, (0.5, 0.5, 0.5, ratio))
 
 
-@pytest.mark.parametrize(("dtype", "full"), [(np.uint8, 255), (np.uint16, 65_535)])
-def test_saturation_is_counted_at_the_full_scale_of_the_type(dtype, full):
+@pytest.mark.parametrize(("dtype", "full"), [(np.uint8, 255), (np.uint16, 1023 * 64)])
+def test_saturation_is_counted_at_the_full_scale_of_eight_or_of_ten_bits_in_sixteen(dtype, full):
     counts = np.full((10, 10), full - 1, dtype)
     assert saturated_ratio(counts) == 0.0
     counts[0, :3] = full
