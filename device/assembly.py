@@ -142,6 +142,8 @@ def _require_own_serial(config: Config, scenario: Scenario) -> None:
             f"serial is {config.serial}, but the simulated probe with {scenario.light} light is {scenario.serial}.",
             "Correct the setting, and its calibration with it.",
         )
+    if scenario.sensor.bits != 8:
+        raise ConfigError(f"sensor.bits is {scenario.sensor.bits}, but the daemon's camera takes 8.", "Set it to 8.")
 
 
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:

@@ -105,7 +105,7 @@ def phantom_recording(
         *recorder.pressed("press", asked, asked.place),
     ]
     return Recording(
-        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"phantom {inclusion} {seed} {asked}")),
+        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"phantom {made_of} {asked} {ramps is None}")),
         serial=made_of.serial,
         software=__version__,
         started_at="1970-01-01T00:00:00.000Z",

@@ -1,8 +1,8 @@
 """Builds the virtual probe's table of faces from finite-element force ramps in finite strain.
 
-Chebyshev points in size, depth, ln E and force: 6 x 6 x 3 x 5 hold 0.5 % of the lump's peak between the points (shown
-by `tests/host_tools/test_surface_table.py` against fresh solves), because what is interpolated is the lump field over
-the force and over the size cubed.
+Chebyshev points in size, depth, ln E and force: 6 x 6 x 3 x 5 hold 0.5 % of a lump's largest deformation between the
+points and 1 % of its largest pressure, ring means both (`tests/host_tools/test_surface_table.py`, fresh solves),
+because what is interpolated is the lump field over the force and over the size cubed.
 """
 
 from __future__ import annotations

@@ -141,10 +141,15 @@ class Procedure:
             with self._lock:
                 if self._requested or pressed:
                     job, self._requested = self._requested or self._new_job(), None
-                    self.board.update(press=job, warnings=())
+                    self.board.update(press=job, warnings=self._warnings_since_last_press())
                     return job
             time.sleep(POLL_S)
         return None
+
+    def _warnings_since_last_press(self) -> tuple[DeviceError, ...]:
+        last = self.board.now.press
+        told = last.warnings if last else ()
+        return tuple(warning for warning in self.board.now.warnings if warning.as_record() not in told)
 
     def _new_job(self) -> PressJob:
         self._capture.cancelled.clear()  # here and not when the job begins: it may be cancelled before that
@@ -185,7 +190,8 @@ class Procedure:
         """Show what does not end a press; the next change of its job keeps it with the press."""
         if warning:
             log.warning("%s %s", warning.code, warning)
-            self.board.update(warnings=(*self.board.now.warnings, warning))
+            others = tuple(one for one in self.board.now.warnings if one.code != warning.code)
+            self.board.update(warnings=(*others, warning))
 
     def _set_job(self, job: PressJob, **changes: Any) -> None:
         warnings = tuple(warning.as_record() for warning in self.board.now.warnings)

@@ -66,11 +66,14 @@ class Sensor:
 
     @property
     def full_scale(self) -> int:
-        """Largest count."""
+        """Largest count of its own bits."""
         return int(2**self.bits - 1)
 
     def expose(self, intensity: Image, *, exposure_us: float, gain: float, seed: tuple[int, int]) -> Counts:
-        """Return the counts of one exposure (uint8, or uint16 for 10 bits); the seed is (scenario, frame number)."""
+        """Return the counts of one exposure; the seed is (scenario, frame number).
+
+        uint8, or for 10 bits uint16 with the 10 at the top, as frames of 16 bits have them.
+        """
         pattern = _pattern(self, intensity.shape)
         electrons = np.maximum(intensity, 0)
         electrons += np.float32(self.ambient_intensity)
@@ -85,8 +88,9 @@ class Sensor:
         electrons += np.float32(self.black_level_counts * self.full_scale / 255)
         np.rint(electrons, out=electrons)
         np.clip(electrons, 0, self.full_scale, out=electrons)
-        counts: Counts = electrons.astype(np.uint8) if self.bits == 8 else electrons.astype(np.uint16)
-        return counts
+        if self.bits == 8:
+            return electrons.astype(np.uint8)
+        return electrons.astype(np.uint16) * np.uint16(2 ** (16 - self.bits))
 
 
 class Pattern(NamedTuple):

@@ -55,7 +55,7 @@ def mitsuba_version(python: Path) -> str | None:
     asking = "from importlib.metadata import version; print(version('mitsuba'))"
     try:
         said = subprocess.run([str(python), "-I", "-c", asking], capture_output=True, text=True, timeout=60)
-    except OSError:
+    except (OSError, subprocess.TimeoutExpired):
         return None
     return said.stdout.strip() if said.returncode == 0 else None
 

@@ -12,7 +12,7 @@ FORCES_N = np.array([0.05, 0.6])
 
 
 @pytest.mark.parametrize("truth", TRUTHS)
-def test_the_table_is_within_half_a_percent_of_the_peak(table, truth):
+def test_the_table_is_within_half_a_percent_of_the_lumps_deformation_and_one_of_its_pressure(table, truth):
     """What the lump adds, over its own peak in the central window: deformation 0.5 %, ring means of pressure 1 %."""
     lump_ramp = table.lump(Inclusion(*truth))
     inside = table.r_mm <= 9.9

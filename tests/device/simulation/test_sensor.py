@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.tactile_image import saturated_ratio
 from device.simulation.sensor import Sensor
 
 SHAPE = (200, 300)
@@ -64,11 +65,13 @@ def test_a_full_well_holds_no_more_electrons():
 
 
 def test_ten_bits_resolve_a_quarter_of_a_count():
-    """The same light: four times the counts in uint16, up to 1023, black level scaled with them."""
+    """The same light: four times the counts, up to 1023, black level scaled with them; at the top of 16 bits."""
     fine = replace(SENSOR, bits=10)
     assert exposed(0.3, sensor=fine).dtype == np.uint16
-    assert exposed(0.3, sensor=fine).mean() == pytest.approx((exposed(0.3).mean()) * 1023 / 255, abs=0.2)
-    assert (exposed(1.0, sensor=fine) == 1023).all()
+    assert not (exposed(0.3, sensor=fine) % 64).any()
+    assert exposed(0.3, sensor=fine).mean() / 64 == pytest.approx((exposed(0.3).mean()) * 1023 / 255, abs=0.2)
+    assert (exposed(1.0, sensor=fine) == 1023 * 64).all()
+    assert saturated_ratio(exposed(1.0, sensor=fine)) == 1.0
 
 
 def test_ambient_light_is_there_with_the_leds_off():
