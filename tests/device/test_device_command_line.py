@@ -195,3 +195,10 @@ def test_a_target_force_that_the_certificate_is_not_for_keeps_the_probe_from_sta
     assert code == 1
     [line] = errors
     assert line.startswith("E401 press.target_n is 0.7, but must be 0.5 N as calibrated")
+
+
+def test_a_camera_of_ten_bits_is_refused_for_the_daemon(run, models, tmp_path):
+    (tmp_path / "scene.toml").write_text("[sensor]\nbits = 10\n")
+    code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")
+    assert code == 1
+    assert errors == ["E001 sensor.bits is 10, but the daemon's camera takes 8. Set it to 8."]

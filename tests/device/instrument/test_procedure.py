@@ -322,6 +322,16 @@ def test_a_warning_stays_with_the_press_and_its_measurement_and_is_gone_with_the
     assert rig.press()["warnings"] == []
 
 
+def test_a_warning_between_two_presses_is_told_once_and_with_the_next_press(rig):
+    warning = ClockJumpError("The clock was set by +3600.0 s.", "Check it.")
+    rig.until(lambda: rig.board.now.step == "ready")
+    for _ in range(2):
+        rig.procedure._warn(warning)
+    assert rig.board.now.warnings == (warning,)
+    assert rig.press()["warnings"] == [warning.as_record()]
+    assert rig.press()["warnings"] == []
+
+
 def test_light_that_lost_a_tenth_between_two_presses_is_warned_of(rig):
     assert rig.press()["warnings"] == []
     rig.bench.brightness = 0.4

@@ -55,3 +55,10 @@ def test_another_schema_is_refused(folder):
 def test_a_missing_array_is_refused_by_name(folder):
     with pytest.raises(InvalidQuantity, match="p_kpa"):
         load(folder, ("r_mm", "p_kpa"))
+
+
+def test_a_changed_record_is_refused_as_a_changed_array_is(folder):
+    path = folder / "some_table.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"origin": 8}))
+    with pytest.raises(InvalidQuantity, match="some table's hash"):
+        load(folder)

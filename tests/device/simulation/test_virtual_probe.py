@@ -1,17 +1,22 @@
 """One scene drives light, image and force: what the emulated chips are told."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from daemon_process import ROOT
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import PixelScale
 from device.simulation.hand import BESIDE_MM
+from device.simulation.light_table import load_light_table
+from device.simulation.off_axis_table import load_off_axis_table
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import CellSettings, Scenario
-from device.simulation.virtual_probe import VirtualProbe
+from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 
+MODELS = ROOT / "models" / "simulated_probe"
 SHAPE = (123, 193)
 SCALE = PixelScale(0.125, 0.146)
 LIT, OFF = (0.6, 0.6, 0.6, 0.6), (0.0, 0.0, 0.0, 0.0)
@@ -104,3 +109,18 @@ def test_the_cell_counts_are_zero_point_plus_force(tables):
 def test_an_inclusion_outside_the_table_is_refused(tables, inclusion):
     with pytest.raises(InvalidQuantity, match="inside the table's range"):
         VirtualProbe(Scenario(inclusion=Inclusion(*inclusion)), tables, SHAPE, SCALE)
+
+
+def test_tables_of_two_scenes_are_refused_together(tmp_path):
+    shutil.copytree(MODELS, tmp_path / "tables")
+    table = load_off_axis_table(MODELS)
+    table.save(tmp_path / "tables", {"scene_defaults": {"tissue": {"youngs_modulus_kpa": 50.0}}, "strain": "small"})
+    with pytest.raises(InvalidQuantity, match=r"off axis table's scene is .*50\.0.*host_tools table"):
+        ProbeTables.load(tmp_path / "tables")
+
+
+def test_a_table_of_light_in_an_impossible_block_is_refused_by_name(tmp_path):
+    table = load_light_table(MODELS)
+    replace(table, block=table.block | {"refractive_index": 0.5}).save(tmp_path, {})
+    with pytest.raises(InvalidQuantity, match="light table's refractive_index is 0.5"):
+        load_light_table(tmp_path)
