@@ -24,7 +24,7 @@ LedRatio = tuple[float, float, float, float]
 """Brightness of the sides +x, +y, -x, -y as a ratio of full scale, 0..1."""
 
 FLOOR_COUNTS = 6.0
-"""A reference dimmer than this above dark divides noise by noise: the pixel is marked invalid."""
+"""A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
 LOADED_RATIO = 0.5
 """Reference frames above this part of the largest reference force are the press; the others show an untouched face."""
 EXPONENT, EXPONENT_SPREAD, LIGHT_NOISE = 0.65, 0.3, 1e-3
@@ -103,6 +103,10 @@ class TactileImage:
     force_n: float
 
 
+def _floor(counts: Counts) -> float:
+    return FLOOR_COUNTS if counts.dtype == np.uint8 else FLOOR_COUNTS * 256
+
+
 def _mean(frames: Sequence[Frame]) -> Image:
     return np.asarray(np.mean([f.counts for f in frames], axis=0, dtype=np.float32))
 
@@ -129,7 +133,7 @@ def reference(frames: Sequence[Frame]) -> Reference:
 
 def _exponent(log_force: NDArray[np.float64], light: Image, dark: Image, frames: Sequence[Frame]) -> float:
     """Return d ln(light) / d ln(force) by least squares, held near `EXPONENT` as far as the frames do not tell."""
-    seen = light >= FLOOR_COUNTS
+    seen = light >= _floor(frames[0].counts)
     if not seen.any():
         return EXPONENT
     log_light = np.log([max(float((frame.counts[seen] - dark[seen]).mean()), 1e-3) for frame in frames])
@@ -152,7 +156,7 @@ def tactile_image(frame: Frame, reference: Reference, scale: PixelScale) -> Tact
         found, expected = ("{1} x {0} px".format(*shape) for shape in (frame.counts.shape, reference.dark.shape))
         raise InvalidQuantity("frame shape", found, f"{expected} like the reference", "use one camera mode")
     base = reference.above_dark(frame.force_n)
-    valid = base >= FLOOR_COUNTS
+    valid = base >= _floor(frame.counts)
     lit = frame.counts.astype(np.float32) - reference.dark
     contrast = np.divide(lit, base, out=np.ones_like(base), where=valid) - np.float32(1.0)
     return TactileImage(contrast=contrast, valid=valid, scale=scale, force_n=frame.force_n)

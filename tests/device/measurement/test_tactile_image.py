@@ -111,6 +111,15 @@ def test_without_a_press_the_reference_is_the_same_at_every_force():
         np.testing.assert_allclose(base.above_dark(force_n), 106, rtol=1e-6)
 
 
+def test_sixteen_bits_have_the_same_floor_as_eight():
+    counts = np.full(SHAPE, 400 * 64, np.uint16)
+    counts[3, 5], counts[3, 6] = (FLOOR_COUNTS - 1) * 256, FLOOR_COUNTS * 256
+    lit = Frame(counts, "reference", 0.0, 0.5, LIGHT)
+    base = reference([frame("dark", 0, dtype=np.uint16), lit])
+    image = tactile_image(frame("press", 500 * 64, 0.5, dtype=np.uint16), base, SCALE)
+    assert (image.valid[3, 5], image.valid[3, 6]) == (False, True)
+
+
 @pytest.mark.parametrize(("level", "is_valid"), [(FLOOR_COUNTS - 1, False), (FLOOR_COUNTS, True)])
 def test_a_pixel_whose_reference_is_too_dim_is_invalid_and_has_no_contrast(level, is_valid):
     counts = np.full(SHAPE, 104, np.uint8)
