@@ -13,7 +13,7 @@ from host_tools.data.plan import SweepPlan
 from host_tools.data.rows import Truth, bare_row
 from host_tools.data.sweep import sweep
 
-SCENES = 30
+SCENES = 12
 
 
 @pytest.fixture(scope="session")

@@ -27,7 +27,19 @@ from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 def _start(folder, name):
     command = [sys.executable, "-m", "host_tools", "sweep", "--scenes", str(SCENES), "--seed", "4", "--out", name]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, start_new_session=True)
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        preexec_fn=_hear_interrupts,
+    )
+
+
+def _hear_interrupts():
+    """A shell's background job ignores SIGINT, and so would all that it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _wait_for_rows(journal, count):
