@@ -12,10 +12,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.tactile_image import LedRatio
+from device.measurement.tactile_image import SIDES, LedRatio
 
-SIDES = ("+x", "+y", "-x", "-y")
-"""The sides of the waveguide in the order of every `LedRatio`; each has one LED."""
 LED_COUNT = len(SIDES)
 
 

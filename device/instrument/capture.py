@@ -10,13 +10,12 @@ import threading
 import time
 
 from device.config import Config
-from device.hardware.interfaces import SIDES
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import TearWatch
 from device.instrument.guidance import Guidance, advise
 from device.instrument.light_check import Levels, level_counts, require_contrast, require_dark, require_every_side
 from device.instrument.status import StatusBoard
-from device.measurement.tactile_image import Frame, LedRatio, Role
+from device.measurement.tactile_image import SIDES, Frame, LedRatio, Role
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from device.errors import AmbientLightError, DarkSideError, DimLightError, NoContrastError, StuckLightError
-from device.hardware.interfaces import SIDES
-from device.measurement.tactile_image import Counts, Frame
+from device.measurement.tactile_image import SIDES, Counts, Frame
 
 ONE_SIDED = 1.3
 """Light that is so much stronger in one half than in the other comes from a side of the waveguide."""

@@ -20,6 +20,8 @@ from device.measurement.quantities import Bound, InvalidQuantity, require
 Counts = NDArray[np.uint8] | NDArray[np.uint16]
 Image = NDArray[np.float32]
 Role = Literal["dark", "reference", "press"]
+SIDES = ("+x", "+y", "-x", "-y")
+"""The sides of the waveguide in the order of every `LedRatio` and of the chip's outputs 0-3; each has one LED."""
 LedRatio = tuple[float, float, float, float]
 """Brightness of the sides +x, +y, -x, -y as a ratio of full scale, 0..1."""
 

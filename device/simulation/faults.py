@@ -14,10 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.tactile_image import LedRatio
-
-SIDES = ("+x", "+y", "-x", "-y")
-"""The sides in the order of the chip's outputs 0-3."""
+from device.measurement.tactile_image import SIDES, LedRatio
 
 PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_stall": (),

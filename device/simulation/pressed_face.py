@@ -43,8 +43,10 @@ class PressedFace:
         self._r_mm, self._bare, self._lump = ramps
         self._off_axis, self.inclusion = off_axis, inclusion
         self._x_mm, self._y_mm = np.broadcast_arrays(x_mm, y_mm)
-        self._from_axis = RadialProfiles(self._r_mm, np.hypot(self._x_mm, self._y_mm))
-        self._tilt = [self._tilt_field(axis) for axis in (self._x_mm, self._y_mm)]
+        from_axis_mm = np.hypot(self._x_mm, self._y_mm)
+        self._from_axis = RadialProfiles(self._r_mm, from_axis_mm)
+        self._solid = RadialProfiles(off_axis.r_mm, from_axis_mm)
+        self._tilt = [self._tilt_field(axis, from_axis_mm) for axis in (self._x_mm, self._y_mm)]
         self._aside = lru_cache(maxsize=8)(self._aside_per_n)
 
     def at(self, force_n: float, place: Placement) -> tuple[Image, Image]:
@@ -70,17 +72,14 @@ class PressedFace:
         """Return w and p for 1 N of a lump at -(x, y) from the axis, but for the centred lump's share."""
         modes = self._off_axis.modes(self.inclusion, float(np.hypot(x_mm, y_mm)))
         angle = np.arctan2(self._y_mm, self._x_mm) - np.arctan2(-y_mm, -x_mm)
-        radial = RadialProfiles(self._off_axis.r_mm, np.hypot(self._x_mm, self._y_mm))
         return [
-            np.asarray(sum(radial(mode) * np.cos(k * angle) for k, mode in enumerate(field)), np.float32)
+            np.asarray(sum(self._solid(mode) * np.cos(k * angle) for k, mode in enumerate(field)), np.float32)
             for field in modes
         ]
 
-    def _tilt_field(self, along: NDArray[np.floating]) -> list[Image]:
-        r = np.hypot(self._x_mm, self._y_mm)
-        radial = RadialProfiles(self._off_axis.r_mm, r)
-        cosine = np.divide(along, r, out=np.zeros_like(r), where=r > 0)
-        return [np.asarray(radial(field) * cosine, np.float32) for field in self._off_axis.tilt_per_deg]
+    def _tilt_field(self, along_mm: NDArray[np.floating], from_axis_mm: NDArray[np.floating]) -> list[Image]:
+        cosine = np.divide(along_mm, from_axis_mm, out=np.zeros_like(from_axis_mm), where=from_axis_mm > 0)
+        return [np.asarray(self._solid(field) * cosine, np.float32) for field in self._off_axis.tilt_per_deg]
 
     def _tilted(self, w_mm: Image, p_kpa: Image, place: Placement) -> tuple[Image, Image]:
         for degrees, field in zip((place.tilt_x_deg, place.tilt_y_deg), self._tilt, strict=True):

@@ -7,7 +7,6 @@ part of it: see `device.simulation.skin`. Coordinates: z = 0 at the glass, z = t
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -64,8 +63,3 @@ class LightBlock:
         require("aperture_radius_mm", self.aperture_radius_mm, lens, "keep the LEDs' walls outside the camera's lens")
         beyond = Bound(self.glass_thickness_mm, 1e3, "mm", low_included=False)
         require("camera_distance_mm", self.camera_distance_mm, beyond, "place the camera below the glass")
-
-    @property
-    def critical_angle_rad(self) -> float:
-        """Incidence on a dry face beyond which all light is reflected: asin(1/n) (Snell)."""
-        return math.asin(1 / self.refractive_index)

@@ -8,12 +8,6 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.optics.light_block import LightBlock
 
 
-def test_light_coupled_from_air_is_just_trapped_at_the_square_root_of_two():
-    # The steepest ray inside stands 90 degrees minus asin(1/n) from the face's normal: equal angles at n = sqrt(2).
-    critical = LightBlock(refractive_index=math.sqrt(2)).critical_angle_rad
-    assert critical == pytest.approx(math.pi / 2 - critical)
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [
