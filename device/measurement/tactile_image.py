@@ -1,8 +1,7 @@
 """Frames to a tactile image: (I - dark) / (reference - dark) - 1, how much brighter the lump makes each pixel.
 
 The reference is the lump-free press at the *force of the frame*: the hand never holds two presses equally hard, and
-1 % of force is several per cent of a lump's contrast. Light grows more slowly than force, as contact fills up, so the
-reference follows a power of the force, whose exponent the reference press itself shows while the hand trembles.
+1 % of force is several per cent of a lump's contrast (`reference_light`).
 Pixels are not square; anything with a length goes through `PixelScale`. Source: docs/measurement.md.
 """
 
@@ -16,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.reference_light import HeldLight, RampLight, reference_light
+from device.measurement.reference_light import Image as Image
 
 Counts = NDArray[np.uint8] | NDArray[np.uint16]
-Image = NDArray[np.float32]
 Role = Literal["dark", "reference", "press"]
 SIDES = ("+x", "+y", "-x", "-y")
 """The sides of the waveguide in the order of every `LedRatio` and of the chip's outputs 0-3; each has one LED."""
@@ -27,10 +27,6 @@ LedRatio = tuple[float, float, float, float]
 
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
-LOADED_RATIO = 0.5
-"""Reference frames above this part of the largest reference force are the press; the others show an untouched face."""
-EXPONENT, EXPONENT_SPREAD, LIGHT_NOISE = 0.65, 0.3, 1e-3
-"""d ln(light) / d ln(force) before a frame is seen, how far off that may be, and how exact a frame's light is."""
 
 
 @dataclass(frozen=True)
@@ -81,18 +77,14 @@ class Frame:
 
 @dataclass(frozen=True)
 class Reference:
-    """The lump-free press: dark, its light above dark at `force_n`, and the power of the force with which it grows."""
+    """The lump-free press: dark, and its light above dark at any force."""
 
     dark: Image
-    light: Image
-    force_n: float
-    exponent: float
+    light: HeldLight | RampLight
 
     def above_dark(self, force_n: float) -> Image:
         """Return reference minus dark at a force (counts)."""
-        if self.exponent == 0.0 or force_n <= 0.0:
-            return self.light
-        return self.light * np.float32((force_n / self.force_n) ** self.exponent)
+        return self.light.at(force_n)
 
 
 @dataclass(frozen=True)
@@ -124,24 +116,8 @@ def reference(frames: Sequence[Frame]) -> Reference:
             raise InvalidQuantity(f"{role} frames", 0, "at least one", f"record {role} frames before the press")
     require_one_shape(frames)
     dark, lit = _mean(by_role["dark"]), by_role["reference"]
-    largest_n = max(frame.force_n for frame in lit)
-    loaded = [frame for frame in lit if frame.force_n >= LOADED_RATIO * largest_n]
-    light = _mean(loaded) - dark
-    if largest_n <= 0.0:
-        return Reference(dark, light, force_n=0.0, exponent=0.0)
-    log_force = np.log([frame.force_n for frame in loaded])
-    return Reference(dark, light, float(np.exp(log_force.mean())), _exponent(log_force, light, dark, loaded))
-
-
-def _exponent(log_force: NDArray[np.float64], light: Image, dark: Image, frames: Sequence[Frame]) -> float:
-    """Return d ln(light) / d ln(force) by least squares, held near `EXPONENT` as far as the frames do not tell."""
-    seen = light >= _floor(frames[0].counts)
-    if not seen.any():
-        return EXPONENT
-    log_light = np.log([max(float((frame.counts[seen] - dark[seen]).mean()), 1e-3) for frame in frames])
-    x, y = log_force - log_force.mean(), log_light - log_light.mean()
-    hold = (LIGHT_NOISE / EXPONENT_SPREAD) ** 2
-    return float((x @ y + hold * EXPONENT) / (x @ x + hold))
+    above = [np.asarray(frame.counts - dark, dtype=np.float32) for frame in lit]
+    return Reference(dark, reference_light([frame.force_n for frame in lit], above, _floor(lit[0].counts)))
 
 
 def require_one_shape(frames: Sequence[Frame]) -> None:

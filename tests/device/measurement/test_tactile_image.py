@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.reference_light import EXPONENT, EXPONENT_SPREAD
 from device.measurement.tactile_image import (
-    EXPONENT,
-    EXPONENT_SPREAD,
     FLOOR_COUNTS,
     Frame,
     PixelScale,
@@ -78,14 +77,14 @@ def pressed(forces_n, exponent, full=40_000):
 def test_light_that_grows_with_a_power_of_the_force_is_followed_by_that_power(exponent):
     """A trembling hand, 0.47 to 0.53 N, shows the power; at 0.4 and 0.6 N the reference is right to 0.1 %."""
     base = reference([frame("dark", 0, dtype=np.uint16), *pressed(np.linspace(0.47, 0.53, 10), exponent)])
-    assert base.exponent == pytest.approx(exponent, abs=2e-3)
+    assert base.light.exponent == pytest.approx(exponent, abs=2e-3)
     for force_n in (0.4, 0.5, 0.6):
         np.testing.assert_allclose(base.above_dark(force_n), 40_000 * force_n**exponent, rtol=1e-3)
 
 
 def test_a_hand_that_does_not_tremble_leaves_the_power_that_was_expected():
     base = reference([frame("dark", 4), frame("reference", 104, 0.5), frame("reference", 104, 0.5)])
-    assert base.exponent == EXPONENT
+    assert base.light.exponent == EXPONENT
     np.testing.assert_allclose(base.above_dark(0.51), 100 * (0.51 / 0.5) ** EXPONENT, rtol=1e-6)
 
 
@@ -95,7 +94,7 @@ def test_noise_of_the_light_hardly_moves_the_power_of_a_steady_hand():
     forces = 0.5 * (1 + 2e-4 * random.standard_normal(10))
     levels = (20_000 * (1 + 1e-3 * random.standard_normal(10))).round().astype(int)
     lit = [frame("reference", level, force, dtype=np.uint16) for level, force in zip(levels, forces, strict=True)]
-    assert reference([frame("dark", 0, dtype=np.uint16), *lit]).exponent == pytest.approx(
+    assert reference([frame("dark", 0, dtype=np.uint16), *lit]).light.exponent == pytest.approx(
         EXPONENT, abs=EXPONENT_SPREAD / 3
     )
 

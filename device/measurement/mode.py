@@ -1,0 +1,41 @@
+"""What a press is asked for: how much time it may take, and so which frames it needs and who answers.
+
+quick: one frame and one network. standard: ten frames over the force and an ensemble. precise: forty frames over the
+force, and the forward model fitted to them. paper: ten frames at one force, three features, as Lee & Won 2013.
+Measured error and time of each: the model card of models/standard, and docs/accuracy.md.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, get_args
+
+from device.measurement.quantities import InvalidQuantity
+
+Mode = Literal["quick", "standard", "precise", "paper"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+
+RAMP_FROM_N, RAMP_TO_N = 0.08, 0.60
+"""Forces of a ramp's first and last frame: some 0.4 to 3 mm of indentation."""
+
+
+class Frames(NamedTuple):
+    """Frames that a press of a mode takes, beside the lesion and again on it: at one force, or over a ramp."""
+
+    count: int
+    is_ramp: bool
+
+
+FRAMES: dict[Mode, Frames] = {
+    "quick": Frames(1, is_ramp=False),
+    "standard": Frames(10, is_ramp=True),
+    "precise": Frames(40, is_ramp=True),
+    "paper": Frames(10, is_ramp=False),
+}
+
+
+def mode_named(name: str) -> Mode:
+    """Return the mode of a name; raise `InvalidQuantity` naming all of them."""
+    for mode in MODES:
+        if mode == name:
+            return mode
+    raise InvalidQuantity("mode", repr(name), f"one of {', '.join(MODES)}", "choose one of them")

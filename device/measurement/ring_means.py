@@ -1,0 +1,67 @@
+"""An image to a few numbers a ring: mean, and first and second harmonic of the angle, on soft rings of the face.
+
+A ring's weight falls linearly from its radius to its neighbours', so that no pixel jumps from ring to ring and the
+means do not depend on where the pixels happen to lie. Without the lump's direction only lengths of harmonics mean
+something, so the first is taken along the direction of the bright side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.tactile_image import Image, PixelScale
+
+Array = NDArray[np.float64]
+
+RING_MM = 0.9
+RINGS = 11
+"""Rings at 0, 0.9 ... 9.0 mm: the last ends where the central window does, at 0.9 of the face's radius."""
+RING_RADII_MM: Array = RING_MM * np.arange(RINGS, dtype=np.float64)
+HARMONICS = 2
+
+
+class RingMeans(NamedTuple):
+    """`mean` [J], and `cosine`, `sine` [2, J] of the first two harmonics, of the image's own unit."""
+
+    mean: Array
+    cosine: Array
+    sine: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RingWeights:
+    """Weights [J, pixels] of the pixels inside the window, and the angle's cosines and sines [2, pixels] there."""
+
+    inside: NDArray[np.bool_]
+    weight: Image
+    cosine: Image
+    sine: Image
+
+    def means(self, image: Image, valid: NDArray[np.bool_]) -> RingMeans:
+        """Return the ring means over the valid pixels of an image [height, width]; a ring without one is 0."""
+        seen = valid[self.inside]
+        values = np.where(seen, image[self.inside], np.float32(0))
+        norm = np.maximum(self.weight @ seen.astype(np.float32), np.float32(1e-6))
+        return RingMeans(
+            (self.weight @ values / norm).astype(float),
+            np.stack([2 * (self.weight @ (values * c)) / norm for c in self.cosine]).astype(float),
+            np.stack([2 * (self.weight @ (values * s)) / norm for s in self.sine]).astype(float),
+        )
+
+
+@lru_cache(maxsize=4)
+def ring_weights(shape: tuple[int, int], scale: PixelScale) -> RingWeights:
+    """Return the weights for images [height, width] of a pixel scale."""
+    x, y = np.broadcast_arrays(*scale.coordinates_mm(shape))
+    r = np.hypot(x, y)
+    inside = r < RINGS * RING_MM
+    angle = np.arctan2(y, x)[inside]
+    order = np.arange(1, HARMONICS + 1, dtype=np.float32)[:, None]
+    distance = np.abs(r[inside][None, :] - RING_RADII_MM[:, None]) / RING_MM
+    weight = np.maximum(1 - distance, 0).astype(np.float32)
+    return RingWeights(inside, weight, np.cos(order * angle), np.sin(order * angle))
