@@ -7,7 +7,8 @@ Measured error and time of each: the model card of models/standard, and docs/acc
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+from dataclasses import dataclass
+from typing import Literal, get_args
 
 from device.measurement.quantities import InvalidQuantity
 
@@ -18,7 +19,8 @@ RAMP_FROM_N, RAMP_TO_N = 0.08, 0.60
 """Forces of a ramp's first and last frame: some 0.4 to 3 mm of indentation."""
 
 
-class Frames(NamedTuple):
+@dataclass(frozen=True)
+class Frames:
     """Frames that a press of a mode takes, beside the lesion and again on it: at one force, or over a ramp."""
 
     count: int

@@ -41,7 +41,7 @@ class PressProfile:
     """What a press says about lump, tissue and skin; K forces `force_n`, J rings `RING_RADII_MM`.
 
     contrast [K, J]: ring means of the tactile image. growth [K - 1, J]: ln of the lump-free light at each force over
-    that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the ramp,
+    that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the forces,
     without the ring in the middle. elongation [J - 1]: the same of the second harmonic, along its own direction.
     residual: root mean square, over rings and frames, of what the polynomial in the force leaves.
     """
@@ -99,15 +99,15 @@ def profile_of_lights(reference: Lights, press: Lights) -> PressProfile:
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
     weights = ring_weights(press.images[0].shape, press.scale)
     everywhere = np.ones(press.images[0].shape, dtype=bool)
-    rings = [
+    frames = [
         weights.means(*contrast_and_valid(image, light, force))
         for force, image in zip(press.force_n, press.images, strict=True)
     ]
-    contrast, residual = _at_profile_forces(press.force_n, np.array([ring.mean for ring in rings]))
+    rings, residual = _at_profile_forces(press.force_n, frames)
     bare = np.array([weights.means(light.at(force), everywhere).mean for force in PROFILE_FORCES_N])
     return PressProfile(
         force_n=PROFILE_FORCES_N,
-        contrast=contrast,
+        contrast=rings.mean,
         growth=np.log(bare[:-1] / bare[-1]),
         offset=harmonic(rings, 1),
         elongation=harmonic(rings, 2),
@@ -122,11 +122,12 @@ def contrast_and_valid(image: Image, light: HeldLight | RampLight, force_n: floa
     return np.divide(image, base, out=np.ones_like(base), where=valid) - np.float32(1), valid
 
 
-def harmonic(rings: Sequence[RingMeans], order: int) -> Array:
-    """Return the harmonic of an order [J - 1], mean over the frames, along its direction in the whole window."""
-    cosine, sine = (
-        np.mean([getattr(ring, part)[order - 1, 1:] for ring in rings], axis=0) for part in RingMeans._fields[1:]
-    )
+def harmonic(rings: RingMeans, order: int) -> Array:
+    """Return the harmonic of an order [J - 1], mean over the forces, along its direction in the whole window.
+
+    `rings` holds means [K, J] and harmonics [K, 2, J].
+    """
+    cosine, sine = (part[:, order - 1, 1:].mean(axis=0) for part in (rings.cosine, rings.sine))
     direction = np.arctan2(sine @ RING_RADII_MM[1:], cosine @ RING_RADII_MM[1:])
     return np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
 
@@ -164,10 +165,13 @@ def _require_ramp(name: str, force_n: Array) -> None:
     require(f"largest {name} force", float(max(force_n)), Bound(RAMP_HIGH_N, 1.0, "N"), AGAIN)
 
 
-def _at_profile_forces(force_n: Array, rows: Array) -> tuple[Array, float]:
-    """Return a polynomial's values [K, J] at the profile's forces, and the root mean square of what it leaves."""
+def _at_profile_forces(force_n: Array, frames: Sequence[RingMeans]) -> tuple[RingMeans, float]:
+    """Return polynomials' values at the profile's forces, and the root mean square of what they leave of the means."""
     top = float(PROFILE_FORCES_N[-1])
     powers = np.vander(force_n / top, RAMP_DEGREE + 1, increasing=True)
-    coefficients, *_ = np.linalg.lstsq(powers, rows, rcond=None)
     at = np.vander(PROFILE_FORCES_N / top, RAMP_DEGREE + 1, increasing=True)
-    return at @ coefficients, float(np.sqrt(np.mean((rows - powers @ coefficients) ** 2)))
+    onto = np.linalg.pinv(powers)
+    parts = [np.array(part) for part in zip(*frames, strict=True)]
+    fitted = RingMeans(*(np.tensordot(at @ onto, part, 1) for part in parts))
+    left = parts[0] - powers @ (onto @ parts[0])
+    return fitted, float(np.sqrt(np.mean(left**2)))

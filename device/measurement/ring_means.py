@@ -26,7 +26,7 @@ HARMONICS = 2
 
 
 class RingMeans(NamedTuple):
-    """`mean` [J], and `cosine`, `sine` [2, J] of the first two harmonics, of the image's own unit."""
+    """`mean` [..., J], and `cosine`, `sine` [..., 2, J] of the first two harmonics, in the image's own unit."""
 
     mean: Array
     cosine: Array
