@@ -1,6 +1,6 @@
 """Builds the virtual probe's table of lumps off the axis, and of a tilted probe, from solves in three dimensions.
 
-Small strain, on the coarse mesh (0.6 % of the peak). Between the points (3 x 4 x 2 x 6) the fields hold a few per cent
+Small strain, on the coarse mesh (0.6 % of the peak). Between the points (5 x 4 x 2 x 6) the fields hold a few per cent
 of the peak, as `tests/host_tools/test_off_axis_table.py` measures against fresh solves.
 """
 
@@ -18,16 +18,17 @@ from joblib import Parallel, delayed
 from device.measurement.quantities import Inclusion
 from device.simulation.chebyshev import Array, points_with_ends
 from device.simulation.off_axis_table import OffAxisTable
+from device.simulation.slab import NOMINAL
 from host_tools.forward.face_state import FaceState
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.plan import model_plan
 from host_tools.forward.tiers import build
 from host_tools.forward.tilt import tilt_per_degree
-from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Placement, Press, Scene
-from host_tools.surface_table import ring_means
+from host_tools.scene import Placement, Press, Scene
+from host_tools.surface_table import lump_axes, ring_means
 
-POINTS = (3, 4, 2, 6)
-"""Points in size, depth, modulus and offset."""
+POINTS = (5, 4, 2, 6)
+"""Points in size, depth, contrast and offset."""
 SMALLEST_SIZE_MM = 2.0
 OFFSETS_MM = (2.0, 16.0)
 MODES = 11
@@ -48,15 +49,17 @@ def cosine_modes(field: Array) -> Array:
     return np.asarray(series[:MODES])
 
 
-def _lumps_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, moduli_kpa: tuple[float, ...]) -> Array:
-    """Return the modes [M, 2, K, R] of one geometry at all moduli, on one mesh."""
+def _lumps_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, contrasts: Array) -> Array:
+    """Return the modes [M, 2, K, R] of one geometry at all contrasts, over these too, on one mesh."""
+    moduli_kpa = [NOMINAL.modulus_kpa(float(contrast)) for contrast in contrasts]
     scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm)
     meshed = build(scene, replace(model_plan(scene), grading="coarse"))
     bare, *pressed = (
         meshed.model.press(materials, [scene.press], estimate_error=False)[0].state
         for materials in (baseline(scene), *(with_inclusion(_with_modulus(scene, E)) for E in moduli_kpa))
     )
-    return np.stack([_modes(meshed.rays.r_mm[0], face, bare) for face in pressed]) / size_mm**3
+    modes = np.stack([_modes(meshed.rays.r_mm[0], face, bare) for face in pressed])
+    return modes / size_mm**3 / contrasts[:, None, None, None]
 
 
 def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
@@ -76,10 +79,7 @@ def build_off_axis_table(
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> OffAxisTable:
     """Solve every point of the table (about twenty minutes on two cores); `on_point` hears done and total."""
-    low, high = PAPER_BOX_LOW, PAPER_BOX_HIGH
-    size = points_with_ends(SMALLEST_SIZE_MM, high[0], points[0])
-    depth = points_with_ends(low[1], high[1], points[1])
-    modulus = np.exp(points_with_ends(np.log(low[2]), np.log(high[2]), points[2]))
+    axes = lump_axes(points[:3], SMALLEST_SIZE_MM)
     offset = points_with_ends(*OFFSETS_MM, points[3])
     r_mm, tilt_w_mm, tilt_p_kpa = tilt_per_degree(Scene(None))
     tilt = np.stack([tilt_w_mm, ring_means(r_mm, tilt_p_kpa)])[:, ::EVERY]
@@ -87,12 +87,12 @@ def build_off_axis_table(
     grid = list(product(range(points[0]), range(points[1]), range(points[3])))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     solved = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_lumps_per_n_mm3)(size[i], depth[j], offset[m], tuple(modulus)) for i, j, m in grid
+        delayed(_lumps_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.contrast) for i, j, m in grid
     )
     for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
         lump[i, j, :, m] = modes
         on_point(done, len(grid))
-    return OffAxisTable(size, depth, modulus, offset, r_mm[::EVERY], np.moveaxis(lump, 4, 0), tilt)
+    return OffAxisTable(*axes, offset, r_mm[::EVERY], np.moveaxis(lump, 4, 0), tilt)
 
 
 def write_off_axis_table(table: OffAxisTable, folder: Path) -> None:

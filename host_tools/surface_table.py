@@ -1,16 +1,18 @@
 """Builds the virtual probe's table of faces from finite-element force ramps in finite strain.
 
-Chebyshev points in size, depth, ln E and force: 6 x 6 x 3 x 5 hold 0.5 % of a lump's largest deformation between the
-points and 1 % of its largest pressure, ring means both (`tests/host_tools/test_surface_table.py`, fresh solves),
-because what is interpolated is the lump field over the force and over the size cubed.
+Chebyshev points in size, depth, contrast and force: 7 x 7 x 3 x 5 hold 0.5 % of a lump's largest deformation between
+the points and 1 % of its largest pressure, ring means both (`tests/host_tools/test_surface_table.py`, fresh solves),
+because what is interpolated is the lump field over the force, the size cubed and the contrast. What other slabs change
+is solved as a star: one modulus or one thickness apart from the nominal slab, at every second size and depth, and each
+as the difference of two solves on one mesh.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +20,24 @@ from joblib import Parallel, delayed
 
 from device.measurement.quantities import Inclusion
 from device.simulation.chebyshev import Array, points_inside, points_with_ends
-from device.simulation.surface_table import PressRamps, Ramp, SurfaceTable
+from device.simulation.lump_axes import LumpAxes
+from device.simulation.slab import NOMINAL, Slab
+from device.simulation.surface_table import COARSE, PressRamps, Ramp, SurfaceTable
 from host_tools.forward.accuracy import Level
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
-from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene
+from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Tissue, TissueLayer
 
-POINTS = (6, 6, 3)
-"""Points in size, depth and modulus."""
+POINTS = (7, 7, 3)
+"""Points in size, depth and contrast."""
+CONTRASTS = (0.1, 0.96)
+"""8-200 kPa in tissue of 4-6.25 kPa, with a little to spare; 6.4-305 kPa in the nominal slab."""
+SLAB_MODULI_KPA = (4.0, 5.0, 6.25)
+SLAB_THICKNESSES_MM = (27.5, 30.0, 36.0)
+"""The star, nominal in the middle; in the thinnest slab the deepest and largest lump just clears the base."""
+RIGID_KPA = 1e6
+"""Modulus of what stands in for the base."""
 SMALLEST_SIZE_MM = 1.0
 FORCES_N = points_inside(0.0, 0.8, 5)
 """Up to some 4 mm of indentation; no solve at 0 N, where a field over the force has no value."""
@@ -36,7 +47,7 @@ RING_MM = 1.0
 """Pressures are kept as means over rings of this width: at points they ring inside the elements by some 2 % of a lump's
 peak, their forces do not. Light spreads as far in the skin."""
 BARE = Level("blunt_fine", 3)
-"""The level of the one ramp without a lump."""
+"""The level of the ramps without a lump."""
 
 
 def ramp(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Solution, ...]:
@@ -65,10 +76,10 @@ def ring_means(r_mm: Array, p_kpa: Array) -> Array:
     return np.asarray((np.interp(outer, r_mm, force) - np.interp(inner, r_mm, force)) * 2 / (outer**2 - inner**2))
 
 
-def _ramps_per_n(scene: Scene, level: Level | None = None) -> tuple[Array, Array]:
+def _ramps_per_n(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Array, Array]:
     """Return both kinds of fields over the force, each [2, F, R]."""
-    bare, lump = zip(*(fields(solution) for solution in ramp(scene, level=level)), strict=True)
-    over = FORCES_N[None, :, None]
+    bare, lump = zip(*(fields(solution) for solution in ramp(scene, forces_n, level)), strict=True)
+    over = forces_n[None, :, None]
     return np.stack(bare, axis=1) / over, np.stack(lump, axis=1) / over
 
 
@@ -79,8 +90,63 @@ def press_ramps(scene: Scene) -> PressRamps:
     return PressRamps(r_mm, Ramp(FORCES_N, bare), Ramp(FORCES_N, lump))
 
 
-def _lump_per_n_mm3(size_mm: float, depth_mm: float, modulus_kpa: float) -> Array:
-    return _ramps_per_n(Scene(Inclusion(size_mm, depth_mm, modulus_kpa)))[1] / size_mm**3
+def scene_in(slab: Slab, inclusion: Inclusion | None = None) -> Scene:
+    """Return the default scene in another slab."""
+    tissue = replace(Tissue(), youngs_modulus_kpa=slab.youngs_modulus_kpa, thickness_mm=slab.thickness_mm)
+    return Scene(inclusion, tissue=tissue)
+
+
+def scene_on_one_mesh(
+    slab: Slab, inclusion: Inclusion | None = None, thicknesses_mm: Sequence[float] = SLAB_THICKNESSES_MM
+) -> Scene:
+    """Return the scene in the layers of a slab that is as thick as the last of the ascending `thicknesses_mm`.
+
+    Those below `slab`, whose thickness is one of them, are as good as rigid: slabs of all these thicknesses have one
+    mesh. Pressures near the rim differ by some 5 % of a lump's from mesh to mesh, more than the thickness changes them.
+    """
+    depths_mm = (0.0, *thicknesses_mm)
+    layers = [
+        TissueLayer(f"to_{base:g}_mm", base - top, slab.youngs_modulus_kpa if base <= slab.thickness_mm else RIGID_KPA)
+        for top, base in pairwise(depths_mm)
+    ]
+    bulk_kpa = layers.pop().youngs_modulus_kpa
+    tissue = replace(Tissue(), youngs_modulus_kpa=bulk_kpa, thickness_mm=depths_mm[-1], layers=tuple(layers))
+    return Scene(inclusion, tissue=tissue)
+
+
+SOFT, STIFF = (Slab(youngs_modulus_kpa=modulus) for modulus in SLAB_MODULI_KPA[::2])
+THIN, THICK = (Slab(thickness_mm=thickness) for thickness in SLAB_THICKNESSES_MM[::2])
+SOLVED = (
+    (scene_in, NOMINAL),
+    (scene_in, SOFT),
+    (scene_in, STIFF),
+    (scene_on_one_mesh, NOMINAL),
+    (scene_on_one_mesh, THIN),
+    (scene_on_one_mesh, THICK),
+)
+"""The slabs of the star and how each is meshed: changes with the modulus are from the first slab, those with the
+thickness from the fourth."""
+SceneOf = Callable[[Slab, Inclusion | None], Scene]
+
+
+def _bare_per_n(scene_of: SceneOf, slab: Slab) -> Array:
+    return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BARE)[0]
+
+
+def _lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, contrast: float) -> Array:
+    """Return what a lump adds [2, F, R] over force, size cubed and contrast, at forces that indent alike."""
+    scene = scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(contrast)))
+    return _ramps_per_n(scene, FORCES_N * slab.stiffness_ratio)[1] / size_mm**3 / contrast
+
+
+def lump_axes(points: tuple[int, int, int], smallest_size_mm: float) -> LumpAxes:
+    """Return Chebyshev points over the sizes and depths of the paper's box and over `CONTRASTS`."""
+    low, high = PAPER_BOX_LOW, PAPER_BOX_HIGH
+    return LumpAxes(
+        points_with_ends(smallest_size_mm, high[0], points[0]),
+        points_with_ends(low[1], high[1], points[1]),
+        points_with_ends(*CONTRASTS, points[2]),
+    )
 
 
 def build_surface_table(
@@ -89,23 +155,47 @@ def build_surface_table(
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> SurfaceTable:
-    """Solve every point of the table (about ten minutes on two cores); `on_point` hears done and total."""
-    low, high = PAPER_BOX_LOW, PAPER_BOX_HIGH
-    size = points_with_ends(SMALLEST_SIZE_MM, high[0], points[0])
-    depth = points_with_ends(low[1], high[1], points[1])
-    modulus = np.exp(points_with_ends(np.log(low[2]), np.log(high[2]), points[2]))
-    bare = _ramps_per_n(Scene(None), BARE)[0]
-    r_mm = np.linspace(0.0, Scene(None).waveguide.radius_mm, bare.shape[-1])
-    lump = np.zeros((*points, 2, len(FORCES_N), len(r_mm)))
-    grid = list(product(*map(range, points)))
+    """Solve every point of the table (about half an hour on two cores); `on_point` hears done and total."""
+    axes = lump_axes(points, SMALLEST_SIZE_MM)
+    places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid)]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    solved = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_lump_per_n_mm3)(size[i], depth[j], modulus[k]) for i, j, k in grid
+    bare = Parallel(n_jobs=jobs)(delayed(_bare_per_n)(*one) for one in SOLVED)
+    solving = Parallel(n_jobs=jobs, return_as="generator")(delayed(_lump_per_n_mm3)(*place) for place in places)
+    lump = []
+    for field in solving:
+        lump.append(field)
+        on_point(len(lump), len(places))
+    return assembled(axes, bare, lump)
+
+
+def _grids(axes: LumpAxes) -> list[LumpAxes]:
+    """Return the points of each of `SOLVED`: all of them in the nominal slab, the coarse ones for the star."""
+    coarse = LumpAxes(axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.contrast)
+    return [axes, *[coarse] * (len(SOLVED) - 1)]
+
+
+def assembled(axes: LumpAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array]) -> SurfaceTable:
+    """Return the table of the fields [2, F, R] in the order of `SOLVED`, each lump's grid with the contrast fastest."""
+    remaining, lumps = iter(lump_per_n_mm3), []
+    for grid in _grids(axes):
+        fields_on_grid = np.array([next(remaining) for _ in product(*grid)])
+        shape = [len(points) for points in grid]
+        lumps.append(np.moveaxis(fields_on_grid.reshape(*shape, *fields_on_grid.shape[1:]), 3, 0))
+    return SurfaceTable(
+        *axes,
+        slab_modulus_kpa=np.array(SLAB_MODULI_KPA),
+        slab_thickness_mm=np.array(SLAB_THICKNESSES_MM),
+        force_n=FORCES_N,
+        r_mm=np.linspace(0.0, Scene(None).waveguide.radius_mm, lumps[0].shape[-1]),
+        bare_per_n=bare_per_n[0],
+        lump_per_n_mm3=lumps[0],
+        bare_change_per_n=_changes(*bare_per_n),
+        lump_change_per_n_mm3=_changes(lumps[0][:, COARSE, COARSE], *lumps[1:]),
     )
-    for done, (index, field) in enumerate(zip(grid, solved, strict=True), start=1):
-        lump[index] = field
-        on_point(done, len(grid))
-    return SurfaceTable(size, depth, modulus, FORCES_N, r_mm, bare, np.moveaxis(lump, 3, 0))
+
+
+def _changes(nominal: Array, soft: Array, stiff: Array, layered: Array, thin: Array, thick: Array) -> Array:
+    return np.stack([soft - nominal, stiff - nominal, thin - layered, thick - layered])
 
 
 def write_surface_table(table: SurfaceTable, folder: Path) -> None:

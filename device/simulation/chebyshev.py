@@ -5,6 +5,8 @@ Source: Berrut & Trefethen, Barycentric Lagrange interpolation, SIAM Review 46 (
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,3 +32,10 @@ def interpolation_weights(points: Array, at: float) -> Array:
     gaps = (points[:, None] - points[None, :]) / np.ptp(points) + np.eye(len(points))
     terms = 1 / (gaps.prod(axis=1) * distance)
     return np.asarray(terms / terms.sum())
+
+
+def interpolated(fields: Array, axes: Iterable[Array], place: Iterable[float]) -> Array:
+    """Return fields [n0, n1, n2, ...] at a place on the axes from n1 on: [n0, ...] without the axes interpolated in."""
+    for points, at in zip(axes, place, strict=True):
+        fields = np.tensordot(interpolation_weights(points, at), fields, (0, 1))
+    return fields

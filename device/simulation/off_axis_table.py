@@ -1,9 +1,8 @@
 """What a lump off the probe's axis adds to the face, and what a tilted probe does, for the virtual probe.
 
 Small strain in three dimensions: fields are proportional to the force (or the tilt) and depend on radius and on the
-angle from the direction of the lump, as a cosine series. Between the solved moduli what counts is the contrast of an
-incompressible sphere, (E - Et) / (E + 3/2 Et), in which the field is all but linear. Written by `host_tools table`.
-Source: Eshelby, Proc. R. Soc. A 241 (1957), on the contrast.
+angle from the direction of the lump, as a cosine series. All in the nominal slab; `PressedFace` carries them over to
+another one. Between the solved moduli the lump's contrast counts (`slab.py`). Written by `host_tools table`.
 """
 
 from __future__ import annotations
@@ -14,32 +13,31 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, require
-from device.simulation.chebyshev import interpolation_weights
+from device.measurement.quantities import Inclusion
+from device.simulation.chebyshev import interpolated
+from device.simulation.lump_axes import LumpAxes
+from device.simulation.slab import NOMINAL
 from device.simulation.table_file import load_table, save_table
 
 Array = NDArray[np.float64]
-NAME, SCHEMA = "off_axis_table", "tsis.off_axis_table/1"
+NAME, SCHEMA = "off_axis_table", "tsis.off_axis_table/2"
 ACTION = "run `host_tools table` to make it again"
-TISSUE_KPA = 5.0
 FADING_MM = 2.5
 """Length over which a lump beyond the largest offset stops to count; assumed, it moves the rim at most."""
 FORGOTTEN = 1e-3
 """What is left of a lump that is not looked for any more: farther off, any inclusion will do."""
 
 
-def contrast(youngs_modulus_kpa: float | Array, tissue_kpa: float = TISSUE_KPA) -> float | Array:
-    """Return (E - Et) / (E + 3/2 Et): 0 for tissue, 1 for a rigid sphere."""
-    return (youngs_modulus_kpa - tissue_kpa) / (youngs_modulus_kpa + 1.5 * tissue_kpa)
-
-
 @dataclass(frozen=True)
 class OffAxisTable:
-    """`lump_per_n_mm3` [2, S, D, M, O, K, R]; `tilt_per_deg` [2, R] times the cosine of the angle; w first, then p."""
+    """`lump_per_n_mm3` [2, S, D, M, O, K, R], over the contrast too; `tilt_per_deg` [2, R] times the angle's cosine.
+
+    w comes first, then p.
+    """
 
     size_mm: Array
     depth_mm: Array
-    youngs_modulus_kpa: Array
+    contrast: Array
     offset_mm: Array
     r_mm: Array
     lump_per_n_mm3: Array
@@ -66,18 +64,9 @@ class OffAxisTable:
         return np.asarray(modes * (min(offset_mm / first_mm, 1.0) ** power)[:, None])
 
     def _modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
-        size_mm, fields = inclusion.size_mm, self.lump_per_n_mm3
-        require("size_mm", size_mm, Bound(0.0, float(self.size_mm[-1]), "mm"), ACTION)
-        at = dict(zip(UNKNOWNS, inclusion.as_tuple(), strict=True)) | {"size_mm": max(size_mm, self.size_mm[0])}
-        for name in (*UNKNOWNS, "offset_mm"):
-            points: Array = getattr(self, name)
-            value = at.get(name, offset_mm)
-            unit = "kPa" if name.endswith("_kpa") else "mm"
-            require(name, value, Bound(points[0], points[-1], unit), "choose an inclusion inside the table's range")
-            if name == "youngs_modulus_kpa":
-                points, value = np.asarray(contrast(points)), float(contrast(value))
-            fields = np.tensordot(interpolation_weights(points, value), fields, (0, 1))
-        return np.asarray(size_mm**3 * fields)
+        axes = LumpAxes(self.size_mm, self.depth_mm, self.contrast)
+        at_offsets = axes.lump_per_n(self.lump_per_n_mm3, inclusion, NOMINAL)
+        return interpolated(at_offsets, [self.offset_mm], [offset_mm])
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write off_axis_table.npz and its description with the hash."""

@@ -1,13 +1,14 @@
 """Force, position and tilt to the deformation and pressure of the whole face, on one grid of points.
 
-A lump off the axis is solved in small strain and grows with the force as the centred one grows; moving the centred
-field instead would be wrong, because a probe that cannot turn answers with a moment. A tilt adds its own fields; where
-the pressure would pull the face has lifted, and the rest carries the force. What each costs in accuracy:
-docs/simulated_probe.md.
+A lump off the axis is solved in small strain in the nominal slab, and changes with force and slab as the centred one
+of its contrast does; moving the centred field instead would be wrong, because a probe that cannot turn answers with a
+moment. A tilt adds its own fields, as stiff as the tissue; where the pressure would pull the face has lifted, and the
+rest carries the force. What each costs in accuracy: docs/simulated_probe.md.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from device.measurement.quantities import Inclusion
 from device.measurement.tactile_image import Image
 from device.simulation.off_axis_table import OffAxisTable
+from device.simulation.slab import NOMINAL, Slab
 from device.simulation.surface_table import Face, PressRamps
 
 BEYOND_RIM_MM = 0.5
@@ -37,23 +39,28 @@ class PressedFace:
     """Fields of one inclusion at the points x_mm [1, nx], y_mm [ny, 1]."""
 
     def __init__(
-        self, ramps: PressRamps, off_axis: OffAxisTable, inclusion: Inclusion, x_mm: Image, y_mm: Image
+        self,
+        ramps: PressRamps,
+        off_axis: OffAxisTable,
+        inclusion: Inclusion,
+        x_mm: Image,
+        y_mm: Image,
+        slab: Slab = NOMINAL,
     ) -> None:
         """Pressing far off the axis later raises `InvalidQuantity` for an inclusion that the table does not hold."""
-        self._r_mm, self._bare, self._lump = ramps
-        self._off_axis, self.inclusion = off_axis, inclusion
+        self._ramps, self._off_axis, self._twin = ramps, off_axis, slab.nominal_twin(inclusion)
         self._x_mm, self._y_mm = np.broadcast_arrays(x_mm, y_mm)
         from_axis_mm = np.hypot(self._x_mm, self._y_mm)
-        self._from_axis = RadialProfiles(self._r_mm, from_axis_mm)
+        self._from_axis = RadialProfiles(ramps.r_mm, from_axis_mm)
         self._solid = RadialProfiles(off_axis.r_mm, from_axis_mm)
-        self._tilt = [self._tilt_field(axis, from_axis_mm) for axis in (self._x_mm, self._y_mm)]
+        self._tilt = [self._tilt_field(axis, from_axis_mm, slab.stiffness_ratio) for axis in (self._x_mm, self._y_mm)]
         self._aside = lru_cache(maxsize=8)(self._aside_per_n)
 
     def at(self, force_n: float, place: Placement) -> tuple[Image, Image]:
         """Return w_mm and p_kpa [ny, nx]; the pressure is never negative and carries the force."""
         if force_n <= 0:
             return np.zeros(self._x_mm.shape, np.float32), np.zeros(self._x_mm.shape, np.float32)
-        bare, lump = self._bare.at(force_n), self._lump.at(force_n)
+        bare, lump = self._ramps.bare.at(force_n), self._ramps.lump.at(force_n)
         share = self._off_axis.centred_share(float(np.hypot(place.x_mm, place.y_mm)))
         w_mm, p_kpa = (self._from_axis(b + share * extra) for b, extra in zip(bare, lump, strict=True))
         if share < 1:
@@ -63,23 +70,31 @@ class PressedFace:
         return self._tilted(w_mm, p_kpa, place)
 
     def _growth(self, lump: Face, force_n: float) -> list[float]:
-        """Return how much larger the centred lump's w and p are, at their largest, than in small strain."""
-        small = self._lump.at_small_strain(force_n)
-        peaks = [(np.abs(now).max(), np.abs(before).max()) for now, before in zip(lump, small, strict=True)]
-        return [float(now / before) if before > 0 else 1.0 for now, before in peaks]
+        """Return how much larger the centred lump's w and p are than nominal in small strain.
+
+        By the root mean square over the face: peaks jump from radius to radius, and the image would with them.
+        """
+        small = (self._ramps.nominal_lump or self._ramps.lump).at_small_strain(force_n)
+        squares = [
+            (self._ramps.r_mm @ now**2, self._ramps.r_mm @ before**2) for now, before in zip(lump, small, strict=True)
+        ]
+        return [math.sqrt(now / before) if before > 0 else 1.0 for now, before in squares]
 
     def _aside_per_n(self, x_mm: float, y_mm: float) -> list[Image]:
         """Return w and p for 1 N of a lump at -(x, y) from the axis, but for the centred lump's share."""
-        modes = self._off_axis.modes(self.inclusion, float(np.hypot(x_mm, y_mm)))
+        modes = self._off_axis.modes(self._twin, float(np.hypot(x_mm, y_mm)))
         angle = np.arctan2(self._y_mm, self._x_mm) - np.arctan2(-y_mm, -x_mm)
         return [
             np.asarray(sum(self._solid(mode) * np.cos(k * angle) for k, mode in enumerate(field)), np.float32)
             for field in modes
         ]
 
-    def _tilt_field(self, along_mm: NDArray[np.floating], from_axis_mm: NDArray[np.floating]) -> list[Image]:
+    def _tilt_field(
+        self, along_mm: NDArray[np.floating], from_axis_mm: NDArray[np.floating], stiffness_ratio: float
+    ) -> list[Image]:
         cosine = np.divide(along_mm, from_axis_mm, out=np.zeros_like(from_axis_mm), where=from_axis_mm > 0)
-        return [np.asarray(self._solid(field) * cosine, np.float32) for field in self._off_axis.tilt_per_deg]
+        fields = stiffness_ratio * self._off_axis.tilt_per_deg
+        return [np.asarray(self._solid(field) * cosine, np.float32) for field in fields]
 
     def _tilted(self, w_mm: Image, p_kpa: Image, place: Placement) -> tuple[Image, Image]:
         for degrees, field in zip((place.tilt_x_deg, place.tilt_y_deg), self._tilt, strict=True):

@@ -16,6 +16,7 @@ from device.simulation.lens import Lens
 from device.simulation.renderer import LinearOptics
 from device.simulation.sensor import Sensor
 from device.simulation.skin import Skin
+from device.simulation.slab import Slab
 
 SERIALS = {"physical": "SIM-0001", "linear": "SIM-LINEAR"}
 DEFAULT_INCLUSION = Inclusion(size_mm=12.0, depth_mm=6.0, youngs_modulus_kpa=60.0)
@@ -42,6 +43,7 @@ class CellSettings:
 class Scenario:
     """What the virtual probe is made of and pressed on, what goes wrong, and the fault code the device must raise.
 
+    An inclusion of 0 mm is none. The tissue is a slab of 4-6.25 kPa and 27-36 mm.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
     """
 
@@ -53,6 +55,8 @@ class Scenario:
     optics: LinearOptics = field(default_factory=LinearOptics)
     sensor: Sensor = field(default_factory=Sensor)
     cell: CellSettings = field(default_factory=CellSettings)
+    tissue_modulus_kpa: float = 5.0
+    slab_thickness_mm: float = 30.0
     seed: int = 1
     faults: tuple[Fault, ...] = ()
     expects: str = ""
@@ -60,7 +64,13 @@ class Scenario:
     def __post_init__(self) -> None:
         if self.light not in SERIALS:
             raise InvalidQuantity("light", repr(self.light), "physical or linear", "choose one of them")
+        _ = self.slab  # refuses tissue that the tables do not hold
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
+
+    @property
+    def slab(self) -> Slab:
+        """The tissue that is pressed; raises `InvalidQuantity` where the tables do not hold it."""
+        return Slab(self.tissue_modulus_kpa, self.slab_thickness_mm)
 
     @property
     def serial(self) -> str:

@@ -1,9 +1,10 @@
 """The virtual probe's mechanics: a table of faces under a force ramp, so that no finite elements run on the device.
 
-For every (size, depth, Young's modulus) of the paper's box and every force up to 0.8 N it gives deformation w(r) and
-contact pressure p(r) of the face: those without a lump, and what the lump adds. Finite strain with true sliding, so
-neither is proportional to the force; both are kept per newton, and what a lump adds also per mm3 of its size cubed,
-because those are smooth. Chebyshev polynomials in size, depth, ln E and force. Written by `host_tools table`.
+For every lump (1-15 mm, 4-12 mm deep, 8-200 kPa), slab of tissue and force it gives deformation w(r) and contact
+pressure p(r) of the face: those without a lump, and what the lump adds. Finite strain with true sliding, so neither is
+proportional to the force; both are kept per newton, and what a lump adds also per mm3 of its size cubed and over its
+contrast, because those are smooth. Chebyshev polynomials in size, depth, contrast and force; a slab other than the
+nominal adds a change that is quadratic in ln Et and in 1/T. Written by `host_tools table`.
 Source: Trefethen, Approximation Theory and Approximation Practice, chapter 5 (barycentric interpolation).
 """
 
@@ -16,13 +17,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, require
+from device.measurement.quantities import Inclusion
 from device.simulation.chebyshev import interpolation_weights
+from device.simulation.lump_axes import LumpAxes
+from device.simulation.slab import NOMINAL, Slab
 from device.simulation.table_file import load_table, save_table
 
 Array = NDArray[np.float64]
-NAME, SCHEMA = "surface_table", "tsis.surface_table/2"
+NAME, SCHEMA = "surface_table", "tsis.surface_table/3"
 ACTION = "run `host_tools table` to make it again"
+COARSE = slice(None, None, 2)
+"""The changes with the slab are kept at every second size and depth: of an odd number of Chebyshev points these are
+Chebyshev points as well."""
 
 
 class Face(NamedTuple):
@@ -52,45 +58,63 @@ class Ramp:
 
 
 class PressRamps(NamedTuple):
-    """The ramp without a lump and what one lump adds, at radii `r_mm` [R]."""
+    """The ramp without a lump and what one lump adds, at radii `r_mm` [R].
+
+    `nominal_lump` is what one of the same contrast adds in the nominal slab, None where that is `lump` itself.
+    """
 
     r_mm: Array
     bare: Ramp
     lump: Ramp
+    nominal_lump: Ramp | None = None
 
 
 @dataclass(frozen=True)
 class SurfaceTable:
     """`bare_per_n` [2, F, R] without a lump, `lump_per_n_mm3` [2, S, D, M, F, R] what one adds; w first, then p.
 
-    Sizes begin at 1 mm: a smaller lump's field is that one's, scaled with its volume.
+    Both are of the nominal slab. `bare_change_per_n` [4, ...] and `lump_change_per_n_mm3` [4, ...] are what the first
+    and last of `slab_modulus_kpa` [3] and of `slab_thickness_mm` [3] change at the same contrast and the same force
+    over the tissue's modulus, at `COARSE` sizes and depths; the middle ones are nominal.
     """
 
     size_mm: Array
     depth_mm: Array
-    youngs_modulus_kpa: Array
+    contrast: Array
+    slab_modulus_kpa: Array
+    slab_thickness_mm: Array
     force_n: Array
     r_mm: Array
     bare_per_n: Array
     lump_per_n_mm3: Array
+    bare_change_per_n: Array
+    lump_change_per_n_mm3: Array
 
-    def ramps(self, inclusion: Inclusion) -> PressRamps:
-        """Return the ramps of one inclusion; refuses one outside the table."""
-        return PressRamps(self.r_mm, Ramp(self.force_n, self.bare_per_n), self.lump(inclusion))
+    def ramps(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> PressRamps:
+        """Return the ramps of one inclusion in a slab; refuses one outside the table.
 
-    def lump(self, inclusion: Inclusion) -> Ramp:
-        """Return what an inclusion adds to the ramp; refuses one outside the table."""
-        size_mm, fields = inclusion.size_mm, self.lump_per_n_mm3
-        require("size_mm", size_mm, Bound(0.0, float(self.size_mm[-1]), "mm"), "choose one inside the table's range")
-        for name in UNKNOWNS:
-            points: Array = getattr(self, name)
-            value = max(size_mm, points[0]) if name == "size_mm" else getattr(inclusion, name)
-            unit = "kPa" if name.endswith("_kpa") else "mm"
-            require(name, value, Bound(points[0], points[-1], unit), "choose an inclusion inside the table's range")
-            if name == "youngs_modulus_kpa":
-                points, value = np.log(points), np.log(value)
-            fields = np.tensordot(interpolation_weights(points, value), fields, (0, 1))
-        return Ramp(self.force_n, size_mm**3 * fields)
+        They reach to 0.78 N times the tissue's modulus over 5 kPa: as deep in every tissue.
+        """
+        lump = self.lump(inclusion, slab)
+        bare = self._ramp(slab, self.bare_per_n + self._changed(self.bare_change_per_n, slab))
+        nominal = None if slab == NOMINAL else self.lump(slab.nominal_twin(inclusion))
+        return PressRamps(self.r_mm, bare, lump, nominal)
+
+    def lump(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
+        """Return what an inclusion adds to the ramp in a slab; refuses one outside the table."""
+        fine = LumpAxes(self.size_mm, self.depth_mm, self.contrast)
+        coarse = LumpAxes(self.size_mm[COARSE], self.depth_mm[COARSE], self.contrast)
+        change = coarse.lump_per_n(self._changed(self.lump_change_per_n_mm3, slab), inclusion, slab)
+        return self._ramp(slab, fine.lump_per_n(self.lump_per_n_mm3, inclusion, slab) + change)
+
+    def _ramp(self, slab: Slab, fields_per_n: Array) -> Ramp:
+        return Ramp(self.force_n * slab.stiffness_ratio, fields_per_n)
+
+    def _changed(self, changes: Array, slab: Slab) -> Array:
+        """Return the sum of the changes [4, ...] that a slab makes: none in the nominal one."""
+        modulus = interpolation_weights(np.log(self.slab_modulus_kpa), np.log(slab.youngs_modulus_kpa))
+        thickness = interpolation_weights(1 / self.slab_thickness_mm, 1 / slab.thickness_mm)
+        return np.tensordot(np.concatenate([modulus[[0, 2]], thickness[[0, 2]]]), changes, (0, 0))
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write surface_table.npz and its description with the hash."""

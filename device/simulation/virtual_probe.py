@@ -65,8 +65,9 @@ class VirtualProbe:
         """
         self.scenario, self.hand = scenario, VirtualHand(scenario.hand)
         self._image = _image_formation(scenario, tables, shape, scale)
-        solved = ramps or tables.centred.ramps(scenario.inclusion)
-        self._face = PressedFace(solved, tables.off_axis, scenario.inclusion, self._image.x_mm, self._image.y_mm)
+        lump, slab = scenario.inclusion, scenario.slab
+        solved = ramps or tables.centred.ramps(lump, slab)
+        self._face = PressedFace(solved, tables.off_axis, lump, self._image.x_mm, self._image.y_mm, slab)
 
     def cell_counts(self, t_s: float) -> float:
         """Return the noise-free load-cell counts at a time."""

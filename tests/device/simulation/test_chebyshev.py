@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.simulation.chebyshev import interpolation_weights, points_inside, points_with_ends
+from device.simulation.chebyshev import interpolated, interpolation_weights, points_inside, points_with_ends
 
 
 @pytest.mark.parametrize("points", [points_with_ends(2.0, 5.0, 6), points_inside(2.0, 5.0, 6)])
@@ -13,6 +13,14 @@ def test_a_polynomial_of_the_degree_is_exact(points):
 
     for x in (2.1, 3.3, 4.9, points[2]):
         assert interpolation_weights(points, x) @ quintic(points) == pytest.approx(quintic(x), rel=1e-12)
+
+
+def test_a_polynomial_in_two_variables_is_exact_and_the_other_axes_stay():
+    """(1 + x) (2 - y^2) times [1, 3] before and [1, 2, 5] after the two axes."""
+    x, y = points_with_ends(0.0, 4.0, 2), points_inside(-1.0, 1.0, 3)
+    fields = np.multiply.outer(np.multiply.outer([1.0, 3.0], np.outer(1 + x, 2 - y**2)), [1.0, 2.0, 5.0])
+    found = interpolated(fields, [x, y], [1.5, 0.3])
+    np.testing.assert_allclose(found, 2.5 * 1.91 * np.outer([1.0, 3.0], [1.0, 2.0, 5.0]), rtol=1e-12)
 
 
 def test_ends_are_points_of_the_second_kind_only():

@@ -5,6 +5,7 @@ import pytest
 
 from device.measurement.quantities import Inclusion
 from device.simulation.pressed_face import Placement, PressedFace
+from device.simulation.slab import NOMINAL, Slab
 
 INCLUSION = Inclusion(10.0, 5.0, 80.0)
 X_MM = np.linspace(-12, 12, 97, dtype=np.float32)[None, :]
@@ -36,7 +37,7 @@ def test_beside_the_lesion_nothing_of_the_lump_is_left(tables, truth, force_n):
 
 def test_centred_the_fields_are_the_tables(face, tables):
     w_mm, p_kpa = face.at(0.5, Placement())
-    bare, lump = (ramp.at(0.5) for ramp in tables.centred.ramps(INCLUSION)[1:])
+    bare, lump = (ramp.at(0.5) for ramp in tables.centred.ramps(INCLUSION)[1:3])
     r_mm = np.hypot(X_MM, Y_MM)
     expected = np.interp(r_mm, tables.centred.r_mm, bare.w_mm + lump.w_mm)
     np.testing.assert_allclose(w_mm[ON_FACE], expected[ON_FACE], rtol=1e-5)
@@ -90,6 +91,25 @@ def test_a_small_offset_departs_from_the_centred_field_in_proportion(face):
     assert np.abs(twice - 2 * once)[ON_FACE].max() < 0.15 * np.abs(twice[ON_FACE]).max()
 
 
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(4.4, 27.6), Slab(6.25, 36.0)])
+def test_off_the_axis_a_lump_changes_with_the_slab_as_the_centred_one_of_its_contrast(tables, slab):
+    """What it adds 4 mm aside is the nominal twin's, times the ratio of both on the axis (root mean square)."""
+
+    def added_mm(inclusion, slab):
+        lump, none = (
+            PressedFace(tables.centred.ramps(one, slab), tables.off_axis, one, X_MM, Y_MM, slab)
+            for one in (inclusion, Inclusion(0.0, inclusion.depth_mm, inclusion.youngs_modulus_kpa))
+        )
+        aside = Placement(4.0, 0.0)
+        return lump.at(0.5, aside)[0] - none.at(0.5, aside)[0]
+
+    both = (INCLUSION, slab), (slab.nominal_twin(INCLUSION), NOMINAL)
+    centred_mm = (tables.centred.lump(*one).at(0.5).w_mm for one in both)
+    squares, nominal_squares = (tables.centred.r_mm @ w_mm**2 for w_mm in centred_mm)
+    aside, nominal_aside = (added_mm(*one) for one in both)
+    np.testing.assert_allclose(aside, nominal_aside * np.sqrt(squares / nominal_squares), atol=1e-5 * aside.max())
+
+
 def test_a_tilt_presses_the_side_it_leans_to_and_lifts_the_other(face):
     """Ten degrees open the contact on the far side; there is no tension."""
     p_kpa = face.at(0.2, Placement(40.0, 0.0, tilt_x_deg=10.0))[1]
@@ -98,3 +118,14 @@ def test_a_tilt_presses_the_side_it_leans_to_and_lifts_the_other(face):
     lifted = (p_kpa == 0) & (np.hypot(X_MM, Y_MM) < 10)
     assert lifted[:, :48].any()
     assert not lifted[:, 49:].any()
+
+
+def test_stiffer_tissue_resists_a_tilt_as_much_more(tables):
+    """A small tilt beside the lesion adds a pressure in proportion to the tissue's modulus."""
+
+    def added_kpa(slab):
+        beside = PressedFace(tables.centred.ramps(INCLUSION, slab), tables.off_axis, INCLUSION, X_MM, Y_MM, slab)
+        tilted, straight = (beside.at(0.5, Placement(40.0, 0.0, tilt_x_deg=degrees))[1] for degrees in (0.1, 0.0))
+        return (tilted - straight)[np.hypot(X_MM, Y_MM) < 9]
+
+    np.testing.assert_allclose(added_kpa(Slab(6.0)), 1.2 * added_kpa(NOMINAL), atol=1e-4)

@@ -10,6 +10,7 @@ from device.simulation.renderer import LinearOptics
 from device.simulation.scenario import CellSettings, Scenario, read_scenario
 from device.simulation.sensor import Sensor
 from device.simulation.skin import Skin
+from device.simulation.slab import Slab
 
 
 @pytest.fixture
@@ -28,7 +29,8 @@ def test_an_empty_file_is_the_default_scene(read):
 
 def test_what_is_written_holds_and_the_rest_stays(read):
     scenario = read(
-        "seed = 7\n[inclusion]\nsize_mm = 4\ndepth_mm = 6.5\nyoungs_modulus_kpa = 100\n"
+        "seed = 7\ntissue_modulus_kpa = 4.4\nslab_thickness_mm = 33\n"
+        "[inclusion]\nsize_mm = 4\ndepth_mm = 6.5\nyoungs_modulus_kpa = 100\n"
         "[hand]\naim_n = 0.8\n[sensor]\nread_noise_e = 0\n[cell]\nnoise_counts = 0\n[optics]\nintercept = 0.2\n"
     )
     assert scenario == Scenario(
@@ -37,8 +39,11 @@ def test_what_is_written_holds_and_the_rest_stays(read):
         optics=LinearOptics(intercept=0.2),
         sensor=Sensor(read_noise_e=0.0),
         cell=CellSettings(noise_counts=0.0),
+        tissue_modulus_kpa=4.4,
+        slab_thickness_mm=33,
         seed=7,
     )
+    assert scenario.slab == Slab(4.4, 33.0)
 
 
 def test_faults_are_a_list_with_the_code_that_is_expected(read):
@@ -71,6 +76,8 @@ def test_an_unknown_key_is_refused_with_what_was_meant(read, text, key, action):
     [
         ("seed = -1", "seed"),
         ("seed = 1.5", "seed"),
+        ("tissue_modulus_kpa = 7", "tissue_modulus_kpa"),
+        ("slab_thickness_mm = 26", "slab_thickness_mm"),
         ("[inclusion]\nsize_mm = -1\ndepth_mm = 5\nyoungs_modulus_kpa = 80", "size_mm"),
         ("[inclusion]\nsize_mm = 10", "inclusion"),
         ("[hand]\nrate_n_per_s = 0", "hand.rate_n_per_s"),

@@ -14,6 +14,7 @@ from device.simulation.light_table import load_light_table
 from device.simulation.off_axis_table import load_off_axis_table
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import CellSettings, Scenario
+from device.simulation.slab import Slab
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 
 MODELS = ROOT / "models" / "simulated_probe"
@@ -57,6 +58,26 @@ def test_the_lump_makes_the_image_brighter(probe):
 def test_without_light_the_frame_is_the_black_level(probe):
     """But for a few hot pixels."""
     assert (frame(probe, led_ratio=OFF) == 4).mean() > 0.999
+
+
+def test_an_inclusion_of_no_size_is_none(tables):
+    """On the lesion and beside it the frames are the same."""
+    probe = VirtualProbe(Scenario(inclusion=Inclusion(0.0, 6.0, 60.0)), tables, SHAPE, SCALE)
+    np.testing.assert_array_equal(frame(probe), frame(probe, place=BESIDE))
+
+
+def test_the_scenes_tissue_is_what_is_pressed(tables):
+    scenario = Scenario(tissue_modulus_kpa=4.4, slab_thickness_mm=28.0)
+    nominal, found, expected = (
+        frame(VirtualProbe(made_of, tables, SHAPE, SCALE, ramps=ramps))
+        for made_of, ramps in (
+            (Scenario(), None),
+            (scenario, None),
+            (Scenario(), tables.centred.ramps(scenario.inclusion, Slab(4.4, 28.0))),
+        )
+    )
+    np.testing.assert_array_equal(found, expected)
+    assert (found != nominal).mean() > 0.05
 
 
 def test_an_untouched_face_is_dark_under_total_internal_reflection(tables):
@@ -105,7 +126,7 @@ def test_the_cell_counts_are_zero_point_plus_force(tables):
     assert probe.cell_counts(5.0) == pytest.approx(550.0, abs=15.0)
 
 
-@pytest.mark.parametrize("inclusion", [(15.5, 5.0, 80.0), (10.0, 3.5, 80.0), (10.0, 5.0, 200.0)])
+@pytest.mark.parametrize("inclusion", [(15.5, 5.0, 80.0), (10.0, 3.5, 80.0), (10.0, 5.0, 310.0)])
 def test_an_inclusion_outside_the_table_is_refused(tables, inclusion):
     with pytest.raises(InvalidQuantity, match="inside the table's range"):
         VirtualProbe(Scenario(inclusion=Inclusion(*inclusion)), tables, SHAPE, SCALE)

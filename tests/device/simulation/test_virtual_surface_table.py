@@ -7,39 +7,83 @@ import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.chebyshev import points_inside, points_with_ends
-from device.simulation.surface_table import SurfaceTable, load_surface_table
+from device.simulation.slab import NOMINAL, Slab
+from device.simulation.surface_table import COARSE, SurfaceTable, load_surface_table
 
 R_MM = np.linspace(0.0, 11.0, 12)
 FORCE_N = points_inside(0.0, 0.8, 3)
+SLAB_KPA, SLAB_MM = np.array([4.0, 5.0, 6.25]), np.array([28.5, 30.0, 36.0])
 
 
-def polynomial(size_mm, depth_mm, log_modulus, force_n):
-    """A polynomial of degree 4, 3, 2 and 2 in size, depth, ln E and force, different at every radius."""
-    smooth = (1 + size_mm - 0.1 * size_mm**4) * (2 - depth_mm**3 / 50) * (log_modulus**2 - 3 * log_modulus)
+def polynomial(size_mm, depth_mm, contrast, force_n):
+    """A polynomial of degree 2, 2, 2 and 2 in size, depth, contrast and force, different at every radius."""
+    smooth = (1 + size_mm - 0.1 * size_mm**2) * (2 - depth_mm**2 / 50) * (contrast**2 - 3 * contrast)
     return np.multiply.outer(smooth * (1 + force_n - 2 * force_n**2), 1 + R_MM)
 
 
-def pressure(*of):
-    return polynomial(*of) * 3
+def slab_effect(modulus_kpa, thickness_mm):
+    """Quadratic in the logarithm of the modulus and in one over the thickness; none in the nominal slab."""
+    stiffness, thinness = np.log(modulus_kpa / 5.0), 1 / thickness_mm - 1 / 30.0
+    return 0.3 * stiffness - stiffness**2 + 20 * thinness + 900 * thinness**2
 
 
 @pytest.fixture
 def small_table():
-    size, depth = points_with_ends(1.0, 15.0, 5), points_with_ends(4.0, 12.0, 4)
-    modulus = np.array([40.0, np.sqrt(40.0 * 120.0), 120.0])  # Chebyshev points in the logarithm
-    grid = np.meshgrid(size, depth, np.log(modulus), FORCE_N, indexing="ij")
-    bare = np.stack([0.4 + R_MM / 20, 2 + R_MM]) * np.ones((3, 1, 1))
-    lump = np.stack([polynomial(*grid), pressure(*grid)])
-    return SurfaceTable(size, depth, modulus, FORCE_N, R_MM, np.swapaxes(bare, 0, 1), lump)
+    axes = points_with_ends(1.0, 15.0, 5), points_with_ends(4.0, 12.0, 5), points_with_ends(0.1, 0.96, 3)
+    grid = np.meshgrid(*axes, FORCE_N, indexing="ij")
+    bare = np.stack([0.4 + R_MM / 20, 2 + R_MM])[:, None] * np.ones((3, 1))
+    lump = np.stack([polynomial(*grid), 3 * polynomial(*grid)])
+    star = slab_effect(np.array([4.0, 6.25, 5.0, 5.0]), np.array([30.0, 30.0, 28.5, 36.0]))
+    return SurfaceTable(
+        *axes,
+        slab_modulus_kpa=SLAB_KPA,
+        slab_thickness_mm=SLAB_MM,
+        force_n=FORCE_N,
+        r_mm=R_MM,
+        bare_per_n=bare,
+        lump_per_n_mm3=lump,
+        bare_change_per_n=np.multiply.outer(star, bare),
+        lump_change_per_n_mm3=np.multiply.outer(star, lump[:, COARSE, COARSE]),
+    )
 
 
-@pytest.mark.parametrize("inclusion", [(3.3, 7.7, 55.0), (15.0, 4.0, 120.0), (1.0, 12.0, 40.0), (9.0, 5.0, 99.0)])
-def test_a_lump_field_is_interpolated_in_size_depth_modulus_and_force(small_table, inclusion):
+@pytest.mark.parametrize("inclusion", [(3.3, 7.7, 55.0), (15.0, 4.0, 200.0), (1.0, 12.0, 8.0), (9.0, 5.0, 99.0)])
+def test_a_lump_field_is_interpolated_in_size_depth_contrast_and_force(small_table, inclusion):
     size, depth, modulus = inclusion
     face = small_table.lump(Inclusion(*inclusion)).at(0.37)
-    scale = 0.37 * size**3
-    np.testing.assert_allclose(face.w_mm, scale * polynomial(size, depth, np.log(modulus), 0.37), rtol=1e-9)
-    np.testing.assert_allclose(face.p_kpa, scale * pressure(size, depth, np.log(modulus), 0.37), rtol=1e-9)
+    contrast = NOMINAL.contrast(modulus)
+    expected = 0.37 * size**3 * contrast * polynomial(size, depth, contrast, 0.37)
+    np.testing.assert_allclose(face.w_mm, expected, rtol=1e-9)
+    np.testing.assert_allclose(face.p_kpa, 3 * expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("slab", [Slab(4.4, 27.6), Slab(6.25, 30.0), Slab(5.0, 36.0), Slab(5.8, 33.0)])
+def test_another_slab_adds_its_change_at_the_same_contrast_and_scaled_force(small_table, slab):
+    ramps = small_table.ramps(Inclusion(9.0, 5.0, 99.0), slab)
+    contrast, nominal_n = slab.contrast(99.0), 0.3
+    force_n = nominal_n * slab.youngs_modulus_kpa / 5.0
+    changed = 1 + slab_effect(slab.youngs_modulus_kpa, slab.thickness_mm)
+    expected = changed * force_n * 9.0**3 * contrast * polynomial(9.0, 5.0, contrast, nominal_n)
+    np.testing.assert_allclose(ramps.lump.at(force_n).w_mm, expected, rtol=1e-9)
+    np.testing.assert_allclose(ramps.bare.at(force_n).w_mm, changed * force_n * (0.4 + R_MM / 20), rtol=1e-9)
+
+
+def test_the_nominal_slab_has_no_change_and_is_its_own_reference(small_table):
+    """Changes a million times too large would show."""
+    inclusion = Inclusion(9.0, 5.0, 99.0)
+    before = small_table.ramps(inclusion)
+    small_table.bare_change_per_n[:] *= 1e6
+    small_table.lump_change_per_n_mm3[:] *= 1e6
+    after = small_table.ramps(inclusion, Slab(5.0, 30.0))
+    np.testing.assert_array_equal(after.bare.fields_per_n, before.bare.fields_per_n)
+    np.testing.assert_array_equal(after.lump.fields_per_n, before.lump.fields_per_n)
+    assert after.nominal_lump is None
+
+
+def test_in_another_slab_the_reference_is_the_lump_of_the_same_contrast_in_the_nominal_one(small_table):
+    reference = small_table.ramps(Inclusion(9.0, 5.0, 80.0), Slab(4.0)).nominal_lump
+    expected = small_table.lump(Inclusion(9.0, 5.0, 100.0))
+    np.testing.assert_allclose(reference.fields_per_n, expected.fields_per_n, rtol=1e-12)
 
 
 def test_a_lump_smaller_than_the_tables_smallest_shrinks_with_its_volume(small_table):
@@ -60,27 +104,18 @@ def test_small_strain_is_the_smallest_force_in_proportion(small_table):
     np.testing.assert_allclose(ramp.at_small_strain(0.5).p_kpa, 0.5 / first * ramp.at(first).p_kpa, rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("inclusion", "quantity"),
-    [
-        ((15.1, 6.0, 80.0), "size_mm"),
-        ((10.0, 3.9, 80.0), "depth_mm"),
-        ((10.0, 12.1, 80.0), "depth_mm"),
-        ((10.0, 6.0, 39.0), "youngs_modulus_kpa"),
-        ((10.0, 6.0, 121.0), "youngs_modulus_kpa"),
-    ],
-)
-def test_an_inclusion_outside_the_table_is_refused_by_what_is_outside(small_table, inclusion, quantity):
-    with pytest.raises(InvalidQuantity, match=f"^{quantity} is .*inside the table's range"):
-        small_table.lump(Inclusion(*inclusion))
-
-
-def test_the_committed_table_holds_every_corner_of_the_papers_box(table):
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(4.0, 27.0), Slab(6.25, 27.0), Slab(4.0, 36.0), Slab(6.25, 36.0)])
+def test_the_committed_table_holds_every_corner_of_its_range_in_every_slab(table, slab):
     for size_mm in (0.0, 15.0):
         for depth_mm in (4.0, 12.0):
-            for modulus_kpa in (40.0, 120.0):
-                face = table.lump(Inclusion(size_mm, depth_mm, modulus_kpa)).at(0.5)
-                assert np.isfinite(face).all()
+            for modulus_kpa in (8.0, 200.0):
+                ramps = table.ramps(Inclusion(size_mm, depth_mm, modulus_kpa), slab)
+                assert np.isfinite([ramp.at(0.5) for ramp in (ramps.bare, ramps.lump)]).all()
+
+
+def test_an_inclusion_outside_the_table_is_refused_in_its_slab(small_table):
+    with pytest.raises(InvalidQuantity, match="^youngs_modulus_kpa is 7.9.*inside the table's range"):
+        small_table.ramps(Inclusion(10.0, 6.0, 7.9), Slab(6.25))
 
 
 def test_a_table_comes_back_as_it_was_saved(small_table, tmp_path):
@@ -108,7 +143,7 @@ def test_a_missing_file_is_refused_with_the_command_that_makes_it(small_table, t
         load_surface_table(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"schema": "tsis.surface_table/1"}'])
+@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"schema": "tsis.surface_table/2"}'])
 def test_a_description_that_is_none_is_refused(small_table, tmp_path, text):
     small_table.save(tmp_path, {})
     (tmp_path / "surface_table.json").write_text(text)
