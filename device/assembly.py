@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Any, TypeVar
 
+from device.answers import answers_for
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.camera import RawMonoCamera, open_camera
@@ -21,11 +22,11 @@ from device.instrument.bench import Bench
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
-from device.instrument.guidance import Guidance
+from device.instrument.guidance import Guidance, before_contact
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import Calibration, read_calibration
-from device.measurement.estimate import estimate_recording
 from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
@@ -130,7 +131,7 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     cell = parts.open(lambda: open_load_cell(line.device_path, config.cell.baud))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
     procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)
-    procedure.on_request(faults.begin_press)
+    procedure.on_request(lambda mode: faults.begin_press())
     _lead_by_hand(procedure, probe)
     return procedure
 
@@ -165,10 +166,10 @@ def _lead_by_hand(procedure: Procedure, probe: VirtualProbe) -> None:
     def follow(guidance: Guidance) -> None:
         probe.hand.follow(guidance.code, time.monotonic())
 
-    def begin() -> None:
+    def begin(mode: Mode) -> None:
         probe.hand.begin()
         guidance = procedure.board.now.guidance
-        if guidance is Guidance.PRESS_BESIDE:  # shown since before the hand took up the probe
+        if guidance is before_contact("reference", mode):  # shown since before the hand took up the probe
             follow(guidance)
 
     procedure.board.on_guidance(follow)
@@ -189,20 +190,22 @@ def _procedure(
     force = parts.open(lambda: _tared(config, cell)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
+    answers = parts.open(lambda: answers_for(config, bundle, calibration)) if bundle and calibration else None
     store = parts.open(lambda: Store(config.data, disk))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.
     assert lights is not None
     assert camera is not None
     assert force is not None
-    assert bundle is not None
+    assert answers is not None
     assert calibration is not None
     assert store is not None
     return Procedure(
         config,
         Bench(lights, camera, force, FramePace(config.camera.late_frames / config.camera.frame_rate_hz)),
-        partial(estimate_recording, bundle=bundle, calibration=calibration),
+        answers.estimator,
         store,
+        modes=answers.modes,
         calibration_id=calibration.id,
         opened=parts.opened,
         clock=clock,

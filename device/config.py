@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from device.errors import ConfigError
+from device.measurement.mode import MODES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.tactile_image import PixelScale
 from device.measurement.toml_record import read_toml
@@ -112,23 +113,32 @@ class CellSection:
 
 @dataclass(frozen=True)
 class PressSection:
-    """The press: target force and its band, when it counts as contact, as steady, and as too much."""
+    """The press: mode unless asked otherwise, target force and its band, what is contact, steady, and too much.
 
+    `max_rate_n_per_s`: a ramp's force may not change faster, or it would not be known at the exposure.
+    """
+
+    mode: Mode = "paper"
     target_n: float = 0.5
     band_ratio: float = 0.05
     contact_n: float = 0.05
     steady_n: float = 0.02
     overload_n: float = 1.0
-    frames: int = 10
+    max_rate_n_per_s: float = 0.35
     timeout_s: float = 60.0
 
     def __post_init__(self) -> None:
+        if self.mode not in MODES:
+            raise InvalidQuantity("press.mode", repr(self.mode), f"one of {', '.join(MODES)}", ACTION)
         require("press.target_n", self.target_n, Bound(0.1, 20.0, "N"), ACTION)
         require("press.band_ratio", self.band_ratio, Bound(0.005, 0.2, ""), ACTION)
-        require("press.contact_n", self.contact_n, Bound(0.005, self.target_n / 2, "N, half the target"), ACTION)
+        highest_n = min(self.target_n / 2, 0.75 * RAMP_FROM_N)
+        bound = Bound(0.005, highest_n, "N, half the target and below every ramp")
+        require("press.contact_n", self.contact_n, bound, ACTION)
         require("press.steady_n", self.steady_n, Bound(0.001, 1.0, "N"), ACTION)
-        require("press.overload_n", self.overload_n, Bound(self.target_n * 1.2, 50.0, "N"), ACTION)
-        require("press.frames", self.frames, Bound(1, 200, "frames"), ACTION)
+        lowest_n = 1.2 * max(self.target_n, RAMP_TO_N)
+        require("press.overload_n", self.overload_n, Bound(lowest_n, 50.0, "N, a fifth above hold and ramp"), ACTION)
+        require("press.max_rate_n_per_s", self.max_rate_n_per_s, Bound(0.05, 5.0, "N/s"), ACTION)
         require("press.timeout_s", self.timeout_s, Bound(1.0, 3600.0, "s"), ACTION)
 
     @property

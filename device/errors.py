@@ -1,6 +1,7 @@
 """The daemon's errors: each class one fault, each with the code that the screen and the API show.
 
-The hundreds are the part: 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request.
+The hundreds are the part: 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request (E803 and
+E804, a malformed one and an unknown path, are device/web/problems.py's own).
 docs/simulated_probe.md lists how each fault is provoked and seen.
 
 DeviceError
@@ -24,7 +25,8 @@ DeviceError
 │   └── DiskFullError        E602  there is no space left
 ├── ClockJumpError           E701  the wall clock was set (a warning)
 ├── BusyError                E801  a press is already under way
-└── UnknownResource          E802  no such press or measurement
+├── UnknownResource          E802  no such press or measurement
+└── ModeUnavailable          E805  this probe cannot answer in that mode
 """
 
 from __future__ import annotations
@@ -182,3 +184,10 @@ class UnknownResource(DeviceError):  # noqa: N818 - the name is what the caller 
 
     code = "E802"
     status = 404
+
+
+class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A press was asked for in a mode for which this probe has no model."""
+
+    code = "E805"
+    status = 422

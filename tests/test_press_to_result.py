@@ -59,6 +59,10 @@ def test_ten_frames_are_taken_in_the_force_band(measurement):
     assert 0.475 <= measurement["force_n"] <= 0.525
 
 
+def test_without_a_mode_the_press_is_taken_in_that_of_the_settings(daemon, job, measurement):
+    assert job["mode"] == measurement["mode"] == daemon.ask("/api/v1/device").json["default_mode"]
+
+
 def test_the_recording_gives_the_same_estimate_again(daemon, measurement, tmp_path, bundle, calibration):
     """What is kept is what was measured: the zip, analysed elsewhere, has the same answer."""
     content = daemon.ask(f"/api/v1/measurements/{measurement['id']}/recording.zip").body
@@ -102,6 +106,7 @@ def test_measurements_are_listed_newest_first(daemon, measurement):
         ("/api/v1/measurements?limit=0", "GET", None, 422, "E803"),
         ("/api/v1/measurements?before_seq=99999999999999999999999", "GET", None, 422, "E803"),
         ("/api/v1/presses", "POST", {"force_newton": 3}, 422, "E803"),
+        ("/api/v1/presses", "POST", {"mode": "fast"}, 422, "E803"),
     ],
 )
 def test_bad_requests_are_problem_documents_with_a_remedy(daemon, path, method, body, status, code):

@@ -53,3 +53,7 @@ class Bench:
     def is_steady(self, t_s: float, steady_n: float) -> bool:
         """Return whether the force hardly varied just before a time: a ramp through the band is no hold."""
         return self.force.range_n(t_s, window_s=STEADY_WINDOW_S) <= steady_n
+
+    def rate_n_per_s(self, t_s: float) -> float:
+        """Return how fast the force grew just before a time, tremor averaged out; negative while the hand eases."""
+        return (self.force.at(t_s) - self.force.at(t_s - STEADY_WINDOW_S)) / STEADY_WINDOW_S

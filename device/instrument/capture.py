@@ -1,26 +1,35 @@
-"""Takes the frames a measurement is made of: unloaded ones, and ten in the force band while the hand holds still.
+"""Takes the frames a measurement is made of: unloaded ones, and those of a press in the mode that was asked for.
 
-A frame counts when its own force lies in the band and the force hardly varied just before it; a hand that lifts early
-begins again. Source: Lee & Won 2013, section IV: ten frames averaged per lesion.
+Which frames of a press count is for `HoldFrames` or `RampFrames` to say; a hand that lifts early begins again.
+The light of each side is looked at while the reference press is still held.
 """
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 
 from device.config import Config
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import TearWatch
-from device.instrument.guidance import Guidance, advise
-from device.instrument.light_check import Levels, level_counts, require_contrast, require_dark, require_every_side
+from device.instrument.guidance import before_contact
+from device.instrument.hold_frames import TOUCH_RATIO, HoldFrames
+from device.instrument.light_check import (
+    Levels,
+    growth_ratio,
+    level_counts,
+    require_contrast,
+    require_dark,
+    require_every_side,
+)
+from device.instrument.ramp_frames import RampFrames, ramp_targets_n
 from device.instrument.status import StatusBoard
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.tactile_image import SIDES, Frame, LedRatio, Role
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02
-TOUCH_RATIO = 0.7
-"""A frame on the way to the hold, at less than this part of its force, shows what the force does to the image."""
 
 
 class PressEnded(Exception):  # noqa: N818 - not every end is an error
@@ -56,37 +65,43 @@ class Capture:
         self.bench.light(DARK)
         return dark + lit
 
-    def loaded(self, role: Role, before_contact: Guidance) -> list[Frame]:
-        """Return the frames of one press.
+    def loaded(self, role: Role, mode: Mode) -> list[Frame]:
+        """Return the frames of one press, as many as the mode needs.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
         depend on it.
         """
+        wanted, begin = self._wanted(role, mode), before_contact(role, mode)
+        self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
         self.bench.light(self.lit)
-        taken: list[Frame] = []
-        touch: Frame | None = None
         last_contact_s = time.monotonic()
-        while len(taken) < self.press.frames:
+        while not wanted.is_complete:
             self._require_going_on()
             frame = self.bench.take(role)
-            if frame.force_n >= self.press.contact_n:
+            is_touching = frame.force_n >= self.press.contact_n
+            if is_touching:
                 last_contact_s = time.monotonic()
-                touch = touch or frame
-            else:
-                taken.clear()
-                touch = None
             self._require_bearable(frame, last_contact_s)
-            guidance = advise(frame.force_n, self.press.band_n, self.press.contact_n, before_contact=before_contact)
-            if guidance is Guidance.HOLD_STILL and self.bench.is_steady(frame.t_s, self.press.steady_n):
-                self._append(taken, frame)
-            self.board.update(guidance=guidance, frames_taken=len(taken))
-        if touch and touch.force_n < TOUCH_RATIO * self.press.target_n:
-            require_contrast(touch, taken, self._dark_counts, self.light.min_contrast_ratio)
-        return taken
+            if is_touching:
+                guidance = wanted.see(frame)
+            else:
+                guidance = begin
+                wanted.begin_again()
+            self.board.update(guidance=guidance, frames_taken=len(wanted.frames), wanted_n=wanted.wanted_n)
+        if seen := wanted.light_and_hard():
+            require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
+        return wanted.frames
 
-    def side_levels(self) -> Levels:
-        """Return the light of each side alone, under the load of the press that is being held, at the target force.
+    def _wanted(self, role: Role, mode: Mode) -> HoldFrames | RampFrames:
+        count = FRAMES[mode].count
+        if FRAMES[mode].is_ramp:
+            return RampFrames(ramp_targets_n(count, role), self.press, self.bench, self._tears)
+        return HoldFrames(count, self.press, self.bench, self._tears)
 
+    def side_levels(self, reference: Sequence[Frame]) -> Levels:
+        """Return the light of each side alone, under the load of the reference press that is being held.
+
+        The levels are those at the target force; the frames of the press tell how its light grows with the force.
         Raises `DarkSideError` when a side gives none, `StuckLightError` or `AmbientLightError` when the dark is not
         dark, `PressEnded` when the hand lifts meanwhile.
         """
@@ -97,8 +112,8 @@ class Capture:
             plus_x, plus_y, minus_x, minus_y = (ratio if side == number else 0.0 for number in range(len(SIDES)))
             frame = self._under_load((plus_x, plus_y, minus_x, minus_y))
             light = level_counts(frame) - level_counts(dark)
-            # Light grows with force, nearly in proportion: this takes out that a hand is never quite still.
-            levels.append(light / ratio * self.press.target_n / frame.force_n)
+            growth = growth_ratio(reference, self._dark_counts, frame.force_n, self.press.target_n)
+            levels.append(light / ratio * growth)
         require_every_side(tuple(levels), self.light.min_side_ratio)
         return tuple(levels)
 
@@ -116,15 +131,8 @@ class Capture:
         self.bench.light(ratio)
         frames: list[Frame] = []
         while len(frames) < UNLOADED_FRAMES:
-            self._append(frames, self.bench.take(role))
+            self._tears.append(frames, self.bench.take(role))
         return frames
-
-    def _append(self, frames: list[Frame], frame: Frame) -> None:
-        """Add a frame, unless it or the one before is torn: then neither stays."""
-        if frames and not self._tears.agree(frames[-1], frame):
-            frames.pop()
-        else:
-            frames.append(frame)
 
     def _under_load(self, ratio: LedRatio) -> Frame:
         """Return the second of two frames that agree, taken under a light while the probe is held pressed."""
@@ -132,7 +140,7 @@ class Capture:
         frames: list[Frame] = []
         while len(frames) < 2:
             self._require_going_on()
-            self._append(frames, self.bench.take("reference"))
+            self._tears.append(frames, self.bench.take("reference"))
         if frames[-1].force_n < TOUCH_RATIO * self.press.target_n:
             raise PressEnded("rejected", "The probe was lifted too early: hold it until the screen says so.")
         return frames[-1]

@@ -61,6 +61,13 @@ class TearWatch:
             raise TornFrameError(cause, REMEDY)
         return step_counts <= self._step_counts
 
+    def append(self, frames: list[Frame], frame: Frame) -> None:
+        """Add a frame of the same light, unless it or the last one is torn: then neither stays."""
+        if frames and not self.agree(frames[-1], frame):
+            frames.pop()
+        else:
+            frames.append(frame)
+
 
 def largest_step(one: Counts, other: Counts) -> tuple[float, int]:
     """Return the largest step (counts) in the difference of two frames that a straight row shows, and its row.

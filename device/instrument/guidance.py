@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from enum import Enum
 
+from device.measurement.mode import FRAMES, Mode
+from device.measurement.tactile_image import Role
+
 
 class Guidance(Enum):
     """The whole vocabulary of the screen's instruction."""
@@ -11,8 +14,12 @@ class Guidance(Enum):
     WAIT = "wait", "Please wait"
     PRESS_BESIDE = "press_beside", "Press beside the lesion"
     PRESS_LESION = "press_lesion", "Press on the lesion"
+    TOUCH_BESIDE = "touch_beside", "Touch beside the lesion"
+    TOUCH_LESION = "touch_lesion", "Touch the lesion"
     PRESS_HARDER = "press_harder", "Press harder"
+    PRESS_SLOWLY = "press_slowly", "Press slowly harder"
     PRESS_LIGHTER = "press_lighter", "Press lighter"
+    SLOWER = "slower", "Slower"
     HOLD_STILL = "hold_still", "Hold still"
     LIFT = "lift", "Lift the probe"
     DONE = "done", "Done"
@@ -23,10 +30,16 @@ class Guidance(Enum):
         self.code, self.text = code, text
 
 
-def advise(force_n: float, band_n: tuple[float, float], contact_n: float, *, before_contact: Guidance) -> Guidance:
-    """Return what to do at a force: begin, press harder, press lighter, or hold still inside the band."""
-    if force_n < contact_n:
-        return before_contact
+def before_contact(role: Role, mode: Mode) -> Guidance:
+    """Return how a press begins; a ramp begins with a touch, so that its small forces are not missed."""
+    is_ramp = FRAMES[mode].is_ramp
+    if role == "reference":
+        return Guidance.TOUCH_BESIDE if is_ramp else Guidance.PRESS_BESIDE
+    return Guidance.TOUCH_LESION if is_ramp else Guidance.PRESS_LESION
+
+
+def advise(force_n: float, band_n: tuple[float, float]) -> Guidance:
+    """Return what to do at a force of the touching probe: press harder, lighter, or hold still inside the band."""
     if force_n < band_n[0]:
         return Guidance.PRESS_HARDER
     if force_n > band_n[1]:

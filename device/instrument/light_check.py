@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from device.errors import AmbientLightError, DarkSideError, DimLightError, NoContrastError, StuckLightError
+from device.measurement.reference_light import reference_light
 from device.measurement.tactile_image import SIDES, Counts, Frame
 
 ONE_SIDED = 1.3
@@ -58,6 +59,17 @@ def _brighter_side(counts: Counts) -> tuple[int, float]:
     light = np.maximum([right, bottom, left, top], 1e-6)
     ratio = light / np.roll(light, 2)
     return int(np.argmax(ratio)), float(np.max(ratio))
+
+
+def growth_ratio(press: Sequence[Frame], dark_counts: float, from_n: float, to_n: float) -> float:
+    """Return the light at one force over that at another, as the frames of a press show it; 1 without light.
+
+    Forces in N, near those of the frames: a hold gives a power of the force, a ramp a curve through its frames.
+    """
+    levels = [np.array([[level_counts(frame) - dark_counts]], dtype=np.float32) for frame in press]
+    light = reference_light([frame.force_n for frame in press], levels, FEWEST_COUNTS)
+    before, after = (float(light.at(force_n)[0, 0]) for force_n in (from_n, to_n))
+    return after / before if min(before, after) >= FEWEST_COUNTS else 1.0
 
 
 def require_every_side(levels: Levels, min_side_ratio: float) -> None:

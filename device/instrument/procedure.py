@@ -15,18 +15,19 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from device import __version__
 from device.config import Config
-from device.errors import BusyError, DeviceError, NoContrastError, UnknownResource
+from device.errors import BusyError, DeviceError, ModeUnavailable, NoContrastError, UnknownResource
 from device.instrument.bench import Bench
 from device.instrument.capture import POLL_S, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
-from device.instrument.guidance import Guidance
+from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
+from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
+from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.recording import CameraSettings, Recording
+from device.measurement.recording import Recording
 from device.measurement.tactile_image import Frame
 from device.records.store import ENDED, Store
 
@@ -36,7 +37,7 @@ UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
 
-Estimator = Callable[[Recording], Estimate]
+Estimator = Callable[[Recording, Mode], Estimate]
 
 
 class Procedure:
@@ -49,19 +50,22 @@ class Procedure:
         estimator: Estimator,
         store: Store,
         *,
+        modes: tuple[Mode, ...],
         calibration_id: str,
         opened: ExitStack,
         clock: ClockWatch | None = None,
         simulated_truth: Inclusion | None = None,
     ) -> None:
+        """Take `modes`, those in which the estimator answers; the settings' own mode is one of them."""
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
+        self.modes = modes
         self.board = StatusBoard()
         self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
         self._capture = Capture(bench, config, self.board)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._requested: PressJob | None = None
-        self._on_request: list[Callable[[], None]] = []
+        self._on_request: list[Callable[[Mode], None]] = []
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
 
@@ -86,23 +90,30 @@ class Procedure:
         self._thread.join(timeout=5.0)
         self._opened.close()
 
-    def request(self) -> PressJob:
-        """Ask for a measurement; raise `BusyError` when one is under way, `DeviceError` when the probe is at fault."""
+    def request(self, mode: Mode | None = None) -> PressJob:
+        """Ask for a measurement in a mode, that of the settings unless given.
+
+        Raises `ModeUnavailable`, `BusyError` when one is under way, or the `DeviceError` that the probe is at fault by.
+        """
+        mode = mode or self.config.press.mode
+        if mode not in self.modes:
+            remedy = f"Choose one of those it has: {', '.join(self.modes)}."
+            raise ModeUnavailable(f"This probe has no model for the mode {mode}.", remedy)
         with self._lock:
             status = self.board.now
             if status.fault:
                 raise status.fault
             if self._requested or (status.press and status.press.state not in ENDED):
                 raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
-            job = self._new_job()
+            job = self._new_job(mode)
             self.store.save_press(job.as_record())
             self._requested = job
         for listener in self._on_request:
-            listener()
+            listener(mode)
         return job
 
-    def on_request(self, listener: Callable[[], None]) -> None:
-        """Call `listener` whenever a press is requested."""
+    def on_request(self, listener: Callable[[Mode], None]) -> None:
+        """Call `listener` with the mode whenever a press is requested."""
         self._on_request.append(listener)
 
     def cancel(self, press_id: str) -> None:
@@ -130,7 +141,8 @@ class Procedure:
         self._warn(self._clock.warning())
         unloaded = self._capture.unloaded()
         if self.board.now.step in ("starting", "fault"):
-            self.board.update(step="ready", guidance=Guidance.PRESS_BESIDE, fault=None)
+            guidance = before_contact("reference", self.config.press.mode)
+            self.board.update(step="ready", guidance=guidance, fault=None)
         job = self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S)
         if job:
             self._measure(job, unloaded)
@@ -140,7 +152,7 @@ class Procedure:
             pressed = self.bench.force.latest_n >= self.config.press.contact_n
             with self._lock:
                 if self._requested or pressed:
-                    job, self._requested = self._requested or self._new_job(), None
+                    job, self._requested = self._requested or self._new_job(self.config.press.mode), None
                     self.board.update(press=job, warnings=self._warnings_since_last_press())
                     return job
             time.sleep(POLL_S)
@@ -151,26 +163,26 @@ class Procedure:
         told = last.warnings if last else ()
         return tuple(warning for warning in self.board.now.warnings if warning.as_record() not in told)
 
-    def _new_job(self) -> PressJob:
+    def _new_job(self, mode: Mode) -> PressJob:
         self._capture.cancelled.clear()  # here and not when the job begins: it may be cancelled before that
-        return PressJob(id=str(uuid.uuid4()))
+        return PressJob(id=str(uuid.uuid4()), mode=mode)
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
         started_at = self._clock.now()
         try:
             self._set_job(job, state="capturing", progress=0.1)
-            self.board.update(step="reference", guidance=Guidance.PRESS_BESIDE, frames_taken=0, measurement_id=None)
-            reference = self._capture.loaded("reference", Guidance.PRESS_BESIDE)
-            self._warn(self._dimming.warning(self._capture.side_levels()))
+            self.board.update(step="reference", measurement_id=None)
+            reference = self._capture.loaded("reference", job.mode)
+            self._warn(self._dimming.warning(self._capture.side_levels(reference)))
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)
-            self.board.update(step="lesion", guidance=Guidance.PRESS_LESION, frames_taken=0)
-            press = self._capture.loaded("press", Guidance.PRESS_LESION)
+            self.board.update(step="lesion")
+            press = self._capture.loaded("press", job.mode)
             self.board.update(step="computing", guidance=Guidance.LIFT)
             self._warn(self._clock.warning())
             self._set_job(job, state="computing", progress=0.9)
-            measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]))
+            measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]), job.mode)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
         except NoContrastError as error:
@@ -200,42 +212,17 @@ class Procedure:
         self.board.update(press=changed)
 
     def _recording(self, started_at: str, frames: list[Frame]) -> Recording:
-        camera = self.config.camera
-        settings = CameraSettings(
-            width_px=camera.width_px,
-            height_px=camera.height_px,
-            bits=8,
-            mm_per_px_x=camera.mm_per_px_x,
-            mm_per_px_y=camera.mm_per_px_y,
-            exposure_us=camera.exposure_us,
-            gain=camera.gain,
-        )
-        return Recording(
-            id=str(uuid.uuid4()),
-            serial=self.config.serial,
-            software=__version__,
+        return recording_of(
+            frames,
+            self.config,
             started_at=started_at,
-            camera=settings,
-            frames=tuple(frames),
             calibration_id=self._calibration_id,
-            truth=self._truth,
-            simulated=self.is_simulated,
+            simulated_truth=self._truth,
         )
 
-    def _keep(self, recording: Recording) -> dict[str, Any]:
-        estimate = self._estimator(recording)
-        press = recording.with_role("press")
-        record = {
-            "id": str(uuid.uuid4()),
-            "taken_at": recording.started_at,
-            "estimate": estimate.as_record(),
-            "features": estimate.features,
-            "force_n": sum(frame.force_n for frame in press) / len(press),
-            "frames": len(press),
-            "recording_id": recording.id,
-            "truth": None if recording.truth is None else vars(recording.truth),
-            "warnings": [warning.as_record() for warning in self.board.now.warnings],
-        }
+    def _keep(self, recording: Recording, mode: Mode) -> dict[str, Any]:
+        estimate = self._estimator(recording, mode)
+        record = measurement_record(recording, estimate, mode, self.board.now.warnings)
         return self.store.add_measurement(record, recording)
 
     def _at_fault(self, error: DeviceError) -> None:

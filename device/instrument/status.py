@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from device.errors import DeviceError
 from device.instrument.guidance import Guidance
+from device.measurement.mode import Mode
 
 Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "fault"]
 JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "cancelled", "failed"]
@@ -16,12 +17,13 @@ JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "can
 
 @dataclass(frozen=True)
 class PressJob:
-    """One press as a resource: POSTed by a client or begun by the operator's hand.
+    """One press as a resource: POSTed by a client or begun by the operator's hand, in a mode.
 
     `code` is that of the fault that ended it; `warnings` are the records of errors that did not.
     """
 
     id: str
+    mode: Mode
     state: JobState = "waiting"
     progress: float = 0.0
     reason: str = ""
@@ -36,11 +38,16 @@ class PressJob:
 
 @dataclass(frozen=True)
 class Status:
-    """One moment of the procedure. `warnings` are those of the last press, or of the time since."""
+    """One moment of the procedure.
+
+    `wanted_n`: forces at which the press under way still wants frames. `warnings`: those of the last press, or of the
+    time since.
+    """
 
     step: Step = "starting"
     guidance: Guidance = Guidance.WAIT
     frames_taken: int = 0
+    wanted_n: tuple[float, ...] = ()
     press: PressJob | None = None
     measurement_id: str | None = None
     fault: DeviceError | None = None

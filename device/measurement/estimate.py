@@ -160,7 +160,7 @@ def _without_answer(
 
 def _origin(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> dict[str, Any]:
     return {
-        "mode": "standard",
+        "mode": "paper",
         "model": bundle.name,
         "model_sha256": bundle.sha256,
         "calibration_id": calibration.id,

@@ -11,11 +11,14 @@ from collections import deque
 from dataclasses import dataclass
 from threading import Lock
 
+from device.measurement.mode import RAMP_TO_N
 from device.measurement.quantities import Bound, require
 from device.simulation.pressed_face import Placement
 
 BESIDE_MM = (40.0, 0.0)
 """Where the hand presses for the reference: far enough that the lump is not felt."""
+TOUCH_N, RAMP_AIM_N = 0.06, RAMP_TO_N + 0.06
+"""What a hand takes a touch to be, and how far it means to go when it is to press slowly harder."""
 REMEMBERED_MOVES = 8
 """The last motions: light, image and load cell ask about a time that is a little past."""
 ACTION = "describe a human hand"
@@ -23,9 +26,13 @@ ACTION = "describe a human hand"
 
 @dataclass(frozen=True)
 class HandSettings:
-    """How this operator presses; `miss` is where the lesion is pressed beside its middle, `tilt` how it leans."""
+    """How this operator presses; `miss` is where the lesion is pressed beside its middle, `tilt` how it leans.
+
+    `rate_n_per_s` is how fast it goes to a force that it then holds, `ramp_rate_n_per_s` what it takes for slowly.
+    """
 
     rate_n_per_s: float = 0.45
+    ramp_rate_n_per_s: float = 0.15
     reaction_s: float = 0.25
     aim_n: float = 0.5
     tremor_n: float = 0.002
@@ -37,6 +44,7 @@ class HandSettings:
 
     def __post_init__(self) -> None:
         require("hand.rate_n_per_s", self.rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
+        require("hand.ramp_rate_n_per_s", self.ramp_rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
         require("hand.reaction_s", self.reaction_s, Bound(0.0, 5.0, "s"), ACTION)
         require("hand.aim_n", self.aim_n, Bound(0.0, 5.0, "N"), ACTION)
         require("hand.tremor_n", self.tremor_n, Bound(0.0, 1.0, "N"), ACTION)
@@ -54,16 +62,17 @@ class HandSettings:
 
 @dataclass(frozen=True)
 class Move:
-    """One motion of the hand: from when, from which force to which, and where."""
+    """One motion of the hand: from when, from which force to which, how fast, and where."""
 
     since_s: float
     from_n: float
     aim_n: float
+    rate_n_per_s: float
     position_mm: tuple[float, float]
 
-    def steady_n(self, t_s: float, rate_n_per_s: float) -> float:
+    def steady_n(self, t_s: float) -> float:
         """Return the force on the way from one to the other, at a limited rate."""
-        step_n, gap_n = rate_n_per_s * max(t_s - self.since_s, 0.0), self.aim_n - self.from_n
+        step_n, gap_n = self.rate_n_per_s * max(t_s - self.since_s, 0.0), self.aim_n - self.from_n
         return self.from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
 
 
@@ -73,12 +82,14 @@ class VirtualHand:
     def __init__(self, settings: HandSettings) -> None:
         self.settings = settings
         self._lock = Lock()
-        self._moves = deque([Move(0.0, 0.0, 0.0, BESIDE_MM)], maxlen=REMEMBERED_MOVES)
-        self._following = False
+        self._moves = deque([Move(0.0, 0.0, 0.0, settings.rate_n_per_s, BESIDE_MM)], maxlen=REMEMBERED_MOVES)
+        self._following = self._is_ramp = False
+        self._ramp_rate_n_per_s = settings.ramp_rate_n_per_s
 
     def begin(self) -> None:
         """Take up the probe: from now on the hand follows the guidance."""
         self._following = True
+        self._ramp_rate_n_per_s = self.settings.ramp_rate_n_per_s
 
     def follow(self, guidance: str, now_s: float) -> None:
         """Read one line of guidance (its code) and act on it after the reaction time."""
@@ -87,20 +98,42 @@ class VirtualHand:
         act_s = now_s + self.settings.reaction_s
         match guidance:
             case "press_beside":
-                self._aim(act_s, self.settings.aim_n, BESIDE_MM)
+                self._hold(act_s, self.settings.aim_n, BESIDE_MM)
             case "press_lesion":
-                self._aim(act_s, self.settings.aim_n, self.settings.on_lesion_mm)
+                self._hold(act_s, self.settings.aim_n, self.settings.on_lesion_mm)
+            case "touch_beside":
+                self._ramp(act_s, TOUCH_N, BESIDE_MM)
+            case "touch_lesion":
+                self._ramp(act_s, TOUCH_N, self.settings.on_lesion_mm)
+            case "press_slowly" | "press_lighter" | "slower" | "hold_still" if self._is_ramp:
+                self._go_on(act_s, guidance)
             case "lift":
-                self._aim(act_s, 0.0, None)
+                self._hold(act_s, 0.0, None)
             case "done" | "rejected" | "fault":
-                self._aim(act_s, 0.0, None)
+                self._hold(act_s, 0.0, None)
                 self._following = False
 
-    def _aim(self, act_s: float, aim_n: float, position_mm: tuple[float, float] | None) -> None:
+    def _go_on(self, act_s: float, guidance: str) -> None:
+        """Follow a ramp's guidance: whoever was too fast once stays slower; to hold still is to stay at the force."""
         before = self._move_at(act_s)
-        force_n = before.steady_n(act_s, self.settings.rate_n_per_s)
+        if guidance == "slower":
+            self._ramp_rate_n_per_s /= 2
+        aim_n = {"press_slowly": RAMP_AIM_N, "press_lighter": TOUCH_N, "slower": before.aim_n}
+        self._ramp(act_s, aim_n.get(guidance, before.steady_n(act_s)), None)
+
+    def _hold(self, act_s: float, aim_n: float, position_mm: tuple[float, float] | None) -> None:
+        self._is_ramp = False
+        self._aim(act_s, aim_n, self.settings.rate_n_per_s, position_mm)
+
+    def _ramp(self, act_s: float, aim_n: float, position_mm: tuple[float, float] | None) -> None:
+        self._is_ramp = True
+        self._aim(act_s, aim_n, self._ramp_rate_n_per_s, position_mm)
+
+    def _aim(self, act_s: float, aim_n: float, rate_n_per_s: float, position_mm: tuple[float, float] | None) -> None:
+        before = self._move_at(act_s)
+        force_n = before.steady_n(act_s)
         with self._lock:
-            self._moves.append(Move(act_s, force_n, aim_n, position_mm or before.position_mm))
+            self._moves.append(Move(act_s, force_n, aim_n, rate_n_per_s, position_mm or before.position_mm))
 
     def _move_at(self, t_s: float) -> Move:
         """Return the motion under way at a time: until the reaction time is over, that is still the one before."""
@@ -109,7 +142,7 @@ class VirtualHand:
 
     def force_n(self, t_s: float) -> float:
         """Return the force on the probe: the steady part, and tremor in proportion to how hard it is held."""
-        steady_n = self._move_at(t_s).steady_n(t_s, self.settings.rate_n_per_s)
+        steady_n = self._move_at(t_s).steady_n(t_s)
         if steady_n <= 0.0:
             return 0.0
         held = min(steady_n / 0.1, 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
+from device.instrument.press_cost import press_cost
 from device.instrument.procedure import Procedure
+from device.measurement.mode import Mode
 from device.records.store import Store
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
@@ -26,9 +29,10 @@ NEWEST = 2**63 - 1
 
 
 class PressRequest(BaseModel):
-    """What a client may say when it starts a press: nothing yet. Unknown fields are refused."""
+    """What a client may say when it starts a press: its mode, else that of the settings. Unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid")
+    mode: Mode | None = None
 
 
 def create_app(procedure: Procedure, store: Store) -> FastAPI:
@@ -52,9 +56,15 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
 def _add_state(app: FastAPI, procedure: Procedure) -> None:
     @app.get(f"{API}/device")
     def device() -> dict[str, Any]:
-        """Say which probe this is."""
-        simulated = procedure.is_simulated
-        return {"serial": procedure.config.serial, "software": __version__, "simulated": simulated}
+        """Say which probe this is, and in which modes it measures at what cost."""
+        config = procedure.config
+        return {
+            "serial": config.serial,
+            "software": __version__,
+            "simulated": procedure.is_simulated,
+            "default_mode": config.press.mode,
+            "modes": [asdict(press_cost(mode, config)) for mode in procedure.modes],
+        }
 
     @app.get(f"{API}/health/live")
     def live() -> dict[str, str]:
@@ -82,7 +92,7 @@ def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
     @app.post(f"{API}/presses", status_code=202)
     def start_press(request: PressRequest | None = None) -> JSONResponse:
         """Start a measurement; on the simulated probe the virtual hand takes up the probe."""
-        job = procedure.request()
+        job = procedure.request(request.mode if request else None)
         return JSONResponse(job.as_record(), status_code=202, headers={"Location": f"{API}/presses/{job.id}"})
 
     @app.get(f"{API}/presses/{{press_id}}")

@@ -10,6 +10,10 @@ from typing import Any
 from device import __version__
 from device.errors import DeviceError, LoadCellError
 from device.instrument.procedure import Procedure
+from device.instrument.ramp_frames import ramp_targets_n
+from device.instrument.status import Status
+from device.measurement.mode import FRAMES, RAMP_TO_N, Mode
+from device.records.store import ENDED
 
 EVENT_INTERVAL_S = 0.06
 
@@ -17,6 +21,9 @@ EVENT_INTERVAL_S = 0.06
 def snapshot(procedure: Procedure) -> dict[str, Any]:
     """Return the present status as a JSON object."""
     status, press = procedure.board.now, procedure.config.press
+    job = status.press if status.press and status.press.state not in ENDED else None
+    mode = job.mode if job else press.mode
+    ramp_n = _ramp_n(mode, status) if FRAMES[mode].is_ramp else None
     faults: list[DeviceError] = [status.fault] if status.fault else []
     try:
         force_n: float | None = round(procedure.bench.force.latest_n, 4)
@@ -31,15 +38,22 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "step": status.step,
         "guidance": {"code": status.guidance.code, "text": status.guidance.text},
         "force_n": force_n,
+        "mode": mode,
+        "kind": "ramp" if ramp_n else "hold",
         "target_n": press.target_n,
-        "band_n": press.band_n,
-        "full_scale_n": 1.6 * press.target_n,
+        "band_n": (ramp_n[0], ramp_n[-1]) if ramp_n else press.band_n,
+        "wanted_n": status.wanted_n if job else ramp_n or (press.target_n,),
+        "full_scale_n": max(1.6 * press.target_n, 1.25 * RAMP_TO_N),
         "frames_taken": status.frames_taken,
-        "frames_needed": press.frames,
+        "frames_needed": FRAMES[mode].count,
         "press": status.press.as_record() if status.press else None,
         "measurement_id": status.measurement_id,
         "faults": [fault.as_record() for fault in faults],
     }
+
+
+def _ramp_n(mode: Mode, status: Status) -> tuple[float, ...]:
+    return ramp_targets_n(FRAMES[mode].count, "reference" if status.step == "reference" else "press")
 
 
 async def status_events(procedure: Procedure) -> AsyncIterator[str]:

@@ -5,11 +5,26 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import socket
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import uvicorn
 from daemon_process import QUICK_HAND, ROOT, Daemon
 from playwright.sync_api import Page, expect, sync_playwright
+
+from device import assembly
+from device.answers import Answers
+from device.assembly import open_simulated_probe
+from device.config import simulated_config
+from device.measurement.estimate import Estimate, Quantity
+from device.measurement.mode import MODES, Mode
+from device.measurement.recording import Recording
+from device.simulation.scenario import Scenario
+from device.web.app import create_app
 
 pytestmark = pytest.mark.browser
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -34,6 +49,31 @@ def page():
         page.set_default_timeout(60_000)
         yield page
         browser.close()
+
+
+@pytest.fixture
+def probe_with_every_mode(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The address of a simulated probe with the default hand, whose answer is the same in every mode."""
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        answer = [Quantity(value, 0.8 * value, 1.2 * value, 0.1, True) for value in (12.0, 6.0, 60.0)]
+        return Estimate(*answer, "ok", "", mode, "stand-in", "00", "c", True, {})
+
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
+    procedure = open_simulated_probe(replace(simulated_config(), data=tmp_path), Scenario())
+    procedure.start()
+    settings = uvicorn.Config(
+        create_app(procedure, procedure.store), log_level="warning", timeout_graceful_shutdown=1, lifespan="off"
+    )
+    server, listening = uvicorn.Server(settings), socket.create_server(("127.0.0.1", 0))
+    serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
+    serving.start()
+    yield f"http://127.0.0.1:{listening.getsockname()[1]}"
+    page.goto("about:blank")  # an open event stream would hold the server
+    server.should_exit = True
+    serving.join()
+    listening.close()
+    procedure.close()
 
 
 def _shoot(page: Page, name: str) -> None:
@@ -74,6 +114,34 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     expect(page.locator("#modulus-value")).to_have_text("not determined")
     expect(page.locator("#simulated-badge")).to_be_visible()
     daemon.stop()
+
+
+def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe_with_every_mode: str):
+    """Every mode with what it costs; a slow ramp is led by its open forces, and the result says how it was taken."""
+    page.goto(probe_with_every_mode)
+    expect(page.locator("#instruction")).to_have_text("Press beside the lesion")
+    modes = page.locator("#modes label")
+    expect(modes).to_have_count(4)
+    expect(page.locator("#modes input:checked")).to_have_value("paper")
+    expect(modes.nth(0)).to_have_text("quick1 frame, 0.2 s")
+    expect(modes.nth(2)).to_have_text("precise40 frames, 3 s")
+    _shoot(page, "modes")
+    _require_fits(page)
+    modes.filter(has_text="standard").click()
+    page.locator("#press-button").click()
+    expect(page.locator("#modes")).to_be_hidden()
+    expect(page.locator("#instruction")).to_have_text("Press slowly harder")
+    wanted = page.locator("#force-wanted span")
+    expect(page.locator("#frames")).to_have_text(re.compile("[3-7] of 10 frames"))
+    assert 0 < wanted.count() < 10
+    _shoot(page, "ramp")
+    _require_fits(page)
+    expect(wanted).to_have_count(0, timeout=60_000)
+    expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
+    expect(page.locator("#image-title")).to_have_text("Measurement 1, standard")
+    expect(page.locator("#modes input:checked")).to_have_value("standard")
+    _shoot(page, "result-standard")
+    _require_fits(page)
 
 
 def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: Page, tmp_path: Path):

@@ -44,10 +44,10 @@ BOUNDS = [
     ("cell.sensitivity_counts_per_n", 1.0, 1e7),
     ("cell.tare_spread_n", 0.0001, 1.0),
     ("press.band_ratio", 0.005, 0.2),
-    ("press.contact_n", 0.005, 0.25),  # half of the target
+    ("press.contact_n", 0.005, 0.06),  # three quarters of the smallest force of a ramp
     ("press.steady_n", 0.001, 1.0),
-    ("press.overload_n", 0.6, 50.0),  # 1.2 times the target
-    ("press.frames", 1, 200),
+    ("press.overload_n", 0.72, 50.0),  # 1.2 times the largest force of a ramp
+    ("press.max_rate_n_per_s", 0.05, 5.0),
     ("press.timeout_s", 1.0, 3600.0),
     ("store.min_free_mb", 1.0, 1e6),
     ("clock.max_jump_s", 0.1, 3600.0),
@@ -121,6 +121,19 @@ def test_a_target_beyond_its_bound_is_refused(target_n):
         PressSection(target_n=target_n, contact_n=0.01, overload_n=50.0)
 
 
+def test_the_overload_lies_above_the_hold_and_the_contact_below_half_of_it():
+    with pytest.raises(InvalidQuantity, match=r"^press\.overload_n is 0\.95, but must be at least 0\.96 "):
+        PressSection(target_n=0.8, overload_n=0.95)
+    with pytest.raises(InvalidQuantity, match=r"^press\.contact_n is 0\.055, but must be .* at most 0\.05 "):
+        PressSection(target_n=0.1, contact_n=0.055)
+
+
+def test_the_mode_is_one_of_those_there_are(read):
+    assert read('[press]\nmode = "precise"\n').press.mode == "precise"
+    with pytest.raises(ConfigError, match="press.mode is 'fast', but must be one of quick, standard, precise, paper"):
+        read('[press]\nmode = "fast"\n')
+
+
 @pytest.mark.parametrize("rate_hz", [0.9, 240.1])
 def test_a_frame_rate_beyond_its_bound_is_refused(rate_hz):
     with pytest.raises(InvalidQuantity, match=r"^camera\.frame_rate_hz is"):
@@ -146,7 +159,7 @@ def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
         ("[light]\ncommissioned_counts = [50, 50, 50]\n", r"light\.commissioned_counts is .*four numbers"),
         ("[light]\ncommissioned_counts = [50, 50, 50, 0.9]\n", r"light\.commissioned_counts is 0\.9"),
         ("[press]\ntarget_n = nan\n", r"press\.target_n is nan"),
-        ("[press]\noverload_n = 0.59\n", r"press\.overload_n is 0\.59, but must be at least 0\.6"),
+        ("[press]\noverload_n = 0.71\n", r"press\.overload_n is 0\.71, but must be at least 0\.72"),
         ("[server]\nport = 65536\n", r"server\.port is 65536"),
         ("serial = 7\n", "serial is 7"),
         ("camera = 3\n", r"write it as \[camera\]"),

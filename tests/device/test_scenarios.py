@@ -19,7 +19,7 @@ from daemon_process import ROOT
 
 from device import errors
 from device.assembly import open_simulated_probe
-from device.config import CameraSection, simulated_config
+from device.config import CameraSection, PressSection, simulated_config
 from device.errors import DeviceError
 from device.instrument import bench, force_recorder, procedure
 from device.instrument.procedure import Procedure
@@ -31,7 +31,8 @@ from device.simulation.scenario import Scenario, read_scenario
 
 FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).expects]
 TIME_RATIO = 0.4
-QUICK_HAND = HandSettings(rate_n_per_s=1.5, reaction_s=0.05)
+QUICK_HAND = HandSettings(rate_n_per_s=1.5, ramp_rate_n_per_s=0.4, reaction_s=0.05)
+QUICK_PRESS = PressSection(max_rate_n_per_s=0.6)
 LONGEST_WAIT_S = 20.0
 
 
@@ -73,7 +74,8 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Scenar
     monkeypatch.setattr(bench, "FRAME_TIMEOUT_S", TIME_RATIO * bench.FRAME_TIMEOUT_S)
     monkeypatch.setattr(force_recorder, "SILENCE_S", TIME_RATIO * force_recorder.SILENCE_S)
     monkeypatch.setattr(procedure, "AFTER_FAULT_S", 0.1)
-    config = replace(simulated_config(), data=tmp_path, camera=CameraSection(frame_rate_hz=60.0))
+    camera = CameraSection(frame_rate_hz=60.0)
+    config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
     @contextmanager
     def run(scenario: Scenario) -> Iterator[Device]:

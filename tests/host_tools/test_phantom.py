@@ -8,6 +8,7 @@ import pytest
 from device.config import simulated_config
 from device.instrument import capture
 from device.measurement.estimate import image_features
+from device.measurement.mode import FRAMES
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario
@@ -25,7 +26,7 @@ def test_phantoms_are_recorded_with_the_simulated_probes_settings():
     assert camera.scale == phantom.CAMERA.scale
     assert (camera.exposure_us, camera.gain) == (phantom.CAMERA.exposure_us, phantom.CAMERA.gain)
     assert config.light.ratio == phantom.LIT
-    assert (config.press.target_n, config.press.frames) == (phantom.TARGET_N, phantom.PRESS_FRAMES)
+    assert (config.press.target_n, FRAMES["paper"].count) == (phantom.TARGET_N, phantom.PRESS_FRAMES)
     assert capture.UNLOADED_FRAMES == phantom.UNLOADED_FRAMES
 
 

@@ -52,9 +52,13 @@ async function ask(method, path, body) {
   return response;
 }
 
-export const startPress = () => ask("POST", "/presses", "{}");
+export const startPress = (mode) => ask("POST", "/presses", JSON.stringify(mode ? { mode } : {}));
 export const cancelPress = (id) => ask("DELETE", `/presses/${encodeURIComponent(id)}`);
 export const imageUrl = (id) => `${API}/measurements/${encodeURIComponent(id)}/image.png`;
+
+export async function fetchDevice() {
+  return (await ask("GET", "/device")).json();
+}
 
 export async function fetchMeasurement(id) {
   return (await ask("GET", `/measurements/${encodeURIComponent(id)}`)).json();

@@ -73,7 +73,7 @@ export function showMeasurement(measurement) {
   const image = byId("image");
   image.src = imageUrl(measurement.id);
   image.alt = `Tactile image of measurement ${measurement.seq}`;
-  setText(byId("image-title"), `Measurement ${measurement.seq}`);
+  setText(byId("image-title"), `Measurement ${measurement.seq}, ${measurement.mode}`);
   setText(byId("image-caption"), measurement.taken_at.slice(0, 16).replace("T", " ") + " UTC");
 }
 

@@ -3,23 +3,29 @@
 
 import { byId, element, setAttribute, setText } from "./dom.js";
 import { showGauge } from "./gauge.js";
-import { cancelPress, fetchMeasurement, followStatus, startPress } from "./probe.js";
+import { chosenMode, offerModes, showModes } from "./modes.js";
+import { cancelPress, fetchDevice, fetchMeasurement, followStatus, startPress } from "./probe.js";
 import { describeEstimate, showMeasurement } from "./result.js";
 
 const UNDER_WAY = new Set(["waiting", "capturing", "computing"]);
 const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
 const ICONS = {
   press_beside: "press", press_lesion: "press", press_harder: "harder", press_lighter: "lighter",
+  touch_beside: "press", touch_lesion: "press", press_slowly: "harder", slower: "wait",
   hold_still: "hold", lift: "lift", done: "done", rejected: "rejected", fault: "fault",
 };
 const WAIT_ICONS = { ready: "press" };
-const TONES = { hold_still: "good", done: "good", rejected: "caution", fault: "bad" };
+const TONES = { hold_still: "good", slower: "caution", done: "good", rejected: "caution", fault: "bad" };
 const STEP_HINTS = {
   starting: "The probe starts and checks its parts.",
   ready: "Two presses make a measurement: one beside the lesion, then one on it.",
   reference: "Reference press: on plain tissue beside the lesion.",
   lesion: "Lesion press: on the lesion, with the same force.",
   computing: "Computing size, depth and Young's modulus.",
+};
+const RAMP_HINTS = {
+  reference: "Reference press: slowly harder, on plain tissue beside the lesion.",
+  lesion: "Lesion press: slowly harder, on the lesion.",
 };
 const PRESS_WORDS = { rejected: "Rejected.", cancelled: "Cancelled.", failed: "Failed." };
 const LONG_INSTRUCTION = 40; // characters; more would need a third line
@@ -29,6 +35,7 @@ const panel = byId("panel");
 const button = byId("press-button");
 let status = null;
 let measurement = null;
+let offersAreKnown = false;
 let loading = false;
 let sending = false;
 let problem = "";
@@ -67,7 +74,7 @@ function showInstruction() {
 
 /** The one sentence under the instruction: a refused command first, then what became of the press, then the result. */
 function describeStatus() {
-  const hint = STEP_HINTS[status.step] ?? "";
+  const hint = (status.kind === "ramp" && RAMP_HINTS[status.step]) || (STEP_HINTS[status.step] ?? "");
   const pressWord = PRESS_WORDS[status.press?.state];
   if (problem) return { word: "Not done.", reason: problem, tone: "caution" };
   if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
@@ -128,15 +135,16 @@ function show() {
   showProgress();
   showFaults();
   showButton();
+  showModes(!pressUnderWay());
   showGauge(status);
 }
 
-async function loadMeasurement(id) {
-  if (loading || id === null || id === measurement?.id) return;
+/** Ask the probe for what the page needs, one thing at a time; what failed is asked for again. */
+async function load(fetchAndShow) {
+  if (loading) return;
   loading = true;
   try {
-    measurement = await fetchMeasurement(id);
-    showMeasurement(measurement);
+    await fetchAndShow();
     problem = "";
   } catch (error) {
     problem = error.message;
@@ -146,9 +154,25 @@ async function loadMeasurement(id) {
   }
 }
 
+async function loadDevice() {
+  offerModes(await fetchDevice());
+  offersAreKnown = true;
+}
+
+async function loadMeasurement() {
+  measurement = await fetchMeasurement(status.measurement_id);
+  showMeasurement(measurement);
+}
+
+function loadWhatIsMissing() {
+  if (!offersAreKnown) load(loadDevice);
+  else if (status.measurement_id !== null && status.measurement_id !== measurement?.id) load(loadMeasurement);
+}
+
 function showConnection(lost) {
   byId("connection-lost").hidden = !lost;
   byId("main").inert = lost;
+  if (lost) offersAreKnown = false; // whoever comes back may be another probe
 }
 
 function receive(next) {
@@ -157,7 +181,7 @@ function receive(next) {
   if (status && status.step !== next.step) problem = "";
   status = next;
   showConnection(false);
-  loadMeasurement(status.measurement_id);
+  loadWhatIsMissing();
   show();
 }
 
@@ -166,7 +190,7 @@ button.addEventListener("click", async () => {
   problem = "";
   button.disabled = true;
   try {
-    await (pressUnderWay() ? cancelPress(status.press.id) : startPress());
+    await (pressUnderWay() ? cancelPress(status.press.id) : startPress(chosenMode()));
   } catch (error) {
     problem = error.message;
   } finally {

@@ -79,6 +79,13 @@ def test_a_force_that_varied_more_than_allowed_is_not_steady(bench, hardware, ra
     assert bench.is_steady(10.0, 0.02) is is_steady
 
 
+def test_the_rate_is_that_of_the_force_just_before(bench):
+    """The force of this hardware grows by 0.01 N/s; that of a hand that eases falls."""
+    assert bench.rate_n_per_s(10.0) == pytest.approx(0.01)
+    bench.force.at = lambda t_s: 1.0 - t_s / 5
+    assert bench.rate_n_per_s(10.0) == pytest.approx(-0.2)
+
+
 def test_after_an_error_of_the_light_it_is_set_again_even_to_what_it_was(bench, hardware, monkeypatch):
     """Nobody knows whether the chip had taken the brightness before it failed."""
     bench.light(DARK)

@@ -12,24 +12,29 @@ from device.instrument.bench import DARK
 from device.instrument.capture import UNLOADED_FRAMES, Capture, PressEnded
 from device.instrument.guidance import Guidance
 from device.instrument.status import StatusBoard
+from device.measurement.mode import FRAMES, Frames
 from device.measurement.tactile_image import Frame
 
-PRESS = PressSection(target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, frames=3, timeout_s=10.0)
+PRESS = PressSection(target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, timeout_s=10.0)
 LIGHT = LightSection(ratio=(0.1, 0.2, 0.3, 0.4))
 CONFIG = Config(press=PRESS, light=LIGHT)
 BLACK_COUNTS, COUNTS_PER_N = 4, 200
 """Of the scripted image: black, and what a newton adds under full light of all sides."""
 FRAME_S = 0.5
+HOLD, RAMP = Frames(3, is_ramp=False), Frames(5, is_ramp=True)
+"""Frames of the modes "paper" and "standard" here; the ramp's targets are 0.08, 0.21, 0.34, 0.47 and 0.60 N."""
 
 
 class ScriptedBench:
     """Gives one frame for each force of a script; a force of 'shaking' frames is not steady.
 
-    The image is as bright as light times force, each side alike; `dead` sides give none, `glow` counts come on top.
-    The lower half of a frame whose number is in `torn` shows the light of the frame before.
+    Its force seems to change by `rate_n_per_s`. The image is as bright as light times force, each side alike; `dead`
+    sides give none, `glow` counts come on top. The lower half of a frame whose number is in `torn` shows the light of
+    the frame before.
     """
 
-    def __init__(self, forces, shaking=(), torn=(), dead=(), glow=0):
+    def __init__(self, forces, shaking=(), torn=(), dead=(), glow=0, rate_n_per_s=0.1):
+        self.rate = rate_n_per_s
         self.forces, self.shaking, self.torn = list(forces), set(shaking), set(torn)
         self.dead, self.glow, self.image_before = dead, glow, None
         self.taken, self.lights, self.now_s = 0, [], 0.0
@@ -55,6 +60,9 @@ class ScriptedBench:
     def is_steady(self, t_s, steady_n):
         return t_s not in self.shaking
 
+    def rate_n_per_s(self, t_s):
+        return self.rate
+
     @property
     def latest_n(self):
         return self.forces.pop(0)
@@ -66,6 +74,8 @@ class ScriptedBench:
 @pytest.fixture
 def capture_of(monkeypatch):
     def capture(*forces, **troubles):
+        monkeypatch.setitem(FRAMES, "paper", HOLD)
+        monkeypatch.setitem(FRAMES, "standard", RAMP)
         bench = ScriptedBench(forces, **troubles)
         clock = types.SimpleNamespace(monotonic=lambda: bench.now_s, sleep=bench.pass_time)
         monkeypatch.setattr(capture_module, "time", clock)
@@ -80,54 +90,117 @@ def times_of(frames):
 
 def test_only_frames_in_the_force_band_count(capture_of):
     """0.474 and 0.526 N are just outside 0.5 N +- 5 %."""
-    frames = capture_of(0.0, 0.3, 0.5, 0.474, 0.475, 0.526, 0.525).loaded("press", Guidance.PRESS_LESION)
+    frames = capture_of(0.0, 0.3, 0.5, 0.474, 0.475, 0.526, 0.525).loaded("press", "paper")
     assert times_of(frames) == [3, 5, 7]
     assert {frame.role for frame in frames} == {"press"}
 
 
 def test_a_force_that_only_passes_through_the_band_does_not_count(capture_of):
-    frames = capture_of(0.5, 0.5, 0.5, 0.5, 0.5, shaking=(1, 3)).loaded("press", Guidance.PRESS_LESION)
+    frames = capture_of(0.5, 0.5, 0.5, 0.5, 0.5, shaking=(1, 3)).loaded("press", "paper")
     assert times_of(frames) == [2, 4, 5]
 
 
 def test_a_hand_that_lifts_early_begins_again(capture_of):
-    frames = capture_of(0.5, 0.5, 0.04, 0.5, 0.5, 0.5).loaded("press", Guidance.PRESS_LESION)
+    frames = capture_of(0.5, 0.5, 0.04, 0.5, 0.5, 0.5).loaded("press", "paper")
     assert times_of(frames) == [4, 5, 6]
 
 
 def test_a_hand_that_leaves_the_band_but_not_the_skin_keeps_its_frames(capture_of):
-    frames = capture_of(0.5, 0.5, 0.06, 0.5).loaded("press", Guidance.PRESS_LESION)
+    frames = capture_of(0.5, 0.5, 0.06, 0.5).loaded("press", "paper")
     assert times_of(frames) == [1, 2, 4]
+
+
+def test_a_ramp_takes_a_frame_at_each_of_its_forces_however_it_is_pressed(capture_of):
+    """The hold's band plays no part, and the hand may go on growing."""
+    frames = capture_of(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6).loaded("press", "standard")
+    assert [frame.force_n for frame in frames] == [0.1, 0.2, 0.3, 0.5, 0.6]
+
+
+def test_a_reference_ramp_reaches_further_at_both_ends(capture_of):
+    """To 0.06 and 0.62 N."""
+    capture = capture_of(0.0, 0.06, 0.2, 0.34, 0.48, 0.61, 0.62)
+    assert [frame.force_n for frame in capture.loaded("reference", "standard")] == [0.06, 0.2, 0.34, 0.48, 0.62]
+
+
+def test_the_board_knows_at_which_forces_a_ramp_still_wants_frames(capture_of):
+    capture, told = capture_of(0.0, 0.08, 0.21, 0.34, 0.47, 0.6), []
+    capture.board.on_guidance(lambda guidance: told.append((guidance, capture.board.now.wanted_n)))
+    capture.loaded("press", "standard")
+    assert [guidance for guidance, _ in told] == [Guidance.TOUCH_LESION, Guidance.PRESS_SLOWLY, Guidance.HOLD_STILL]
+    assert [len(wanted_n) for _, wanted_n in told] == [5, 4, 0]
+    assert told[0][1] == pytest.approx((0.08, 0.21, 0.34, 0.47, 0.60))
+
+
+def test_a_hand_that_lifts_in_a_ramp_begins_again(capture_of):
+    frames = capture_of(0.1, 0.2, 0.3, 0.0, 0.08, 0.21, 0.34, 0.47, 0.6).loaded("press", "standard")
+    assert times_of(frames) == [5, 6, 7, 8, 9]
+
+
+def test_a_ramp_that_is_too_fast_has_no_frames_and_the_operator_is_told(capture_of):
+    capture, told = capture_of(0.1, 0.3, 0.6, 1.25, rate_n_per_s=0.36), []
+    capture.board.on_guidance(told.append)
+    with pytest.raises(PressEnded, match="rose to 1.25 N"):
+        capture.loaded("press", "standard")
+    assert told == [Guidance.TOUCH_LESION, Guidance.SLOWER]
+    assert capture.board.now.frames_taken == 0
+
+
+def test_a_ramp_that_goes_too_far_is_rejected(capture_of):
+    with pytest.raises(PressEnded, match=r"rose to 1\.01 N, above 1\.00 N"):
+        capture_of(0.1, 0.2, 1.01).loaded("press", "standard")
+
+
+def test_a_ramp_that_never_comes_is_rejected_after_the_timeout(capture_of):
+    with pytest.raises(PressEnded, match="No press came for 10 s"):
+        capture_of(0.0).loaded("press", "standard")
+
+
+@pytest.mark.parametrize(("flag", "state"), [("cancelled", "cancelled"), ("stopping", "failed")])
+def test_a_ramp_that_is_cancelled_or_stopped_ends_in_the_middle(capture_of, flag, state):
+    capture = capture_of(0.0, 0.1, 0.2)
+    capture.board.on_guidance(lambda guidance: guidance is Guidance.PRESS_SLOWLY and getattr(capture, flag).set())
+    with pytest.raises(PressEnded) as end:
+        capture.loaded("press", "standard")
+    assert end.value.state == state
+    assert capture.bench.taken == 2
+
+
+def test_a_ramp_whose_smallest_force_is_as_bright_as_its_largest_ends_the_press(capture_of, monkeypatch):
+    capture = capture_of(0.08, 0.21, 0.34, 0.47, 0.6)
+    dry = capture.bench.image
+    monkeypatch.setattr(capture.bench, "image", lambda force_n: dry(0.5))
+    with pytest.raises(NoContrastError):
+        capture.loaded("press", "standard")
 
 
 def test_the_screen_is_told_at_every_frame(capture_of):
     capture, told = capture_of(0.0, 0.3, 0.6, 0.5), []
     capture.board.on_guidance(told.append)
-    capture.loaded("reference", Guidance.PRESS_BESIDE)
+    capture.loaded("reference", "paper")
     assert told == [Guidance.PRESS_BESIDE, Guidance.PRESS_HARDER, Guidance.PRESS_LIGHTER, Guidance.HOLD_STILL]
     assert capture.board.now.frames_taken == 3
 
 
 def test_frames_are_taken_under_the_configured_light(capture_of):
-    frames = capture_of(0.5).loaded("press", Guidance.PRESS_LESION)
+    frames = capture_of(0.5).loaded("press", "paper")
     assert {frame.led_ratio for frame in frames} == {(0.1, 0.2, 0.3, 0.4)}
 
 
 def test_too_much_force_rejects_the_press_with_both_numbers(capture_of):
     with pytest.raises(PressEnded, match=r"rose to 1\.25 N, above 1\.00 N") as end:
-        capture_of(0.5, 0.5, 1.25).loaded("press", Guidance.PRESS_LESION)
+        capture_of(0.5, 0.5, 1.25).loaded("press", "paper")
     assert end.value.state == "rejected"
 
 
 def test_the_overload_itself_is_still_bearable(capture_of):
-    assert len(capture_of(1.0, 0.5).loaded("press", Guidance.PRESS_LESION)) == 3
+    assert len(capture_of(1.0, 0.5).loaded("press", "paper")) == 3
 
 
 def test_a_press_that_never_comes_is_rejected_after_the_timeout(capture_of):
     """10 s are 20 frames; the 21st is too late."""
     capture = capture_of(0.0)
     with pytest.raises(PressEnded, match="No press came for 10 s") as end:
-        capture.loaded("press", Guidance.PRESS_LESION)
+        capture.loaded("press", "paper")
     assert end.value.state == "rejected"
     assert capture.bench.taken == 21
 
@@ -135,7 +208,7 @@ def test_a_press_that_never_comes_is_rejected_after_the_timeout(capture_of):
 def test_the_time_counts_from_the_last_contact(capture_of):
     """15 frames without contact, one with, and 15 more: neither pause is too long."""
     forces = [0.0] * 15 + [0.3] + [0.0] * 15 + [0.5]
-    assert len(capture_of(*forces).loaded("press", Guidance.PRESS_LESION)) == 3
+    assert len(capture_of(*forces).loaded("press", "paper")) == 3
 
 
 @pytest.mark.parametrize(("flag", "state"), [("cancelled", "cancelled"), ("stopping", "failed")])
@@ -143,7 +216,7 @@ def test_a_press_that_is_cancelled_or_stopped_ends_before_the_next_frame(capture
     capture = capture_of(0.5)
     getattr(capture, flag).set()
     with pytest.raises(PressEnded) as end:
-        capture.loaded("press", Guidance.PRESS_LESION)
+        capture.loaded("press", "paper")
     assert end.value.state == state
     assert end.value.reason
     assert capture.bench.taken == 0
@@ -200,36 +273,45 @@ def test_a_press_can_be_cancelled_or_stopped_before_the_probe_is_lifted(capture_
 
 HELD = (0.5,)
 """A hand that holds the target."""
+REFERENCE = [Frame(np.full((16, 16), 104, np.uint8), "reference", 0.0, 0.5, LIGHT.ratio)] * 3
+"""What was taken of it under full light before."""
 
 
 def test_each_side_is_lit_alone_after_a_dark_frame_while_the_hand_holds(capture_of):
     capture = capture_of(*HELD)
-    capture.side_levels()
+    capture.side_levels(REFERENCE)
     alone = [tuple(ratio if side == number else 0.0 for side, ratio in enumerate(LIGHT.ratio)) for number in range(4)]
     assert capture.bench.lights == [DARK, *alone]
 
 
 def test_a_sides_level_is_that_of_full_brightness_at_the_target_force(capture_of):
-    """0.1 of 1.0 at 0.5 N are 10 counts above dark: 100 at full brightness; at 0.4 N 8 counts say the same."""
-    assert capture_of(0.5).side_levels() == pytest.approx((100.0,) * 4)
-    assert capture_of(0.4).side_levels() == pytest.approx((100.0,) * 4)
+    """0.1 of 1.0 at 0.5 N are 10 counts above dark: 100 at full brightness."""
+    assert capture_of(0.5).side_levels(REFERENCE) == pytest.approx((100.0,) * 4)
+
+
+def test_a_side_that_is_looked_at_under_another_force_has_the_level_of_the_target_all_the_same(capture_of):
+    """At 0.65 N 0.1 of 1.0 are 13 counts; the reference ramp tells that light is in proportion to the force."""
+    capture = capture_of(*[0.0] * (1 + 2 * UNLOADED_FRAMES), 0.08, 0.21, 0.34, 0.47, 0.65)
+    capture.unloaded()
+    reference = capture.loaded("reference", "standard")
+    assert capture.side_levels(reference) == pytest.approx((100.0,) * 4, rel=0.01)
 
 
 def test_a_dead_side_is_named(capture_of):
     with pytest.raises(DarkSideError, match=r"No light from -x although"):
-        capture_of(*HELD, dead=(2,)).side_levels()
+        capture_of(*HELD, dead=(2,)).side_levels(REFERENCE)
 
 
 def test_light_that_is_there_while_all_sides_are_off_is_seen_untouched_and_under_load(capture_of):
     with pytest.raises(AmbientLightError):
         capture_of(0.0, 0.0, glow=20).unloaded()
     with pytest.raises(AmbientLightError):
-        capture_of(*HELD, glow=20).side_levels()
+        capture_of(*HELD, glow=20).side_levels(REFERENCE)
 
 
 def test_a_hand_that_lifts_before_the_light_is_checked_is_told_to_hold(capture_of):
     with pytest.raises(PressEnded, match="lifted too early") as end:
-        capture_of(0.5, 0.5, 0.3).side_levels()
+        capture_of(0.5, 0.5, 0.3).side_levels(REFERENCE)
     assert end.value.state == "rejected"
 
 
@@ -239,14 +321,14 @@ def test_an_image_that_is_as_bright_at_a_touch_as_in_the_hold_ends_the_press(cap
     dry = capture.bench.image
     monkeypatch.setattr(capture.bench, "image", lambda force_n: dry(0.5))
     with pytest.raises(NoContrastError):
-        capture.loaded("press", Guidance.PRESS_LESION)
+        capture.loaded("press", "paper")
 
 
 def test_a_press_whose_way_to_the_hold_was_not_seen_is_not_judged_by_its_contrast(capture_of, monkeypatch):
     """0.4 N is above 0.7 of the target: too near to the hold to tell."""
     capture = capture_of(0.4, 0.5)
     monkeypatch.setattr(capture.bench, "image", lambda force_n: np.full((16, 16), 90, np.uint8))
-    assert len(capture.loaded("press", Guidance.PRESS_LESION)) == 3
+    assert len(capture.loaded("press", "paper")) == 3
 
 
 def test_a_torn_frame_and_its_neighbour_are_taken_again(capture_of):
@@ -259,4 +341,4 @@ def test_a_torn_frame_and_its_neighbour_are_taken_again(capture_of):
 
 def test_a_camera_whose_every_frame_is_torn_is_at_fault(capture_of):
     with pytest.raises(TornFrameError):
-        capture_of(0.9, torn=range(2, 100)).side_levels()
+        capture_of(0.9, torn=range(2, 100)).side_levels(REFERENCE)

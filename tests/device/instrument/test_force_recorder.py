@@ -1,5 +1,6 @@
 """Force over time, from a cell whose samples are written down here: 1000 counts are 1 N, 500 counts are no load."""
 
+import math
 import threading
 from queue import Empty, Queue
 
@@ -69,6 +70,19 @@ def reached(condition):
 @pytest.mark.parametrize(("t_s", "force_n"), [(1.0, 0.0), (1.25, 0.5), (1.5, 1.0), (2.0, 2.0), (3.0, 1.5), (4.0, 1.0)])
 def test_the_force_is_interpolated_between_samples(recorder, t_s, force_n):
     assert recorder.at(t_s) == pytest.approx(force_n)
+
+
+def test_a_ramp_with_a_tremor_is_known_to_a_millinewton_in_the_middle_of_every_exposure(cell, recorder):
+    """80 samples a second of 0.15 N/s and 2 mN at 9.3 Hz: the chord of the tremor is 0.1 mN off at most."""
+
+    def force_n(t_s):
+        return 0.15 * (t_s - 5.0) + 0.002 * math.sin(2 * math.pi * 9.3 * t_s)
+
+    cell.say(*((5.0 + k / 80, 500.0 + 1000.0 * force_n(5.0 + k / 80)) for k in range(400)))
+    middles_s = [5.1 + k / 30 + 0.002 for k in range(120)]
+    assert [recorder.at(t_s) for t_s in middles_s] == pytest.approx([force_n(t_s) for t_s in middles_s], abs=0.001)
+    straight = [recorder.at(t_s) - 0.15 * (t_s - 5.0) for t_s in middles_s]
+    assert max(straight) > 0.0015  # the tremor is followed, not averaged out
 
 
 def test_the_latest_force_is_that_of_the_last_sample(recorder):

@@ -60,6 +60,15 @@ def test_a_single_torn_frame_disagrees_with_its_neighbours_and_no_more():
     assert watch.agree(*whole)
 
 
+def test_of_two_frames_that_disagree_neither_stays():
+    one, two, broken = frame(image(100)), frame(image(100, 2)), frame(torn(image(100, 5), image(0, 6), 60))
+    watch, kept = TearWatch(3.0), []
+    for taken in (one, two, broken, one):
+        watch.append(kept, taken)
+    assert len(kept) == 2
+    assert kept[0] is kept[1] is one
+
+
 def test_frames_that_are_torn_again_and_again_are_a_fault_with_row_and_step():
     whole, broken = frame(image(100)), frame(torn(image(100, 5), image(0, 6), 60))
     watch = TearWatch(3.0)

@@ -2,17 +2,14 @@
 
 import pytest
 
-from device.instrument.guidance import Guidance, advise
+from device.instrument.guidance import Guidance, advise, before_contact
 
-BAND_N, CONTACT_N = (0.475, 0.525), 0.05
+BAND_N = (0.475, 0.525)
 
 
 @pytest.mark.parametrize(
     ("force_n", "guidance"),
     [
-        (-0.01, Guidance.PRESS_LESION),
-        (0.0, Guidance.PRESS_LESION),
-        (0.049, Guidance.PRESS_LESION),
         (0.05, Guidance.PRESS_HARDER),
         (0.474, Guidance.PRESS_HARDER),
         (0.475, Guidance.HOLD_STILL),
@@ -21,12 +18,20 @@ BAND_N, CONTACT_N = (0.475, 0.525), 0.05
         (5.0, Guidance.PRESS_LIGHTER),
     ],
 )
-def test_the_band_includes_both_its_ends_and_contact_begins_at_its_threshold(force_n, guidance):
-    assert advise(force_n, BAND_N, CONTACT_N, before_contact=Guidance.PRESS_LESION) is guidance
+def test_the_band_includes_both_its_ends(force_n, guidance):
+    assert advise(force_n, BAND_N) is guidance
 
 
-def test_before_contact_the_operator_is_told_where_to_press():
-    assert advise(0.0, BAND_N, CONTACT_N, before_contact=Guidance.PRESS_BESIDE) is Guidance.PRESS_BESIDE
+@pytest.mark.parametrize("mode", ["quick", "paper"])
+def test_before_contact_the_operator_is_told_where_to_press(mode):
+    assert before_contact("reference", mode) is Guidance.PRESS_BESIDE
+    assert before_contact("press", mode) is Guidance.PRESS_LESION
+
+
+@pytest.mark.parametrize("mode", ["standard", "precise"])
+def test_a_ramp_begins_with_a_touch(mode):
+    assert before_contact("reference", mode) is Guidance.TOUCH_BESIDE
+    assert before_contact("press", mode) is Guidance.TOUCH_LESION
 
 
 def test_every_guidance_has_a_code_and_a_sentence_of_its_own():

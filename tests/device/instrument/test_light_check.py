@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from device.errors import AmbientLightError, DarkSideError, NoContrastError, StuckLightError
-from device.instrument.light_check import DimmingWatch, require_contrast, require_dark, require_every_side
+from device.instrument.light_check import (
+    DimmingWatch,
+    growth_ratio,
+    require_contrast,
+    require_dark,
+    require_every_side,
+)
 from device.measurement.tactile_image import Frame
 
 X = np.linspace(-1, 1, 64)[None, :] * np.ones((48, 1))
@@ -75,6 +81,22 @@ def test_commissioned_levels_hold_from_the_first_press_on():
     watch = DimmingWatch(0.07, LEVELS)
     assert watch.warning(dimmed(0.9)).code == "E206"
     assert watch.warning(dimmed(1.1)) is None
+
+
+def test_the_growth_of_a_hold_is_a_power_of_the_force():
+    """Frames at one force do not tell the power; without them it is 0.65."""
+    assert growth_ratio([frame(110, 0.5)] * 10, 10.0, 0.6, 0.5) == pytest.approx((0.5 / 0.6) ** 0.65, rel=1e-5)
+
+
+def test_the_growth_of_a_ramp_is_that_of_its_own_frames():
+    """100 f + 200 f^2 counts above dark: 100 at 0.5 N, 132 at 0.6 N."""
+    forces = np.linspace(0.1, 0.6, 11)
+    ramp = [frame(10 + 100 * force + 200 * force**2, force) for force in forces]
+    assert growth_ratio(ramp, 10.0, 0.6, 0.5) == pytest.approx(100 / 132, abs=0.005)  # counts are whole numbers
+
+
+def test_without_light_there_is_no_growth():
+    assert growth_ratio([frame(11, 0.1), frame(10, 0.5)] * 5, 10.0, 0.6, 0.5) == 1.0
 
 
 def test_light_in_proportion_to_the_force_is_all_contrast():

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from device.config import CameraSection, Config, PressSection
-from device.errors import BusyError, CameraError, ClockJumpError, DiskFullError, StorageError, UnknownResource
+from device.errors import (
+    BusyError,
+    CameraError,
+    ClockJumpError,
+    DiskFullError,
+    ModeUnavailable,
+    StorageError,
+    UnknownResource,
+)
 from device.instrument import procedure as procedure_module
 from device.instrument.guidance import Guidance
 from device.instrument.procedure import Procedure
@@ -16,7 +24,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Frame
 from device.records.store import ENDED, Store
 
-CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(frames=2, timeout_s=5.0))
+CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(timeout_s=5.0))
 ANSWER = Estimate(
     *[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {"total": 1.0}
 )
@@ -56,12 +64,13 @@ class Rig:
     def __init__(self, folder):
         self.bench, self.store, opened = ObedientBench(), Store(folder), ExitStack()
         opened.callback(self.bench.close)
-        self.estimator = lambda recording: ANSWER
+        self.estimator, self.modes_asked = lambda recording: ANSWER, []
         self.procedure = Procedure(
             CONFIG,
             self.bench,
-            lambda recording: self.estimator(recording),
+            self.estimate,
             self.store,
+            modes=("paper", "quick", "standard"),
             calibration_id="c",
             opened=opened,
             simulated_truth=Inclusion(10.0, 5.0, 80.0),
@@ -73,7 +82,11 @@ class Rig:
         self.procedure.start()
         self.until(lambda: self.board.now.step == "ready")
 
-    def take_up(self):
+    def estimate(self, recording, mode):
+        self.modes_asked.append(mode)
+        return self.estimator(recording)
+
+    def take_up(self, mode=None):
         self.bench.is_at_work = not self.is_away
 
     def put_down(self, guidance):
@@ -83,9 +96,9 @@ class Rig:
     def until(self, condition):
         assert any(condition() or self.waiting.wait(0.005) for _ in range(2000)), self.board.now
 
-    def press(self):
+    def press(self, mode=None):
         """Request a press and return its job once it has ended."""
-        job = self.procedure.request()
+        job = self.procedure.request(mode)
         self.until(lambda: not self.bench.is_at_work and self.board.now.press.state in ENDED)
         return self.store.press(job.id)
 
@@ -109,7 +122,7 @@ def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
     job = rig.press()
     assert (job["state"], job["progress"]) == ("done", 1.0)
     kept = rig.store.measurement(job["measurement_id"])
-    assert (kept["frames"], kept["force_n"]) == (2, 0.5)
+    assert (kept["frames"], kept["force_n"]) == (10, 0.5)
     assert kept["truth"] == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
     assert kept["estimate"]["reason"] == "A stand-in."
     assert rig.store.recording_folder(kept["recording_id"]).is_dir()
@@ -122,8 +135,43 @@ def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig)
     rig.estimator = lambda recording: seen.append(recording) or ANSWER
     rig.press()
     [recording] = seen
-    assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 6, 2]
+    assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 14, 10]
     assert (recording.serial, recording.calibration_id, recording.simulated) == ("TSIS-0000", "c", True)
+
+
+def test_a_press_is_taken_and_estimated_in_the_mode_that_was_asked_for(rig):
+    """Quick: one frame; the unloaded four and one are lit references."""
+    seen = []
+    rig.estimator = lambda recording: seen.append(recording) or ANSWER
+    job = rig.press("quick")
+    assert (job["mode"], rig.modes_asked) == ("quick", ["quick"])
+    assert [len(seen[0].with_role(role)) for role in ("reference", "press")] == [5, 1]
+    assert rig.store.measurement(job["measurement_id"])["mode"] == "quick"
+
+
+def test_without_a_mode_that_of_the_settings_holds(rig):
+    """Neither the hand that begins a press nor a request has to say one."""
+    rig.take_up()
+    rig.until(lambda: rig.board.now.press and rig.board.now.press.state == "done")
+    assert rig.board.now.press.mode == "paper"
+    assert rig.press()["mode"] == "paper"
+
+
+def test_a_mode_that_this_probe_cannot_answer_in_is_refused_at_once_with_those_it_can(rig):
+    with pytest.raises(ModeUnavailable, match="mode precise.*Choose one of those it has: paper, quick, standard"):
+        rig.procedure.request("precise")
+    assert rig.board.now.press is None
+    assert rig.press()["state"] == "done"
+
+
+def test_a_ramp_begins_with_another_guidance_than_a_hold(rig):
+    rig.is_away, told = True, []
+    rig.board.on_guidance(told.append)
+    job = rig.procedure.request("standard")
+    rig.until(lambda: rig.board.now.step == "reference")
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.store.press(job.id)["state"] == "cancelled")
+    assert told[0] is Guidance.TOUCH_BESIDE
 
 
 def test_a_device_error_in_the_middle_fails_the_press_and_the_probe_recovers(rig):

@@ -5,8 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
+from device.measurement.mode import RAMP_TO_N
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.hand import BESIDE_MM, HandSettings, VirtualHand
+from device.simulation.hand import BESIDE_MM, RAMP_AIM_N, TOUCH_N, HandSettings, VirtualHand
 from device.simulation.pressed_face import Placement
 
 STEADY = HandSettings(rate_n_per_s=0.5, reaction_s=0.2, aim_n=0.4, tremor_n=0.0, drift_n=0.0)
@@ -102,7 +103,49 @@ def test_it_lifts_at_the_end_and_follows_no_longer(end):
     assert hand.force_n(30.0) == pytest.approx(0.4)
 
 
-@pytest.mark.parametrize("code", ["wait", "press_harder", "press_lighter", "hold_still"])
+SLOW = HandSettings(ramp_rate_n_per_s=0.1, reaction_s=0.2, tremor_n=0.0, drift_n=0.0)
+
+
+def test_it_touches_and_waits_for_what_is_next():
+    hand = hand_at(SLOW, ("touch_beside", 0.0))
+    assert hand.force_n(0.7) == pytest.approx(0.05)
+    assert hand.force_n(9.0) == pytest.approx(TOUCH_N)
+    assert hand.place(9.0) == Placement(*BESIDE_MM)
+
+
+def test_it_presses_slowly_to_a_little_above_the_ramp():
+    hand = hand_at(SLOW, ("touch_lesion", 0.0), ("press_slowly", 1.0))
+    assert hand.place(9.0) == Placement()
+    assert hand.force_n(2.2) == pytest.approx(TOUCH_N + 0.1)
+    assert hand.force_n(20.0) == pytest.approx(RAMP_AIM_N)
+    assert 0 < RAMP_AIM_N - RAMP_TO_N < 0.1
+
+
+def test_it_eases_slowly_without_lifting():
+    hand = hand_at(SLOW, ("touch_beside", 0.0), ("press_slowly", 1.0), ("press_lighter", 4.0))
+    assert hand.force_n(4.2) == pytest.approx(TOUCH_N + 0.3)
+    assert hand.force_n(5.2) == pytest.approx(TOUCH_N + 0.2)
+    assert hand.force_n(20.0) == pytest.approx(TOUCH_N)
+
+
+def test_it_holds_a_ramp_where_it_is():
+    hand = hand_at(SLOW, ("touch_beside", 0.0), ("press_slowly", 1.0), ("hold_still", 4.0))
+    assert [hand.force_n(t_s) for t_s in (4.2, 9.0)] == pytest.approx([TOUCH_N + 0.3] * 2)
+
+
+def test_a_hand_that_was_too_fast_once_stays_slower_until_it_takes_up_the_probe_again():
+    hand = hand_at(SLOW, ("touch_beside", 0.0), ("press_slowly", 1.0), ("slower", 2.0), ("press_slowly", 4.0))
+    assert hand.force_n(2.2) == pytest.approx(TOUCH_N + 0.1)
+    assert hand.force_n(4.2) == pytest.approx(TOUCH_N + 0.2)
+    assert hand.force_n(5.2) == pytest.approx(TOUCH_N + 0.25)
+    hand.follow("done", 6.0)
+    hand.begin()
+    hand.follow("touch_beside", 20.0)
+    hand.follow("press_slowly", 21.0)
+    assert hand.force_n(22.2) == pytest.approx(TOUCH_N + 0.1)
+
+
+@pytest.mark.parametrize("code", ["wait", "press_harder", "press_lighter", "hold_still", "press_slowly", "slower"])
 def test_other_guidance_does_not_change_what_it_aims_at(code):
     hand = hand_at(STEADY, ("press_beside", 0.0), (code, 1.0))
     assert hand.force_n(9.0) == pytest.approx(0.4)
@@ -117,7 +160,14 @@ def test_a_long_session_of_presses_is_followed_to_the_end():
 
 @pytest.mark.parametrize(
     ("name", "low", "high"),
-    [("rate_n_per_s", 0.01, 10), ("reaction_s", 0, 5), ("aim_n", 0, 5), ("tremor_n", 0, 1), ("drift_n", 0, 1)],
+    [
+        ("rate_n_per_s", 0.01, 10),
+        ("ramp_rate_n_per_s", 0.01, 10),
+        ("reaction_s", 0, 5),
+        ("aim_n", 0, 5),
+        ("tremor_n", 0, 1),
+        ("drift_n", 0, 1),
+    ],
 )
 def test_a_setting_is_taken_at_both_ends_of_its_bound_and_refused_beyond(name, low, high):
     for value in (low, high):

@@ -55,6 +55,28 @@ def test_a_load_cell_at_fault_is_told_at_once_and_has_no_force(told):
     assert [fault["code"] for fault in status["faults"]] == ["E304"]
 
 
+def test_a_hold_has_a_narrow_band_around_its_target(told):
+    status = told(Status(press=PressJob("p-1", "quick", "capturing"), frames_taken=0, wanted_n=(0.5,)), Force())
+    assert (status["mode"], status["kind"], status["frames_needed"]) == ("quick", "hold", 1)
+    assert status["band_n"] == pytest.approx((0.475, 0.525))
+    assert status["wanted_n"] == (0.5,)
+
+
+def test_a_ramp_has_the_forces_at_which_frames_are_still_wanted(told):
+    job = PressJob("p-1", "standard", "capturing")
+    status = told(Status(step="lesion", press=job, frames_taken=9, wanted_n=(0.6,)), Force())
+    assert (status["mode"], status["kind"], status["frames_needed"]) == ("standard", "ramp", 10)
+    assert status["band_n"] == pytest.approx((0.08, 0.6))
+    assert status["wanted_n"] == (0.6,)
+    reference = told(Status(step="reference", press=job, wanted_n=(0.62,)), Force())
+    assert reference["band_n"] == pytest.approx((0.06, 0.62))
+
+
+def test_before_a_press_the_mode_is_that_of_the_settings(told):
+    status = told(Status(press=PressJob("p-1", "standard", "done"), wanted_n=()), Force())
+    assert (status["mode"], status["kind"], status["wanted_n"]) == ("paper", "hold", (0.5,))
+
+
 def test_a_press_that_failed_has_its_code(told):
-    status = told(Status(press=PressJob("p-1", "failed", code="E203", reason="No light.")), Force())
+    status = told(Status(press=PressJob("p-1", "paper", "failed", code="E203", reason="No light.")), Force())
     assert (status["press"]["code"], status["press"]["warnings"]) == ("E203", ())

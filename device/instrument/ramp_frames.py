@@ -1,0 +1,98 @@
+"""The frames of a press that grows slowly: for each of evenly spaced forces the frame that comes nearest to it.
+
+A frame counts when its force is within half a spacing of a target and changes so slowly that it is known at the
+exposure, on the way up or down. A ramp is complete when every target has its frame and the hand is at the top, where
+it then holds. Which forces an estimate needs: device/measurement/mode.py.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from device.config import PressSection
+from device.instrument.bench import Bench
+from device.instrument.frame_check import TearWatch
+from device.instrument.guidance import Guidance
+from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
+from device.measurement.tactile_image import Frame, Role
+
+REFERENCE_BEYOND_N = 0.02
+"""So much further the reference ramp reaches at both ends: no press frame's flat field is extrapolated."""
+
+
+def ramp_targets_n(count: int, role: Role) -> tuple[float, ...]:
+    """Return the `count` forces (N), evenly spaced and growing, at which a press of a role is to be seen."""
+    beyond_n = REFERENCE_BEYOND_N if role == "reference" else 0.0
+    return tuple(float(force) for force in np.linspace(RAMP_FROM_N - beyond_n, RAMP_TO_N + beyond_n, count))
+
+
+class RampFrames:
+    """One frame for each of two or more target forces, evenly spaced and growing."""
+
+    def __init__(self, targets_n: tuple[float, ...], press: PressSection, bench: Bench, tears: TearWatch) -> None:
+        self._targets_n, self._reach_n = targets_n, (targets_n[1] - targets_n[0]) / 2
+        self._press, self._bench, self._tears = press, bench, tears
+        self._kept: dict[float, Frame] = {}
+        self._before: Frame | None = None
+        self._is_rising = True
+
+    @property
+    def frames(self) -> list[Frame]:
+        """The frames so far, by growing target."""
+        return [self._kept[target] for target in self._targets_n if target in self._kept]
+
+    @property
+    def wanted_n(self) -> tuple[float, ...]:
+        """Forces (N) at which a frame is still wanted."""
+        return tuple(target for target in self._targets_n if target not in self._kept)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all frames are there and the hand has come to the top."""
+        return not self.wanted_n and self._before is not None and self._before.force_n >= self._targets_n[-1]
+
+    def see(self, frame: Frame) -> Guidance:
+        """Keep a frame of the touching probe if it counts; return what to do next."""
+        is_whole = self._agrees_with_the_one_before(frame)
+        is_slow = abs(self._bench.rate_n_per_s(frame.t_s)) <= self._press.max_rate_n_per_s
+        if is_whole and is_slow:
+            self._keep(frame)
+        return self._advise(frame.force_n) if is_slow else Guidance.SLOWER
+
+    def begin_again(self) -> None:
+        """Forget all frames: the probe was lifted."""
+        self._kept.clear()
+        self._before, self._is_rising = None, True
+
+    def light_and_hard(self) -> tuple[Frame, list[Frame]]:
+        """Return the frame at the smallest force, and in a list that at the largest."""
+        return self.frames[0], self.frames[-1:]
+
+    def _agrees_with_the_one_before(self, frame: Frame) -> bool:
+        """Compare neighbours in time, whose forces hardly differ; when one is torn, neither stays."""
+        before, self._before = self._before, frame
+        if before is None or self._tears.agree(before, frame):
+            return True
+        self._kept = {target: kept for target, kept in self._kept.items() if kept is not before}
+        self._before = None
+        return False
+
+    def _keep(self, frame: Frame) -> None:
+        def miss_n(other: Frame) -> float:
+            return abs(other.force_n - target)
+
+        target = min(self._targets_n, key=lambda force: abs(force - frame.force_n))
+        kept = self._kept.get(target)
+        if miss_n(frame) <= self._reach_n and (kept is None or miss_n(frame) < miss_n(kept)):
+            self._kept[target] = frame
+
+    def _advise(self, force_n: float) -> Guidance:
+        """Lead up past every open target, and only from the last one down again to those that were missed."""
+        wanted_n = self.wanted_n or self._targets_n[-1:]
+        if min(wanted_n) >= force_n - self._reach_n:
+            self._is_rising = True
+        elif max(wanted_n) < force_n - self._reach_n:
+            self._is_rising = False
+        if not self.wanted_n and force_n >= self._targets_n[-1]:
+            return Guidance.HOLD_STILL
+        return Guidance.PRESS_SLOWLY if self._is_rising else Guidance.PRESS_LIGHTER

@@ -1,0 +1,145 @@
+"""Which frames of a slow press count: one for each of five forces, 0.1 to 0.5 N, told as a list of (force, rate)."""
+
+import numpy as np
+import pytest
+
+from device.config import PressSection
+from device.errors import TornFrameError
+from device.instrument.frame_check import TORN_PAIRS, TearWatch
+from device.instrument.guidance import Guidance
+from device.instrument.ramp_frames import RampFrames, ramp_targets_n
+from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N
+from device.measurement.tactile_image import Frame
+
+TARGETS_N = (0.1, 0.2, 0.3, 0.4, 0.5)
+PRESS = PressSection(max_rate_n_per_s=0.3)
+UP, DOWN, HOLD = Guidance.PRESS_SLOWLY, Guidance.PRESS_LIGHTER, Guidance.HOLD_STILL
+
+
+class RatedBench:
+    """The force changes as fast as a frame's time says: this bench's clock tells rates."""
+
+    def rate_n_per_s(self, t_s):
+        return t_s
+
+
+@pytest.fixture
+def ramp():
+    return RampFrames(TARGETS_N, PRESS, RatedBench(), TearWatch(10.0))
+
+
+def frame(force_n, rate_n_per_s=0.1, torn=False):
+    counts = np.full((32, 32), round(200 * force_n), np.uint8)
+    if torn:
+        counts[16:] = 0
+    return Frame(counts, "press", rate_n_per_s, force_n, (0.6,) * 4)
+
+
+def see(ramp, *forces_n):
+    return [ramp.see(frame(force_n)) for force_n in forces_n]
+
+
+def forces_of(ramp):
+    return [kept.force_n for kept in ramp.frames]
+
+
+@pytest.mark.parametrize("mode", ["standard", "precise"])
+def test_the_targets_are_evenly_spaced_from_end_to_end_and_the_references_reach_further(mode):
+    press, reference = (ramp_targets_n(FRAMES[mode].count, role) for role in ("press", "reference"))
+    assert len(press) == len(reference) == FRAMES[mode].count
+    assert (press[0], press[-1]) == pytest.approx((RAMP_FROM_N, RAMP_TO_N))
+    assert (reference[0], reference[-1]) == pytest.approx((0.06, 0.62))
+    assert np.ptp(np.diff(press)) < 1e-12
+
+
+def test_a_frame_counts_within_half_a_spacing_of_an_open_target(ramp):
+    see(ramp, 0.049, 0.051)
+    assert forces_of(ramp) == [0.051]
+    see(ramp, 0.551)
+    assert forces_of(ramp) == [0.051]
+    see(ramp, 0.549)
+    assert forces_of(ramp) == [0.051, 0.549]
+
+
+def test_the_frame_nearest_to_its_target_stays(ramp):
+    see(ramp, 0.17, 0.19, 0.205, 0.23)
+    assert forces_of(ramp) == [0.205]
+
+
+def test_frames_are_given_in_order_of_their_force_in_whatever_order_they_came(ramp):
+    see(ramp, 0.3, 0.5, 0.2)
+    assert forces_of(ramp) == [0.2, 0.3, 0.5]
+    assert ramp.wanted_n == (0.1, 0.4)
+
+
+@pytest.mark.parametrize(("rate_n_per_s", "counts"), [(0.3, 1), (0.301, 0), (-0.3, 1), (-0.301, 0)])
+def test_a_frame_whose_force_changes_too_fast_does_not_count_and_the_hand_is_slowed(ramp, rate_n_per_s, counts):
+    guidance = ramp.see(frame(0.2, rate_n_per_s))
+    assert len(ramp.frames) == counts
+    assert (guidance is Guidance.SLOWER) is (counts == 0)
+
+
+def test_the_hand_is_led_up_past_every_target_and_holds_at_the_top(ramp):
+    assert see(ramp, 0.1, 0.2, 0.3, 0.4, 0.48, 0.49) == [UP] * 6
+    assert not ramp.is_complete  # every target has its frame, but the top is not reached
+    assert see(ramp, 0.5) == [HOLD]
+    assert ramp.is_complete
+    assert forces_of(ramp) == list(TARGETS_N)
+
+
+def test_what_was_missed_is_fetched_from_above_after_the_rest(ramp):
+    """0.2 and 0.3 N are missed: up to the top first, then down past both, and up again."""
+    assert see(ramp, 0.1, 0.4, 0.5) == [UP, UP, DOWN]
+    assert see(ramp, 0.42, 0.3, 0.27) == [DOWN] * 3
+    assert see(ramp, 0.21, 0.3) == [UP] * 2
+    assert see(ramp, 0.5) == [HOLD]
+
+
+def test_what_was_missed_below_is_not_asked_for_while_there_is_something_above(ramp):
+    assert see(ramp, 0.3, 0.4) == [UP, UP]
+
+
+def test_a_hand_that_lifts_begins_again(ramp):
+    see(ramp, 0.1, 0.2, 0.3, 0.4, 0.5)
+    ramp.begin_again()
+    assert ramp.frames == []
+    assert ramp.wanted_n == TARGETS_N
+    assert not ramp.is_complete
+    assert see(ramp, 0.1) == [UP]
+
+
+def test_a_torn_frame_and_the_one_before_it_are_taken_again(ramp):
+    see(ramp, 0.1, 0.3)
+    ramp.see(frame(0.4, torn=True))
+    assert forces_of(ramp) == [0.1]
+    see(ramp, 0.3, 0.4, 0.2, 0.5)
+    assert forces_of(ramp) == list(TARGETS_N)
+
+
+def test_a_ramp_is_not_complete_on_a_torn_frame(ramp):
+    see(ramp, 0.1, 0.2, 0.3, 0.4, 0.46)
+    ramp.see(frame(0.5, torn=True))
+    assert not ramp.is_complete
+    see(ramp, 0.5)
+    assert ramp.is_complete
+
+
+def test_a_camera_whose_frames_are_torn_again_and_again_is_at_fault(ramp):
+    frames = [frame(0.3, torn=number % 2 == 1) for number in range(2 * TORN_PAIRS)]
+    for one in frames[:-1]:
+        ramp.see(one)
+    with pytest.raises(TornFrameError):
+        ramp.see(frames[-1])
+
+
+def test_neighbours_in_time_are_compared_however_far_apart_the_kept_frames_are(ramp):
+    """The kept frames differ by 20 counts each, above the 10 of a tear; but no row of them is a step."""
+    see(ramp, *np.linspace(0.1, 0.5, 41))
+    assert ramp.is_complete
+
+
+def test_the_smallest_force_is_told_from_the_largest(ramp):
+    see(ramp, 0.1, 0.2, 0.3, 0.4, 0.5)
+    light, hard = ramp.light_and_hard()
+    assert light.force_n == 0.1
+    assert [one.force_n for one in hard] == [0.5]

@@ -1,0 +1,24 @@
+"""What a probe can answer: the modes whose model is there, and none other by default."""
+
+from dataclasses import replace
+
+import pytest
+
+from device.answers import Answers, answers_for
+from device.config import PressSection, simulated_config
+from device.errors import ConfigError
+from device.measurement.estimate import estimate_recording
+
+
+def test_the_estimate_of_a_paper_press_is_that_of_its_model(bundle, calibration, recording):
+    answers = answers_for(replace(simulated_config(), press=PressSection(mode="paper")), bundle, calibration)
+    assert "paper" in answers.modes
+    assert answers.estimator(recording, "paper") == estimate_recording(recording, bundle, calibration)
+
+
+def test_a_mode_without_a_model_is_no_default():
+    answers = Answers(("quick", "paper"), lambda recording, mode: None)
+    answers.require("quick")
+    with pytest.raises(ConfigError, match=r"press\.mode is precise, but .* models for quick, paper only") as refusal:
+        answers.require("precise")
+    assert refusal.value.code == "E001"

@@ -1,0 +1,209 @@
+"""A press in each mode through the daemon's whole procedure on emulated chips: which recording reaches the estimator.
+
+The estimator is a stand-in that keeps what it got. Hands and cameras are faster than people's, by as much as the
+largest rate of a ramp is raised.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from device import assembly
+from device.answers import Answers
+from device.assembly import open_simulated_probe
+from device.config import CameraSection, PressSection, simulated_config
+from device.instrument.procedure import Procedure
+from device.instrument.ramp_frames import ramp_targets_n
+from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
+from device.measurement.mode import FRAMES, MODES, Mode
+from device.measurement.recording import Recording
+from device.records.store import ENDED
+from device.simulation import virtual_probe
+from device.simulation.faults import Fault
+from device.simulation.hand import HandSettings, VirtualHand
+from device.simulation.scenario import Scenario
+
+HAND = HandSettings(rate_n_per_s=1.5, ramp_rate_n_per_s=0.4, reaction_s=0.05)
+QUICK = Scenario(hand=HAND)
+PRESS = PressSection(max_rate_n_per_s=0.6)
+RAMPS = [mode for mode in MODES if FRAMES[mode].is_ramp]
+LONGEST_WAIT_S = 30.0
+
+
+class Witness:
+    """An estimator that answers in every mode and keeps what it is asked."""
+
+    def __init__(self) -> None:
+        self.recordings: list[Recording] = []
+
+    def estimate(self, recording: Recording, mode: Mode) -> Estimate:
+        self.recordings.append(recording)
+        unknown = [UNKNOWN_QUANTITY] * 3
+        return Estimate(*unknown, "not_identifiable", "A stand-in.", mode, "m", "00", "c", True, {})
+
+
+class Device:
+    """A simulated probe that runs, its witness, and every guidance it has given."""
+
+    def __init__(self, procedure: Procedure, witness: Witness) -> None:
+        self.procedure, self.board, self.witness, self.told = procedure, procedure.board, witness, []
+        self._pause = threading.Event()
+        self.board.on_guidance(lambda guidance: self.told.append(guidance.code))
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        tries = round(LONGEST_WAIT_S / 0.01)
+        assert any(condition() or self._pause.wait(0.01) for _ in range(tries)), (self.board.now, self.told)
+
+    def begin(self, mode: Mode) -> str:
+        self.until(lambda: self.board.now.step != "starting" and self.board.now.fault is None)
+        return self.procedure.request(mode).id
+
+    def ended(self, press_id: str) -> dict[str, Any]:
+        self.until(lambda: self.procedure.store.press(press_id)["state"] in ENDED)
+        return self.procedure.store.press(press_id)
+
+    def press(self, mode: Mode) -> dict[str, Any]:
+        return self.ended(self.begin(mode))
+
+
+@pytest.fixture
+def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    witness = Witness()
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, witness.estimate))
+    config = replace(simulated_config(), data=tmp_path, camera=CameraSection(frame_rate_hz=60.0), press=PRESS)
+
+    @contextmanager
+    def run(scenario: Scenario = QUICK) -> Iterator[Device]:
+        opened = open_simulated_probe(config, scenario)
+        device = Device(opened, witness)
+        opened.start()
+        try:
+            yield device
+        finally:
+            opened.close()
+
+    return run
+
+
+def pressed_n(recording: Recording, role: str) -> list[float]:
+    return sorted(frame.force_n for frame in recording.with_role(role) if frame.force_n > PRESS.contact_n)
+
+
+@pytest.mark.parametrize("mode", RAMPS)
+def test_a_ramp_has_its_frames_spread_over_the_force_beside_the_lesion_and_on_it(running, mode):
+    with running() as device:
+        job = device.press(mode)
+    assert (job["state"], job["warnings"]) == ("done", [])
+    [recording] = device.witness.recordings
+    for role in ("reference", "press"):
+        targets_n = ramp_targets_n(FRAMES[mode].count, role)
+        forces_n = pressed_n(recording, role)
+        assert len(forces_n) == FRAMES[mode].count
+        assert np.abs(np.subtract(forces_n, targets_n)).max() <= (targets_n[1] - targets_n[0]) / 2 + 1e-9
+    assert {"touch_beside", "touch_lesion", "press_slowly", "hold_still", "lift", "done"} <= set(device.told)
+    assert "slower" not in device.told
+
+
+@pytest.mark.parametrize("mode", [mode for mode in MODES if not FRAMES[mode].is_ramp])
+def test_a_hold_has_as_many_frames_as_its_mode_needs(running, mode):
+    with running() as device:
+        job = device.press(mode)
+    assert job["state"] == "done"
+    [recording] = device.witness.recordings
+    for role in ("reference", "press"):
+        forces_n = pressed_n(recording, role)
+        assert len(forces_n) == FRAMES[mode].count
+        assert all(PRESS.band_n[0] <= force_n <= PRESS.band_n[1] for force_n in forces_n)
+
+
+def test_the_mode_stands_in_the_job_the_measurement_and_its_estimate(running):
+    with running() as device:
+        job = device.press("quick")
+        measurement = device.procedure.store.measurement(job["measurement_id"])
+    assert job["mode"] == measurement["mode"] == measurement["estimate"]["mode"] == "quick"
+
+
+def test_a_hand_that_is_too_fast_is_slowed_and_gets_its_ramp(running):
+    """1.1 N/s against 0.6 N/s: what it missed it fetches on the way down."""
+    hand = replace(HAND, ramp_rate_n_per_s=1.1)
+    with running(Scenario(hand=hand)) as device:
+        job = device.press("standard")
+    assert job["state"] == "done"
+    assert {"slower", "press_lighter"} <= set(device.told)
+    assert len(pressed_n(device.witness.recordings[0], "press")) == 10
+
+
+def test_a_hand_that_lifts_midway_begins_again(running, monkeypatch):
+    """On the lesion it lifts half a second after it was told to press slowly harder."""
+    lifted_s: list[float] = []
+
+    class LiftingHand(VirtualHand):
+        def follow(self, guidance: str, now_s: float) -> None:
+            super().follow(guidance, now_s)
+            if guidance == "press_slowly" and self.place(now_s).x_mm == 0.0 and not lifted_s:
+                lifted_s.append(now_s + 0.5)
+                super().follow("lift", now_s + 0.5)
+
+    monkeypatch.setattr(virtual_probe, "VirtualHand", LiftingHand)
+    with running() as device:
+        job = device.press("standard")
+    assert job["state"] == "done"
+    assert device.told.count("touch_lesion") == 2
+    press = device.witness.recordings[0].with_role("press")
+    assert len(press) == 10
+    assert min(frame.t_s for frame in press) > lifted_s[0]
+
+
+def test_a_ramp_that_goes_too_far_is_rejected_with_both_numbers(running, monkeypatch):
+    """From 0.3 N on the hand leans on the probe with 1 N more."""
+
+    class HeavyHand(VirtualHand):
+        def force_n(self, t_s: float) -> float:
+            force_n = super().force_n(t_s)
+            return force_n if force_n < 0.3 else force_n + 1.0
+
+    monkeypatch.setattr(virtual_probe, "VirtualHand", HeavyHand)
+    with running() as device:
+        job = device.press("standard")
+    assert job["state"] == "rejected"
+    assert "above 1.00 N" in job["reason"]
+    assert device.witness.recordings == []
+
+
+def test_a_ramp_is_cancelled_in_the_middle(running):
+    with running() as device:
+        press_id = device.begin("precise")
+        device.until(lambda: device.board.now.frames_taken >= 5)
+        device.procedure.cancel(press_id)
+        job = device.ended(press_id)
+    assert job["state"] == "cancelled"
+    assert device.witness.recordings == []
+
+
+def test_a_wet_face_is_seen_in_a_ramp(running):
+    with running(Scenario(hand=HAND, faults=(Fault("wet_face", ratio=1.0),))) as device:
+        job = device.press("standard")
+    assert (job["state"], job["code"]) == ("rejected", "E501")
+
+
+def test_a_camera_that_tears_its_frames_is_at_fault_in_a_ramp(running):
+    with running(Scenario(hand=HAND, faults=(Fault("camera_torn", from_press=1),))) as device:
+        job = device.press("standard")
+    assert (job["state"], job["code"]) == ("failed", "E103")
+
+
+def test_a_light_that_lost_a_tenth_is_warned_of_after_holds_and_ramps_alike(running):
+    """The first press says how bright a side is at the target force, whatever its mode."""
+    with running(Scenario(hand=HAND, faults=(Fault("led_dimmed", ratio=0.9, from_press=4),))) as device:
+        warned = [[w["code"] for w in device.press(mode)["warnings"]] for mode in ("standard", "quick", "precise")]
+        dimmed = device.press("standard")["warnings"]
+    assert warned == [[], [], []]
+    assert [warning["code"] for warning in dimmed] == ["E206"]

@@ -1,0 +1,77 @@
+"""The choice of a mode over REST, against a procedure that only writes down what it is asked for."""
+
+import asyncio
+import types
+
+import httpx
+import pytest
+
+from device.config import Config
+from device.errors import ModeUnavailable
+from device.instrument.status import PressJob
+from device.web.app import create_app
+
+
+class Procedure:
+    """A probe with two modes."""
+
+    def __init__(self):
+        self.config, self.modes, self.is_simulated, self.asked = Config(), ("paper", "standard"), True, []
+
+    def request(self, mode=None):
+        self.asked.append(mode)
+        if mode not in (None, *self.modes):
+            raise ModeUnavailable(f"This probe has no model for the mode {mode}.", "Choose one of those it has.")
+        return PressJob("p-1", mode or "paper")
+
+
+@pytest.fixture
+def procedure():
+    return Procedure()
+
+
+@pytest.fixture
+def ask(procedure):
+    app = create_app(procedure, types.SimpleNamespace())
+
+    def asking(method, path, **content):
+        async def answer():
+            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://probe") as client:
+                return await client.request(method, path, **content)
+
+        return asyncio.run(answer())
+
+    return asking
+
+
+@pytest.mark.parametrize(
+    ("content", "asked", "mode"),
+    [({}, None, "paper"), ({"json": {}}, None, "paper"), ({"json": {"mode": "standard"}}, "standard", "standard")],
+)
+def test_a_press_is_asked_for_in_a_mode_or_in_none(ask, procedure, content, asked, mode):
+    answer = ask("POST", "/api/v1/presses", **content)
+    assert answer.status_code == 202
+    assert answer.json()["mode"] == mode
+    assert procedure.asked == [asked]
+
+
+def test_an_unknown_mode_is_refused_with_all_there_are(ask, procedure):
+    answer = ask("POST", "/api/v1/presses", json={"mode": "fast"})
+    assert (answer.status_code, answer.json()["code"]) == (422, "E803")
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert all(mode in answer.json()["detail"] for mode in ("quick", "standard", "precise", "paper"))
+    assert procedure.asked == []
+
+
+def test_a_mode_without_a_model_is_refused_with_its_own_code(ask):
+    answer = ask("POST", "/api/v1/presses", json={"mode": "precise"})
+    assert (answer.status_code, answer.json()["code"]) == (422, "E805")
+
+
+def test_the_device_says_in_which_modes_it_measures_at_what_cost(ask):
+    device = ask("GET", "/api/v1/device").json()
+    assert device["default_mode"] == "paper"
+    assert device["modes"] == [
+        {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5},
+        {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0},
+    ]
