@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording import Recording
-from device.measurement.reference_light import HeldLight, Image, RampLight, reference_light
+from device.measurement.reference_light import BEYOND_RATIO, HeldLight, Image, RampLight, reference_light
 from device.measurement.ring_means import RING_RADII_MM, RingMeans, ring_weights
 from device.measurement.tactile_image import Frame, PixelScale
 
@@ -33,6 +33,8 @@ RAMP_DEGREE = 3
 RAMP_LOW_N, RAMP_HIGH_N = 0.15, 0.5
 """A ramp reaches from at most the first to at least the second of these forces."""
 MIN_RAMP_FRAMES = 6
+LARGEST_STEP_N = 0.17
+"""Between forces further apart than this a ramp's polynomials are not held: four forces hold them, three do not."""
 AGAIN = "press slowly harder from the first touch to 0.6 N, beside the lesion and on it"
 
 
@@ -80,7 +82,8 @@ class Lights:
 def press_profile(recording: Recording) -> PressProfile:
     """Return the profile of a recording whose reference and press are force ramps.
 
-    Raises `InvalidQuantity` when a role is missing, or a ramp is too short or has too few frames.
+    Press frames far below or above the reference's forces count nothing. Raises `InvalidQuantity` when a role is
+    missing, or a ramp is too short, has too few frames or a gap.
     """
     dark = recording.with_role("dark")
     if not dark:
@@ -94,8 +97,9 @@ def press_profile(recording: Recording) -> PressProfile:
 
 def profile_of_lights(reference: Lights, press: Lights) -> PressProfile:
     """Return the profile of lights above dark (counts of 8 bits); as `press_profile`, for light without a camera."""
-    for name, lights in (("reference", reference), ("press", press)):
-        _require_ramp(name, lights.force_n)
+    _require_ramp("reference", reference.force_n)
+    press = _within(press, reference.force_n)
+    _require_ramp("press", press.force_n)
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
     weights = ring_weights(press.images[0].shape, press.scale)
     everywhere = np.ones(press.images[0].shape, dtype=bool)
@@ -139,6 +143,16 @@ def _lights(recording: Recording, role: str, dark: Image, per_count: float, fact
     return Lights(forces, images, binned_scale(recording.camera.scale))
 
 
+def _within(press: Lights, reference_n: Array) -> Lights:
+    """Return the press frames whose force the reference's light follows; others have no flat field of their force."""
+    if not len(press.force_n):
+        return press
+    low, high = BEYOND_RATIO
+    kept = (press.force_n >= low * reference_n.min()) & (press.force_n <= high * reference_n.max())
+    images = [image for image, keep in zip(press.images, kept, strict=True) if keep]
+    return Lights(press.force_n[kept], images, press.scale)
+
+
 def _binning(scale: PixelScale) -> tuple[int, int]:
     return tuple(max(round(BINNED_MM / size), 1) for size in (scale.mm_per_px_x, scale.mm_per_px_y))  # type: ignore[return-value]
 
@@ -163,6 +177,8 @@ def _require_ramp(name: str, force_n: Array) -> None:
     require(f"{name} frames", len(force_n), Bound(MIN_RAMP_FRAMES, 1e6, "frames"), AGAIN)
     require(f"smallest {name} force", float(min(force_n)), Bound(0.0, RAMP_LOW_N, "N"), AGAIN)
     require(f"largest {name} force", float(max(force_n)), Bound(RAMP_HIGH_N, 1.0, "N"), AGAIN)
+    step_n = float(np.diff(np.sort(force_n)).max())
+    require(f"largest step of the {name} force", step_n, Bound(0.0, LARGEST_STEP_N, "N"), AGAIN)
 
 
 def _at_profile_forces(force_n: Array, frames: Sequence[RingMeans]) -> tuple[RingMeans, float]:

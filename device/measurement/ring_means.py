@@ -22,11 +22,16 @@ RING_MM = 0.9
 RINGS = 11
 """Rings at 0, 0.9 ... 9.0 mm: the last ends where the central window does, at 0.9 of the face's radius."""
 RING_RADII_MM: Array = RING_MM * np.arange(RINGS, dtype=np.float64)
+RING_AREAS_MM2: Array = np.pi * RING_MM * np.append(RING_MM / 3, 2 * RING_RADII_MM[1:])
+"""Integral of each ring's weight: times the means, they add up to the image's integral."""
 HARMONICS = 2
 
 
 class RingMeans(NamedTuple):
-    """`mean` [..., J], and `cosine`, `sine` [..., 2, J] of the first two harmonics, in the image's own unit."""
+    """`mean` [..., J], and `cosine`, `sine` [..., 2, J] of the first two harmonics, in the image's own unit.
+
+    The harmonics are those of what differs from the ring's mean: a ring that is seen in part has none by itself.
+    """
 
     mean: Array
     cosine: Array
@@ -44,14 +49,15 @@ class RingWeights:
 
     def means(self, image: Image, valid: NDArray[np.bool_]) -> RingMeans:
         """Return the ring means over the valid pixels of an image [height, width]; a ring without one is 0."""
-        seen = valid[self.inside]
-        values = np.where(seen, image[self.inside], np.float32(0))
-        norm = np.maximum(self.weight @ seen.astype(np.float32), np.float32(1e-6))
-        return RingMeans(
-            (self.weight @ values / norm).astype(float),
-            np.stack([2 * (self.weight @ (values * c)) / norm for c in self.cosine]).astype(float),
-            np.stack([2 * (self.weight @ (values * s)) / norm for s in self.sine]).astype(float),
-        )
+        seen = valid[self.inside].astype(np.float32)
+        values = np.where(seen > 0, image[self.inside], np.float32(0))
+        waves = np.concatenate([self.cosine, self.sine])
+        rows = np.concatenate([[values], [seen], values * waves, seen * waves])
+        total, count, of_values, of_seen = np.split(self.weight @ rows.T, (1, 2, 2 + len(waves)), axis=1)
+        norm = np.maximum(count, np.float32(1e-6))
+        mean = total / norm
+        cosine, sine = np.split((2 * (of_values - mean * of_seen) / norm).T.astype(float), 2)
+        return RingMeans(mean[:, 0].astype(float), cosine, sine)
 
 
 @lru_cache(maxsize=4)
