@@ -18,13 +18,16 @@ import onnxruntime
 from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
 
+from device.measurement.press_profile import ROW_NAMES
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
 
 SCHEMA = "tsis.model/1"
 MODEL_FILE, CARD_FILE = "model.onnx", "model.json"
 
 FEATURE_UNITS = {"max_deformation_mm": "mm", "central_deformation_mm3": "mm3", "deformation_area_mm2": "mm2"}
-"""The features the probe can measure: the paper's O1, O2, O3, in this order."""
+"""The features of the paper's network: O1, O2, O3, in this order."""
+PROFILE_UNITS = dict.fromkeys(ROW_NAMES, "")
+"""The features of a network that reads the press profile: its whole row, ratios all of them."""
 
 GOLDEN_TOLERANCE = 1e-4
 """Relative. Rounding of float32 is 6e-8; processors differ far less than this, wrong weights far more."""
@@ -108,7 +111,7 @@ class ModelBundle:
         sentences = []
         for (name, (low, high)), value in zip(self.feature_range.items(), features, strict=True):
             if not low <= value <= high:
-                unit = FEATURE_UNITS[name]
+                unit = FEATURE_UNITS.get(name, "")
                 spoken = name.rpartition("_")[0].replace("_", " ").capitalize()
                 sentences.append(f"{spoken} is {value:.4g} {unit}, outside the trained {low:.4g} to {high:.4g} {unit}.")
         return sentences
@@ -199,15 +202,12 @@ def _verified_hash(fields: _Fields, network: bytes) -> str:
 
 
 def _verified_names(fields: _Fields) -> tuple[str, ...]:
-    known = [{"name": name, "unit": unit} for name, unit in FEATURE_UNITS.items()]
     features = fields.of("features", list)
-    for feature in features:
-        if feature not in known:
-            fields.refuse("features", feature, f"among {', '.join(FEATURE_UNITS)}, each with its unit")
-    names = tuple(feature["name"] for feature in features)
-    if names != tuple(FEATURE_UNITS):
-        fields.refuse("features", list(names), f"{', '.join(FEATURE_UNITS)}, in this order")
-    return names
+    for units in (FEATURE_UNITS, PROFILE_UNITS):
+        if features == [{"name": name, "unit": unit} for name, unit in units.items()]:
+            return tuple(units)
+    bound = f"{', '.join(FEATURE_UNITS)}, each with its unit and in this order, or the columns of the press profile"
+    fields.refuse("features", [entry.get("name") if isinstance(entry, dict) else entry for entry in features], bound)
 
 
 def _open_session(fields: _Fields, network: bytes) -> onnxruntime.InferenceSession:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import onnx
+from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from device.measurement.durable import sync_directory, write_and_sync
@@ -26,6 +27,8 @@ from host_tools.inverse.train import Trained
 
 OPSET, IR_VERSION = 17, 8
 """Of 2022: old enough for any onnxruntime a probe may carry."""
+
+Constant = Array | NDArray[np.float32] | np.float64 | np.float32
 
 AGREEMENT = 1e-5
 """Largest relative difference between the exported network and NumPy; float32 outputs round at 6e-8."""
@@ -63,7 +66,7 @@ def build_network(ensemble: Ensemble) -> bytes:
     """Return the ensemble as serialised ONNX: features float32 [n, 3] -> estimate, spread float32 [n, 3]."""
     scaling, trials = ensemble.scaling, len(ensemble.parameters)
     low, half_width = scaling.box_low, 0.5 * (scaling.box_high - scaling.box_low)
-    graph = _Graph()
+    graph = OnnxGraph()
     logs = graph.add("Log", graph.add("Max", graph.add("Cast", "features", to=TensorProto.DOUBLE), scaling.floor))
     signal = graph.add(
         "Div", graph.add("Sub", graph.add("MatMul", logs, LOG_RATIOS), scaling.log_mean), scaling.log_std
@@ -80,35 +83,34 @@ def build_network(ensemble: Ensemble) -> bytes:
     return graph.serialise()
 
 
-class _Graph:
-    """Collects ONNX nodes; arrays given as inputs become constants."""
+class OnnxGraph:
+    """Collects ONNX nodes; arrays given as inputs become constants, of single precision where they are."""
 
     def __init__(self) -> None:
         self.nodes: list[Any] = []
         self.constants: list[Any] = []
 
-    def add(
-        self, operator: str, *inputs: str | Array | np.float64, output: str = "", **attributes: int | list[int]
-    ) -> str:
+    def add(self, operator: str, *inputs: str | Constant, output: str = "", **attributes: int | list[int]) -> str:
         """Append a node and return the name of its output."""
         names = [value if isinstance(value, str) else self._constant(value) for value in inputs]
         output = output or f"{operator.lower()}_{len(self.nodes)}"
         self.nodes.append(helper.make_node(operator, names, [output], **attributes))
         return output
 
-    def _constant(self, values: Array | np.float64) -> str:
+    def _constant(self, values: Constant) -> str:
         name = f"constant_{len(self.constants)}"
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values, dtype=np.float64), name))
+        kept = values if values.dtype == np.float32 else np.asarray(values, dtype=np.float64)
+        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(kept), name))
         return name
 
-    def serialise(self) -> bytes:
-        """Return the checked model."""
+    def serialise(self, features: int = LAYERS[0]) -> bytes:
+        """Return the checked model from so many features to estimate and spread."""
 
         def port(name: str, columns: int) -> Any:
             return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", columns])
 
-        outputs = [port(name, LAYERS[-1]) for name in ("estimate", "spread")]
-        graph = helper.make_graph(self.nodes, "inverse", [port("features", LAYERS[0])], outputs, self.constants)
+        outputs = [port(name, len(UNKNOWNS)) for name in ("estimate", "spread")]
+        graph = helper.make_graph(self.nodes, "inverse", [port("features", features)], outputs, self.constants)
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
         onnx.checker.check_model(model, full_check=True)
         return bytes(model.SerializeToString(deterministic=True))

@@ -1,0 +1,43 @@
+"""Simulated presses with noise to the bands behind every interval, one set for each unknown.
+
+Bounds are quantiles of (truth - mean) / spread over the presses nearest in truth and in the logarithm of the spread.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from device.measurement.confidence import COVERAGE, IDENTIFIABLE_RATIO, Array, Bands
+from device.measurement.press_parameters import EVEN_STD
+from device.measurement.quantities import Bound, require
+
+TRUTHS, SPREADS = 17, 5
+TRUTH_LENGTH = 0.15
+"""Presses this far apart in truth are as unlike as those one standard deviation of the log spread apart."""
+FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.05
+"""Presses of which a bound is the quantile, and their share of all: 400 leave an error of 1.5 % of coverage."""
+
+
+def confidence_bands(truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
+    """Return bands for each unknown of truths, means and spreads [n, 3] in coordinates.
+
+    Only presses that determine an unknown count for it. Raises `InvalidQuantity` when these are too few.
+    """
+    return tuple(_bands(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
+
+
+def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
+    known = spread < IDENTIFIABLE_RATIO * EVEN_STD
+    require("presses that determine an unknown", int(known.sum()), Bound(2 * FEWEST, np.inf, ""), "simulate more")
+    neighbours = int(np.clip(NEIGHBOUR_RATIO * known.sum(), FEWEST, MOST))
+    truth, unusual, log_spread = truth[known], ((truth - mean) / spread)[known], np.log(spread[known])
+    truths = -np.cos(np.pi * np.arange(TRUTHS) / (TRUTHS - 1))  # closer to each other at the ends of the range
+    spreads = np.quantile(log_spread, np.linspace(0.02, 0.98, SPREADS))
+    tails = (1 - COVERAGE) / 2, (1 + COVERAGE) / 2
+    table = np.empty((TRUTHS, SPREADS, 2))
+    for i, at in enumerate(truths):
+        for j, log in enumerate(spreads):
+            distance = np.hypot((truth - at) / TRUTH_LENGTH, (log_spread - log) / max(float(np.std(log_spread)), 1e-3))
+            near = np.argpartition(distance, neighbours - 1)[:neighbours]
+            table[i, j] = np.quantile(unusual[near], tails)
+    return Bands(truths, spreads, table[..., 0], table[..., 1])

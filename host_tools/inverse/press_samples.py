@@ -1,0 +1,123 @@
+"""Random presses of the virtual probe without camera noise: unknowns and nuisances to rows of the press profile.
+
+What the surrogate learns from. Light comes from the probe's own tables and optics, on pixels as coarse as the profile
+bins them; forces are exactly the profile's, so nothing is fitted. One lump-free press serves several lumps.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from device.measurement.press_parameters import NUISANCES, PARAMETERS, from_unit
+from device.measurement.press_profile import PROFILE_FORCES_N, harmonic
+from device.measurement.quantities import Inclusion
+from device.measurement.ring_means import RingMeans, ring_weights
+from device.measurement.tactile_image import Image, PixelScale
+from device.simulation.hand import BESIDE_MM
+from device.simulation.image_formation import ScatteredImage
+from device.simulation.lens import Lens
+from device.simulation.pressed_face import Placement, PressedFace
+from device.simulation.skin import Skin
+from device.simulation.slab import Slab
+from device.simulation.virtual_probe import ProbeTables
+
+Array = NDArray[np.float64]
+
+SHAPE, SCALE = (162, 162), PixelScale(0.125, 0.125)
+"""The central window, in pixels of the profile's binning."""
+LENS = Lens(blur_px=0.2)
+LIT = (0.6, 0.6, 0.6, 0.6)
+LUMPS_A_SKIN = 3
+"""Lumps that are pressed on one tissue and skin: their lump-free press is made once."""
+CHUNK = 24
+NEAREST_MM = 1.0
+"""A lump ends at least this far above the slab's base."""
+
+
+@dataclass(frozen=True, eq=False)
+class PressSamples:
+    """Parameters [n, 9] in the order of `PARAMETERS` and rows [n, P] in that of `press_profile.ROW_NAMES`."""
+
+    parameters: Array
+    rows: Array
+
+
+def draw_parameters(count: int, rng: np.random.Generator, *, lumps_a_skin: int = 1) -> Array:
+    """Return parameters [count, 9], even over their ranges; the offset is even over its disk.
+
+    Consecutive `lumps_a_skin` rows share tissue and skin. Lumps that would touch the slab's base are drawn again.
+    """
+    unknowns = len(PARAMETERS) - len(NUISANCES)
+    unit = rng.uniform(-1, 1, (count, len(PARAMETERS)))
+    unit[:, unknowns:] = np.repeat(unit[::lumps_a_skin, unknowns:], lumps_a_skin, axis=0)[:count]
+    unit[:, -1] = 2 * np.sqrt(rng.uniform(0, 1, count)) - 1
+    values = from_unit(unit)
+    while (buried := values[:, 0] + values[:, 1] > values[:, PARAMETERS.index("slab_thickness_mm")] - NEAREST_MM).any():
+        unit[buried, :2] = rng.uniform(-1, 1, (buried.sum(), 2))
+        values = from_unit(unit)
+    return values
+
+
+def sample_presses(
+    tables: ProbeTables,
+    count: int,
+    *,
+    seed: int,
+    jobs: int = -1,
+    on_done: Callable[[int], None] = lambda done: None,
+) -> PressSamples:
+    """Return `count` random presses; the same seed gives the same ones whatever `jobs` (-1: all cores)."""
+    parameters = draw_parameters(count, np.random.default_rng(seed), lumps_a_skin=LUMPS_A_SKIN)
+    parts = np.split(parameters, range(CHUNK * LUMPS_A_SKIN, count, CHUNK * LUMPS_A_SKIN))
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    rows = []
+    for part in Parallel(n_jobs=jobs, return_as="generator")(delayed(profile_rows)(tables, p) for p in parts):
+        rows.append(part)
+        on_done(len(part))
+    return PressSamples(parameters, np.concatenate(rows))
+
+
+def profile_rows(tables: ProbeTables, parameters: Array) -> Array:
+    """Return the profile rows [n, P] of presses without noise, for parameters [n, 9]."""
+    scene = _Scene(tables)
+    return np.array([scene.row(dict(zip(PARAMETERS, map(float, values), strict=True))) for values in parameters])
+
+
+class _Scene:
+    """Presses lumps on one tissue and skin after the other; remembers the lump-free press of the last."""
+
+    def __init__(self, tables: ProbeTables) -> None:
+        self._tables, self._weights = tables, ring_weights(SHAPE, SCALE)
+        self._valid = np.ones(SHAPE, dtype=bool)
+        self._skin: Skin | None = None
+        self._slab: Slab | None = None
+
+    def row(self, at: dict[str, float]) -> Array:
+        skin = Skin(albedo=at["albedo"], spread_mm=at["spread_mm"], contact_pressure_kpa=at["contact_pressure_kpa"])
+        slab = Slab(at["tissue_modulus_kpa"], at["slab_thickness_mm"])
+        inclusion = Inclusion(at["size_mm"], at["depth_mm"], at["youngs_modulus_kpa"])
+        if (skin, slab) != (self._skin, self._slab):
+            self._skin, self._slab = skin, slab
+            self._image = ScatteredImage(self._tables.light, skin, LENS, SHAPE, SCALE)
+            self._bare = self._lights(inclusion, Placement(*BESIDE_MM))
+            bare = np.array([self._means(light).mean for light in self._bare])
+            self._growth = np.log(bare[:-1] / bare[-1])
+        lights = self._lights(inclusion, Placement(x_mm=at["offset_mm"]))
+        rings = [self._means(light / bare - np.float32(1)) for light, bare in zip(lights, self._bare, strict=True)]
+        stacked = RingMeans(*(np.array(part) for part in zip(*rings, strict=True)))
+        return np.concatenate([stacked.mean.ravel(), self._growth.ravel(), harmonic(stacked, 1)])
+
+    def _lights(self, inclusion: Inclusion, place: Placement) -> list[Image]:
+        assert self._slab is not None  # row has set it
+        ramps = self._tables.centred.ramps(inclusion, self._slab)
+        face = PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, self._slab)
+        return [self._image.intensity(*face.at(float(force), place), LIT) for force in PROFILE_FORCES_N]
+
+    def _means(self, image: Image) -> RingMeans:
+        return self._weights.means(image, self._valid)

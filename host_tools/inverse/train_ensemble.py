@@ -1,0 +1,81 @@
+"""Random presses to an ensemble of networks, whose mean is the standard mode's estimate.
+
+Members differ in their first weights and in the presses they see. The ensemble's variance is the mean of the members'
+variances plus the variance of their means. Source: Lakshminarayanan et al., NeurIPS 2017.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed, parallel_config
+
+from device.measurement.quantities import UNKNOWNS, Bound, require
+from host_tools.inverse.adam import Adam
+from host_tools.inverse.dense_network import (
+    Array,
+    InputScaling,
+    Layer,
+    Single,
+    initial_layers,
+    loss_and_gradient,
+    predict,
+)
+from host_tools.inverse.noisy_presses import Pool
+
+MEMBERS, STEPS, BATCH, RATE = 5, 16_000, 1024, 3e-3
+SCALED_ON = 20_000
+"""Rows of which the scaling of the inputs is taken."""
+FEWEST_PRESSES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class DenseEnsemble:
+    """Networks that share one scaling of the inputs."""
+
+    scaling: InputScaling
+    members: tuple[list[Layer], ...]
+
+    def estimate(self, rows: Array) -> tuple[Array, Array]:
+        """Return mean and spread [n, 3] of the coordinates of the unknowns, for rows [n, P]."""
+        inputs = self.scaling.inputs(rows.astype(np.float32))
+        predictions = [predict(layers, inputs) for layers in self.members]
+        means = np.array([prediction.mean for prediction in predictions], dtype=np.float64)
+        variances = np.exp(np.array([prediction.log_variance for prediction in predictions], dtype=np.float64))
+        return means.mean(axis=0), np.sqrt(variances.mean(axis=0) + means.var(axis=0))
+
+
+def train_ensemble(
+    pool: Pool, *, seed: int, members: int = MEMBERS, steps: int = STEPS, columns: slice = slice(None), jobs: int = -1
+) -> DenseEnsemble:
+    """Return the ensemble trained on a pool's rows, or on some of their columns.
+
+    The same seed gives the same ensemble whatever `jobs` (-1: all cores). Raises `InvalidQuantity` for too few presses.
+    """
+    require("presses", len(pool.rows), Bound(FEWEST_PRESSES, np.inf, "presses"), "draw more random presses")
+    require("members", members, Bound(1, 100, "networks"), "train at least one")
+    rng = np.random.default_rng([seed, 0])
+    some = pool.noisy(rng.integers(len(pool.rows), size=min(SCALED_ON, len(pool.rows))), rng)
+    typical = pool.sampler.noise.covariance(pool.rows.mean(axis=0).astype(np.float64))
+    scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical[columns, columns])
+    with parallel_config(backend="loky", inner_max_num_threads=1):
+        trained = Parallel(n_jobs=jobs)(
+            delayed(train_member)(pool, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
+            for member in range(members)
+        )
+    return DenseEnsemble(scaling, tuple(trained))
+
+
+def train_member(
+    pool: Pool, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
+) -> list[Layer]:
+    """Return the layers of one network after `steps` batches of fresh noise."""
+    layers = initial_layers(2 * scaling.projection.shape[1], rng)
+    adam = Adam(layers, rate=RATE, steps=steps)
+    target: Single = pool.unit[:, : len(UNKNOWNS)]
+    for _ in range(steps):
+        index = rng.integers(len(pool.rows), size=BATCH)
+        inputs = scaling.inputs(pool.noisy(index, rng)[:, columns])
+        adam.step(loss_and_gradient(layers, inputs, target[index])[1])
+    return layers

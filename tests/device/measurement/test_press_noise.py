@@ -1,0 +1,117 @@
+"""The noise model against direct averages over the angle, and what each kind of drift does to a row."""
+
+import numpy as np
+import pytest
+from small_surrogate import COLUMNS, EXACT, white_noise
+
+from device.measurement.press_noise import (
+    ErrorLevels,
+    PressNoise,
+    drift_directions,
+    light_ratio,
+    ring_correlation,
+    smooth_errors,
+)
+from device.measurement.press_profile import PROFILE_FORCES_N
+from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
+from device.measurement.reference_light import EXPONENT
+from device.measurement.ring_means import RING_RADII_MM, RINGS
+
+
+@pytest.fixture
+def row() -> np.ndarray:
+    return np.random.default_rng(1).uniform(0.0, 0.5, COLUMNS)
+
+
+def test_the_covariance_is_symmetric_and_positive_definite(row):
+    covariance = white_noise(1e-4, ErrorLevels()).covariance(row)
+    np.testing.assert_allclose(covariance, covariance.T, rtol=1e-12)
+    assert np.linalg.eigvalsh(covariance).min() > 0.9e-8
+
+
+def test_without_drift_and_smooth_errors_only_the_camera_is_left(row):
+    noise = white_noise(1e-3)
+    np.testing.assert_allclose(noise.covariance(row), noise.camera, rtol=1e-14, atol=1e-30)
+
+
+@pytest.mark.parametrize("length_mm", [1.0, 2.5, 6.0])
+@pytest.mark.parametrize("harmonic", [0, 1])
+def test_the_correlation_of_rings_is_the_fields_averaged_over_both_angles(length_mm, harmonic):
+    """Rings are a(r) = mean of 2 f(r, angle) cos(angle), or without the 2 cos; trapezia are exact on a circle."""
+    angle = 2 * np.pi * np.arange(256) / 256
+    basis = np.ones_like(angle) if harmonic == 0 else 2 * np.cos(angle)
+    x, y = np.multiply.outer(RING_RADII_MM, (np.cos(angle), np.sin(angle))).transpose(1, 0, 2)
+    expected = np.empty((RINGS, RINGS))
+    for i in range(RINGS):
+        for j in range(RINGS):
+            distance2 = np.subtract.outer(x[i], x[j]) ** 2 + np.subtract.outer(y[i], y[j]) ** 2
+            expected[i, j] = basis @ np.exp(-distance2 / (2 * length_mm**2)) @ basis / len(angle) ** 2
+    np.testing.assert_allclose(ring_correlation(length_mm, harmonic=harmonic), expected, atol=1e-10)
+
+
+def test_a_field_that_is_the_same_everywhere_moves_all_rings_and_no_harmonic():
+    np.testing.assert_allclose(ring_correlation(1e5, harmonic=0), 1.0, atol=1e-7)
+    np.testing.assert_allclose(ring_correlation(1e5, harmonic=1), 0.0, atol=1e-7)
+
+
+def test_a_short_field_averages_out_along_a_ring_but_not_in_the_middle():
+    """Far above its length a ring of radius r holds some sqrt(2 pi) r / length patches of their own."""
+    length_mm = 0.05
+    variance = np.diag(ring_correlation(length_mm, harmonic=0))
+    assert variance[0] == 1.0
+    np.testing.assert_allclose(variance[1:], length_mm / (np.sqrt(2 * np.pi) * RING_RADII_MM[1:]), rtol=1e-3)
+
+
+def test_more_light_moves_a_contrast_by_the_light_that_is_there(row):
+    """(1 + g) (1 + c) - 1 = c + g (1 + c); growth and offset are ratios that it leaves."""
+    gain = drift_directions(light_ratio(row))[:, 0]
+    np.testing.assert_allclose(gain[:CONTRAST_COLUMNS], 1 + row[:CONTRAST_COLUMNS], rtol=1e-14)
+    np.testing.assert_array_equal(gain[CONTRAST_COLUMNS:], 0.0)
+
+
+def test_a_drift_of_the_cells_zero_moves_light_as_its_power_of_the_force_does(row):
+    """Light grows as the force to `EXPONENT`: its ratio at forces that differ by dz, to first order."""
+    zero, step_n = drift_directions(light_ratio(row))[:CONTRAST_COLUMNS, 1], 1e-6
+    force_n = np.repeat(PROFILE_FORCES_N, RINGS)
+    moved = (1 + row[:CONTRAST_COLUMNS]) * (((force_n + step_n) / force_n) ** EXPONENT - 1) / step_n
+    np.testing.assert_allclose(zero, moved, rtol=1e-4)
+
+
+def test_a_drift_of_the_cells_zero_matters_most_at_the_smallest_load():
+    bare = drift_directions(np.ones(COLUMNS))[:CONTRAST_COLUMNS, 1].reshape(-1, RINGS)
+    assert (np.diff(bare, axis=0) < 0).all()
+
+
+def test_drifts_enter_the_covariance_with_their_levels(row):
+    levels = ErrorLevels(gain_ratio=0.02, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
+    covariance = white_noise(1e-3, levels).covariance(row) - 1e-6 * np.eye(COLUMNS)
+    light = 1 + row[:CONTRAST_COLUMNS]
+    np.testing.assert_allclose(
+        covariance[:CONTRAST_COLUMNS, :CONTRAST_COLUMNS], 4e-4 * np.outer(light, light), atol=1e-15
+    )
+
+
+def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones_own():
+    first, second = slice(0, RINGS), slice(RINGS, 2 * RINGS)
+    flat = smooth_errors(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))
+    model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
+    np.testing.assert_array_equal(flat[first, second], flat[first, first])
+    assert flat[0, 0] == pytest.approx(1e-4)
+    np.testing.assert_array_equal(model[first, second], 0.0)
+    assert model[0, 0] == pytest.approx(1e-4)
+
+
+def test_growth_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
+    model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
+    growth = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+    middle = model[growth, growth][::RINGS, ::RINGS]
+    np.testing.assert_allclose(middle, 1e-4 * (np.eye(3) + 1), rtol=1e-12)
+
+
+def test_smooth_errors_grow_with_the_light_they_are_a_ratio_of():
+    levels = ErrorLevels(gain_ratio=0.0, zero_n=0.0)
+    camera = np.zeros((COLUMNS, COLUMNS))
+    dark, bright = (PressNoise(camera, levels).covariance(np.full(COLUMNS, c)) for c in (0.0, 0.5))
+    np.testing.assert_allclose(np.diag(bright)[:CONTRAST_COLUMNS], 2.25 * np.diag(dark)[:CONTRAST_COLUMNS], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[CONTRAST_COLUMNS:], np.diag(dark)[CONTRAST_COLUMNS:], rtol=1e-12)
+    assert np.diag(PressNoise(camera, EXACT).covariance(np.ones(COLUMNS))).max() == 0

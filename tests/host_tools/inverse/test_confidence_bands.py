@@ -1,0 +1,36 @@
+"""Bands from simulated answers: they cover nine in ten, whatever the truth is."""
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.inverse.confidence_bands import confidence_bands
+
+
+def shrunk_answers(count, seed, noise=0.15):
+    """Posterior means of an even truth seen with noise: they shrink to the middle, most at the ends."""
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(-1, 1, count)
+    seen = truth + rng.normal(0, noise, count)
+    grid = np.linspace(-1, 1, 201)
+    weight = np.exp(-0.5 * ((grid - seen[:, None]) / noise) ** 2)
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean = weight @ grid
+    return truth, mean, np.sqrt(np.maximum(weight @ grid**2 - mean**2, 1e-6))
+
+
+def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
+    """A Bayesian interval covers 0.9 on the average, but misses most truths at the ends of the range."""
+    bands = confidence_bands(*(column[:, None] for column in shrunk_answers(12_000, 1)))[0]
+    truth, mean, spread = shrunk_answers(6000, 2)
+    intervals = [bands.interval(m, s) for m, s in zip(mean, spread, strict=True)]
+    inside = np.array([one.low <= t <= one.high for one, t in zip(intervals, truth, strict=True)])
+    octile = np.minimum(((truth + 1) * 4).astype(int), 7)
+    assert inside.mean() == pytest.approx(0.9, abs=0.02)
+    assert min(inside[octile == k].mean() for k in range(8)) > 0.85
+
+
+def test_too_few_presses_that_determine_an_unknown_are_refused():
+    truth = np.linspace(-1, 1, 1000)[:, None]
+    with pytest.raises(InvalidQuantity, match="presses that determine an unknown is 0, but must be at least 120"):
+        confidence_bands(truth, truth, np.full_like(truth, 0.5))
