@@ -1,7 +1,8 @@
 """Builds the virtual probe's table of lumps off the axis, and of a tilted probe, from solves in three dimensions.
 
-Small strain, on the coarse mesh (0.6 % of the peak). Between the points (5 x 4 x 2 x 6) the fields hold a few per cent
-of the peak, as `tests/host_tools/test_off_axis_table.py` measures against fresh solves.
+Small strain, on the coarse mesh (0.6 % of the peak). Between the points (5 x 4 x 2 x 6) the fields hold 5 % of the peak
+for stiff lumps under the face, 10 % for soft ones and 15 % at its rim, as `tests/host_tools/test_off_axis_table.py`
+measures against fresh solves.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def test_the_json_has_the_contracts_fields_and_no_other(estimated, recording, bu
     assert record["model_sha256"] == bundle.sha256
     assert record["calibration_id"] == calibration.id
     assert record["simulated"] is True
-    assert record["mode"] == "standard"
+    assert record["mode"] == "paper"
 
 
 def test_frames_are_estimated_one_by_one_then_averaged_and_their_scatter_is_given(
