@@ -12,6 +12,7 @@ from host_tools.commands.features import features
 from host_tools.commands.model import calibrate, evaluate, phantom, table, train
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note
+from host_tools.commands.paper import paper
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
 from host_tools.commands.verify import verify
@@ -32,6 +33,7 @@ app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools features --out docs/features.md")(features)
+app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
 app.add_typer(optics, name="optics")
 
 

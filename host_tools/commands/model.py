@@ -20,7 +20,7 @@ from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.surface_table import load_surface_table
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.output import note, progress
+from host_tools.commands.output import note, note_left_out, progress
 
 if TYPE_CHECKING:
     from host_tools.phantom_sets import Phantom
@@ -41,8 +41,7 @@ def train(
     from host_tools.inverse.train import train as run_training
 
     rows = training_rows(data)
-    if rows.excluded_rows:
-        note.print(f"{rows.excluded_rows} failed scenes of {data} are left out.")
+    note_left_out(rows.excluded_rows, data)
     with progress("networks") as bar:
         task = bar.add_task("", total=trials)
         trained = run_training(

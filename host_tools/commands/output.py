@@ -18,6 +18,12 @@ def progress(what: str) -> Progress:
     return Progress(text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=note)
 
 
+def note_left_out(scenes: int, data: Path) -> None:
+    """Say how many scenes of a data set cannot be used; nothing when all can."""
+    if scenes:
+        note.print(f"{scenes} scenes of {data}, failed or without a number, are left out.", soft_wrap=True)
+
+
 def require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:
     """Refuse a file that could not be written before minutes are spent on what it would hold."""
     if path and path.suffix.lower() not in suffixes:

@@ -1,8 +1,8 @@
 """The netCDF file of a sweep to what training needs.
 
-Failed scenes, rows of NaN with their reason, are counted and left out. The nine phantom scenes are the rows nearest to
-an orthogonal array over the box, so that calibration sees all of it; the other rows train. Source of 125 + 9: Lee &
-Won 2013, section IV; of the array: Taguchi's L9.
+Scenes that failed, and rows that lack a number of feature or truth, are counted and left out. The nine phantom scenes
+are the rows nearest to an orthogonal array over the box, so that calibration sees all of it; the other rows train.
+Source of 125 + 9: Lee & Won 2013, section IV; of the array: Taguchi's L9.
 """
 
 from __future__ import annotations
@@ -45,17 +45,21 @@ def read_dataset(path: Path) -> xr.Dataset:
 
 
 def training_rows(path: Path) -> TrainingRows:
-    """Return the solved rows of a sweep as features and truths, with the nine phantoms marked and failures counted.
+    """Return the usable rows of a sweep as features and truths, with the nine phantoms marked and the others counted.
 
-    Raise `InvalidQuantity` for a data set of several loads or of finite strain: the three features are of one load.
+    A row is left out when it gives a reason for having failed, or when a feature or a truth is not finite. Raise
+    `InvalidQuantity` for a data set of several loads or of finite strain, since the three features are of one load, and
+    for one without a column that training needs.
     """
     dataset = read_dataset(path)
     if "load" in dataset.dims:
         bound = f"{SCHEMA}, of one load in small strain"
         raise InvalidQuantity("schema", SCHEMA_OF_LOADS, bound, "sweep with one force and `--strain small`")
-    solved = dataset.isel(scene=np.flatnonzero(dataset["reason"].values == ""))
-    truth = np.column_stack([solved[name].values for name in UNKNOWNS])
-    features = np.column_stack([solved[name].values for name in FEATURES])
+    _require_columns(dataset)
+    truth = np.column_stack([dataset[name].values for name in UNKNOWNS])
+    features = np.column_stack([dataset[name].values for name in FEATURES])
+    usable = (dataset["reason"].values == "") & np.isfinite(np.column_stack([truth, features])).all(axis=1)
+    truth, features = truth[usable], features[usable]
     origin: dict[str, Any] = json.loads(dataset.attrs["origin"])
     return TrainingRows(
         feature_names=FEATURES,
@@ -64,8 +68,17 @@ def training_rows(path: Path) -> TrainingRows:
         phantom_index=phantom_index(truth),
         dataset_sha256=hashlib.sha256(np.column_stack([truth, features]).tobytes()).hexdigest(),
         scene_defaults=origin["scene_defaults"],
-        excluded_rows=int(dataset.sizes["scene"] - solved.sizes["scene"]),
+        excluded_rows=int(np.sum(~usable)),
     )
+
+
+def _require_columns(dataset: xr.Dataset) -> None:
+    action = "make the data set anew with `host_tools sweep`"
+    for name in (*UNKNOWNS, *FEATURES, "reason"):
+        if name not in dataset:
+            raise InvalidQuantity(name, "missing", "a column of the data set", action)
+    if "origin" not in dataset.attrs:
+        raise InvalidQuantity("origin", "missing", "an attribute of the data set", action)
 
 
 def phantom_index(truth: NDArray[np.float64]) -> NDArray[np.int64]:

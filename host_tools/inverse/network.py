@@ -7,6 +7,7 @@ Source: Lee & Won, IEEE JBHI 17(2), 2013, sections II (layers, box) and IV-A (10
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -91,22 +92,38 @@ def misfit(residual: Array) -> float:
     return 0.5 * float(np.sum(np.log(np.mean(residual**2, axis=0) + LEAST_VARIANCE)))
 
 
-def loss_and_gradient(parameters: Array, inputs: Array, targets: Array) -> tuple[float, Array]:
+def mean_square(residual: Array) -> float:
+    """Return half the sum over the unknowns of the mean squared scaled residual [n, 3]: the loss of the textbooks."""
+    return 0.5 * float(np.sum(np.mean(residual**2, axis=0)))
+
+
+class Loss(NamedTuple):
+    """What training minimises; its derivative by a residual of n rows is residual / (n variance)."""
+
+    value: Callable[[Array], float]
+    variance: Callable[[Array], Array]
+
+
+MISFIT = Loss(misfit, lambda residual: np.asarray(np.mean(residual**2, axis=0) + LEAST_VARIANCE))
+MEAN_SQUARE = Loss(mean_square, lambda residual: np.ones(residual.shape[1]))
+
+
+def loss_and_gradient(parameters: Array, inputs: Array, targets: Array, loss: Loss = MISFIT) -> tuple[float, Array]:
     """Return the loss of scaled rows (inputs and targets [n, 3]) and its gradient [99] by back-propagation.
 
-    The loss is `misfit`. Source of back-propagation: Rumelhart, Hinton & Williams, Nature 323:533-536, 1986.
+    Source of back-propagation: Rumelhart, Hinton & Williams, Nature 323:533-536, 1986.
     """
     layers, signals = unpack(parameters), [inputs]
     for layer in layers[:-1]:
         signals.append(sigmoid(signals[-1] @ layer.weights + layer.biases))
     residual = signals[-1] @ layers[-1].weights + layers[-1].biases - targets
     gradient = np.empty_like(parameters)
-    slope = residual / (len(inputs) * (np.mean(residual**2, axis=0) + LEAST_VARIANCE))  # [n, 3]
+    slope = residual / (len(inputs) * loss.variance(residual))  # [n, 3]
     for layer, gradients, signal in zip(layers[::-1], unpack(gradient)[::-1], signals[::-1], strict=True):
         gradients.weights[...] = signal.T @ slope
         gradients.biases[...] = slope.sum(axis=0)
         slope = (slope @ layer.weights.T) * signal * (1.0 - signal)  # [n, fan_in]
-    return misfit(residual), gradient
+    return loss.value(residual), gradient
 
 
 def initial_parameters(rng: np.random.Generator) -> Array:

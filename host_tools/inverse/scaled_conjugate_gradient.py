@@ -23,6 +23,8 @@ Objective = Callable[[Vector], tuple[float, Vector]]
 Stop = Callable[[Vector], str]
 """Sees x after every accepted step; a non-empty answer ends the search and is its reason."""
 
+Status = Literal["converged", "max_iterations", "stopped"]
+
 SIGMA = 1e-5
 """Length of the step that measures the curvature (step 1: 0 < sigma <= 1e-4)."""
 
@@ -46,7 +48,7 @@ class Minimum:
     value: float
     gradient_norm: float
     iterations: int
-    status: Literal["converged", "max_iterations", "stopped"]
+    status: Status
     reason: str
 
 
@@ -150,7 +152,5 @@ def minimise(
     return _minimum(state, max_iterations, "max_iterations", f"{max_iterations} iterations are used up")
 
 
-def _minimum(
-    state: _State, iterations: int, status: Literal["converged", "max_iterations", "stopped"], reason: str
-) -> Minimum:
+def _minimum(state: _State, iterations: int, status: Status, reason: str) -> Minimum:
     return Minimum(state.w, state.value, float(np.linalg.norm(state.r)), iterations, status, reason)

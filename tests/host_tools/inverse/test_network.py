@@ -7,12 +7,16 @@ import pytest
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.inverse.network import (
+    MEAN_SQUARE,
+    MISFIT,
     PARAMETER_COUNT,
     Ensemble,
+    Loss,
     Scaling,
     forward,
     initial_parameters,
     loss_and_gradient,
+    mean_square,
     misfit,
     sigmoid,
     unpack,
@@ -66,16 +70,22 @@ def test_misfit_is_half_the_log_of_the_mean_squares() -> None:
     assert misfit(residual) == pytest.approx(np.log(6.0))
 
 
-def test_the_gradient_agrees_with_differences() -> None:
+def test_mean_square_is_half_the_sum_of_the_mean_squares() -> None:
+    """Squares of constant size 1, 4, 9: (1 + 4 + 9)/2 = 7."""
+    assert mean_square(np.tile([1.0, -1.0], (3, 2)).T * [1.0, 2.0, 3.0]) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize("loss", [MISFIT, MEAN_SQUARE])
+def test_the_gradient_agrees_with_differences(loss: Loss) -> None:
     """Central differences of step 1e-6 are wrong by some 1e-10 of the third derivative and by rounding 1e-10."""
     rng = np.random.default_rng(3)
     parameters, inputs, targets = rng.normal(size=99), rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
-    _, gradient = loss_and_gradient(parameters, inputs, targets)
+    _, gradient = loss_and_gradient(parameters, inputs, targets, loss)
     steps = 1e-6 * np.eye(99)
     differences = [
         (
-            loss_and_gradient(parameters + step, inputs, targets)[0]
-            - loss_and_gradient(parameters - step, inputs, targets)[0]
+            loss_and_gradient(parameters + step, inputs, targets, loss)[0]
+            - loss_and_gradient(parameters - step, inputs, targets, loss)[0]
         )
         / 2e-6
         for step in steps

@@ -10,7 +10,9 @@ import pytest
 from device.measurement.quantities import InvalidQuantity
 from host_tools.inverse import train as training
 from host_tools.inverse.evaluate import relative_errors
-from host_tools.inverse.train import TrainingRows, train
+from host_tools.inverse.network import Array, Loss, Scaling, forward
+from host_tools.inverse.scaled_conjugate_gradient import Minimum, Stop
+from host_tools.inverse.train import LM, Method, TrainingRows, run_trial, train
 
 
 @pytest.fixture
@@ -57,13 +59,36 @@ def test_progress_is_told_after_each_trial(rows: TrainingRows) -> None:
     assert told == [(1, 3), (2, 3), (3, 3)]
 
 
-def test_early_stopping_keeps_the_best_and_stops_when_no_better_follows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_early_stopping_keeps_the_best_and_stops_when_no_better_follows() -> None:
     """Networks of output biases b only answer b, so against targets 0 the misfit rises with |b|: 0.1 is the best."""
-    monkeypatch.setattr(training, "PATIENCE", 2)
     tried = [np.r_[np.zeros(96), np.full(3, bias)] for bias in (0.5, 0.1, 0.2, 0.3)]
-    keep_best = training._KeepBest(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(99))
+    keep_best = training._KeepBest(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(99), patience=2)
     assert [bool(keep_best(parameters)) for parameters in tried] == [False, False, False, True]
     assert np.array_equal(keep_best.parameters, tried[1])
+
+
+def test_levenberg_marquardt_finds_all_three_unknowns_too(rows: TrainingRows) -> None:
+    """One network on features that can be inverted on paper, answering for scenes that it never saw."""
+    seen, unseen = rows.training_index, rows.phantom_index
+    scaling = Scaling.fit(rows.features[seen])
+    inputs, targets = scaling.inputs(rows.features[seen]), scaling.targets(rows.truth[seen])
+    trial = run_trial(inputs, targets, np.random.default_rng(1), method=LM)
+    answers = scaling.unknowns(forward(trial.parameters, scaling.inputs(rows.features[unseen])))
+    assert np.all(relative_errors(rows.truth[unseen], answers).mean(axis=0) < 0.03)
+
+
+def test_two_methods_of_one_seed_begin_alike_with_the_same_scenes(rows: TrainingRows) -> None:
+    asked: list[tuple[Array, Array, Array]] = []
+
+    def search(inputs: Array, targets: Array, loss: Loss, start: Array, stop: Stop | None) -> Minimum:
+        asked.append((inputs, targets, start))
+        return Minimum(start, 0.0, 0.0, 0, "stopped", "at once")
+
+    for patience in (1, 2):
+        run_trial(rows.features, rows.truth, np.random.default_rng(5), method=Method(search, patience))
+    first, second = asked
+    assert all(np.array_equal(one, other) for one, other in zip(first, second, strict=True))
+    assert len(first[0]) == round(0.8 * len(rows.features))
 
 
 def test_too_few_rows_are_refused(rows: TrainingRows) -> None:

@@ -1,0 +1,72 @@
+"""`host_tools paper`: the paper's protocol to the letter, and what it was worth, on the screen and in docs/."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
+from host_tools.commands.output import note, note_left_out, require_writable
+
+if TYPE_CHECKING:
+    from host_tools.study.benchmark import Chapter
+
+DEFAULT_DATA = ROOT / "build" / "sweep.nc"
+DEFAULT_TABLE = ROOT / "models" / "simulated_probe"
+DEFAULT_SEEDS = 100
+
+
+def paper(
+    out: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
+    data: Annotated[Path, typer.Option(help="Data set of `host_tools sweep`.")] = DEFAULT_DATA,
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = DEFAULT_TABLE,
+    seeds: Annotated[int, typer.Option(help="Trials of each network; bounds are meant for 100.")] = DEFAULT_SEEDS,
+) -> None:
+    """Repeat the paper's protocol, take its assumptions away, and set two algorithms side by side.
+
+    Exit code 1 when a bound is missed. Some five minutes on one core for 100 seeds.
+    """
+    require_writable(out, (".md",))
+    from host_tools.data.dataset import training_rows
+    from host_tools.study.paper_chapters import paper_chapters
+    from host_tools.study.paper_study import PaperStudy
+
+    rows = training_rows(data)
+    note_left_out(rows.excluded_rows, data)
+    study = PaperStudy(rows, ProbeTables.load(table), seeds=seeds)
+    measured = measure_chapters(paper_chapters(study))
+    failed = 0
+    for timed in measured.values():
+        failed += print_chapter(timed)
+        _print_tables(timed.chapter)
+    if out:
+        from host_tools.study.document import write_document
+        from host_tools.study.paper_verdict import cover
+
+        write_document(out, measured, command=_command(out, data, table, seeds), cover=cover(study))
+        note.print(f"{out} written.")
+    if failed:
+        note.print(f"{failed} benchmarks miss their bound.")
+        raise typer.Exit(1)
+
+
+def _command(out: Path, data: Path, table: Path, seeds: int) -> str:
+    flags = [f"--data {shown(data)}"] if data != DEFAULT_DATA else []
+    flags += [f"--table {shown(table)}"] if table != DEFAULT_TABLE else []
+    flags += [f"--seeds {seeds}"] if seeds != DEFAULT_SEEDS else []
+    return " ".join(["host_tools paper", *flags, f"--out {shown(out)}"])
+
+
+def _print_tables(chapter: Chapter) -> None:
+    console = Console(width=160, highlight=False)
+    for table in chapter.tables:
+        printed = Table(*map(escape, table.header), title=escape(table.caption), title_justify="left")
+        for row in table.rows:
+            printed.add_row(*map(escape, row))
+        console.print(printed)

@@ -1,0 +1,37 @@
+"""What a perfect camera sees is what the virtual probe's camera sees on average, and exactly that every time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from device.measurement.estimate import image_features
+from device.measurement.quantities import Inclusion
+from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.phantom import phantom_recording
+from host_tools.study.noise_free_image import PerfectCamera
+from host_tools.study.paper_protocol import SETTINGS
+
+
+@pytest.mark.parametrize("light", ["linear", "physical"])
+def test_the_noisy_camera_scatters_about_the_perfect_one(tables: ProbeTables, light: str) -> None:
+    """A strong lump: ten frames scatter by 1 %, a press's own force and reference by another 1 %."""
+    scenario, lump = Scenario(light=light), Inclusion(12.0, 5.0, 100.0)
+    seen = image_features(phantom_recording(lump, tables, seed=5, scenario=scenario), SETTINGS).mean(axis=0)
+    assert PerfectCamera(scenario, tables).features(lump, SETTINGS) == pytest.approx(seen, rel=0.02)
+
+
+def test_without_a_lump_it_sees_nothing_at_all(tables: ProbeTables) -> None:
+    camera = PerfectCamera(Scenario(light="linear"), tables)
+    assert camera.features(Inclusion(0.0, 6.0, 60.0), SETTINGS) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_linear_light_is_a_straight_line_in_the_deformation(tables: ProbeTables) -> None:
+    """Contrast is slope x lump / (slope x bare press + intercept), and the bare press of both lumps is the same."""
+    camera = PerfectCamera(Scenario(light="linear"), tables)
+    ratios = []
+    for lump in (Inclusion(12.0, 5.0, 100.0), Inclusion(12.0, 9.0, 100.0)):
+        peak_mm = np.abs(tables.centred.ramps(lump).lump.at(0.5).w_mm).max()
+        ratios.append(camera.features(lump, SETTINGS)[0] / peak_mm)
+    assert ratios[0] == pytest.approx(ratios[1], rel=0.05)
