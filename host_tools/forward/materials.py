@@ -7,6 +7,7 @@ of the inclusion is made of the layer around it: separate meshes would put 50 % 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +37,10 @@ class Elasticity:
         return mesh.MaterialCF(self.modulus_kpa), mesh.MaterialCF(self.poisson_ratio)
 
 
+Parts = Mapping[str, Elasticity]
+"""By the name of a modulus, the materials that have it; all others are without stiffness."""
+
+
 def baseline(scene: Scene) -> Elasticity:
     """Return the materials without the inclusion."""
     probe, stack = scene.waveguide, scene.tissue.stack
@@ -55,3 +60,9 @@ def with_inclusion(scene: Scene) -> Elasticity:
     parts = [f"inclusion{i}" for i in range(len(scene.tissue.stack))]
     modulus = plain.modulus_kpa | dict.fromkeys(parts, scene.inclusion.youngs_modulus_kpa)
     return Elasticity(modulus, plain.poisson_ratio | dict.fromkeys(parts, scene.placement.poisson_ratio))
+
+
+def only(elasticity: Elasticity, *materials: str) -> Elasticity:
+    """Return the same materials without stiffness but in those whose name begins so."""
+    moduli = {name: E if name.startswith(materials) else 0.0 for name, E in elasticity.modulus_kpa.items()}
+    return Elasticity(moduli, elasticity.poisson_ratio)

@@ -1,0 +1,101 @@
+"""Where size, depth and modulus of a lump can be known: Cramer-Rao bounds over the box, and over ways to measure.
+
+Each scene is solved once; every way to measure then looks at the same faces. `limits_markdown` writes the part of
+docs/accuracy.md that says what no method can beat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from device.measurement.intervals import IDENTIFIABLE_RATIO
+from device.measurement.quantities import Inclusion
+from host_tools.forward.sensitive_ramp import Ramps, sensitive_ramp
+from host_tools.inverse.information import Array
+from host_tools.inverse.limits import BOX_STD, Limits, limit_of_sights
+from host_tools.inverse.observation import Sight, rings_of, sights
+from host_tools.inverse.protocol import Observable, Protocol, read_protocol
+from host_tools.scene import Scene
+
+SIZES_MM, DEPTHS_MM, MODULI_KPA = (3.0, 6.0, 10.0, 15.0), (4.0, 6.0, 8.0, 12.0), (15.0, 40.0, 80.0, 120.0)
+PROTOCOLS = Path(__file__).resolve().parents[2] / "protocols"
+STANDARD, PRECISE = "standard", "precise"
+SIGHTS: tuple[Observable, ...] = ("image", "pressure", "displacement")
+"""What is looked at; the scalars are made of the image."""
+
+Triple = tuple[float, float, float]
+"""Size (mm), depth (mm) and Young's modulus (kPa) of a lump."""
+
+
+@dataclass(frozen=True, eq=False)
+class MappedScene:
+    """The bounds of every way to measure one lump, by its name."""
+
+    lump: Triple
+    limits: Mapping[str, Limits]
+
+
+def ways() -> dict[str, Protocol]:
+    """Return the ways to measure that the map compares; all but the precise one take as many frames."""
+    standard, precise = (read_protocol(PROTOCOLS / f"{name}.toml") for name in (STANDARD, PRECISE))
+    one_load = replace(standard, forces_n=standard.forces_n[-1:])
+    return {
+        STANDARD: standard,
+        PRECISE: precise,
+        "standard, no smooth error": replace(standard, systematic_ratio=0.0),
+        "standard, tissue and skin known": replace(
+            standard, tissue_modulus_spread_ratio=0.0, thickness_spread_ratio=0.0, contact_law_spread_ratio=0.0
+        ),
+        "standard, largest load only": one_load,
+        "three scalars": replace(standard, observable="scalars"),
+        "three scalars, largest load only": replace(one_load, observable="scalars"),
+        "pressure itself": replace(standard, observable="pressure"),
+        "pressure itself, largest load only": replace(one_load, observable="pressure"),
+        "displacement itself": replace(standard, observable="displacement"),
+        "displacement itself, largest load only": replace(one_load, observable="displacement"),
+    }
+
+
+def lumps() -> list[Triple]:
+    """Return the lumps of the map, those of one size and depth together: they share the solve without a lump."""
+    return list(product(SIZES_MM, DEPTHS_MM, MODULI_KPA))
+
+
+def mapped_scene(lump: Triple) -> MappedScene:
+    """Solve one lump and return its bounds."""
+    compared = ways()
+    ramps = sensitive_ramp(Scene(Inclusion(*lump)), compared[STANDARD].forces_n)
+    seen = {order: {what: sights(ramp, what) for what in SIGHTS} for order, ramp in ramps.items()}
+    return MappedScene(lump, {name: _limits(ramps, seen, protocol) for name, protocol in compared.items()})
+
+
+def _limits(ramps: Ramps, seen: Mapping[int, Mapping[Observable, list[Sight]]], protocol: Protocol) -> Limits:
+    what: Observable = "image" if protocol.observable == "scalars" else protocol.observable
+    rings = rings_of(next(iter(ramps.values())))
+    loads = len(protocol.forces_n)
+    return Limits({order: limit_of_sights(by[what][-loads:], rings, protocol) for order, by in seen.items()})
+
+
+def stds(scenes: list[MappedScene], way: str, *, with_box: bool = False) -> Array:
+    """Return the bounds [sizes, depths, moduli, 3] of one way to measure, of a whole map."""
+    rows = [s.limits[way].std_with_box if with_box else s.limits[way].std for s in scenes]
+    return np.array(rows).reshape(len(SIZES_MM), len(DEPTHS_MM), len(MODULI_KPA), 3)
+
+
+def is_identifiable(limits: Limits) -> tuple[bool, ...]:
+    """Return, for each unknown, what the probe would say of an estimate as good as the bound.
+
+    It calls an unknown identifiable when its interval is under half of what the box alone would give.
+    """
+    return tuple(bool(narrow) for narrow in limits.std_with_box < IDENTIFIABLE_RATIO * BOX_STD)
+
+
+def deepest_mm(known: Array) -> float | None:
+    """Return the largest depth down to which every depth [D] counts as known; None if not even the first does."""
+    count = int(np.argmin([*known.tolist(), False]))
+    return DEPTHS_MM[count - 1] if count else None
