@@ -9,6 +9,7 @@ import typer
 from device.measurement.inversion import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.features import features
+from host_tools.commands.limits import limits
 from host_tools.commands.model import calibrate, evaluate, phantom, table, train
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note
@@ -34,6 +35,7 @@ app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/c
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools features --out docs/features.md")(features)
 app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
+app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)
 app.add_typer(optics, name="optics")
 
 

@@ -71,6 +71,7 @@ def _record(found: Limits) -> dict[str, Any]:
     return {
         "std_percent": _percents(found.std),
         "std_with_box_percent": _percents(found.std_with_box),
+        "identifiable": dict(zip(UNKNOWNS, found.identifiable, strict=True)),
         "not_converged": list(found.not_converged),
         "correlation": [[_finite(x) for x in row] for row in quoted.correlation],
         "worst_direction": [_finite(x) for x in quoted.worst_direction],
@@ -100,6 +101,8 @@ def _print(found: Limits) -> None:
         rows[f"  alone, order {order}"] = limit.alone.std
     for name, std in rows.items():
         print(f"{name:22}" + "".join(f"{100 * value:18.3g} %" for value in std))
+    verdicts = ["yes" if known else "no" for known in found.identifiable]
+    print(f"{'identifiable':22}" + "".join(f"{verdict:>20}" for verdict in verdicts))
     worst = found.quoted.alone
     toward = ", ".join(f"{x:+.2f} {letter}" for x, letter in zip(worst.worst_direction, LETTERS, strict=True))
     print(f"known worst: {toward}, to {100 * worst.worst_std:.3g} %")
@@ -115,8 +118,9 @@ def _write_map(out: Path | None, given: list[object]) -> None:
         raise InvalidQuantity("map", "asked for", "asked for with --out and no scene", "add --out docs/accuracy.md")
     require_writable(out, (".md",))
     from device.measurement.durable import write_durably
+    from host_tools.study.accuracy_figure import draw_map
     from host_tools.study.accuracy_map import lumps, mapped_scene
-    from host_tools.study.accuracy_page import FIGURE, draw_map, limits_markdown
+    from host_tools.study.accuracy_page import FIGURE, limits_markdown
 
     chosen, mapped = lumps(), []
     with progress("scenes") as bar:

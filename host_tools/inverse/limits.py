@@ -12,21 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from device.measurement.quantities import UNKNOWNS
+from device.measurement.confidence import IDENTIFIABLE_RATIO
+from device.measurement.press_parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_of_unit
+from device.measurement.quantities import UNKNOWNS, Inclusion
+from host_tools.forward.mesh_velocity import lump_of
 from host_tools.forward.sensitive_offset import sensitive_offset
 from host_tools.forward.sensitive_ramp import LumpSensitivity, sensitive_ramp
 from host_tools.forward.sensitivity import FORCE
+from host_tools.inverse.growth import with_growth
 from host_tools.inverse.information import Array, CramerRao, cramer_rao, with_nuisances
-from host_tools.inverse.observation import CONTACT_LAW, FORCE_ERROR, GAIN, PLACE, Sight, observe, rings_of, sights
+from host_tools.inverse.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe
 from host_tools.inverse.protocol import Protocol
 from host_tools.inverse.rings import Rings
 from host_tools.inverse.scalars import scalars_of
-from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Scene
+from host_tools.inverse.sight import Sight, rings_of, sights
+from host_tools.scene import Scene
 
-SMALLEST_SIZE_MM = 2.0
-"""Lower end of the box's sizes: it begins at 0, which has no logarithm."""
-BOX_STD = np.log(np.array(PAPER_BOX_HIGH) / (SMALLEST_SIZE_MM, *PAPER_BOX_LOW[1:])) / np.sqrt(12)
-"""Standard deviations of the logarithms of d, h and E spread evenly over the box: 58, 32 and 32 %."""
 CONVERGED_RATIO = 1.2
 
 
@@ -40,9 +41,11 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Bounds by the order of the elements; both arrays [3] are the larger ones, in the order of `UNKNOWNS`."""
+    """Bounds by the order of the elements; `std` and `std_with_box` [3] are the larger ones, as `UNKNOWNS` has them."""
 
     by_order: Mapping[int, Limit]
+    box_std: Array
+    """What the box alone says at this lump [3]."""
 
     @property
     def std(self) -> Array:
@@ -53,6 +56,14 @@ class Limits:
     def std_with_box(self) -> Array:
         """Standard deviations of ln d, ln h, ln E with the box as prior."""
         return np.asarray(np.max([limit.with_box.std for limit in self.by_order.values()], axis=0))
+
+    @property
+    def identifiable(self) -> tuple[bool, ...]:
+        """For each unknown, whether the probe would call an estimate as good as the bound identifiable.
+
+        It does when the spread is under half of what the box alone leaves (`device/measurement/confidence.py`).
+        """
+        return tuple(bool(narrow) for narrow in self.std_with_box < IDENTIFIABLE_RATIO * self.box_std)
 
     @property
     def not_converged(self) -> tuple[str, ...]:
@@ -74,26 +85,42 @@ def limits(scene: Scene, protocol: Protocol) -> Limits:
     """
     ramps = sensitive_ramp(scene, protocol.forces_n, strain=protocol.strain)
     aside = [sensitive_offset(scene, offset_mm, protocol.forces_n[-1]) for offset_mm in protocol.offsets_mm]
-    return Limits(
-        {order: limit_of((*ramp, *(press[order] for press in aside)), protocol) for order, ramp in ramps.items()}
-    )
+    box_std = std_of_box(lump_of(scene))
+    by_order = {
+        order: limit_of((*ramp, *(press[order] for press in aside)), protocol, box_std) for order, ramp in ramps.items()
+    }
+    return Limits(by_order, box_std)
 
 
-def limit_of(presses: Sequence[LumpSensitivity], protocol: Protocol) -> Limit:
+def std_of_box(lump: Inclusion) -> Array:
+    """Return the standard deviations [3] of ln d, ln h, ln E at a lump, of lumps spread over the probe's box.
+
+    The box and how lumps are spread over it: `RANGES` of `device/measurement/press_parameters.py`. In a coordinate
+    that is even it has one width everywhere; in its logarithm a small size is known worse than a large one.
+    """
+    unknowns = {name: getattr(lump, name) for name in UNKNOWNS}
+    values = np.array([(unknowns | NOMINAL)[name] for name in PARAMETERS])
+    slope = slope_of_unit(values)[: len(UNKNOWNS)]
+    return np.asarray(EVEN_STD * slope / np.array(lump.as_tuple()))
+
+
+def limit_of(presses: Sequence[LumpSensitivity], protocol: Protocol, box_std: Array) -> Limit:
     """Return the bound of a protocol on its presses, those beside the lump last, as they were solved."""
-    return limit_of_sights(sights(presses, protocol.observable), rings_of(presses), protocol)
+    return limit_of_sights(sights(presses, protocol.observable), rings_of(presses), protocol, box_std)
 
 
-def limit_of_sights(seen: Sequence[Sight], rings: Rings, protocol: Protocol) -> Limit:
+def limit_of_sights(seen: Sequence[Sight], rings: Rings, protocol: Protocol, box_std: Array) -> Limit:
     """Return the bound of a protocol on what its sensor sees: making that takes most of the time after the solve."""
     observed = observe(seen, rings, protocol)
     if protocol.observable == "scalars":
         observed = scalars_of(observed, len(seen), rings)
+    else:
+        observed = with_growth(observed, seen, rings, protocol)
     spreads = _spreads(protocol, len(seen))
     nuisances = np.stack([observed.derivatives[name] for name in spreads], axis=1)
     covariance = with_nuisances(observed.covariance, nuisances, np.array(list(spreads.values())))
     jacobian = np.stack([observed.derivatives[name] for name in UNKNOWNS], axis=1)
-    return Limit(cramer_rao(jacobian, covariance), cramer_rao(jacobian, covariance, BOX_STD))
+    return Limit(cramer_rao(jacobian, covariance), cramer_rao(jacobian, covariance, box_std))
 
 
 def _spreads(protocol: Protocol, presses: int) -> dict[str, float]:
@@ -101,9 +128,12 @@ def _spreads(protocol: Protocol, presses: int) -> dict[str, float]:
     common = {
         "tissue_modulus_kpa": protocol.tissue_modulus_spread_ratio,
         "thickness_mm": protocol.thickness_spread_ratio,
-        CONTACT_LAW: protocol.contact_law_spread_ratio,
+        "contact_pressure_kpa": protocol.contact_law_spread_ratio,
+        "albedo": protocol.albedo_spread_ratio,
+        "spread_mm": protocol.scattering_spread_ratio,
         GAIN: protocol.gain_spread_ratio,
         FORCE: protocol.force_scale_spread_ratio,
+        ZERO: protocol.zero_spread_n,
     }
     own = {f"{FORCE_ERROR}_{i}": protocol.force_error_ratio for i in range(presses)}
     aside = range(len(protocol.forces_n), presses)

@@ -6,6 +6,7 @@ an element they ring, their forces do not. Lenses and fixed patterns drop out of
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -23,7 +24,10 @@ FADE_MM = 0.5
 """Length over which the deformation fades beyond the rim."""
 STEP_RATIO = 0.05
 """Of the mean pressure, in differences: small for the law of contact, large for single precision."""
-LAW_STEP = 0.02
+SKIN_STEP = 0.02
+"""Of the logarithm of a quantity of the skin."""
+SKIN = ("contact_pressure_kpa", "albedo", "spread_mm")
+"""What differs from skin to skin (`device/measurement/press_parameters.py`): law of contact, and light in it."""
 HARMONICS = 4
 """The mean and cos(angle) to cos(3 angle); the lump lies at angle 0."""
 ALL_LEDS = (1.0, 1.0, 1.0, 1.0)
@@ -45,8 +49,8 @@ class Picture(Protocol):
     def change(self, face: Profiles, change: Profiles) -> Array:
         """Return the derivative of the light along a change of the face."""
 
-    def change_by_law(self, face: Profiles) -> Array:
-        """Return the derivative of the light by the logarithm of the skin's contact pressure."""
+    def changes_by_skin(self, face: Profiles) -> dict[str, Array]:
+        """Return the derivatives of the light by the logarithm of each quantity of `SKIN`."""
 
 
 class IdealPicture:
@@ -65,9 +69,9 @@ class IdealPicture:
         """See `Picture`: it is linear."""
         return self.light(change)
 
-    def change_by_law(self, face: Profiles) -> Array:
+    def changes_by_skin(self, face: Profiles) -> dict[str, Array]:
         """See `Picture`: no skin comes in."""
-        return np.zeros(self._cosines.shape[0] * len(self._rings.r_mm))
+        return {name: np.zeros(len(self._cosines) * len(self._rings.r_mm)) for name in SKIN}
 
 
 class LightPicture:
@@ -90,8 +94,9 @@ class LightPicture:
     def change(self, face: Profiles, change: Profiles) -> Array:
         """See `Picture`: by central differences, of the pressure alone.
 
-        Deformation changes the light by a hundredth of what pressure does (docs/optics.md), less than the noise of the
-        traced table along its depths; that noise would count as information, 2 to 10 times too much of it.
+        Deformation changes the light by a hundredth of what pressure does (docs/optics.md), which cannot be told from
+        the noise of the traced table along its depths: counted, it makes bounds up to two times smaller, and those of
+        both orders differ.
         """
         window = self._r_mm <= self._rings.edges_mm[-1]
         largest = float(np.abs(change.p_kpa[:, window]).max() / face.p_kpa[:, window].mean())
@@ -101,11 +106,15 @@ class LightPicture:
         more, less = (Profiles(face.w_mm, face.p_kpa + s * change.p_kpa) for s in (step, -step))
         return (self.light(more) - self.light(less)) / (2 * step)
 
-    def change_by_law(self, face: Profiles) -> Array:
+    def changes_by_skin(self, face: Profiles) -> dict[str, Array]:
         """See `Picture`: by central differences."""
-        p0_kpa = self._skin.contact_pressure_kpa
-        more, less = (self._seen(face, Skin(contact_pressure_kpa=p0_kpa * np.exp(s))) for s in (LAW_STEP, -LAW_STEP))
-        return (more - less) / (2 * LAW_STEP)
+        changes = {}
+        for name in SKIN:
+            nominal, factors = getattr(self._skin, name), np.exp([SKIN_STEP, -SKIN_STEP]).tolist()
+            skins = [replace(self._skin, **{name: nominal * factor}) for factor in factors]
+            more, less = (self._seen(face, skin) for skin in skins)
+            changes[name] = (more - less) / (2 * SKIN_STEP)
+        return changes
 
     def _seen(self, face: Profiles, skin: Skin) -> Array:
         w_mm = self._from_rays(face.w_mm) * self._fade

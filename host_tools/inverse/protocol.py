@@ -22,6 +22,8 @@ SPREADS = (
     "tissue_modulus_spread_ratio",
     "thickness_spread_ratio",
     "contact_law_spread_ratio",
+    "albedo_spread_ratio",
+    "scattering_spread_ratio",
     "gain_spread_ratio",
     "force_scale_spread_ratio",
     "force_error_ratio",
@@ -32,32 +34,38 @@ MOST_FORCES = 12
 
 @dataclass(frozen=True)
 class Protocol:
-    """One way to measure a lesion; the defaults are the spreads of a hand-held probe on tissue that is hardly known.
+    """One way to measure a lesion; tissue and skin vary by default as `device/measurement/press_parameters.py` has it.
 
     `forces_n` ascend; `frames`, and `reference_frames` on tissue without the lump, are spread evenly over all loads.
     `observable`: the image of the probe, its three scalars (`docs/measurement.md`), or the image of an ideal sensor
     that shows pressure or displacement itself. `mean_level_counts`, of 255: mean of the reference press at the largest
     force. `offsets_mm`: further presses beside the lump at the largest force, one for each, solved in
     small strain, each of which lies only to `place_spread_mm` where it should.
-    `force_scale_spread_ratio` is common to all presses, `force_error_ratio` each load's own. Systematic errors of
+    `contact_law_spread_ratio` is that of the skin's contact pressure, `albedo_spread_ratio` and
+    `scattering_spread_ratio` of the light that it gives back and how far that spreads; `gain_spread_ratio` is drift of
+    the light between the two presses. `force_scale_spread_ratio` is common to all presses, `force_error_ratio` each
+    press's own, `zero_spread_n` drift of the cell's zero between the two presses. Systematic errors of
     `systematic_ratio` come twice: common to all loads, smooth over `common_correlation_mm`, and each load's own,
     smooth over `load_correlation_mm`.
     Raises `InvalidQuantity` for a value that no measurement has.
     """
 
-    forces_n: tuple[float, ...] = (0.1, 0.35, 0.6)
+    forces_n: tuple[float, ...] = (0.12, 0.25, 0.40, 0.55)
     frames: int = 10
     reference_frames: int = 10
     observable: Observable = "image"
     strain: Strain = "finite"
     offsets_mm: tuple[float, ...] = ()
     mean_level_counts: float = 100.0
-    tissue_modulus_spread_ratio: float = 0.2
-    thickness_spread_ratio: float = 0.1
-    contact_law_spread_ratio: float = 0.2
-    gain_spread_ratio: float = 0.005
+    tissue_modulus_spread_ratio: float = 0.115
+    thickness_spread_ratio: float = 0.058
+    contact_law_spread_ratio: float = 0.17
+    albedo_spread_ratio: float = 0.115
+    scattering_spread_ratio: float = 0.13
+    gain_spread_ratio: float = 0.01
     force_scale_spread_ratio: float = 0.005
     force_error_ratio: float = 0.001
+    zero_spread_n: float = 0.001
     place_spread_mm: float = 1.0
     systematic_ratio: float = 0.0
     common_correlation_mm: float = 2.0
@@ -74,6 +82,7 @@ class Protocol:
             require(f"offsets_mm[{i}]", offset_mm, Bound(0.0, 30.0, "mm", low_included=False), "press beside the lump")
         if self.offsets_mm and self.observable == "scalars":
             raise InvalidQuantity("offsets_mm", list(self.offsets_mm), "empty with scalars", "observe the image")
+        require("zero_spread_n", self.zero_spread_n, Bound(0.0, 1.0, "N"), "say how far the cell's zero drifts")
         require("place_spread_mm", self.place_spread_mm, Bound(0.0, 30.0, "mm"), "say how well the probe is placed")
         lit = Bound(0.0, 255.0, "counts", low_included=False)
         require("mean_level_counts", self.mean_level_counts, lit, "expose so that the image is not dark")

@@ -18,10 +18,15 @@ STEP = 1e-6
 
 
 def scalars_of(seen: Observation, loads: int, rings: Rings) -> Observation:
-    """Return centre (1), integral (mm2) and bright area (mm2) for each load instead of the rings."""
+    """Return centre (1), integral (mm2) and bright area (mm2) for each load instead of the rings.
+
+    An area that fills the window is left out: it has no error, and knows nothing.
+    """
     slope = _slope(seen.values, loads, rings)
+    varies = slope.any(axis=1)
+    slope = slope[varies]
     return Observation(
-        _scalars(seen.values, loads, rings),
+        _scalars(seen.values, loads, rings)[varies],
         {name: slope @ change for name, change in seen.derivatives.items()},
         slope @ seen.covariance @ slope.T,
     )

@@ -13,18 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from device.measurement.intervals import IDENTIFIABLE_RATIO
 from device.measurement.quantities import Inclusion
 from host_tools.forward.sensitive_ramp import Ramps, sensitive_ramp
 from host_tools.inverse.information import Array
-from host_tools.inverse.limits import BOX_STD, Limits, limit_of_sights
-from host_tools.inverse.observation import Sight, rings_of, sights
+from host_tools.inverse.limits import Limits, limit_of_sights, std_of_box
 from host_tools.inverse.protocol import Observable, Protocol, read_protocol
+from host_tools.inverse.sight import Sight, rings_of, sights
 from host_tools.scene import Scene
 
 SIZES_MM, DEPTHS_MM, MODULI_KPA = (3.0, 6.0, 10.0, 15.0), (4.0, 6.0, 8.0, 12.0), (15.0, 40.0, 80.0, 120.0)
 PROTOCOLS = Path(__file__).resolve().parents[2] / "protocols"
-STANDARD, PRECISE = "standard", "precise"
+STANDARD, PRECISE, NOT_SMOOTH = "standard", "precise", "standard, no smooth error"
+UNKNOWN_RATIO = 10.0
 SIGHTS: tuple[Observable, ...] = ("image", "pressure", "displacement")
 """What is looked at; the scalars are made of the image."""
 
@@ -47,9 +47,15 @@ def ways() -> dict[str, Protocol]:
     return {
         STANDARD: standard,
         PRECISE: precise,
-        "standard, no smooth error": replace(standard, systematic_ratio=0.0),
+        NOT_SMOOTH: replace(standard, systematic_ratio=0.0),
+        "standard, gain unknown": replace(standard, gain_spread_ratio=UNKNOWN_RATIO),
         "standard, tissue and skin known": replace(
-            standard, tissue_modulus_spread_ratio=0.0, thickness_spread_ratio=0.0, contact_law_spread_ratio=0.0
+            standard,
+            tissue_modulus_spread_ratio=0.0,
+            thickness_spread_ratio=0.0,
+            contact_law_spread_ratio=0.0,
+            albedo_spread_ratio=0.0,
+            scattering_spread_ratio=0.0,
         ),
         "standard, largest load only": one_load,
         "three scalars": replace(standard, observable="scalars"),
@@ -71,14 +77,17 @@ def mapped_scene(lump: Triple) -> MappedScene:
     compared = ways()
     ramps = sensitive_ramp(Scene(Inclusion(*lump)), compared[STANDARD].forces_n)
     seen = {order: {what: sights(ramp, what) for what in SIGHTS} for order, ramp in ramps.items()}
-    return MappedScene(lump, {name: _limits(ramps, seen, protocol) for name, protocol in compared.items()})
+    return MappedScene(lump, {name: _limits(lump, ramps, seen, protocol) for name, protocol in compared.items()})
 
 
-def _limits(ramps: Ramps, seen: Mapping[int, Mapping[Observable, list[Sight]]], protocol: Protocol) -> Limits:
+def _limits(
+    lump: Triple, ramps: Ramps, seen: Mapping[int, Mapping[Observable, list[Sight]]], protocol: Protocol
+) -> Limits:
     what: Observable = "image" if protocol.observable == "scalars" else protocol.observable
     rings = rings_of(next(iter(ramps.values())))
-    loads = len(protocol.forces_n)
-    return Limits({order: limit_of_sights(by[what][-loads:], rings, protocol) for order, by in seen.items()})
+    loads, box_std = len(protocol.forces_n), std_of_box(Inclusion(*lump))
+    by_order = {order: limit_of_sights(by[what][-loads:], rings, protocol, box_std) for order, by in seen.items()}
+    return Limits(by_order, box_std)
 
 
 def stds(scenes: list[MappedScene], way: str, *, with_box: bool = False) -> Array:
@@ -87,12 +96,9 @@ def stds(scenes: list[MappedScene], way: str, *, with_box: bool = False) -> Arra
     return np.array(rows).reshape(len(SIZES_MM), len(DEPTHS_MM), len(MODULI_KPA), 3)
 
 
-def is_identifiable(limits: Limits) -> tuple[bool, ...]:
-    """Return, for each unknown, what the probe would say of an estimate as good as the bound.
-
-    It calls an unknown identifiable when its interval is under half of what the box alone would give.
-    """
-    return tuple(bool(narrow) for narrow in limits.std_with_box < IDENTIFIABLE_RATIO * BOX_STD)
+def factors(scenes: list[MappedScene], way: str) -> Array:
+    """Return the bounds [3] of a way over those of the standard one, medians over all scenes."""
+    return np.asarray(np.median(stds(scenes, way) / stds(scenes, STANDARD), axis=(0, 1, 2)))
 
 
 def deepest_mm(known: Array) -> float | None:

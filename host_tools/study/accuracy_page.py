@@ -7,28 +7,22 @@ another part.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
-import matplotlib
-
-matplotlib.use("Agg")
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.colors import LogNorm
 
+from device.measurement.press_parameters import RANGES
+from device.measurement.quantities import UNKNOWNS
+from host_tools.forward.sensitive_ramp import ORDERS
 from host_tools.inverse.information import Array
-from host_tools.inverse.limits import BOX_STD
 from host_tools.study.accuracy_map import (
-    DEPTHS_MM,
     MODULI_KPA,
+    NOT_SMOOTH,
     PRECISE,
     SIZES_MM,
     STANDARD,
     MappedScene,
     deepest_mm,
-    is_identifiable,
+    factors,
     stds,
     ways,
 )
@@ -39,8 +33,6 @@ WELL, ROUGHLY = 0.1, 0.3
 """Known well and roughly: standard deviations of the logarithm."""
 MOST = 10.0
 """Bounds beyond 1000 % are not written out."""
-SHOWN_MODULI = slice(1, None)
-"""The paper's box begins at 40 kPa; the softer lump is shown beside it."""
 
 
 def limits_markdown(scenes: list[MappedScene], command: str) -> str:
@@ -58,18 +50,23 @@ def _opening(scenes: list[MappedScene], command: str) -> Iterator[str]:
         "",
         "The Cramer-Rao bound is the least standard deviation that any unbiased estimate can have, whatever network or "
         "fit makes it. It is computed here from derivatives of the forward model in finite strain with true sliding, "
-        "through the simulated light to the contrast on rings of the image. Everything here is simulated.",
+        "through the simulated light to the contrast on rings of the image, and to how the light of the press beside "
+        "the lump grows with the force. Everything here is simulated.",
         "",
-        f"Written by `{command}`: do not edit.",
+        f"Written by `{command}`: do not edit. One scene: `host_tools limits scene.toml --protocol "
+        "protocols/precise.toml` (what a protocol may say: `host_tools/inverse/protocol.py`).",
         "",
         f"*Standard* takes {standard.frames} frames at {forces} N and as many beside the lump, *precise* "
         f"{ways()[PRECISE].frames}. Not known, beside size, depth and modulus: the tissue's modulus "
-        f"({_percent(standard.tissue_modulus_spread_ratio)} %) and thickness "
-        f"({_percent(standard.thickness_spread_ratio)} %), the skin's law of contact "
-        f"({_percent(standard.contact_law_spread_ratio)} %), gain ({_percent(standard.gain_spread_ratio)} %), force "
-        f"({_percent(standard.force_scale_spread_ratio)} %). To the camera's noise comes a smooth error of "
-        f"{_percent(standard.systematic_ratio)} % that no frame takes away (light or model). All numbers are standard "
-        "deviations in per cent, of the logarithm. Above some 50 % they only say: not known.",
+        f"({percent(standard.tissue_modulus_spread_ratio)} %) and thickness "
+        f"({percent(standard.thickness_spread_ratio)} %); of the skin its law of contact "
+        f"({percent(standard.contact_law_spread_ratio)} %), the light it gives back "
+        f"({percent(standard.albedo_spread_ratio)} %) and how far that spreads "
+        f"({percent(standard.scattering_spread_ratio)} %); gain ({percent(standard.gain_spread_ratio)} %), force "
+        f"({percent(standard.force_scale_spread_ratio)} %, and {percent(standard.force_error_ratio)} % of each press "
+        f"by itself) and the cell's zero ({1e3 * standard.zero_spread_n:g} mN). To the camera's noise comes a smooth "
+        f"error of {percent(standard.systematic_ratio)} % that no frame takes away (light or model). All numbers are "
+        "standard deviations in per cent, of the logarithm. Above some 50 % they only say: not known.",
         "",
         f"![bounds over the box](figures/{FIGURE})",
         "",
@@ -85,70 +82,113 @@ def _where(scenes: list[MappedScene]) -> Iterator[str]:
             f"- **{name.capitalize()}**: to 10 % in {well} of {len(scenes)} scenes, to 30 % in {roughly}, "
             f"not to 30 % in {len(scenes) - roughly}."
         )
-    worst = [limit.quoted.alone for limit in (scene.limits[STANDARD] for scene in scenes)]
-    toward = np.median([np.abs(bound.worst_direction) for bound in worst], axis=0)
     yield from (
-        f"- The direction known worst is nearly the modulus alone: (ln d, ln h, ln E) = "
-        f"({toward[0]:.2f}, {toward[1]:.2f}, {toward[2]:.2f}), median of the absolute values. A harder lump looks like "
-        "a slightly larger and shallower one.",
-        "- **Knowing the box helps size and depth through the modulus**: if E is known to come from 40 to 120 kPa, "
-        f"size is known to {_percent(float(np.median(boxed[..., 0])))} % and depth to "
-        f"{_percent(float(np.median(boxed[..., 1])))} % in the median scene "
-        f"({_percent(float(np.median(found[..., 0])))} and {_percent(float(np.median(found[..., 1])))} % without); "
-        f"the modulus itself stays at {_percent(float(np.median(boxed[..., 2])))} %, and the box alone gives "
-        f"{_percent(BOX_STD[2])} %.",
+        _what_decides(scenes),
+        _worst_direction(scenes),
+        _with_box(found, boxed, scenes),
+        _called_identifiable(scenes),
         "",
-        "Largest depth (mm) down to which it is known for every modulus from 40 to 120 kPa, standard protocol:",
+    )
+    yield from _deepest(found)
+
+
+def _what_decides(scenes: list[MappedScene]) -> str:
+    """Say by how much the smooth error and the number of frames change the bounds."""
+    smooth, frames = (" / ".join(f"{1 / x:.2g}" for x in factors(scenes, way)) for way in (NOT_SMOOTH, PRECISE))
+    return (
+        f"- The smooth error decides, not the camera: without it the bounds of size / depth / modulus would be "
+        f"{smooth} times smaller; with four times the frames they are {frames} times smaller."
+    )
+
+
+def _worst_direction(scenes: list[MappedScene]) -> str:
+    worst = [scene.limits[STANDARD].quoted.alone.worst_direction for scene in scenes]
+    size, depth, modulus = np.median(worst, axis=0)
+    return (
+        f"- The direction known worst is nearly the modulus alone: (ln d, ln h, ln E) = ({size:+.2f}, {depth:+.2f}, "
+        f"{modulus:+.2f}) in the median. A harder lump looks like a slightly larger and shallower one."
+    )
+
+
+def _with_box(found: Array, boxed: Array, scenes: list[MappedScene]) -> str:
+    alone, together = (np.median(stds.reshape(-1, 3), axis=0) for stds in (found, boxed))
+    box = np.median([scene.limits[STANDARD].box_std for scene in scenes], axis=0)
+    return (
+        f"- **Knowing the box helps size and depth, through the modulus**: if lumps come from {_box()}, the median "
+        f"scene's size is known to {percent(together[0])} % and its depth to {percent(together[1])} % "
+        f"({percent(alone[0])} and {percent(alone[1])} % without). The modulus is then known to "
+        f"{percent(together[2])} %, where the box alone says {percent(box[2])} %."
+    )
+
+
+def _called_identifiable(scenes: list[MappedScene]) -> str:
+    called = np.array([scene.limits[STANDARD].identifiable for scene in scenes])
+    counts, always = called.sum(axis=0), np.all(called.reshape(-1, len(MODULI_KPA), 3), axis=1)
+    return (
+        "- The probe calls an unknown `identifiable` when its spread is under half of what the box alone leaves "
+        "(`device/measurement/confidence.py`). An estimate as good as the bound with the box would be called so for "
+        f"size in {counts[0]}, depth in {counts[1]} and modulus in {counts[2]} of {len(scenes)} scenes; whatever the "
+        "modulus, for {} / {} / {} of {} pairs of size and depth.".format(*always.sum(axis=0), len(always))
+    )
+
+
+def _deepest(found: Array) -> Iterator[str]:
+    yield from (
+        f"Largest depth (mm) down to which it is known, whatever the modulus from {MODULI_KPA[0]:g} to "
+        f"{MODULI_KPA[-1]:g} kPa, standard protocol, without the box:",
         "",
         "| size | size to 10 % | to 30 % | depth to 10 % | to 30 % | modulus to 10 % | to 30 % |",
         "|---|---|---|---|---|---|---|",
     )
     for i, size_mm in enumerate(SIZES_MM):
-        worst_std = found[i, :, SHOWN_MODULI].max(axis=1)
+        worst_std = found[i].max(axis=1)
         cells = [_depth(deepest_mm(worst_std[:, k] <= level)) for k in range(3) for level in (WELL, ROUGHLY)]
         yield f"| {size_mm:g} mm | " + " | ".join(cells) + " |"
     yield ""
+
+
+def _box() -> str:
+    (d, h, E) = (RANGES[name] for name in UNKNOWNS)
+    return f"{d.low:g}-{d.high:g} mm, {h.low:g}-{h.high:g} mm deep, {E.low:g}-{E.high:g} kPa"
 
 
 def _ways(scenes: list[MappedScene]) -> Iterator[str]:
     yield from (
         "### Ways to measure, compared",
         "",
-        "Bounds over those of the standard protocol: geometric means over all scenes, so 2 means twice as uncertain. "
-        "Pressure and displacement stand for ideal sensors that show nothing else, with the same camera.",
+        "Bounds over those of the standard protocol: medians over all scenes, so 2 means twice as uncertain. "
+        "Pressure and displacement stand for ideal sensors that show nothing else, with the same camera. The last "
+        "column counts scenes in which the bounds of the two orders of elements differ by more than 20 %.",
         "",
-        "| way | size | depth | modulus | scenes with size to 30 % | depth to 30 % | modulus to 30 % |",
-        "|---|---|---|---|---|---|---|",
+        "| way | size | depth | modulus | scenes with size to 30 % | depth to 30 % | modulus to 30 % | orders apart |",
+        "|---|---|---|---|---|---|---|---|",
     )
-    standard = stds(scenes, STANDARD)
     for name in ways():
-        found = stds(scenes, name)
-        both = np.isfinite(found).all(axis=-1)
-        factor = np.exp(np.log(found[both] / standard[both]).mean(axis=0)) if both.any() else np.full(3, np.inf)
-        counts = (found <= ROUGHLY).sum(axis=(0, 1, 2))
-        yield (
-            f"| {name} | " + " | ".join(f"{x:.2g}" for x in factor) + " | " + " | ".join(str(n) for n in counts) + " |"
-        )
+        found, apart = stds(scenes, name), sum(bool(scene.limits[name].not_converged) for scene in scenes)
+        cells = [f"{factor:.2g}" for factor in factors(scenes, name)]
+        cells += [str(count) for count in (found <= ROUGHLY).sum(axis=(0, 1, 2))]
+        yield f"| {name} | " + " | ".join(cells) + f" | {apart} |"
     yield ""
 
 
 def _tables(scenes: list[MappedScene]) -> Iterator[str]:
+    both = np.array([[limit.alone.std for limit in s.limits[STANDARD].by_order.values()] for s in scenes])
+    apart = both.max(axis=1) / both.min(axis=1) - 1
     yield from (
         "### All scenes",
         "",
-        "Size / depth / modulus in per cent, of the measurement alone. Computed with elements of order 3 and "
-        "of order 4; the larger is shown, with ~ where they differ by more than 20 %: such a bound is known to that "
-        "factor only.",
+        "Size / depth / modulus in per cent, of the measurement alone. Computed with elements of order "
+        f"{' and of order '.join(map(str, ORDERS))} on the same mesh; the larger is shown, with ~ where they differ by "
+        "more than 20 %: such a bound is known to that factor only. In the median they differ by "
+        f"{percent(float(np.median(apart)))} %, at most by {percent(float(apart.max()))} %.",
         "",
     )
     for way in (STANDARD, PRECISE):
         yield from _table(scenes, way, with_box=False)
     yield from (
-        "With the box as prior (sizes 2-15 mm, depths 4-12 mm, moduli 40-120 kPa, evenly in the logarithm; alone it "
-        f"gives {' / '.join(_percent(std) for std in BOX_STD)}). **Bold** where the probe would call an estimate as "
-        "good as this `identifiable`: under half of the box's own spread ([measurement](measurement.md#intervals)). "
-        "What is not bold here can honestly only be answered with 'not determined', by any method. A lump of 15 kPa "
-        "lies outside the box.",
+        f"With the box as prior ({_box()}, spread as in `device/measurement/press_parameters.py`). **Bold** where the "
+        "probe would call an estimate as good as this `identifiable`. What is not bold here can honestly only be "
+        "answered with 'not determined', by any method.",
         "",
     )
     yield from _table(scenes, STANDARD, with_box=True)
@@ -168,9 +208,9 @@ def _table(scenes: list[MappedScene], way: str, *, with_box: bool) -> Iterator[s
 def _cell(scene: MappedScene, way: str, with_box: bool) -> str:
     found = scene.limits[way]
     if with_box:
-        pairs = zip(found.std_with_box, is_identifiable(found), strict=True)
-        return " / ".join(f"**{_percent(std)}**" if narrow else _percent(std) for std, narrow in pairs)
-    return " / ".join(_percent(std) for std in found.std) + (" ~" if found.not_converged else "")
+        pairs = zip(found.std_with_box, found.identifiable, strict=True)
+        return " / ".join(f"**{percent(std)}**" if narrow else percent(std) for std, narrow in pairs)
+    return " / ".join(percent(std) for std in found.std) + (" ~" if found.not_converged else "")
 
 
 def _closing() -> Iterator[str]:
@@ -178,50 +218,27 @@ def _closing() -> Iterator[str]:
         "### What the limits leave out",
         "",
         "- They hold for small errors about one scene, and for unbiased estimates; a bound of 200 % is no prediction "
-        "of an error, only of ignorance. With the box as prior no error exceeds the box.",
+        "of an error, only of ignorance.",
+        "- The box enters as a Gaussian of the same spread about the lump itself. An estimate that also knows where "
+        "the box ends errs less there.",
+        "- With the box it is assumed that the image is a straight line over all of the box's moduli. It is not: a "
+        "press that cannot tell 15 from 80 kPa cannot know which of these columns it is in, so the largest number of a "
+        "row counts.",
         "- The law of the material (neo-Hookean), Poisson ratios, the probe's layers, the sphere's shape, and a "
         "lump on the axis are taken as known. Not knowing them makes everything worse.",
         "- The smooth error is assumed, not measured: 0.2 % of the light, correlated over 2 mm and alike at all loads, "
         "and again over 3 mm for each load by itself.",
-        "- Deformation bends the light too, but by a hundredth of what pressure does; with the traced tables of the "
-        "simulated probe its noise would pass for information (bounds 2 to 10 times too small), so it is left out.",
+        "- Deformation bends the light too, but by a hundredth of what pressure does, which cannot be told from the "
+        "noise of the simulated probe's traced tables. It is left out; counted, it makes bounds up to twice smaller.",
         "- Size and depth move the mesh. What only the elements make of that cancels against the same press without "
-        "the lump on the same mesh; two meshes would make bounds up to 10 times too small.",
+        "the lump on the same mesh; without that, bounds came out up to 10 times too small.",
         "",
     )
 
 
-def draw_map(scenes: list[MappedScene], path: Path) -> None:
-    """Write the figure: the standard protocol's bounds, one panel for each unknown and modulus."""
-    found = 100 * stds(scenes, STANDARD)
-    figure, panels = plt.subplots(3, len(MODULI_KPA), figsize=(11, 7.6), sharex=True, sharey=True, layout="constrained")
-    for k, j in np.ndindex(3, len(MODULI_KPA)):
-        panel = panels[k, j]
-        image = _draw_panel(panel, found[:, :, j, k].T)
-        if k == 0:
-            panel.set_title(f"E = {MODULI_KPA[j]:g} kPa")
-        if j == 0:
-            panel.set_ylabel(f"{NAMES[k]} known to (%)\n\ndepth (mm)")
-        if k == 2:
-            panel.set_xlabel("size (mm)")
-    figure.colorbar(image, ax=panels, label="standard deviation (%)", extend="both", shrink=0.6)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-
-
-def _draw_panel(panel: Any, percent: Array) -> Any:
-    """Draw one unknown and modulus, depth downwards over size."""
-    image = panel.imshow(percent, norm=LogNorm(1, 300), cmap="RdYlGn_r", aspect="auto")
-    for (row, column), value in np.ndenumerate(percent):
-        weight = "bold" if value <= 100 * ROUGHLY else "normal"
-        panel.text(column, row, _percent(value / 100), ha="center", va="center", fontsize=9, weight=weight)
-    panel.set_xticks(range(len(SIZES_MM)), [f"{size:g}" for size in SIZES_MM])
-    panel.set_yticks(range(len(DEPTHS_MM)), [f"{depth:g}" for depth in DEPTHS_MM])
-    return image
-
-
-def _percent(ratio: float) -> str:
-    return f"{100 * ratio:.2g}" if ratio < 1 else f"{100 * ratio:.0f}" if ratio <= MOST else ">1000"
+def percent(ratio: float) -> str:
+    """Return a ratio in per cent, to two digits."""
+    return f"{100 * ratio:.2g}" if ratio < 0.995 else f"{100 * ratio:.0f}" if ratio <= MOST else ">1000"
 
 
 def _depth(depth_mm: float | None) -> str:
