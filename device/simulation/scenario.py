@@ -13,6 +13,7 @@ from device.measurement.toml_record import read_toml
 from device.simulation.faults import Fault
 from device.simulation.hand import HandSettings
 from device.simulation.lens import Lens
+from device.simulation.neighbour import Neighbour
 from device.simulation.renderer import LinearOptics
 from device.simulation.sensor import Sensor
 from device.simulation.skin import Skin
@@ -43,7 +44,7 @@ class CellSettings:
 class Scenario:
     """What the virtual probe is made of and pressed on, what goes wrong, and the fault code the device must raise.
 
-    An inclusion of 0 mm is none. The tissue is a slab of 4-6.25 kPa and 27-36 mm.
+    An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 4-6.25 kPa, 27-36 mm.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
     """
 
@@ -58,6 +59,7 @@ class Scenario:
     tissue_modulus_kpa: float = 5.0
     slab_thickness_mm: float = 30.0
     seed: int = 1
+    neighbour: Neighbour | None = None
     faults: tuple[Fault, ...] = ()
     expects: str = ""
 

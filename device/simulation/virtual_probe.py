@@ -10,11 +10,12 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Counts, LedRatio, PixelScale
 from device.simulation.hand import VirtualHand
 from device.simulation.image_formation import ImageFormation, LinearImage, ScatteredImage
 from device.simulation.lookup_optics import LookupOptics
+from device.simulation.neighbour import Face, NeighbouredFace
 from device.simulation.off_axis_table import OffAxisTable, load_off_axis_table
 from device.simulation.pressed_face import Placement, PressedFace
 from device.simulation.scenario import Scenario
@@ -65,9 +66,17 @@ class VirtualProbe:
         """
         self.scenario, self.hand = scenario, VirtualHand(scenario.hand)
         self._image = _image_formation(scenario, tables, shape, scale)
-        lump, slab = scenario.inclusion, scenario.slab
-        solved = ramps or tables.centred.ramps(lump, slab)
-        self._face = PressedFace(solved, tables.off_axis, lump, self._image.x_mm, self._image.y_mm, slab)
+        self._face = self._faces(tables, ramps)
+
+    def _faces(self, tables: ProbeTables, ramps: PressRamps | None) -> Face:
+        scenario, x_mm, y_mm = self.scenario, self._image.x_mm, self._image.y_mm
+
+        def face(lump: Inclusion, solved: PressRamps | None = None) -> Face:
+            solved = solved or tables.centred.ramps(lump, scenario.slab)
+            return PressedFace(solved, tables.off_axis, lump, x_mm, y_mm, scenario.slab)
+
+        first, second = face(scenario.inclusion, ramps), scenario.neighbour
+        return NeighbouredFace(first, face(second.inclusion), second) if second else first
 
     def cell_counts(self, t_s: float) -> float:
         """Return the noise-free load-cell counts at a time."""
