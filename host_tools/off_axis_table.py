@@ -59,7 +59,7 @@ def _lumps_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, contrast
         meshed.model.press(materials, [scene.press], estimate_error=False)[0].state
         for materials in (baseline(scene), *(with_inclusion(_with_modulus(scene, E)) for E in moduli_kpa))
     )
-    modes = np.stack([_modes(meshed.rays.r_mm[0], face, bare) for face in pressed])
+    modes = np.stack([face_modes(meshed.rays.r_mm[0], face, bare) for face in pressed])
     return modes / size_mm**3 / contrasts[:, None, None, None]
 
 
@@ -68,7 +68,8 @@ def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
     return replace(scene, inclusion=replace(scene.inclusion, youngs_modulus_kpa=modulus_kpa))
 
 
-def _modes(r_mm: Array, face: FaceState, bare: FaceState) -> Array:
+def face_modes(r_mm: Array, face: FaceState, bare: FaceState) -> Array:
+    """Return the cosine series [2, K, R] of what a lump adds to deformation and pressure, on the radii of the table."""
     p_kpa = np.array([ring_means(r_mm, ray) for ray in face.p_kpa - bare.p_kpa])
     return np.stack([cosine_modes(face.w_mm - bare.w_mm), cosine_modes(p_kpa)])[..., ::EVERY]
 

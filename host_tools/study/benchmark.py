@@ -45,7 +45,8 @@ def at_most(case: str, quantity: str, measured: float, bound: float) -> Benchmar
 
 def at_least(case: str, quantity: str, measured: float, bound: float) -> Benchmark:
     """Return a benchmark on a number that must reach a bound; the error is by how much it falls short."""
-    return Benchmark(case, f"{quantity} (at least)", measured, bound, max(0.0, bound - measured), 0.0)
+    short = 0.0 if measured >= bound else bound - measured  # not max(), which would take NaN for none
+    return Benchmark(case, f"{quantity} (at least)", measured, bound, short, 0.0)
 
 
 @dataclass(frozen=True)

@@ -31,3 +31,7 @@ def test_a_chapter_passes_when_all_of_it_does():
     good, bad = at_most("", "", 0.5, 1.0), at_most("", "", 2.0, 1.0)
     assert Chapter("", "", "", (good,)).passed
     assert not Chapter("", "", "", (good, bad)).passed
+
+
+def test_a_share_of_nothing_reaches_no_bound():
+    assert not at_least("case", "share", float("nan"), 0.9).passed
