@@ -5,7 +5,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test check bench verify sweep train evaluate lock clean
+.PHONY: help setup run test check bench verify sweep train evaluate modes lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -54,11 +54,16 @@ train: sweep ## regenerate everything in models/ from nothing
 	rm -rf build/phantoms
 	$(HOST_TOOLS) table --out models/simulated_probe
 	$(HOST_TOOLS) optics build --out models/simulated_probe
-	$(HOST_TOOLS) train --data build/sweep.nc --out models/paper
+	$(HOST_TOOLS) train --profile paper --data build/sweep.nc --out models/paper
+	$(HOST_TOOLS) train --profile standard --out models/standard
+	$(HOST_TOOLS) train --profile quick --out models/quick
 	$(HOST_TOOLS) phantom --out build/phantoms/physical
 	$(HOST_TOOLS) calibrate build/phantoms/physical/* --out models/simulated_probe/calibration.json
 	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
 	$(HOST_TOOLS) calibrate build/phantoms/linear/* --out models/simulated_probe/calibration_linear.json
+
+modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
+	$(HOST_TOOLS) modes --out docs/modes.md
 
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
 	$(HOST_TOOLS) evaluate

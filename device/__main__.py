@@ -17,13 +17,14 @@ from pathlib import Path
 
 import uvicorn
 
+from device.answers import answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
 from device.config import Config, read_config, simulated_config
 from device.errors import DeviceError
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import read_calibration
-from device.measurement.estimate import estimate_recording
 from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
 from device.simulation.scenario import Scenario, read_scenario
@@ -47,6 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--port", type=int, help="port of the screen and the API")
     commands = parser.add_subparsers(dest="command", metavar="analyse")
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
+    analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
     return parser
 
@@ -83,8 +85,13 @@ def _analyse(options: argparse.Namespace) -> int:
     for path in options.recordings:
         recording = read_recording(path)
         config = stated or simulated_config(recording.serial)
-        bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
-        estimate = estimate_recording(recording, bundle, calibration)
+        mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
+        answers = answers_for(
+            replace(config, press=replace(config.press, mode=mode)),
+            ModelBundle.load(config.model),
+            read_calibration(config.calibration),
+        )
+        estimate = answers.estimator(recording, mode)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))
     return 0
 

@@ -180,10 +180,16 @@ class ServerSection:
 
 @dataclass(frozen=True)
 class Config:
-    """All settings of the daemon."""
+    """All settings of the daemon.
+
+    `model` answers in mode paper; `quick_model` in quick and `profile_model` in standard and precise, where they are
+    installed and for this probe.
+    """
 
     serial: str = "TSIS-0000"
     model: Path = MODELS / "paper"
+    quick_model: Path = MODELS / "quick"
+    profile_model: Path = MODELS / "standard"
     calibration: Path = Path("/var/lib/tsis/calibration.json")
     data: Path = Path("/var/lib/tsis")
     camera: CameraSection = field(default_factory=CameraSection)
@@ -195,10 +201,21 @@ class Config:
     server: ServerSection = field(default_factory=ServerSection)
 
 
+SIMULATED: dict[str, tuple[str, Mode]] = {
+    "SIM-0001": ("calibration.json", "standard"),
+    "SIM-LINEAR": ("calibration_linear.json", "paper"),
+}
+"""Certificate and mode of each simulated probe."""
+
+
 def simulated_config(serial: str = "SIM-0001") -> Config:
-    """Return the settings of a simulated probe: its certificate and data folder. Each kind of light has a serial."""
-    certificate = "calibration_linear.json" if serial == "SIM-LINEAR" else "calibration.json"
-    return Config(serial=serial, calibration=MODELS / "simulated_probe" / certificate, data=Path("var"))
+    """Return the settings of a simulated probe: its certificate, mode and data folder. Each kind of light has a serial.
+
+    Only the paper's regressions can be had for the paper's light.
+    """
+    certificate, mode = SIMULATED.get(serial, SIMULATED["SIM-0001"])
+    calibration = MODELS / "simulated_probe" / certificate
+    return Config(serial=serial, calibration=calibration, data=Path("var"), press=PressSection(mode=mode))
 
 
 def read_config(path: Path) -> Config:

@@ -8,14 +8,17 @@ import typer
 
 from device.measurement.inversion import BundleRefused
 from device.measurement.quantities import InvalidQuantity
+from host_tools.commands.evaluate import evaluate
 from host_tools.commands.features import features
 from host_tools.commands.limits import limits
-from host_tools.commands.model import calibrate, evaluate, phantom, table, train
+from host_tools.commands.model import calibrate, phantom, table
+from host_tools.commands.modes import modes
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note
 from host_tools.commands.paper import paper
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
+from host_tools.commands.train import train
 from host_tools.commands.verify import verify
 from host_tools.forward.errors import PressFailed
 
@@ -28,12 +31,13 @@ app = typer.Typer(
 app.command(epilog="Example: host_tools simulate --size-mm 10 --depth-mm 6 --modulus-kpa 80 --explain")(simulate)
 app.command(epilog="Example: host_tools verify --quick --out build/verification.md")(verify)
 app.command(epilog="Example: host_tools sweep --scenes 134 --seed 1 --out build/sweep.nc")(sweep)
-app.command(epilog="Example: host_tools train --data build/sweep.nc --out models/paper")(train)
+app.command(epilog="Example: host_tools train --profile standard --out models/standard")(train)
 app.command(epilog="Example: host_tools table --out models/simulated_probe")(table)
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools features --out docs/features.md")(features)
+app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)
 app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
 app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)
 app.add_typer(optics, name="optics")

@@ -58,9 +58,9 @@ class Daemon:
             with error:
                 return Answer(error.code, dict(error.headers), error.read())
 
-    def press(self) -> dict[str, Any]:
+    def press(self, mode: str | None = None) -> dict[str, Any]:
         """Start a press and return its job once it has ended."""
-        answer = self.ask("/api/v1/presses", "POST", {})
+        answer = self.ask("/api/v1/presses", "POST", {"mode": mode} if mode else {})
         assert answer.status == 202, answer.body
         return self.ended(answer.headers["location"])
 
@@ -81,4 +81,4 @@ class Daemon:
         return code
 
 
-QUICK_HAND = "[hand]\nrate_n_per_s = 1.5\nreaction_s = 0.05\n"
+QUICK_HAND = "[hand]\nrate_n_per_s = 1.5\nramp_rate_n_per_s = 0.25\nreaction_s = 0.05\n"

@@ -12,10 +12,11 @@ from dataclasses import replace
 import pytest
 from daemon_process import QUICK_HAND, Daemon
 
+from device.answers import answers_for
 from device.assembly import StartFailed, open_simulated_probe
 from device.config import PressSection, simulated_config
 from device.errors import StorageError
-from device.measurement.estimate import estimate_recording
+from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.measurement.recording import read_recording
 from device.records.store import Store
 from device.simulation.scenario import Scenario
@@ -54,9 +55,9 @@ def test_a_modulus_that_the_press_does_not_determine_is_said_to_be_so(measuremen
     assert "Young's modulus" in measurement["estimate"]["reason"]
 
 
-def test_ten_frames_are_taken_in_the_force_band(measurement):
+def test_ten_frames_are_taken_over_the_ramp(measurement):
     assert measurement["frames"] == 10
-    assert 0.475 <= measurement["force_n"] <= 0.525
+    assert measurement["force_n"] == pytest.approx((RAMP_FROM_N + RAMP_TO_N) / 2, abs=0.05)
 
 
 def test_without_a_mode_the_press_is_taken_in_that_of_the_settings(daemon, job, measurement):
@@ -70,7 +71,8 @@ def test_the_recording_gives_the_same_estimate_again(daemon, measurement, tmp_pa
         archive.extractall(tmp_path)
     recording = read_recording(tmp_path / measurement["recording_id"])
     assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 14, 10]
-    again = json.loads(json.dumps(estimate_recording(recording, bundle, calibration).as_record()))
+    answers = answers_for(simulated_config(), bundle, calibration)
+    again = json.loads(json.dumps(answers.estimator(recording, "standard").as_record()))
     assert again == measurement["estimate"]
 
 
@@ -128,7 +130,7 @@ def test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_sa
 
 def test_a_press_that_is_too_hard_is_rejected_with_both_numbers(tmp_path):
     daemon = Daemon(tmp_path, QUICK_HAND + "aim_n = 1.4\n")
-    job = daemon.press()
+    job = daemon.press("paper")
     assert job["state"] == "rejected"
     assert "above 1.00 N" in job["reason"]
     daemon.stop()

@@ -1,7 +1,7 @@
 """What a press of a mode costs: frames, the forces at which they are taken, and how long the hand is busy with them.
 
 The time is that of one press, of the two that make a measurement, from when its first frame may be taken; computing
-the answer comes on top. Measured error and time of each mode: docs/accuracy.md.
+the answer comes on top. Measured error and time of each mode: docs/modes.md.
 """
 
 from __future__ import annotations

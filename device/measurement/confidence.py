@@ -56,7 +56,8 @@ class Bands:
         low, high = (self._at(truth, np.log(spread), table) for table in (self.low, self.high))
         usual = truth[(low <= (truth - mean) / spread) & ((truth - mean) / spread <= high)]
         if not len(usual):  # an answer that is unusual for every truth: nothing narrower may be said
-            return Interval(max(-1.0, mean - 2 * spread), min(1.0, mean + 2 * spread), True)
+            at = min(max(mean, -1.0), 1.0)
+            return Interval(max(-1.0, at - 2 * spread), min(1.0, at + 2 * spread), True)
         half_step = 1 / (GRID - 1)
         return Interval(max(-1.0, usual[0] - half_step), min(1.0, usual[-1] + half_step), True)
 

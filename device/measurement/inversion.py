@@ -18,6 +18,7 @@ import onnxruntime
 from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
 
+from device.measurement.held_profile import HELD_NAMES
 from device.measurement.press_profile import ROW_NAMES
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
 
@@ -28,6 +29,8 @@ FEATURE_UNITS = {"max_deformation_mm": "mm", "central_deformation_mm3": "mm3", "
 """The features of the paper's network: O1, O2, O3, in this order."""
 PROFILE_UNITS = dict.fromkeys(ROW_NAMES, "")
 """The features of a network that reads the press profile: its whole row, ratios all of them."""
+HELD_UNITS = {name: "N" if name == "force_n" else "" for name in HELD_NAMES}
+"""The features of a network that reads one held press."""
 
 GOLDEN_TOLERANCE = 1e-4
 """Relative. Rounding of float32 is 6e-8; processors differ far less than this, wrong weights far more."""
@@ -111,7 +114,7 @@ class ModelBundle:
         sentences = []
         for (name, (low, high)), value in zip(self.feature_range.items(), features, strict=True):
             if not low <= value <= high:
-                unit = FEATURE_UNITS.get(name, "")
+                unit = (FEATURE_UNITS | HELD_UNITS).get(name, "")
                 spoken = name.rpartition("_")[0].replace("_", " ").capitalize()
                 sentences.append(f"{spoken} is {value:.4g} {unit}, outside the trained {low:.4g} to {high:.4g} {unit}.")
         return sentences
@@ -142,20 +145,25 @@ class _Fields:
     def refuse(self, field: str, value: object, bound: str) -> NoReturn:
         raise BundleRefused(self.folder, field, value, bound)
 
-    def of(self, path: str, kind: type) -> Any:
+    def of(self, path: str, kind: type, *within: str) -> Any:
+        """Return the field of a dotted path, or of a key `within` it that may hold dots itself."""
         value: Any = self.card
-        for key in path.split("."):
+        for key in (*path.split("."), *within):
             value = value.get(key) if isinstance(value, dict) else None
         if not isinstance(value, kind):
-            self.refuse(path, "missing" if value is None else repr(value), f"present and of type {kind.__name__}")
+            self.refuse(
+                ".".join((path, *within)),
+                "missing" if value is None else repr(value),
+                f"present and of type {kind.__name__}",
+            )
         return value
 
     def ranges(self, group: str, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
         """Return (low, high) of each name under training_range."""
-        return {name: self._range(f"training_range.{group}.{name}") for name in names}
+        return {name: self._range(f"training_range.{group}", name) for name in names}
 
-    def _range(self, path: str) -> tuple[float, float]:
-        values = self.of(path, list)
+    def _range(self, group: str, name: str) -> tuple[float, float]:
+        values, path = self.of(group, list, name), f"{group}.{name}"
         anywhere = Bound(-np.inf, np.inf, "")
         if len(values) != 2 or not all(isinstance(v, int | float) and anywhere.holds(v) for v in values):
             self.refuse(path, values, "two finite numbers")
@@ -203,10 +211,11 @@ def _verified_hash(fields: _Fields, network: bytes) -> str:
 
 def _verified_names(fields: _Fields) -> tuple[str, ...]:
     features = fields.of("features", list)
-    for units in (FEATURE_UNITS, PROFILE_UNITS):
+    for units in (FEATURE_UNITS, PROFILE_UNITS, HELD_UNITS):
         if features == [{"name": name, "unit": unit} for name, unit in units.items()]:
             return tuple(units)
-    bound = f"{', '.join(FEATURE_UNITS)}, each with its unit and in this order, or the columns of the press profile"
+    named = f"{', '.join(FEATURE_UNITS)}, each with its unit and in this order"
+    bound = f"{named}, or the columns of the press profile or of a held press"
     fields.refuse("features", [entry.get("name") if isinstance(entry, dict) else entry for entry in features], bound)
 
 

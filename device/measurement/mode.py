@@ -2,11 +2,12 @@
 
 quick: one frame and one network. standard: ten frames over the force and an ensemble. precise: forty frames over the
 force, and the forward model fitted to them. paper: ten frames at one force, three features, as Lee & Won 2013.
-Measured error and time of each: the model card of models/standard, and docs/accuracy.md.
+Measured error and time of each: the model cards, and docs/modes.md.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -33,6 +34,18 @@ FRAMES: dict[Mode, Frames] = {
     "precise": Frames(40, is_ramp=True),
     "paper": Frames(10, is_ramp=False),
 }
+
+
+RAMP_RATIO = 2.0
+"""Press frames whose largest force is this many times the smallest are of a ramp."""
+
+
+def mode_of(force_n: Sequence[float]) -> Mode:
+    """Return the mode that reads most of press frames at these forces."""
+    if not force_n or max(force_n) <= 0.0 or max(force_n) < RAMP_RATIO * min(force_n):
+        return "quick" if len(force_n) == FRAMES["quick"].count else "paper"
+    between = (FRAMES["standard"].count + FRAMES["precise"].count) / 2
+    return "precise" if len(force_n) > between else "standard"
 
 
 def mode_named(name: str) -> Mode:

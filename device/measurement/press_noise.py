@@ -20,7 +20,6 @@ from scipy.special import ive
 
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS
-from device.measurement.reference_light import EXPONENT
 from device.measurement.ring_means import RING_RADII_MM, RINGS
 
 Array = NDArray[np.float64]
@@ -45,7 +44,7 @@ class ErrorLevels:
 
 @dataclass(frozen=True, eq=False)
 class PressNoise:
-    """`camera` [P, P]: covariance of rows over repeated recordings; `levels` of everything else."""
+    """`camera` [P, P]: covariance of repeated recordings over the light ratio; `levels` of everything else."""
 
     camera: Array
     levels: ErrorLevels = ErrorLevels()
@@ -53,11 +52,10 @@ class PressNoise:
     def covariance(self, row: Array) -> Array:
         """Return the covariance [P, P] of a row [P] about the forward model's; it depends on the contrast seen."""
         light = light_ratio(row)
-        common = drift_directions(light)
+        common = np.stack(drift_directions(row), axis=-1)
         levels = np.array([self.levels.gain_ratio, self.levels.zero_n])
-        return np.asarray(
-            self.camera + (common * levels**2) @ common.T + light[:, None] * light * smooth_errors(self.levels)
-        )
+        alike = self.camera + smooth_errors(self.levels)
+        return np.asarray((common * levels**2) @ common.T + light[:, None] * light * alike)
 
 
 def light_ratio(rows: Rows) -> Rows:
@@ -67,13 +65,32 @@ def light_ratio(rows: Rows) -> Rows:
     return light
 
 
-def drift_directions(light: Array) -> Array:
-    """Return what a unit of gain and a newton of zero drift add to a row [P, 2], to first order."""
-    gain, zero = np.zeros(len(light)), np.zeros(len(light))
-    gain[:CONTRAST_COLUMNS] = light[:CONTRAST_COLUMNS]
-    growth = EXPONENT / PROFILE_FORCES_N
-    zero[:CONTRAST_COLUMNS] = light[:CONTRAST_COLUMNS] * np.repeat(growth, RINGS)
-    return np.column_stack([gain, zero])
+def drift_directions(rows: Rows) -> tuple[Rows, Rows]:
+    """Return what a unit of gain and a newton of zero drift add to rows [..., P], to first order.
+
+    A cell that reads a newton too much looks up the reference light a newton too high: d ln(light) / d force of it,
+    which the growth in the row tells, ring by ring.
+    """
+    light = light_ratio(rows)
+    gain, zero = np.zeros_like(rows), np.zeros_like(rows)
+    gain[..., :CONTRAST_COLUMNS] = light[..., :CONTRAST_COLUMNS]
+    below = rows[..., CONTRAST_COLUMNS : CONTRAST_COLUMNS + GROWTH_COLUMNS]
+    log_light = below.reshape(*rows.shape[:-1], LOADS - 1, RINGS)  # over that at the largest force, where it is 0
+    slope_per_n = np.einsum("kl,...lj->...kj", _SLOPE_PER_N[:, :-1].astype(rows.dtype), log_light)
+    zero[..., :CONTRAST_COLUMNS] = -gain[..., :CONTRAST_COLUMNS] * slope_per_n.reshape(*rows.shape[:-1], -1)
+    return gain, zero
+
+
+def _slope_per_n() -> Array:
+    """Return the matrix [K, K] that turns values at the profile's forces into slopes there, by the cubic in ln(F)."""
+    powers = np.vander(np.log(PROFILE_FORCES_N), increasing=True)
+    degree = np.arange(LOADS)
+    of_powers = np.zeros((LOADS, LOADS))
+    of_powers[:, 1:] = degree[1:] * powers[:, :-1]
+    return np.asarray(of_powers @ np.linalg.inv(powers) / PROFILE_FORCES_N[:, None])
+
+
+_SLOPE_PER_N = _slope_per_n()
 
 
 @lru_cache(maxsize=4)

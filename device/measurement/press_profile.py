@@ -30,8 +30,10 @@ BINNED_MM = 0.125
 FLOOR_COUNTS = 3.0
 """A binned reference dimmer than this above dark (of 8 bits) is no flat field."""
 RAMP_DEGREE = 3
-RAMP_LOW_N, RAMP_HIGH_N = 0.15, 0.5
+RAMP_LOW_N, RAMP_HIGH_N = 0.17, 0.5
 """A ramp reaches from at most the first to at least the second of these forces."""
+TOUCHED_N = 0.07
+"""Below this force a reference frame shows an untouched face."""
 MIN_RAMP_FRAMES = 6
 LARGEST_STEP_N = 0.17
 """Between forces further apart than this a ramp's polynomials are not held: four forces hold them, three do not."""
@@ -85,6 +87,11 @@ def press_profile(recording: Recording) -> PressProfile:
     Press frames far below or above the reference's forces count nothing. Raises `InvalidQuantity` when a role is
     missing, or a ramp is too short, has too few frames or a gap.
     """
+    return profile_of_lights(*lights_of(recording))
+
+
+def lights_of(recording: Recording) -> tuple[Lights, Lights]:
+    """Return the light of the touched reference frames and of the press frames; raises without dark frames."""
     dark = recording.with_role("dark")
     if not dark:
         raise InvalidQuantity("dark frames", 0, "at least one", "record dark frames before the press")
@@ -92,7 +99,7 @@ def press_profile(recording: Recording) -> PressProfile:
     base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
     per_count = 1 if recording.camera.bits == 8 else 1 / 256
     reference, press = (_lights(recording, role, base, per_count, factor) for role in ("reference", "press"))
-    return profile_of_lights(reference, press)
+    return reference, press
 
 
 def profile_of_lights(reference: Lights, press: Lights) -> PressProfile:
@@ -137,7 +144,7 @@ def harmonic(rings: RingMeans, order: int) -> Array:
 
 
 def _lights(recording: Recording, role: str, dark: Image, per_count: float, factor: tuple[int, int]) -> Lights:
-    frames = [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > 0.5 * RAMP_LOW_N]
+    frames = [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > TOUCHED_N]
     images = [(_binned(frame, factor) - dark) * np.float32(per_count) for frame in frames]
     forces = np.array([frame.force_n for frame in frames])
     return Lights(forces, images, binned_scale(recording.camera.scale))

@@ -1,4 +1,4 @@
-"""`host_tools table`, `train`, `phantom`, `calibrate`, `evaluate`: from a data set to a scored model bundle."""
+"""`host_tools table`, `phantom`, `calibrate`: the simulated probe's tables, recordings and certificates."""
 
 from __future__ import annotations
 
@@ -7,57 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from device import __version__
-from device.measurement.calibration import read_calibration
 from device.measurement.durable import write_durably
 from device.measurement.features import FEATURE_NAMES
 from device.measurement.inversion import FEATURE_UNITS, ModelBundle
-from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import read_recording, write_recording
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.surface_table import load_surface_table
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.output import note, note_left_out, progress
+from host_tools.commands.output import note, progress
 
 if TYPE_CHECKING:
     from host_tools.phantom_sets import Phantom
 
-CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 MODELS = Path(__file__).resolve().parents[2] / "models"
-
-
-def train(
-    data: Annotated[Path, typer.Option(help="Data set of `host_tools sweep`.")],
-    out: Annotated[Path, typer.Option(help="Folder of the model bundle.")],
-    trials: Annotated[int, typer.Option(help="Networks that are averaged.")] = 100,
-    seed: Annotated[int, typer.Option(help="Seed of weights and splits.")] = 1,
-) -> None:
-    """Train the 3-10-4-3 network by scaled conjugate gradient and export the bundle."""
-    from host_tools.data.dataset import training_rows
-    from host_tools.inverse.export import ExportRefused, export
-    from host_tools.inverse.train import train as run_training
-
-    rows = training_rows(data)
-    note_left_out(rows.excluded_rows, data)
-    with progress("networks") as bar:
-        task = bar.add_task("", total=trials)
-        trained = run_training(
-            rows, trials=trials, seed=seed, progress=lambda done, _: bar.update(task, completed=done)
-        )
-    command = f"host_tools train --data {data} --out {out} --trials {trials} --seed {seed}"
-    try:
-        export(trained, out, software_version=__version__, training_command=command)
-    except ExportRefused as refused:
-        note.print(str(refused), markup=False, soft_wrap=True)
-        raise typer.Exit(1) from refused
-    bundle = ModelBundle.load(out)
-    print(f"{out}: {trials} networks from {len(rows.training_index)} scenes, model {bundle.sha256[:12]}")
-    for unknown, errors in bundle.card["held_out_errors_percent"].items():
-        if unknown in UNKNOWNS:
-            print(f"{unknown:20} " + "  ".join(f"{name} {value:6.2f} %" for name, value in errors.items()))
 
 
 def table(
@@ -124,12 +89,12 @@ def _phantom_set(which: str, model: Path, scenes: int, seed: int) -> Iterator[Ph
         return random_set(scenes, seed)
     if which != "calibration":
         raise InvalidQuantity("set", repr(which), "calibration, breast-imager or random", "choose one of them")
-    return (Phantom(f"phantom{i}", truth) for i, truth in enumerate(_phantoms(model), start=1))
+    return (Phantom(f"phantom{i}", truth) for i, truth in enumerate(phantoms_of(ModelBundle.load(model)), start=1))
 
 
-def _phantoms(model: Path) -> list[Inclusion]:
+def phantoms_of(bundle: ModelBundle) -> list[Inclusion]:
     """Return the phantom scenes that a bundle was scored on."""
-    rows = ModelBundle.load(model).card.get("phantoms")
+    rows = bundle.card.get("phantoms")
     if not rows:
         raise InvalidQuantity("phantoms", "missing in model.json", "the scored scenes", "train the model anew")
     return [Inclusion(*row) for row in rows]
@@ -155,22 +120,3 @@ def calibrate(
     for image, line, name in zip(FEATURE_NAMES, certificate.regressions, FEATURE_UNITS, strict=True):
         law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"
         print(f"{law:76} R2 {line.r_squared:.5f}  leave-one-out {line.leave_one_out_std:.3g}")
-
-
-def evaluate(
-    model: Annotated[Path, typer.Option(help="Bundle to score.")] = MODELS / "paper",
-    table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = MODELS / "simulated_probe",
-    light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
-    scenes: Annotated[int, typer.Option(help="Random scenes for the coverage of the intervals.")] = 100,
-    seed: Annotated[int, typer.Option(help="Seed of scenes, camera and hand.")] = 1000,
-) -> None:
-    """Score the model on its nine phantoms, noise-free and through the camera, and its intervals on random scenes."""
-    from host_tools.score import Rig, print_intervals, print_phantoms
-
-    scenario = Scenario(light=light)
-    certificate = read_calibration(table / CERTIFICATES[light])
-    rig = Rig(ModelBundle.load(model), certificate, ProbeTables.load(table), scenario)
-    out = Console(width=110, highlight=False)
-    print_phantoms(rig, _phantoms(model), seed=seed, out=out)
-    if scenes:
-        print_intervals(rig, scenes=scenes, seed=seed, out=out)

@@ -39,5 +39,5 @@ def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
         for j, log in enumerate(spreads):
             distance = np.hypot((truth - at) / TRUTH_LENGTH, (log_spread - log) / max(float(np.std(log_spread)), 1e-3))
             near = np.argpartition(distance, neighbours - 1)[:neighbours]
-            table[i, j] = np.quantile(unusual[near], tails)
+            table[i, j] = np.quantile(unusual[near], tails, method="weibull")  # covers the share, of few presses too
     return Bands(truths, spreads, table[..., 0], table[..., 1])

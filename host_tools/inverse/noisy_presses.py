@@ -6,6 +6,7 @@ Source of the noise: `device/measurement/press_noise.py`, the very covariance th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,29 @@ from device.measurement.press_noise import PressNoise, drift_directions, light_r
 from device.measurement.press_parameters import to_unit
 from device.measurement.press_surrogate import PressSurrogate
 from host_tools.inverse.dense_network import Single
-from host_tools.inverse.press_samples import draw_parameters
+from host_tools.inverse.press_samples import Array, draw_parameters
 
 Index = NDArray[np.int64]
 
 BLOCK = 4000
+
+
+class Presses(Protocol):
+    """What networks learn from: coordinates [n, 9] and rows [n, P] of presses, and how noise is added to them."""
+
+    @property
+    def unit(self) -> Single:
+        """Coordinates [n, 9]."""
+
+    @property
+    def rows(self) -> Single:
+        """Noise-free rows [n, P]."""
+
+    def noisy(self, index: Index, rng: np.random.Generator) -> Single:
+        """Return the rows [m, P] of an index [m], with fresh noise."""
+
+    def typical_noise(self) -> Array:
+        """Return the covariance [P, P] of the noise of a mean row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +52,10 @@ class Pool:
         """Return the rows [m, P] of an index [m], with fresh noise."""
         return self.sampler.add(self.rows[index], rng)
 
+    def typical_noise(self) -> Array:
+        """Return the covariance [P, P] of the noise of a mean row."""
+        return self.sampler.noise.covariance(self.rows.mean(axis=0).astype(np.float64))
+
 
 class NoiseSampler:
     """Draws noise that is distributed as `PressNoise.covariance` says."""
@@ -42,15 +65,15 @@ class NoiseSampler:
         smooth = smooth_errors(noise.levels) + 1e-14 * np.eye(columns)
         camera, flat = (np.linalg.cholesky(part).T.astype(np.float32) for part in (noise.camera, smooth))
         self.noise, self._camera, self._smooth = noise, camera, flat
-        self._drift = drift_directions(np.ones(columns)).T.astype(np.float32)
-        self._levels = np.array([noise.levels.gain_ratio, noise.levels.zero_n], np.float32)
 
     def add(self, rows: Single, rng: np.random.Generator) -> Single:
         """Return rows [n, P] with camera noise, drift of light and cell, and smooth errors."""
         camera, smooth = rng.standard_normal((2, *rows.shape), dtype=np.float32)
-        drift = (self._levels * rng.standard_normal((len(rows), 2), dtype=np.float32)) @ self._drift
-        noisy = rows + camera @ self._camera
-        noisy += light_ratio(rows) * (drift + smooth @ self._smooth)
+        gain, zero_n = rng.standard_normal((2, len(rows), 1), dtype=np.float32)
+        by_gain, by_zero = drift_directions(rows)
+        noisy = rows + light_ratio(rows) * (camera @ self._camera + smooth @ self._smooth)
+        noisy += np.float32(self.noise.levels.gain_ratio) * gain * by_gain
+        noisy += np.float32(self.noise.levels.zero_n) * zero_n * by_zero
         return np.asarray(noisy)
 
 

@@ -29,8 +29,8 @@ from device.simulation.virtual_probe import ProbeTables
 
 Array = NDArray[np.float64]
 
-SHAPE, SCALE = (162, 162), PixelScale(0.125, 0.125)
-"""The central window, in pixels of the profile's binning."""
+SHAPE, SCALE = (164, 192), PixelScale(0.125, 0.10938)
+"""The probe's frame in pixels of the profile's binning: it cuts the outermost ring at top and bottom."""
 LENS = Lens(blur_px=0.2)
 LIT = (0.6, 0.6, 0.6, 0.6)
 LUMPS_A_SKIN = 3
@@ -46,6 +46,14 @@ class PressSamples:
 
     parameters: Array
     rows: Array
+
+    def split(self, count: int) -> tuple[PressSamples, PressSamples]:
+        """Return the first `count` presses and the others."""
+        first, second = slice(0, count), slice(count, None)
+        return (
+            PressSamples(self.parameters[first], self.rows[first]),
+            PressSamples(self.parameters[second], self.rows[second]),
+        )
 
 
 def draw_parameters(count: int, rng: np.random.Generator, *, lumps_a_skin: int = 1) -> Array:

@@ -22,7 +22,7 @@ from host_tools.inverse.dense_network import (
     loss_and_gradient,
     predict,
 )
-from host_tools.inverse.noisy_presses import Pool
+from host_tools.inverse.noisy_presses import Presses
 
 MEMBERS, STEPS, BATCH, RATE = 5, 16_000, 1024, 3e-3
 SCALED_ON = 20_000
@@ -47,7 +47,13 @@ class DenseEnsemble:
 
 
 def train_ensemble(
-    pool: Pool, *, seed: int, members: int = MEMBERS, steps: int = STEPS, columns: slice = slice(None), jobs: int = -1
+    pool: Presses,
+    *,
+    seed: int,
+    members: int = MEMBERS,
+    steps: int = STEPS,
+    columns: slice = slice(None),
+    jobs: int = -1,
 ) -> DenseEnsemble:
     """Return the ensemble trained on a pool's rows, or on some of their columns.
 
@@ -57,8 +63,8 @@ def train_ensemble(
     require("members", members, Bound(1, 100, "networks"), "train at least one")
     rng = np.random.default_rng([seed, 0])
     some = pool.noisy(rng.integers(len(pool.rows), size=min(SCALED_ON, len(pool.rows))), rng)
-    typical = pool.sampler.noise.covariance(pool.rows.mean(axis=0).astype(np.float64))
-    scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical[columns, columns])
+    typical = pool.typical_noise()[columns, columns]
+    scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical)
     with parallel_config(backend="loky", inner_max_num_threads=1):
         trained = Parallel(n_jobs=jobs)(
             delayed(train_member)(pool, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
@@ -68,7 +74,7 @@ def train_ensemble(
 
 
 def train_member(
-    pool: Pool, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
+    pool: Presses, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
 ) -> list[Layer]:
     """Return the layers of one network after `steps` batches of fresh noise."""
     layers = initial_layers(2 * scaling.projection.shape[1], rng)

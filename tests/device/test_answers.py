@@ -8,12 +8,25 @@ from device.answers import Answers, answers_for
 from device.config import PressSection, simulated_config
 from device.errors import ConfigError
 from device.measurement.estimate import estimate_recording
+from device.measurement.mode import MODES
 
 
 def test_the_estimate_of_a_paper_press_is_that_of_its_model(bundle, calibration, recording):
     answers = answers_for(replace(simulated_config(), press=PressSection(mode="paper")), bundle, calibration)
     assert "paper" in answers.modes
     assert answers.estimator(recording, "paper") == estimate_recording(recording, bundle, calibration)
+
+
+def test_the_simulated_probe_answers_in_every_mode_and_the_one_of_the_papers_light_in_that_only(bundle, calibration):
+    assert answers_for(simulated_config(), bundle, calibration).modes == MODES
+    assert answers_for(simulated_config("SIM-LINEAR"), bundle, calibration).modes == ("paper",)
+
+
+def test_a_probe_without_their_models_has_the_papers_mode_only(bundle, calibration, tmp_path):
+    config = replace(
+        simulated_config("SIM-LINEAR"), serial="SIM-0001", profile_model=tmp_path / "a", quick_model=tmp_path / "b"
+    )
+    assert answers_for(config, bundle, calibration).modes == ("paper",)
 
 
 def test_a_mode_without_a_model_is_no_default():

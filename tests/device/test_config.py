@@ -1,5 +1,6 @@
 """Settings: the defaults hold, both ends of every bound are taken, and what lies beyond is refused by its name."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -78,7 +79,12 @@ def test_the_simulated_probe_has_its_own_serial_certificate_and_data_folder():
     assert simulated.serial == "SIM-0001"
     assert simulated.calibration.is_file()
     assert simulated.data != real.data
-    assert (simulated.camera, simulated.press) == (real.camera, real.press)
+    assert simulated.camera == real.camera
+    assert simulated.press == replace(real.press, mode="standard")
+
+
+def test_in_the_papers_light_only_its_own_mode_can_be_had():
+    assert simulated_config("SIM-LINEAR").press.mode == "paper"
 
 
 def test_only_this_machine_is_served_unless_told_otherwise():

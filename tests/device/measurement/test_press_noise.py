@@ -14,13 +14,18 @@ from device.measurement.press_noise import (
 )
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
-from device.measurement.reference_light import EXPONENT
 from device.measurement.ring_means import RING_RADII_MM, RINGS
+
+POWER = 0.8
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
 
 
 @pytest.fixture
 def row() -> np.ndarray:
-    return np.random.default_rng(1).uniform(0.0, 0.5, COLUMNS)
+    """A random contrast on light that grows as the force to the power of 0.8."""
+    row = np.random.default_rng(1).uniform(0.0, 0.5, COLUMNS)
+    row[GROWTH] = np.repeat(POWER * np.log(PROFILE_FORCES_N[:-1] / PROFILE_FORCES_N[-1]), RINGS)
+    return row
 
 
 def test_the_covariance_is_symmetric_and_positive_definite(row):
@@ -30,8 +35,9 @@ def test_the_covariance_is_symmetric_and_positive_definite(row):
 
 
 def test_without_drift_and_smooth_errors_only_the_camera_is_left(row):
-    noise = white_noise(1e-3)
-    np.testing.assert_allclose(noise.covariance(row), noise.camera, rtol=1e-14, atol=1e-30)
+    """As large as the light is: white noise of 1e-3 where there is no contrast."""
+    noise, light = white_noise(1e-3), light_ratio(row)
+    np.testing.assert_allclose(noise.covariance(row), np.outer(light, light) * noise.camera, rtol=1e-14, atol=1e-30)
 
 
 @pytest.mark.parametrize("length_mm", [1.0, 2.5, 6.0])
@@ -64,31 +70,37 @@ def test_a_short_field_averages_out_along_a_ring_but_not_in_the_middle():
 
 def test_more_light_moves_a_contrast_by_the_light_that_is_there(row):
     """(1 + g) (1 + c) - 1 = c + g (1 + c); growth and offset are ratios that it leaves."""
-    gain = drift_directions(light_ratio(row))[:, 0]
+    gain, _ = drift_directions(row)
     np.testing.assert_allclose(gain[:CONTRAST_COLUMNS], 1 + row[:CONTRAST_COLUMNS], rtol=1e-14)
     np.testing.assert_array_equal(gain[CONTRAST_COLUMNS:], 0.0)
 
 
-def test_a_drift_of_the_cells_zero_moves_light_as_its_power_of_the_force_does(row):
-    """Light grows as the force to `EXPONENT`: its ratio at forces that differ by dz, to first order."""
-    zero, step_n = drift_directions(light_ratio(row))[:CONTRAST_COLUMNS, 1], 1e-6
+def test_a_drift_of_the_cells_zero_looks_up_the_reference_at_another_force(row):
+    """The reference's light is F^0.8: the contrast seen is (1 + c) (F / (F + dz))^0.8 - 1, to first order."""
+    zero, step_n = drift_directions(row)[1][:CONTRAST_COLUMNS], 1e-6
     force_n = np.repeat(PROFILE_FORCES_N, RINGS)
-    moved = (1 + row[:CONTRAST_COLUMNS]) * (((force_n + step_n) / force_n) ** EXPONENT - 1) / step_n
+    moved = (1 + row[:CONTRAST_COLUMNS]) * ((force_n / (force_n + step_n)) ** POWER - 1) / step_n
     np.testing.assert_allclose(zero, moved, rtol=1e-4)
 
 
-def test_a_drift_of_the_cells_zero_matters_most_at_the_smallest_load():
-    bare = drift_directions(np.ones(COLUMNS))[:CONTRAST_COLUMNS, 1].reshape(-1, RINGS)
+def test_a_drift_of_the_cells_zero_matters_most_at_the_smallest_load(row):
+    row[:CONTRAST_COLUMNS] = 0.0
+    bare = np.abs(drift_directions(row)[1][:CONTRAST_COLUMNS]).reshape(-1, RINGS)
     assert (np.diff(bare, axis=0) < 0).all()
+
+
+def test_drifts_of_many_rows_are_those_of_each(row):
+    rows = np.stack([row, 0.5 * row])
+    for together, alone in zip(drift_directions(rows), zip(*map(drift_directions, rows), strict=True), strict=True):
+        np.testing.assert_allclose(together, np.stack(alone), rtol=1e-12)
 
 
 def test_drifts_enter_the_covariance_with_their_levels(row):
     levels = ErrorLevels(gain_ratio=0.02, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
-    covariance = white_noise(1e-3, levels).covariance(row) - 1e-6 * np.eye(COLUMNS)
     light = 1 + row[:CONTRAST_COLUMNS]
-    np.testing.assert_allclose(
-        covariance[:CONTRAST_COLUMNS, :CONTRAST_COLUMNS], 4e-4 * np.outer(light, light), atol=1e-15
-    )
+    covariance = white_noise(1e-3, levels).covariance(row)[:CONTRAST_COLUMNS, :CONTRAST_COLUMNS]
+    expected = np.outer(light, light) * (4e-4 + 1e-6 * np.eye(CONTRAST_COLUMNS))
+    np.testing.assert_allclose(covariance, expected, atol=1e-15)
 
 
 def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones_own():
@@ -103,8 +115,7 @@ def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones
 
 def test_growth_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
     model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
-    growth = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
-    middle = model[growth, growth][::RINGS, ::RINGS]
+    middle = model[GROWTH, GROWTH][::RINGS, ::RINGS]
     np.testing.assert_allclose(middle, 1e-4 * (np.eye(3) + 1), rtol=1e-12)
 
 

@@ -147,7 +147,7 @@ def test_a_missing_role_is_refused_by_its_name(role):
     [
         (RAMP_N[:: len(RAMP_N) // (MIN_RAMP_FRAMES - 2)], "{} frames"),
         (np.full(10, 0.5), "smallest {} force"),
-        (np.linspace(0.16, 0.6, 10), "smallest {} force"),
+        (np.linspace(0.18, 0.6, 10), "smallest {} force"),
         (np.linspace(0.08, 0.48, 10), "largest {} force"),
         ([0.1] * 5 + [0.6] * 5, "largest step of the {} force"),
         ([0.1, 0.12, 0.15, 0.16 + LARGEST_STEP_N, 0.45, 0.6], "largest step of the {} force"),

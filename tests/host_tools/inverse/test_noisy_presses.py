@@ -6,7 +6,8 @@ from small_surrogate import COLUMNS, random_surrogate, white_noise
 
 from device.measurement.press_noise import ErrorLevels, PressNoise
 from device.measurement.press_parameters import from_unit
-from device.measurement.press_surrogate import CONTRAST_COLUMNS
+from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
+from device.measurement.ring_means import RINGS
 from host_tools.inverse import noisy_presses
 from host_tools.inverse.noisy_presses import NoiseSampler, random_pool
 
@@ -19,6 +20,7 @@ DRAWS = 40_000
 def row() -> np.ndarray:
     row = np.zeros(COLUMNS)
     row[:CONTRAST_COLUMNS] = 0.3
+    row[CONTRAST_COLUMNS : CONTRAST_COLUMNS + GROWTH_COLUMNS] = np.repeat([-1.2, -0.7, -0.3], RINGS)
     return row
 
 

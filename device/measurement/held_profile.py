@@ -1,0 +1,39 @@
+"""A recording of held presses to one row: the contrast on rings of the face at one force, and that force.
+
+What mode quick reads: one frame beside the lesion and one on it are enough. Frames are binned before they are divided,
+as in `press_profile`, and the reference light follows the power law that a hold has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from device.measurement.press_profile import FLOOR_COUNTS, Array, contrast_and_valid, lights_of
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording import Recording
+from device.measurement.reference_light import reference_light
+from device.measurement.ring_means import RING_RADII_MM, ring_weights
+
+HELD_FORCES_N = 0.44, 0.56
+"""Mean forces of a hold that the network has learnt from; `press.target_n` is 0.5 N."""
+AGAIN = "hold 0.5 N beside the lesion and on it"
+HELD_NAMES = (*(f"contrast_{r:.1f}_mm" for r in RING_RADII_MM), "force_n")
+
+
+def held_row(recording: Recording) -> Array:
+    """Return contrast on the rings and mean force, in the order of `HELD_NAMES`, mean over the press frames.
+
+    Raises `InvalidQuantity` when a role is missing or a press was not held within `HELD_FORCES_N`.
+    """
+    reference, press = lights_of(recording)
+    for name, force_n in (("reference", reference.force_n), ("press", press.force_n)):
+        if not len(force_n):
+            raise InvalidQuantity(f"{name} frames", 0, "at least one", AGAIN)
+        require(f"mean {name} force", float(np.mean(force_n)), Bound(*HELD_FORCES_N, "N"), AGAIN)
+    light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
+    weights = ring_weights(press.images[0].shape, press.scale)
+    rings = [
+        weights.means(*contrast_and_valid(image, light, float(force))).mean
+        for force, image in zip(press.force_n, press.images, strict=True)
+    ]
+    return np.append(np.mean(rings, axis=0), np.mean(press.force_n))

@@ -1,0 +1,88 @@
+"""A recording of a force ramp to its estimate: size, depth and modulus with 90 % intervals, or why there are none.
+
+Numbers are given for one round inclusion inside the trained ranges only. That a press is not one shows in what the
+best fit leaves, in how far the bright spot is from round, and in a size or depth that would rather lie beyond its
+range. Source: docs/accuracy.md on what can be known; docs/modes.md on how often each doubt is right.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from device.measurement.calibration import Calibration
+from device.measurement.estimate import Estimate
+from device.measurement.interval_estimate import origin_of, saturation, with_numbers, without_numbers
+from device.measurement.mode import Mode
+from device.measurement.press_noise import PressNoise
+from device.measurement.press_profile import PROFILE_FORCES_N, PressProfile, press_profile
+from device.measurement.profile_model import RAMP_MODES, Answer, ModeLimits, ProfileModel
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording import Recording
+from device.measurement.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS
+
+VISIBLE_DEVIATIONS = 4.0
+"""A lump stands out when its contrast lies so many standard deviations above none."""
+BEYOND_DEVIATIONS = 3.0
+"""A size or depth that would lie this far outside its range, were it free to, is outside."""
+OFFSETS_SHARE, NOISE_CONTRAST = 0.3, 0.004
+"""The second harmonic of a round lump off the axis is at most this share of its first, and noise is this contrast."""
+
+
+def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, calibration: Calibration) -> Estimate:
+    """Return the estimate of a recording in mode standard or precise.
+
+    Raises `InvalidQuantity` for another mode, a probe or pixel size that model and certificate are not for, or a
+    recording whose reference and press are no force ramps.
+    """
+    if mode not in RAMP_MODES:
+        raise InvalidQuantity("mode", mode, f"one of {', '.join(RAMP_MODES)}", "choose one that reads a force ramp")
+    origin = origin_of(recording, mode, model.bundle, calibration)
+    if reason := saturation(recording):
+        return without_numbers("saturated", reason, origin)
+    profile = press_profile(recording)
+    if not stands_out(profile, model.answers.noise[mode]):
+        return without_numbers("not_identifiable", "No inclusion stands out.", origin)
+    answer, limits = model.answer(profile.as_row(), mode), model.limits[mode]
+    doubts = doubts_about(profile, answer, limits)
+    if doubts:
+        return without_numbers("outside_range", " ".join(doubts), origin)
+    features = {
+        "misfit_ratio": answer.misfit_ratio,
+        "elongation_ratio": elongation_ratio(profile),
+        "residual": profile.residual,
+    }
+    if answer.tissue_kpa:
+        features |= dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
+    return with_numbers(answer.mean, answer.spread, limits.bands, features, origin)
+
+
+def stands_out(profile: PressProfile, noise: PressNoise) -> bool:
+    """Return whether the middle, mean over the forces, is brighter than noise: by itself, or against the rim."""
+    row, forces = profile.as_row(), len(PROFILE_FORCES_N)
+    bare = np.concatenate([np.zeros(forces * RINGS), row[forces * RINGS :]])
+    covariance = noise.covariance(bare)[: forces * RINGS, : forces * RINGS]
+    return any(
+        float(weights @ row[: forces * RINGS]) > VISIBLE_DEVIATIONS * float(np.sqrt(weights @ covariance @ weights))
+        for weights in (np.tile(rings / forces, forces) for rings in (MIDDLE, MIDDLE_LESS_RIM))
+    )
+
+
+def elongation_ratio(profile: PressProfile) -> float:
+    """Return the second harmonic over the most that a round lump as far off the axis shows; both root mean squares."""
+    oblong, aside = (float(np.sqrt(np.mean(part**2))) for part in (profile.elongation, profile.offset))
+    return oblong / (NOISE_CONTRAST + OFFSETS_SHARE * aside)
+
+
+def doubts_about(profile: PressProfile, answer: Answer, limits: ModeLimits) -> list[str]:
+    """Return a sentence for every reason why this is not one round inclusion inside the trained ranges; [] is good."""
+    found = []
+    if answer.misfit_ratio > limits.misfit_ratio:
+        found.append(
+            f"No single round inclusion explains this press: misfit {answer.misfit_ratio:.2f}, "
+            f"above the usual {limits.misfit_ratio:.2f}."
+        )
+    if (ratio := elongation_ratio(profile)) > limits.elongation_ratio:
+        found.append(f"The lump is not round: elongation {ratio:.2f}, above the usual {limits.elongation_ratio:.2f}.")
+    if answer.beyond_deviations > BEYOND_DEVIATIONS:
+        found.append("Size or depth lies outside the trained range.")
+    return found

@@ -1,0 +1,129 @@
+"""A press profile to mean and spread of the unknowns: standard by networks, precise by fitting the forward model.
+
+Either way the best fit of the forward model is sought, because how badly it fits is what tells that a press is not of
+one round inclusion in the trained ranges. The bundle is a folder: `model.onnx` and `model.json` as every bundle,
+`surrogate.npz` beside them. Source of the format: docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.confidence import Bands
+from device.measurement.fit_press import PressPosterior, best_fit, beyond_range
+from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.mode import Mode
+from device.measurement.press_noise import PressNoise
+from device.measurement.press_parameters import NUISANCES, from_unit, slope_of_unit, to_unit
+from device.measurement.press_surrogate import TISSUE, PressSurrogate, load_surrogate
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from device.measurement.sample_press import fit_press
+
+Array = NDArray[np.float64]
+
+SURROGATE_FILE = "surrogate.npz"
+RAMP_MODES: tuple[Mode, ...] = ("standard", "precise")
+WELL_INSIDE = 0.95
+"""A fit is begun no nearer to the ends of the ranges, where it would stick."""
+
+
+class Answer(NamedTuple):
+    """Mean and spread [3] of the unknowns' coordinates, and how well one inclusion explains the press.
+
+    `misfit_ratio`: squared residuals of the best fit, each over its standard deviation, over their number.
+    `beyond_deviations`: by how many standard deviations size or depth would rather lie outside their ranges.
+    `tissue_kpa`: mean and spread of the tissue's modulus, which the press beside the lesion tells; precise only.
+    """
+
+    mean: Array
+    spread: Array
+    misfit_ratio: float
+    beyond_deviations: float
+    tissue_kpa: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ModeLimits:
+    """What held-out presses of a mode have shown: bands of each unknown, and the largest usual values of doubt."""
+
+    bands: tuple[Bands, ...]
+    misfit_ratio: float
+    elongation_ratio: float
+
+
+class ProfileAnswers:
+    """Networks, surrogate and noise of each mode: what answers, without any limit on its answers."""
+
+    def __init__(self, surrogate: PressSurrogate, noise: Mapping[Mode, PressNoise]) -> None:
+        self.surrogate, self.noise = surrogate, noise
+
+    def answer(self, row: Array, mode: Mode, mean: Array, spread: Array) -> Answer:
+        """Return the answer to a profile row [P] for which the networks say `mean` and `spread` [3]."""
+        posterior = PressPosterior(row, self.surrogate, self.noise[mode])
+        start = np.concatenate([np.clip(mean, -WELL_INSIDE, WELL_INSIDE), np.zeros(len(NUISANCES))])
+        if mode != "precise":
+            return _answer(posterior, best_fit(posterior, start), mean, spread)
+        fit = fit_press(posterior, start)
+        values = from_unit(fit.mean)
+        tissue_kpa = float(values[TISSUE]), float((fit.spread * slope_of_unit(values))[TISSUE])
+        unknowns = slice(len(UNKNOWNS))
+        return _answer(posterior, fit.best, fit.mean[unknowns], fit.spread[unknowns])._replace(tissue_kpa=tissue_kpa)
+
+
+def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) -> Answer:
+    residuals = posterior.residuals(best)
+    return Answer(mean, spread, float(np.mean(residuals**2)), beyond_range(posterior, best))
+
+
+class ProfileModel:
+    """A verified bundle: networks, what fits the forward model, and the limits of each mode."""
+
+    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers) -> None:
+        """Use `load` for what is installed. Raises `BundleRefused` when the card lacks the limits of a mode."""
+        self.bundle, self.answers = bundle, answers
+        try:
+            self.limits = {mode: _limits(bundle.card["modes"][mode]) for mode in RAMP_MODES}
+        except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
+            raise BundleRefused(Path(bundle.name), "modes", f"incomplete ({error})", "limits of every mode") from error
+
+    @classmethod
+    def load(cls, folder: Path) -> ProfileModel:
+        """Return the model of a folder; raises `BundleRefused` or `InvalidQuantity` when anything does not hold."""
+        bundle = ModelBundle.load(folder)
+        stated, path = bundle.card.get("surrogate_sha256"), folder / SURROGATE_FILE
+        found = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
+        if found != stated:
+            raise BundleRefused(folder, SURROGATE_FILE, found, f"{stated} as model.json states")
+        with np.load(path) as file:
+            noise = {mode: PressNoise(np.asarray(file[f"camera_{mode}"], np.float64)) for mode in RAMP_MODES}
+        return cls(bundle, ProfileAnswers(load_surrogate(path), noise))
+
+    def answer(self, row: Array, mode: Mode) -> Answer:
+        """Return what mode standard or precise makes of a profile row [P]."""
+        mean, spread = self.networks(row[None])
+        return self.answers.answer(row, mode, mean[0], spread[0])
+
+    def networks(self, rows: Array) -> tuple[Array, Array]:
+        """Return the networks' mean and spread [n, 3] of the unknowns' coordinates, for rows [n, P]."""
+        raw = self.bundle.estimate(rows)
+        values = np.hstack([raw.estimate, np.ones((len(rows), len(NUISANCES)))])
+        return to_unit(values)[:, : len(UNKNOWNS)], raw.spread
+
+
+def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
+    """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
+    parts = ("truth", "log_spread", "low", "high")
+    return tuple(
+        Bands(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS
+    )
+
+
+def _limits(entry: Mapping[str, Any]) -> ModeLimits:
+    return ModeLimits(bands_of(entry), float(entry["misfit_ratio"]), float(entry["elongation_ratio"]))

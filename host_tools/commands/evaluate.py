@@ -1,0 +1,132 @@
+"""`host_tools evaluate`: scores of recordings with truth, or of random presses of the simulated probe, in any mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from device.measurement.calibration import Calibration, read_calibration
+from device.measurement.estimate import Estimate, estimate_recording
+from device.measurement.held_estimate import HeldModel, estimate_held
+from device.measurement.inversion import ModelBundle
+from device.measurement.mode import Mode, mode_named, mode_of
+from device.measurement.profile_estimate import estimate_profile
+from device.measurement.profile_model import RAMP_MODES, ProfileModel
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording import Recording, read_recording
+from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.commands.model import MODELS, phantoms_of
+from host_tools.commands.output import note
+
+CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
+PROBE = MODELS / "simulated_probe"
+
+
+def evaluate(
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(help="Recordings with truth; random presses if none.")
+    ] = None,
+    mode: Annotated[str, typer.Option(help="quick, standard, precise or paper; that of the frames by default.")] = "",
+    model: Annotated[Path, typer.Option(help="Bundle of mode paper.")] = MODELS / "paper",
+    quick_model: Annotated[Path, typer.Option(help="Bundle of mode quick.")] = MODELS / "quick",
+    profile_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = PROBE,
+    light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
+    scenes: Annotated[int, typer.Option(help="Random presses.")] = 100,
+    seed: Annotated[int, typer.Option(help="Seed of scenes, camera and hand.")] = 1000,
+) -> None:
+    """Score what the device answers: on recordings, or on random presses with every drift.
+
+    In mode paper without recordings: the model's nine phantoms, noise-free and through the camera, and random scenes.
+
+    Example: host_tools evaluate --mode precise --scenes 50
+    """
+    from host_tools.score_recordings import print_score, score
+
+    out = Console(width=110, highlight=False)
+    asked = mode_named(mode) if mode else None
+    certificate = read_calibration(table / _certificate(light))
+    if not recordings and asked in (None, "paper"):
+        _print_paper(ModelBundle.load(model), certificate, table, light, scenes, seed, out)
+        return
+    answer = _Answers(Folders(model, quick_model, profile_model), certificate, asked)
+    named = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
+    print_score(list(score(named, answer, note.print)), out)
+
+
+class Folders(NamedTuple):
+    """Where the bundles of the modes are."""
+
+    paper: Path
+    quick: Path
+    ramps: Path
+
+
+class _Answers:
+    """What the device answers to a recording, in one mode or in the one that its frames are for.
+
+    Bundles are loaded when they are first asked.
+    """
+
+    def __init__(self, folders: Folders, calibration: Calibration, mode: Mode | None) -> None:
+        self._folders, self._calibration, self._mode = folders, calibration, mode
+
+    @cached_property
+    def _paper(self) -> ModelBundle:
+        return ModelBundle.load(self._folders.paper)
+
+    @cached_property
+    def _held(self) -> HeldModel:
+        return HeldModel.load(self._folders.quick)
+
+    @cached_property
+    def _profile(self) -> ProfileModel:
+        return ProfileModel.load(self._folders.ramps)
+
+    def __call__(self, recording: Recording) -> Estimate:
+        mode = self._mode or mode_of([frame.force_n for frame in recording.with_role("press")])
+        if mode == "quick":
+            return estimate_held(recording, self._held, self._calibration)
+        if mode in RAMP_MODES:
+            return estimate_profile(recording, mode, self._profile, self._calibration)
+        return estimate_recording(recording, self._paper, self._calibration)
+
+
+def _certificate(light: str) -> str:
+    if light not in CERTIFICATES:
+        raise InvalidQuantity("light", repr(light), f"one of {', '.join(CERTIFICATES)}", "choose one of them")
+    return CERTIFICATES[light]
+
+
+def _print_paper(
+    bundle: ModelBundle, certificate: Calibration, table: Path, light: str, scenes: int, seed: int, out: Console
+) -> None:
+    from host_tools.score import Rig, print_intervals, print_phantoms
+
+    rig = Rig(bundle, certificate, ProbeTables.load(table), Scenario(light=light))
+    print_phantoms(rig, phantoms_of(bundle), seed=seed, out=out)
+    if scenes:
+        print_intervals(rig, scenes=scenes, seed=seed, out=out)
+
+
+def _named(paths: list[Path] | None) -> Iterator[tuple[str, Recording]]:
+    return ((str(path), read_recording(path)) for path in paths or [])
+
+
+def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[tuple[str, Recording]]:
+    """Yield presses over the trained ranges that no training has seen, with every drift."""
+    from device.measurement.press_noise import ErrorLevels
+    from host_tools.inverse.press_samples import draw_parameters
+    from host_tools.inverse.recorded_presses import recorded_press
+
+    tables = ProbeTables.load(table)
+    for number, parameters in enumerate(draw_parameters(scenes, np.random.default_rng([seed, 3]))):
+        recording = recorded_press(tables, parameters, mode, 100_000 * seed + number, levels=ErrorLevels())
+        yield f"press {number}", recording

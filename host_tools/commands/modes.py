@@ -1,0 +1,69 @@
+"""`host_tools modes`: what the modes of a press are worth, measured on the simulated probe, and docs/modes.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from device.measurement.calibration import read_calibration
+from device.measurement.held_estimate import HeldModel
+from device.measurement.inversion import ModelBundle
+from device.measurement.profile_model import RAMP_MODES, ProfileModel
+from device.measurement.quantities import InvalidQuantity
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
+from host_tools.commands.output import note, require_writable
+
+MODELS = ROOT / "models"
+
+
+def modes(
+    out: Annotated[Path | None, typer.Option(help="Markdown file to write; printed only when not given.")] = None,
+    model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
+    only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
+) -> None:
+    """Measure error, time, coverage and refusals of the modes against bounds; a quarter of an hour on two cores.
+
+    Exit code 1 when a figure misses its bound: the page says by how much.
+    """
+    from host_tools.study.document import write_document
+    from host_tools.study.mode_breast_imager import breast_imager_chapter
+    from host_tools.study.mode_coverage import coverage_chapter
+    from host_tools.study.mode_dial import dial_chapter
+    from host_tools.study.mode_noise_free import noise_free_chapter
+    from host_tools.study.mode_outside import outside_chapter
+    from host_tools.study.mode_page import MODES_PAGE
+    from host_tools.study.mode_posterior import posterior_chapter
+    from host_tools.study.outside_presses import kinds
+
+    if out:
+        require_writable(out, (".md",))
+    trained, paper, tables = ProfileModel.load(model), ModelBundle.load(MODELS / "paper"), ProbeTables.load(table)
+    held = HeldModel.load(MODELS / "quick")
+    calibration = read_calibration(table / "calibration.json")
+    chapters = {
+        "dial": lambda: dial_chapter(trained, held, paper, calibration, tables),
+        "coverage": lambda: coverage_chapter(trained),
+        "posterior": lambda: posterior_chapter(trained),
+        "noise-free": lambda: noise_free_chapter(trained.answers.surrogate, tables),
+        "outside": lambda: outside_chapter(trained, kinds(tables, 60), RAMP_MODES),
+        "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
+    }  # fmt: skip
+    measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})
+    missed = sum(print_chapter(timed) for timed in measured.values())
+    if out:
+        chosen = "".join(f" --only {name}" for name in only or [])
+        write_document(out, measured, command=f"host_tools modes --out {shown(out)}{chosen}", cover=MODES_PAGE)
+        note.print(f"{out} written.")
+    if missed:
+        raise typer.Exit(1)
+
+
+def _chosen(only: list[str] | None, known: tuple[str, ...]) -> tuple[str, ...]:
+    for name in only or []:
+        if name not in known:
+            raise InvalidQuantity("only", repr(name), f"one of {', '.join(known)}", "name a chapter")
+    return tuple(only) if only else known

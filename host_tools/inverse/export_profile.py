@@ -1,0 +1,144 @@
+"""Turns the trained modes into model bundles: model.onnx, model.json, and for the ramps surrogate.npz.
+
+The same parts give the same bytes. Source of the format: the model bundle of docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from device.measurement.inversion import CARD_FILE, HELD_UNITS, MODEL_FILE, PROFILE_UNITS, SCHEMA
+from device.measurement.press_parameters import NUISANCES, RANGES
+from device.measurement.profile_model import SURROGATE_FILE
+from device.measurement.quantities import UNKNOWNS
+from host_tools.inverse.dense_network import Array, Single
+from host_tools.inverse.ensemble_network import build_network, golden_vectors
+from host_tools.inverse.export import write_folder
+from host_tools.inverse.mode_outcome import ModeOutcome
+from host_tools.inverse.mode_statistics import statistics
+from host_tools.inverse.profile_training import TrainedProfile
+from host_tools.inverse.quick_training import TrainedQuick
+
+GOLDEN_ROWS = 8
+
+
+def export_profile(
+    trained: TrainedProfile, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
+) -> None:
+    """Write the bundle to `folder`, whole or not at all; raises `ExportRefused` when onnxruntime and NumPy differ.
+
+    `serials` are those of the probes whose light and tables it was trained with: it answers for no other.
+    """
+    rows = trained.samples.rows[:: len(trained.samples.rows) // GOLDEN_ROWS][:GOLDEN_ROWS].astype(np.float32)
+    network = build_network(trained.ensemble)
+    golden = golden_vectors(trained.ensemble, network, rows.astype(np.float64))
+    surrogate = _surrogate_file(trained)
+    card = {
+        **_card(folder, network, serials, software_version, training_command),
+        "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
+        "seed": trained.seed,
+        "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
+        "effort": vars(trained.effort),
+        "features": [{"name": name, "unit": unit} for name, unit in PROFILE_UNITS.items()],
+        "training_range": _training_range(dict(zip(PROFILE_UNITS, trained.samples.rows.T, strict=True))),
+        "surrogate_error": {
+            "largest": float(trained.surrogate_error.max()),
+            "mean": float(trained.surrogate_error.mean()),
+        },
+        "modes": {
+            mode: {
+                "misfit_ratio": outcome.misfit_ratio,
+                "elongation_ratio": outcome.elongation_ratio,
+                **_answers(outcome),
+            }
+            for mode, outcome in trained.outcomes.items()
+        },
+        "golden": golden,
+    }
+    write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card), SURROGATE_FILE: surrogate})
+
+
+def export_quick(
+    trained: TrainedQuick, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
+) -> None:
+    """Write the bundle of mode quick; as `export_profile`."""
+    rows = trained.pool.rows[:GOLDEN_ROWS]
+    network = build_network(trained.ensemble)
+    card = {
+        **_card(folder, network, serials, software_version, training_command),
+        "seed": trained.seed,
+        "dataset_sha256": hashlib.sha256(trained.pool.rows.tobytes()).hexdigest(),
+        "effort": vars(trained.effort),
+        "features": [{"name": name, "unit": unit} for name, unit in HELD_UNITS.items()],
+        "training_range": _training_range(dict(zip(HELD_UNITS, _usual(trained).T, strict=True))),
+        "modes": {"quick": {"faintest_contrast": list(trained.faintest_contrast), **_answers(trained)}},
+        "golden": golden_vectors(trained.ensemble, network, rows.astype(np.float64)),
+    }
+    write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card)})
+
+
+def _usual(trained: TrainedQuick) -> Array:
+    """Return the ends [2, 12] between which rows with noise lie, but for one in two thousand at each."""
+    pool = trained.pool
+    noisy = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([trained.seed, 55]))
+    return np.quantile(noisy.astype(np.float64), [0.0005, 0.9995], axis=0)
+
+
+def _card(
+    folder: Path, network: bytes, serials: tuple[str, ...], software_version: str, training_command: str
+) -> dict[str, Any]:
+    """Return what every card says first."""
+    return {
+        "schema": SCHEMA,
+        "name": folder.resolve().name,
+        "sha256": hashlib.sha256(network).hexdigest(),
+        "software_version": software_version,
+        "training_command": training_command,
+        "serials": list(serials),
+        "unknowns": list(UNKNOWNS),
+    }
+
+
+def _training_range(columns: Mapping[str, Array | Single]) -> dict[str, Any]:
+    return {
+        "features": {name: [float(column.min()), float(column.max())] for name, column in columns.items()},
+        "unknowns": {name: [RANGES[name].low, RANGES[name].high] for name in UNKNOWNS},
+        "nuisances": {name: [RANGES[name].low, RANGES[name].high] for name in NUISANCES},
+    }
+
+
+def _text(card: dict[str, Any]) -> bytes:
+    return (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
+
+
+def _surrogate_file(trained: TrainedProfile) -> bytes:
+    lump, bare = trained.surrogate.lump, trained.surrogate.bare
+    arrays: dict[str, Any] = {
+        "lump_degrees": lump.degrees,
+        "lump_coefficients": lump.coefficients.astype(np.float32),
+        "bare_degrees": bare.degrees,
+        "bare_coefficients": bare.coefficients.astype(np.float32),
+        **{f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()},
+    }
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    return content.getvalue()
+
+
+def _answers(outcome: ModeOutcome | TrainedQuick) -> dict[str, Any]:
+    """Return bands and statistics of a mode."""
+    return {
+        "bands": {
+            name: {part: np.round(getattr(bands, part), 4).tolist() for part in ("truth", "log_spread", "low", "high")}
+            for name, bands in zip(UNKNOWNS, outcome.bands, strict=True)
+        },
+        "simulated": statistics(outcome.simulated, outcome.bands),
+        "recorded": statistics(outcome.recorded, outcome.bands),
+    }

@@ -1,0 +1,106 @@
+"""What a mode makes of presses nobody has learned from: answers, bands of its intervals, coverage, and usual doubts.
+
+Bands come from one half of the simulated presses and are counted on the other. What is usual of misfit and elongation
+comes from recordings, because only they hold all that a recording does to a profile.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from device.measurement.confidence import Bands
+from device.measurement.mode import Mode
+from device.measurement.press_parameters import to_unit
+from device.measurement.profile_model import Answer, ProfileAnswers
+from device.measurement.quantities import UNKNOWNS
+from host_tools.inverse.confidence_bands import confidence_bands
+from host_tools.inverse.noisy_presses import Pool
+from host_tools.inverse.press_samples import Array
+from host_tools.inverse.recorded_presses import RecordedPresses, in_parallel
+from host_tools.inverse.train_ensemble import DenseEnsemble
+
+USUAL_RATIO = 0.985
+"""Share of recorded presses inside the trained ranges whose misfit, and whose elongation, count as usual."""
+THREE = len(UNKNOWNS)
+
+
+@dataclass(frozen=True, eq=False)
+class Answered:
+    """Truth, mean and spread [n, 3] of presses, in coordinates."""
+
+    truth: Array
+    mean: Array
+    spread: Array
+
+    def part(self, chosen: slice) -> Answered:
+        """Return some of the presses."""
+        return Answered(self.truth[chosen], self.mean[chosen], self.spread[chosen])
+
+    def covered(self, bands: tuple[Bands, ...]) -> tuple[Array, Array]:
+        """Return, as booleans [n, 3], whether each interval holds the truth, and whether it narrows the range down."""
+        intervals = [
+            [one.interval(float(m), float(s)) for one, m, s in zip(bands, mean, spread, strict=True)]
+            for mean, spread in zip(self.mean, self.spread, strict=True)
+        ]
+        low, high, known = np.moveaxis(np.array(intervals), 2, 0)
+        return (low <= self.truth) & (self.truth <= high), known.astype(bool)
+
+
+@dataclass(frozen=True, eq=False)
+class ModeOutcome:
+    """Bands and usual doubts of a mode; `simulated` presses that the bands have not seen, and `recorded` ones."""
+
+    bands: tuple[Bands, ...]
+    misfit_ratio: float
+    elongation_ratio: float
+    simulated: Answered
+    recorded: Answered
+
+
+def judged_mode(
+    mode: Mode,
+    ensemble: DenseEnsemble,
+    answers: ProfileAnswers,
+    pool: Pool,
+    recorded: RecordedPresses,
+    *,
+    seed: int,
+    jobs: int = -1,
+) -> ModeOutcome:
+    """Return the outcome of a mode on a pool's presses with noise and on recorded ones."""
+    rows = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([seed, 1])).astype(np.float64)
+    truth = pool.unit[:, :THREE].astype(np.float64)
+    simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
+    half = len(rows) // 2
+    found = answers_to(mode, ensemble, answers, recorded.rows, jobs)
+    misfit = np.array([answer.misfit_ratio for answer in found])
+    seen = simulated.part(slice(half))
+    return ModeOutcome(
+        confidence_bands(seen.truth, seen.mean, seen.spread),
+        float(np.quantile(misfit, USUAL_RATIO)),
+        float(np.quantile(recorded.elongation, USUAL_RATIO)),
+        simulated.part(slice(half, None)),
+        Answered(
+            to_unit(recorded.parameters)[:, :THREE],
+            np.array([answer.mean for answer in found]),
+            np.array([answer.spread for answer in found]),
+        ),
+    )
+
+
+def answers_to(mode: Mode, ensemble: DenseEnsemble, answers: ProfileAnswers, rows: Array, jobs: int) -> list[Answer]:
+    """Return what a mode makes of rows [n, P], best fit and all."""
+    mean, spread = ensemble.estimate(rows)
+    return in_parallel(lambda i: answers.answer(rows[i], mode, mean[i], spread[i]), len(rows), jobs)
+
+
+def _answered(
+    mode: Mode, ensemble: DenseEnsemble, answers: ProfileAnswers, rows: Array, jobs: int
+) -> tuple[Array, Array]:
+    """Return mean and spread [n, 3]; mode standard needs no fit for them."""
+    if mode == "standard":
+        return ensemble.estimate(rows)
+    found = answers_to(mode, ensemble, answers, rows, jobs)
+    return np.array([answer.mean for answer in found]), np.array([answer.spread for answer in found])

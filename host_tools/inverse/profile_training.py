@@ -1,0 +1,106 @@
+"""Everything behind the standard and the precise mode, from the virtual probe's tables to what the bundle holds.
+
+Random presses make the surrogate; recordings of random presses the camera's noise; surrogate and noise endless
+training presses for the networks. Presses that nobody has learned from give the bands of every interval; recordings
+with every drift give what misfit and elongation are usual, and the errors that the card states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from device.measurement.mode import Mode
+from device.measurement.press_noise import ErrorLevels, PressNoise
+from device.measurement.press_surrogate import PressSurrogate
+from device.measurement.profile_model import RAMP_MODES, ProfileAnswers
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.inverse.camera_noise import camera_covariance
+from host_tools.inverse.fit_surrogate import fit_surrogate, held_out_error
+from host_tools.inverse.mode_outcome import ModeOutcome, judged_mode
+from host_tools.inverse.noisy_presses import random_pool
+from host_tools.inverse.press_samples import Array, PressSamples, draw_parameters, sample_presses
+from host_tools.inverse.recorded_presses import record_presses
+from host_tools.inverse.train_ensemble import DenseEnsemble, train_ensemble
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many presses go into each step; the defaults take some half an hour on two cores."""
+
+    presses: int = 10_000
+    held_out: int = 600
+    noise_recordings: int = 200
+    pool: int = 120_000
+    members: int = 4
+    steps: int = 9_000
+    judged: int = 30_000
+    fitted: int = 1_600
+    test_recordings: int = 400
+
+
+QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 4_000, 900, 40)
+"""Enough to try the chain; the model is a poor one."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedProfile:
+    """All parts of the bundle."""
+
+    surrogate: PressSurrogate
+    surrogate_error: Array
+    noise: dict[Mode, PressNoise]
+    ensemble: DenseEnsemble
+    outcomes: dict[Mode, ModeOutcome]
+    samples: PressSamples
+    effort: Effort
+    seed: int
+
+
+def train_profile(
+    tables: ProbeTables,
+    *,
+    effort: Effort | None = None,
+    seed: int = 1,
+    jobs: int = -1,
+    say: Callable[[str], None] = lambda step: None,
+) -> TrainedProfile:
+    """Return the trained parts; `say` hears what begins. The same seed gives the same ones whatever `jobs`."""
+    asked = effort or Effort()
+    say(f"{asked.presses} random presses")
+    samples = sample_presses(tables, asked.presses + asked.held_out, seed=seed, jobs=jobs)
+    learned, kept = samples.split(asked.presses)
+    surrogate = fit_surrogate(learned)
+    say(f"{asked.noise_recordings} recordings for the noise of each mode")
+    noise = {
+        mode: PressNoise(camera_covariance(tables, mode, asked.noise_recordings, seed=seed + 10 + number, jobs=jobs))
+        for number, mode in enumerate(RAMP_MODES)
+    }
+    say(f"{asked.members} networks")
+    pool = random_pool(surrogate, noise["standard"], asked.pool, seed + 20)
+    ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
+    outcomes = judged(tables, ensemble, ProfileAnswers(surrogate, noise), asked, seed=seed, jobs=jobs, say=say)
+    return TrainedProfile(surrogate, held_out_error(surrogate, kept), noise, ensemble, outcomes, samples, asked, seed)
+
+
+def judged(
+    tables: ProbeTables,
+    ensemble: DenseEnsemble,
+    answers: ProfileAnswers,
+    effort: Effort,
+    *,
+    seed: int,
+    jobs: int = -1,
+    say: Callable[[str], None] = lambda step: None,
+) -> dict[Mode, ModeOutcome]:
+    """Return what each mode makes of random presses with noise, and of recordings that drift."""
+    parameters = draw_parameters(effort.test_recordings, np.random.default_rng(seed + 40))
+    outcomes: dict[Mode, ModeOutcome] = {}
+    for mode, simulated in zip(RAMP_MODES, (effort.judged, effort.fitted), strict=True):
+        say(f"{simulated} presses and {len(parameters)} recordings for the limits of mode {mode}")
+        pool = random_pool(answers.surrogate, answers.noise[mode], simulated, seed + 30)
+        recorded = record_presses(tables, parameters, mode, seed=seed + 40, levels=ErrorLevels(), jobs=jobs)
+        outcomes[mode] = judged_mode(mode, ensemble, answers, pool, recorded, seed=seed + 30, jobs=jobs)
+    return outcomes

@@ -1,0 +1,131 @@
+"""Recordings that carry truth to a score: errors, coverage and refusals, over all presses and by octiles of the truth.
+
+What is scored is what the device would say: values clipped to their intervals, and only presses that it answers.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from device.measurement.estimate import SPOKEN, Estimate
+from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
+from device.measurement.recording import Recording
+
+Array = NDArray[np.float64]
+
+OCTILES, FEWEST_A_OCTILE = 8, 5
+
+
+@dataclass(frozen=True)
+class ScoredPress:
+    """What a press was of, and what the device said."""
+
+    truth: Inclusion
+    estimate: Estimate
+
+
+def score(
+    recordings: Iterable[tuple[str, Recording]],
+    estimate: Callable[[Recording], Estimate],
+    on_excluded: Callable[[str], None] = lambda sentence: None,
+) -> Iterator[ScoredPress]:
+    """Yield the presses that carry truth and can be read; `on_excluded` hears of every other one, and why."""
+    for name, recording in recordings:
+        if recording.truth is None:
+            on_excluded(f"{name} is left out: it carries no truth.")
+            continue
+        try:
+            yield ScoredPress(recording.truth, estimate(recording))
+        except InvalidQuantity as error:
+            on_excluded(f"{name} is left out: {error}")
+
+
+def print_score(presses: Sequence[ScoredPress], out: Console) -> None:
+    """Print the score; raises `InvalidQuantity` when there is no press to score."""
+    if not presses:
+        raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
+    status = Counter(press.estimate.status for press in presses)
+    out.print(f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common()))
+    answered = [press for press in presses if press.estimate.size_mm.value is not None]
+    if answered:
+        out.print(_overall(answered))
+        octiles = _by_octiles(answered)
+        if octiles.row_count:
+            out.print(octiles)
+
+
+def _overall(presses: Sequence[ScoredPress]) -> Table:
+    table = Table("", *(SPOKEN[name] for name in UNKNOWNS), title=f"{len(presses)} answered presses")
+    columns = [_Column(presses, name) for name in UNKNOWNS]
+    for spoken, part in (
+        ("mean error", np.mean),
+        ("standard deviation", np.std),
+        ("smallest error", np.min),
+        ("largest error", np.max),
+    ):
+        table.add_row(spoken, *(f"{part(column.percent):.2f} %" for column in columns))
+    table.add_row("error / stated spread", *(f"{column.error_over_spread:.2f}" for column in columns))
+    table.add_row("skill against the range", *(f"{column.skill:.2f}" for column in columns))
+    table.add_row("determined", *(f"{column.known.mean():.1%}" for column in columns))
+    table.add_row("truth inside 90 % intervals of these", *(column.coverage() for column in columns))
+    return table
+
+
+def _by_octiles(presses: Sequence[ScoredPress]) -> Table:
+    table = Table("octile of the truth", "from", "to", "mean error", "determined", "covered")
+    for name in UNKNOWNS:
+        column = _Column(presses, name)
+        if len(column.truth) < OCTILES * FEWEST_A_OCTILE:
+            continue
+        ends = np.quantile(column.truth, np.linspace(0, 1, OCTILES + 1))
+        octile = np.clip(np.searchsorted(ends, column.truth, side="right") - 1, 0, OCTILES - 1)
+        for number in range(OCTILES):
+            inside = octile == number
+            if not inside.any():  # equal truths, all in one octile
+                continue
+            table.add_row(
+                f"{SPOKEN[name]} {number + 1}",
+                *(f"{end:.3g}" for end in ends[number : number + 2]),
+                f"{column.percent[inside].mean():.2f} %",
+                f"{column.known[inside].mean():.0%}",
+                column.coverage(inside),
+            )
+    return table
+
+
+class _Column:
+    """Truths, errors and intervals [n] of one unknown."""
+
+    def __init__(self, presses: Sequence[ScoredPress], name: str) -> None:
+        found = [getattr(press.estimate, name) for press in presses]
+        self.truth = np.array([getattr(press.truth, name) for press in presses])
+        value, low, high, std = (
+            np.array([getattr(one, part) for one in found], dtype=float) for part in ("value", "low", "high", "std")
+        )
+        self.known = np.array([one.identifiable for one in found])
+        self.covered = (low <= self.truth) & (self.truth <= high)
+        self.percent = 100 * np.abs(value - self.truth) / self.truth
+        self._error, self._std = value - self.truth, std
+
+    @property
+    def error_over_spread(self) -> float:
+        """Root mean square error over that of the spreads that the device states: 1 is honest."""
+        return float(np.sqrt(np.mean(self._error**2) / np.mean(self._std**2))) if self._std.any() else float("nan")
+
+    @property
+    def skill(self) -> float:
+        """1 - root mean square error over that of the middle of these truths."""
+        guess = np.sqrt(np.mean((self.truth - self.truth.mean()) ** 2))
+        return float(1 - np.sqrt(np.mean(self._error**2)) / guess) if guess > 0 else float("nan")
+
+    def coverage(self, chosen: NDArray[np.bool_] | None = None) -> str:
+        """Return the covered share of the determined presses among those chosen."""
+        counted = self.known if chosen is None else self.known & chosen
+        return f"{self.covered[counted].mean():.1%} of {counted.sum()}" if counted.any() else "-"

@@ -1,0 +1,72 @@
+"""Coverage of the 90 % intervals, by the octiles of each unknown, as the model card states it.
+
+The card's presses were drawn when the model was trained; neither networks nor bands have seen them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from device.measurement.estimate import SPOKEN
+from device.measurement.profile_model import RAMP_MODES, ProfileModel
+from device.measurement.quantities import UNKNOWNS
+from host_tools.study.benchmark import Benchmark, Chapter, Table, at_least
+
+LOWEST, HIGHEST, LOWEST_IN_OCTILE = 0.88, 0.92, 0.85
+
+
+def coverage_chapter(model: ProfileModel) -> Chapter:
+    """Return coverage overall and in the worst octile, and errors and skill by octile."""
+    benchmarks: list[Benchmark] = []
+    rows: list[tuple[str, ...]] = []
+    for mode in RAMP_MODES:
+        entry = model.bundle.card["modes"][mode]
+        for name in UNKNOWNS:
+            case = f"{mode}, {SPOKEN[name]}"
+            benchmarks += _judged(case, entry["simulated"][name])
+            benchmarks.append(_recorded(case, entry["recorded"]["presses"], entry["recorded"][name]))
+            rows.append(_row(case, entry["simulated"][name]))
+    numbers = ", ".join(f"{model.bundle.card['modes'][mode]['simulated']['presses']} in {mode}" for mode in RAMP_MODES)
+    return Chapter(
+        title="Intervals hold what they promise",
+        claim=(
+            f"Random presses with camera noise and every nuisance ({numbers}), and recordings of the simulated camera. "
+            "Counted are presses that determine the unknown; the others get the whole range as their interval, and "
+            "`not identifiable`. An octile in which nothing is determined has no coverage. Recordings are fewer: "
+            "their coverage may fall short by twice its standard error."
+        ),
+        source="models/standard/model.json; host_tools/inverse/mode_outcome.py",
+        benchmarks=tuple(benchmarks),
+        tables=(Table("By octiles of the truth, lowest first: mean error (coverage)", HEADER, tuple(rows)),),
+    )
+
+
+HEADER = ("mode, unknown", "skill", "determined", *(f"octile {number}" for number in range(1, 9)))
+
+
+def _judged(case: str, stated: dict[str, Any]) -> list[Benchmark]:
+    middle = (LOWEST + HIGHEST) / 2
+    octiles = [one for one in stated["coverage_per_octile"] if one is not None]
+    overall = _number(stated["coverage"])
+    return [
+        Benchmark(case, "coverage", overall, 0.9, abs(overall - middle), HIGHEST - middle),
+        at_least(case, "coverage in the worst octile", min(octiles, default=math.nan), LOWEST_IN_OCTILE),
+    ]
+
+
+def _recorded(case: str, presses: int, stated: dict[str, Any]) -> Benchmark:
+    """Return the coverage of recordings against the lowest that chance allows."""
+    counted = max(presses * stated["determined"], 1.0)
+    error = math.sqrt(0.9 * 0.1 / counted)
+    return at_least(case, "coverage of recordings", _number(stated["coverage"]), LOWEST - 2 * error)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _row(case: str, stated: dict[str, Any]) -> tuple[str, ...]:
+    octiles = zip(stated["mean_percent_per_octile"], stated["coverage_per_octile"], strict=True)
+    cells = (f"{error:.1f} % ({'-' if covered is None else f'{covered:.0%}'})" for error, covered in octiles)
+    return case, f"{stated['skill']:.2f}", f"{stated['determined']:.0%}", *cells

@@ -1,0 +1,48 @@
+"""Recordings of presses in the frames of each mode, and the committed models that read them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from daemon_process import ROOT
+
+from device.measurement.held_estimate import HeldModel
+from device.measurement.mode import Mode
+from device.measurement.press_parameters import NOMINAL
+from device.measurement.profile_model import ProfileModel
+from device.measurement.recording import Recording
+from device.simulation.neighbour import Neighbour
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.inverse.recorded_presses import recorded_press
+
+Press = Callable[..., Recording]
+
+
+@pytest.fixture(scope="session")
+def profile_model() -> ProfileModel:
+    return ProfileModel.load(ROOT / "models" / "standard")
+
+
+@pytest.fixture(scope="session")
+def held_model() -> HeldModel:
+    return HeldModel.load(ROOT / "models" / "quick")
+
+
+@pytest.fixture(scope="session")
+def pressed(tables: ProbeTables) -> Press:
+    """A press on the nominal tissue in a mode: 12 mm, 6 mm deep, 60 kPa unless told otherwise."""
+
+    def press(
+        mode: Mode,
+        unknowns: tuple[float, float, float] = (12.0, 6.0, 60.0),
+        *,
+        neighbour: Neighbour | None = None,
+        wet_ratio: float = 0.0,
+        **nuisances: float,
+    ) -> Recording:
+        parameters = np.array([*unknowns, *(NOMINAL | nuisances).values()])
+        return recorded_press(tables, parameters, mode, 5, neighbour=neighbour, wet_ratio=wet_ratio)
+
+    return press

@@ -1,0 +1,46 @@
+"""Forces of press frames to the mode that reads most of them, and the names of the modes."""
+
+import numpy as np
+import pytest
+
+from device.measurement.mode import FRAMES, MODES, RAMP_FROM_N, RAMP_TO_N, mode_named, mode_of
+from device.measurement.quantities import InvalidQuantity
+
+
+def ramp(count: int) -> list[float]:
+    return list(np.linspace(RAMP_FROM_N, RAMP_TO_N, count))
+
+
+@pytest.mark.parametrize("mode", [mode for mode in MODES if FRAMES[mode].is_ramp])
+def test_a_ramp_of_a_modes_own_frames_is_read_by_that_mode(mode):
+    assert mode_of(ramp(FRAMES[mode].count)) == mode
+
+
+@pytest.mark.parametrize(("count", "mode"), [(2, "standard"), (25, "standard"), (26, "precise"), (400, "precise")])
+def test_from_the_middle_between_both_modes_frames_on_a_ramp_is_a_precise_one(count, mode):
+    """10 and 40 frames: 25 are as near to one as to the other."""
+    assert mode_of(ramp(count)) == mode
+
+
+@pytest.mark.parametrize("force_n", [[], [0.5, 0.5], [0.5] * 10, [0.49, 0.51, 0.5], [0.26, 0.5], [0.5] * 40])
+def test_frames_at_one_force_are_read_as_the_paper_does(force_n):
+    assert mode_of(force_n) == "paper"
+
+
+@pytest.mark.parametrize(("largest_n", "mode"), [(0.399, "paper"), (0.4, "standard")])
+def test_a_ramp_begins_where_the_largest_force_is_twice_the_smallest(largest_n, mode):
+    assert mode_of([0.3, largest_n, 0.2]) == mode
+
+
+def test_a_single_frame_is_quick():
+    assert mode_of([0.5]) == "quick"
+
+
+def test_a_first_frame_that_the_cell_reads_below_zero_does_not_hide_a_ramp():
+    assert mode_of([-0.002, *ramp(9)]) == "standard"
+
+
+def test_modes_are_found_by_their_names_and_no_other():
+    assert [mode_named(mode) for mode in MODES] == ["quick", "standard", "precise", "paper"]
+    with pytest.raises(InvalidQuantity, match="^mode is 'fast', but must be one of quick, standard, precise, paper"):
+        mode_named("fast")

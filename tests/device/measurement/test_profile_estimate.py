@@ -1,0 +1,127 @@
+"""Estimates of recorded force ramps by the committed model: numbers for one round inclusion, and for nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.measurement.press_profile import press_profile
+from device.measurement.profile_estimate import doubts_about, elongation_ratio, estimate_profile
+from device.measurement.profile_model import RAMP_MODES, Answer
+from device.measurement.quantities import InvalidQuantity
+from device.simulation.neighbour import Neighbour
+
+NO_DOUBT = Answer(np.zeros(3), np.ones(3), 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def ramp(pressed):
+    return pressed("standard")
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(
+    pressed, profile_model, calibration, mode
+):
+    estimate = estimate_profile(pressed(mode), mode, profile_model, calibration)
+    assert (estimate.mode, estimate.model) == (mode, "standard")
+    for name, truth, share in (("size_mm", 12.0, 0.1), ("depth_mm", 6.0, 0.1), ("youngs_modulus_kpa", 60.0, None)):
+        quantity = getattr(estimate, name)
+        assert quantity.low <= quantity.value <= quantity.high
+        assert quantity.low <= truth <= quantity.high
+        if share:
+            assert quantity.identifiable
+            assert quantity.value == pytest.approx(truth, rel=share)
+
+
+@pytest.mark.parametrize("tissue_kpa", [4.3, 5.7])
+def test_the_press_beside_the_lesion_tells_the_patients_tissue(pressed, profile_model, calibration, tissue_kpa):
+    recording = pressed("precise", tissue_modulus_kpa=tissue_kpa)
+    features = estimate_profile(recording, "precise", profile_model, calibration).features
+    assert features["tissue_modulus_std_kpa"] < 0.4
+    assert features["tissue_modulus_kpa"] == pytest.approx(tissue_kpa, abs=3 * features["tissue_modulus_std_kpa"])
+
+
+def test_the_same_recording_gives_the_same_estimate_again(ramp, profile_model, calibration):
+    first, again = (estimate_profile(ramp, "precise", profile_model, calibration) for _ in range(2))
+    assert first == again
+
+
+def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, profile_model, calibration):
+    """A deep small lump says nothing of its modulus: 10-160 kPa are left."""
+    estimate = estimate_profile(pressed("standard", (9.0, 9.0, 100.0)), "standard", profile_model, calibration)
+    modulus = estimate.youngs_modulus_kpa
+    assert (modulus.low, modulus.high) == (pytest.approx(10.0), pytest.approx(160.0))
+    assert not modulus.identifiable
+    assert estimate.status == "not_identifiable"
+    assert "Young's modulus" in estimate.reason
+
+
+def test_nothing_under_the_skin_gets_no_numbers(pressed, profile_model, calibration):
+    estimate = estimate_profile(pressed("standard", (0.0, 6.0, 60.0)), "standard", profile_model, calibration)
+    assert estimate.status == "not_identifiable"
+    assert estimate.size_mm.value is None
+
+
+def test_two_inclusions_get_no_numbers_and_a_reason(pressed, profile_model, calibration):
+    two = pressed("standard", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
+    estimate = estimate_profile(two, "standard", profile_model, calibration)
+    assert estimate.status == "outside_range"
+    assert "not round" in estimate.reason or "No single round inclusion" in estimate.reason
+    assert estimate.size_mm.value is None
+
+
+def test_gel_on_the_face_gets_no_numbers(pressed, profile_model, calibration):
+    wet = pressed("standard", wet_ratio=0.4)
+    assert estimate_profile(wet, "standard", profile_model, calibration).size_mm.value is None
+
+
+def test_every_doubt_is_said_in_its_own_sentence(ramp, profile_model):
+    profile, limits = press_profile(ramp), profile_model.limits["standard"]
+    assert doubts_about(profile, NO_DOUBT, limits) == []
+    misfit = doubts_about(profile, NO_DOUBT._replace(misfit_ratio=2 * limits.misfit_ratio), limits)
+    beyond = doubts_about(profile, NO_DOUBT._replace(beyond_deviations=3.1), limits)
+    oblong = replace(profile, elongation=np.full_like(profile.elongation, 0.1))
+    assert "misfit" in misfit[0]
+    assert beyond == ["Size or depth lies outside the trained range."]
+    assert "not round" in doubts_about(oblong, NO_DOUBT, limits)[0]
+
+
+def test_a_lump_beside_the_axis_is_not_called_oblong(pressed, profile_model):
+    """2 mm aside the second harmonic of a sphere is far above noise; its first explains it."""
+    aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
+    assert np.abs(aside.elongation).max() > 0.005
+    assert elongation_ratio(aside) < profile_model.limits["precise"].elongation_ratio
+
+
+def test_full_scale_pixels_are_refused(ramp, profile_model, calibration):
+    frames = tuple(
+        replace(frame, counts=np.full_like(frame.counts, 255)) if frame.role == "press" else frame
+        for frame in ramp.frames
+    )
+    estimate = estimate_profile(replace(ramp, frames=frames), "standard", profile_model, calibration)
+    assert estimate.status == "saturated"
+    assert "lower the light" in estimate.reason
+
+
+@pytest.mark.parametrize(
+    ("change", "mode", "words"),
+    [
+        ({"serial": "TSIS-0042"}, "standard", "serial is TSIS-0042, but must be one of SIM-0001"),
+        ({}, "paper", "mode is paper, but must be one of standard, precise"),
+    ],
+)
+def test_what_the_model_is_not_for_is_refused(ramp, profile_model, calibration, change, mode, words):
+    with pytest.raises(InvalidQuantity, match=words):
+        estimate_profile(replace(ramp, **change), mode, profile_model, calibration)
+
+
+def test_frames_of_another_pixel_size_are_refused(ramp, profile_model, calibration):
+    camera = replace(ramp.camera, mm_per_px_x=0.04)
+    with pytest.raises(InvalidQuantity, match="mm_per_px"):
+        estimate_profile(replace(ramp, camera=camera), "standard", profile_model, calibration)
+
+
+def test_a_hold_is_no_ramp(pressed, profile_model, calibration):
+    with pytest.raises(InvalidQuantity, match="press slowly harder"):
+        estimate_profile(pressed("paper"), "standard", profile_model, calibration)

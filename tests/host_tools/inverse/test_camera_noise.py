@@ -1,0 +1,62 @@
+"""Covariances from few recordings, shrunk: variances stay, correlations are those of the paper formula."""
+
+import numpy as np
+import pytest
+
+from device.measurement.press_noise import light_ratio
+from device.measurement.press_parameters import NOMINAL
+from host_tools.inverse import camera_noise
+from host_tools.inverse.camera_noise import camera_covariance, shrinkage, shrunk_covariance
+from host_tools.inverse.press_samples import profile_rows
+from host_tools.inverse.recorded_presses import RecordedPresses
+
+
+def test_mean_squares_stay_and_correlations_shrink():
+    """Two columns of correlation 0.6: their mean product is that times less than 1, their mean squares are as drawn."""
+    errors = np.random.default_rng(3).multivariate_normal([0, 0], [[4.0, 1.2], [1.2, 1.0]], 50)
+    sample, found = errors.T @ errors / 50, shrunk_covariance(errors)
+    np.testing.assert_allclose(np.diag(found), np.diag(sample))
+    assert 0.7 < found[0, 1] / sample[0, 1] < 1.0
+
+
+def test_correlations_that_are_chance_vanish_and_those_that_are_not_stay():
+    """Independent columns shrink nearly all the way; a common error of many recordings hardly."""
+    rng = np.random.default_rng(4)
+    chance = rng.standard_normal((40, 30))
+    common = rng.standard_normal((4000, 1)) + 0.1 * rng.standard_normal((4000, 30))
+    assert intensity(chance) > 0.8
+    assert intensity(common) < 0.01
+
+
+def intensity(errors: np.ndarray) -> float:
+    standard = errors / np.sqrt(np.mean(errors**2, axis=0))
+    return shrinkage(standard, standard.T @ standard / len(errors))
+
+
+def test_a_common_error_counts_as_noise_and_is_not_taken_out_as_a_mean():
+    np.testing.assert_allclose(np.diag(shrunk_covariance(np.full((7, 2), 0.3))), 0.09)
+
+
+def test_fewer_recordings_than_columns_still_leave_a_covariance_that_can_be_inverted():
+    errors = np.random.default_rng(1).normal(0, 1, (20, 80))
+    assert np.linalg.matrix_rank(errors.T @ errors) == 20
+    assert np.linalg.eigvalsh(shrunk_covariance(errors)).min() > 0.1
+
+
+def test_the_covariance_is_that_of_recorded_rows_about_the_exact_ones(tables, monkeypatch):
+    """Recordings that are the exact rows plus known errors, as large as the light, give back the errors' covariance."""
+    drawn = np.array([[12.0, 6.0, 60.0, *NOMINAL.values()], [9.0, 5.0, 120.0, *NOMINAL.values()]])
+    exact = profile_rows(tables, drawn)
+    errors = np.random.default_rng(2).normal(0, 1e-3, exact.shape)
+    asked = {}
+
+    def record(tables, parameters, mode, *, seed, jobs):
+        asked.update(mode=mode, seed=seed, jobs=jobs)
+        return RecordedPresses(parameters, exact + light_ratio(exact) * errors, np.zeros(2))
+
+    monkeypatch.setattr(camera_noise, "draw_parameters", lambda count, rng: drawn[:count])
+    monkeypatch.setattr(camera_noise, "record_presses", record)
+    found = camera_covariance(tables, "precise", 2, seed=9, jobs=1)
+    np.testing.assert_allclose(found, shrunk_covariance(errors), atol=1e-12)
+    assert asked == {"mode": "precise", "seed": 9, "jobs": 1}
+    assert np.diag(found) == pytest.approx(np.mean(errors**2, axis=0))

@@ -1,0 +1,230 @@
+"""The bundle of the ramp modes: the network NumPy has, the surrogate it was trained with, limits of both modes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import pytest
+from small_surrogate import COLUMNS, random_surrogate, white_noise
+
+from device.measurement.confidence import Bands
+from device.measurement.inversion import BundleRefused
+from device.measurement.press_parameters import NUISANCES, PARAMETERS, RANGES
+from device.measurement.press_profile import ROW_NAMES
+from device.measurement.profile_model import SURROGATE_FILE, ProfileModel
+from device.measurement.quantities import UNKNOWNS
+from host_tools.inverse import export_profile as exporting
+from host_tools.inverse.dense_network import LARGEST_LOG_VARIANCE, InputScaling, Layer, initial_layers
+from host_tools.inverse.ensemble_network import build_network, physical_estimate
+from host_tools.inverse.export import ExportRefused
+from host_tools.inverse.export_profile import GOLDEN_ROWS, export_profile
+from host_tools.inverse.mode_outcome import Answered, ModeOutcome
+from host_tools.inverse.press_samples import PressSamples, draw_parameters
+from host_tools.inverse.profile_training import QUICK_EFFORT, TrainedProfile
+from host_tools.inverse.train_ensemble import DenseEnsemble
+
+SERIALS = ("SIM-0001", "SIM-0002")
+PRESSES = 40
+
+
+def made_ensemble(rows: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble:
+    scaling = InputScaling.fit(rows, np.eye(COLUMNS))
+    members = []
+    for seed in (1, 2):
+        *hidden, last = initial_layers(2 * scaling.projection.shape[1], np.random.default_rng(seed))
+        biases = np.repeat(np.float32([0.1, log_variance]), len(UNKNOWNS))
+        members.append([*hidden, Layer(0.5 * last.weights, biases)])
+    return DenseEnsemble(scaling, tuple(members))
+
+
+def made_outcome(misfit_ratio: float) -> ModeOutcome:
+    ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
+    bands = tuple(Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
+    truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
+    seen = Answered(truth, truth + 0.05, np.full((64, 3), 0.1))
+    return ModeOutcome(bands, misfit_ratio, 0.8, seen, seen)
+
+
+@pytest.fixture(scope="module")
+def trained() -> TrainedProfile:
+    rng = np.random.default_rng(5)
+    rows = rng.normal(0, 0.2, (PRESSES, COLUMNS))
+    surrogate = random_surrogate()
+    return TrainedProfile(
+        surrogate=surrogate,
+        surrogate_error=np.array([1e-4, 3e-4]),
+        noise={"standard": white_noise(2e-3), "precise": white_noise(1e-3)},
+        ensemble=made_ensemble(rows),
+        outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
+        samples=PressSamples(draw_parameters(PRESSES, rng), rows),
+        effort=QUICK_EFFORT,
+        seed=11,
+    )
+
+
+def write(trained: TrainedProfile, folder: Path) -> Path:
+    export_profile(trained, folder, serials=SERIALS, software_version="1.2.3", training_command="host_tools train x")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(trained: TrainedProfile, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(trained, tmp_path_factory.mktemp("models") / "demo")
+
+
+@pytest.fixture(scope="module")
+def model(folder: Path) -> ProfileModel:
+    return ProfileModel.load(folder)
+
+
+def run(network: bytes, rows: np.ndarray) -> list[np.ndarray]:
+    session = onnxruntime.InferenceSession(network, providers=["CPUExecutionProvider"])
+    return session.run(["estimate", "spread"], {"features": rows.astype(np.float32)})
+
+
+def test_the_exported_network_computes_what_numpy_does(trained: TrainedProfile) -> None:
+    """Single precision all along: a few of its roundings of 6e-8."""
+    rows = np.random.default_rng(8).normal(0, 0.3, (200, COLUMNS)).astype(np.float32)
+    found = run(build_network(trained.ensemble), rows)
+    for theirs, ours in zip(found, physical_estimate(trained.ensemble, rows.astype(float)), strict=True):
+        assert theirs.dtype == np.float32
+        np.testing.assert_allclose(theirs, ours, rtol=2e-5)
+        assert np.std(ours, axis=0).min() > 0
+
+
+def test_what_nobody_knows_is_held_at_the_largest_variance_in_both(trained: TrainedProfile) -> None:
+    """So a spread is exp(1/2), or more where the members disagree."""
+    ensemble = made_ensemble(trained.samples.rows, log_variance=9.0)
+    found = run(build_network(ensemble), trained.samples.rows)[1]
+    expected = physical_estimate(ensemble, trained.samples.rows.astype(np.float32).astype(float))[1]
+    np.testing.assert_allclose(found, expected, rtol=2e-5)
+    assert found.min() == pytest.approx(np.exp(LARGEST_LOG_VARIANCE / 2), rel=0.1)
+    assert found.min() >= np.exp(LARGEST_LOG_VARIANCE / 2) - 1e-5
+
+
+def test_coordinates_of_the_network_are_millimetres_and_kilopascals(trained: TrainedProfile) -> None:
+    """Networks that always say 0.1: size 8.5 + 0.65, depth 8 + 0.4, modulus 40 x 4 to the power 0.1."""
+    still = [[*layers[:-1], Layer(0 * layers[-1].weights, layers[-1].biases)] for layers in trained.ensemble.members]
+    ensemble = replace(trained.ensemble, members=tuple(still))
+    estimate, spread = run(build_network(ensemble), trained.samples.rows)
+    np.testing.assert_allclose(estimate, np.tile([9.15, 8.4, 40 * 4**0.1], (PRESSES, 1)), rtol=1e-5)
+    np.testing.assert_allclose(spread, np.exp(-1), rtol=1e-5)
+
+
+def test_the_device_gets_back_the_networks_coordinates(trained: TrainedProfile, model: ProfileModel) -> None:
+    rows = trained.samples.rows
+    for found, expected in zip(model.networks(rows), trained.ensemble.estimate(rows), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_the_device_gets_back_surrogate_and_noise(trained: TrainedProfile, model: ProfileModel) -> None:
+    """The surrogate to single precision."""
+    unit = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
+    expected = trained.surrogate.rows(unit)
+    np.testing.assert_allclose(model.answers.surrogate.rows(unit), expected, atol=1e-5 * np.abs(expected).max())
+    for mode, noise in trained.noise.items():
+        np.testing.assert_array_equal(model.answers.noise[mode].camera, noise.camera)
+
+
+def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedProfile, model: ProfileModel) -> None:
+    assert (model.limits["standard"].misfit_ratio, model.limits["precise"].misfit_ratio) == (1.3, 1.2)
+    for limits in model.limits.values():
+        assert limits.elongation_ratio == 0.8
+        assert [bands.high[0, 0] for bands in limits.bands] == [1.5, 1.6, 1.7]
+        assert [bands.low[1, 1] for bands in limits.bands] == [-1.5, -1.6, -1.7]
+    assert model.limits["standard"].bands[0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
+
+
+def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trained, folder, model) -> None:
+    card = model.bundle.card
+    assert tuple(card["serials"]) == tuple(card["serials"]) == SERIALS
+    assert (card["name"], card["software_version"], card["seed"]) == ("demo", "1.2.3", 11)
+    assert card["training_command"] == "host_tools train x"
+    assert card["effort"]["members"] == QUICK_EFFORT.members
+    assert card["dataset_sha256"] == hashlib.sha256(trained.samples.rows.tobytes()).hexdigest()
+    assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
+    assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()
+    assert (card["surrogate_error"]["largest"], card["surrogate_error"]["mean"]) == pytest.approx((3e-4, 2e-4))
+    ranges = card["training_range"]
+    assert {name: tuple(ends) for name, ends in (ranges["unknowns"] | ranges["nuisances"]).items()} == {
+        name: (RANGES[name].low, RANGES[name].high) for name in (*UNKNOWNS, *NUISANCES)
+    }
+    name, column = ROW_NAMES[-1], trained.samples.rows[:, -1]
+    assert ranges["features"][name] == [column.min(), column.max()]
+    assert tuple(feature["name"] for feature in card["features"]) == ROW_NAMES
+
+
+def test_the_card_states_each_modes_errors_on_simulated_and_on_recorded_presses(model: ProfileModel) -> None:
+    """Answers 0.05 of a coordinate too high: 0.2 mm of the depth."""
+    for mode in ("standard", "precise"):
+        entry = model.bundle.card["modes"][mode]
+        for kind in ("simulated", "recorded"):
+            assert entry[kind]["presses"] == 64
+            assert entry[kind]["depth_mm"]["skill"] == pytest.approx(1 - 0.05 * np.sqrt(3), rel=1e-3)
+
+
+def test_golden_rows_are_of_the_training_and_spread_over_it(trained: TrainedProfile, model: ProfileModel) -> None:
+    golden = model.bundle.card["golden"]
+    features = np.array(golden["features"])
+    assert features.shape == (GOLDEN_ROWS, COLUMNS)
+    expected = trained.samples.rows[:: PRESSES // GOLDEN_ROWS].astype(np.float32)
+    np.testing.assert_array_equal(features, expected)
+    np.testing.assert_allclose(golden["estimate"], physical_estimate(trained.ensemble, features)[0], rtol=1e-4)
+    np.testing.assert_allclose(golden["spread"], physical_estimate(trained.ensemble, features)[1], rtol=1e-4)
+
+
+def test_the_same_parts_give_the_same_bytes(trained: TrainedProfile, folder: Path, tmp_path: Path) -> None:
+    twice = folder, write(trained, tmp_path / "demo")
+    first, again = ({path.name: path.read_bytes() for path in at.iterdir()} for at in twice)
+    assert first == again
+    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE}
+
+
+def changed(trained: TrainedProfile, tmp_path: Path, file: str) -> Path:
+    folder = write(trained, tmp_path / "demo")
+    content = bytearray((folder / file).read_bytes())
+    content[len(content) // 2] ^= 1
+    (folder / file).write_bytes(bytes(content))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("file", "named"), [(SURROGATE_FILE, "surrogate.npz is [0-9a-f]{64}"), ("model.onnx", "sha256")]
+)
+def test_a_changed_bit_is_refused_by_the_device(trained, tmp_path, file, named) -> None:
+    with pytest.raises(BundleRefused, match=named):
+        ProfileModel.load(changed(trained, tmp_path, file))
+
+
+def test_a_missing_surrogate_is_refused_by_the_device(trained: TrainedProfile, tmp_path: Path) -> None:
+    folder = write(trained, tmp_path / "demo")
+    (folder / SURROGATE_FILE).unlink()
+    with pytest.raises(BundleRefused, match=r"surrogate.npz is missing, but must be [0-9a-f]{64}"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_without_limits_is_refused_by_the_device(trained, tmp_path) -> None:
+    folder = write(trained, tmp_path / "demo")
+    card = json.loads((folder / "model.json").read_text())
+    del card["modes"]
+    (folder / "model.json").write_text(json.dumps(card))
+    with pytest.raises(BundleRefused, match="incomplete .*modes"):
+        ProfileModel.load(folder)
+
+
+def test_a_network_that_differs_from_numpy_is_refused_and_nothing_is_written(trained, tmp_path, monkeypatch) -> None:
+    """An output bias off by 1e-2 moves a size of some 8.5 mm by 65 um: nearly a hundredth."""
+    members = [
+        [*layers[:-1], Layer(layers[-1].weights, layers[-1].biases + np.float32(1e-2))]
+        for layers in trained.ensemble.members
+    ]
+    wrong = build_network(replace(trained.ensemble, members=tuple(members)))
+    monkeypatch.setattr(exporting, "build_network", lambda ensemble: wrong)
+    with pytest.raises(ExportRefused, match="differs from NumPy by"):
+        write(trained, tmp_path / "demo")
+    assert list(tmp_path.iterdir()) == []

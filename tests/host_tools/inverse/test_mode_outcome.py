@@ -1,0 +1,173 @@
+"""Bands, coverage and usual doubts of toys: answers with Gaussian errors of a spread that they know."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_surrogate import COLUMNS, linear_surrogate, white_noise
+
+from device.measurement.confidence import Bands
+from device.measurement.press_parameters import EVEN_STD, PARAMETERS, from_unit
+from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
+from device.measurement.profile_model import ProfileAnswers
+from host_tools.inverse.confidence_bands import confidence_bands
+from host_tools.inverse.mode_outcome import USUAL_RATIO, Answered, ModeOutcome, answers_to, judged_mode
+from host_tools.inverse.noisy_presses import NoiseSampler, Pool
+from host_tools.inverse.recorded_presses import RecordedPresses
+
+STD, COUNT, RECORDED = 0.1, 8000, 150
+TOLD = np.arange(len(PARAMETERS)) != MODULUS
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+NOISE = white_noise(STD)
+
+
+class FirstColumns:
+    """In place of an ensemble: the first three columns are the coordinates, seen with the rows' noise."""
+
+    def estimate(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return rows[:, :3], np.full((len(rows), 3), STD)
+
+
+def even(count: int, columns: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1, 1, (count, columns))
+
+
+def gaussian(count: int, seed: int) -> Answered:
+    truth = even(count, 3, seed)
+    return Answered(
+        truth, truth + np.random.default_rng([seed, 1]).normal(0, STD, truth.shape), np.full((count, 3), STD)
+    )
+
+
+def exact_bands(bound: float) -> tuple[Bands, ...]:
+    """Bands of an error that is never more than so many spreads, whatever truth and spread."""
+    ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
+    return (Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
+
+
+def some(recorded: RecordedPresses, count: int) -> RecordedPresses:
+    return RecordedPresses(recorded.parameters[:count], recorded.rows[:count], recorded.elongation[:count])
+
+
+@pytest.fixture(scope="module")
+def slopes() -> np.ndarray:
+    slopes = np.random.default_rng(5).normal(0.0, 0.5, (len(PARAMETERS), GROWTH_COLUMNS))
+    slopes[MODULUS] = 0.0
+    return slopes
+
+
+@pytest.fixture(scope="module")
+def answers(slopes) -> ProfileAnswers:
+    return ProfileAnswers(linear_surrogate(slopes), {"standard": NOISE, "precise": NOISE})
+
+
+@pytest.fixture(scope="module")
+def pool() -> Pool:
+    unit = even(COUNT, len(PARAMETERS), 1)
+    rows = np.zeros((COUNT, COLUMNS))
+    rows[:, :3] = unit[:, :3]
+    return Pool(unit.astype(np.float32), rows.astype(np.float32), NoiseSampler(NOISE))
+
+
+@pytest.fixture(scope="module")
+def recorded(answers) -> RecordedPresses:
+    """Presses of the surrogate, seen with its noise; elongations 1 to 150."""
+    unit = even(RECORDED, len(PARAMETERS), 2) * 0.8
+    rows = answers.surrogate.rows(unit) + np.random.default_rng(3).normal(0, STD, (RECORDED, COLUMNS))
+    return RecordedPresses(from_unit(unit), rows, np.arange(1.0, RECORDED + 1))
+
+
+@pytest.fixture(scope="module")
+def outcome(answers, pool, recorded) -> ModeOutcome:
+    return judged_mode("standard", FirstColumns(), answers, pool, recorded, seed=4, jobs=1)
+
+
+def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
+    covered, known = gaussian(6000, 1).covered(exact_bands(1.645))
+    assert known.all()
+    np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.015)
+
+
+def test_bands_of_one_half_of_gaussian_answers_cover_nine_in_ten_of_the_other():
+    both = gaussian(8000, 2)
+    seen, unseen = both.part(slice(4000)), both.part(slice(4000, None))
+    covered, _ = unseen.covered(confidence_bands(seen.truth, seen.mean, seen.spread))
+    np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.02)
+
+
+def test_an_interval_covers_the_truth_inside_it_and_not_the_one_beside_it():
+    """0.1 +- 2 x 0.1 holds -0.05 and 0.29, not 0.32 and -0.15; a spread above half the prior's tells nothing."""
+    truth = np.array([[-0.05, 0.32, 0.9], [0.29, -0.15, -0.9]])
+    spread = np.array([[0.1, 0.1, 0.51 * EVEN_STD]] * 2)
+    covered, known = Answered(truth, np.full((2, 3), 0.1), spread).covered(exact_bands(2.0))
+    np.testing.assert_array_equal(covered, [[True, False, True]] * 2)
+    np.testing.assert_array_equal(known, [[True, True, False]] * 2)
+
+
+def test_a_part_is_of_the_same_presses_in_all_its_arrays():
+    whole = gaussian(10, 3)
+    part = whole.part(slice(4, 7))
+    for name in ("truth", "mean", "spread"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[4:7])
+
+
+def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome, pool):
+    """Noise is as large as the light, 1 + a contrast that is even between -1 and 1: its mean square is 1 + 1/3."""
+    np.testing.assert_array_equal(outcome.simulated.truth, pool.unit[COUNT // 2 :, :3])
+    error = outcome.simulated.mean - outcome.simulated.truth
+    np.testing.assert_allclose(error.std(axis=0), STD * np.sqrt(4 / 3), rtol=0.05)
+    np.testing.assert_allclose(outcome.simulated.covered(outcome.bands)[0].mean(axis=0), 0.9, atol=0.025)
+
+
+def test_bands_come_from_the_first_half_alone(outcome, answers, pool, recorded):
+    """Truths that lie elsewhere in the second half leave the bands what they were."""
+    unit = pool.unit.copy()
+    unit[COUNT // 2 :] *= -1
+    turned = Pool(unit, pool.rows, pool.sampler)
+    other = judged_mode("standard", FirstColumns(), answers, turned, some(recorded, 2), seed=4, jobs=1)
+    for one, again in zip(outcome.bands, other.bands, strict=True):
+        np.testing.assert_array_equal(one.low, again.low)
+        np.testing.assert_array_equal(one.high, again.high)
+    assert other.simulated.covered(other.bands)[0].mean() < 0.5
+
+
+def test_recorded_answers_keep_their_truth_and_the_networks_mean(outcome, recorded):
+    unit = even(RECORDED, len(PARAMETERS), 2) * 0.8
+    np.testing.assert_allclose(outcome.recorded.truth, unit[:, :3], atol=1e-12)
+    np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[:, :3])
+    np.testing.assert_array_equal(outcome.recorded.spread, STD)
+
+
+def test_a_usual_elongation_is_one_that_few_recordings_pass(outcome, recorded):
+    """Elongations of 1, 2 ... 150: the quantile 0.985 lies at 1 + 0.985 x 149."""
+    assert outcome.elongation_ratio == pytest.approx(1 + USUAL_RATIO * (RECORDED - 1))
+    assert np.mean(recorded.elongation > outcome.elongation_ratio) == pytest.approx(1 - USUAL_RATIO, abs=0.01)
+
+
+def test_a_usual_misfit_is_a_high_quantile_of_chi_square(outcome):
+    """Less the eight parameters that fit: COLUMNS - 8 degrees of freedom, whose 0.985 quantile is 2.17 deviations
+    above their number (and 0.6 for its skewness); of 150 draws it strays by a twentieth."""
+    freedom = COLUMNS - TOLD.sum()
+    expected = (freedom + 2.17 * np.sqrt(2 * freedom) + 2 / 3 * (2.17**2 - 1)) / COLUMNS
+    assert outcome.misfit_ratio == pytest.approx(expected, rel=0.15)
+
+
+def test_the_same_seed_gives_the_same_answers_and_another_one_other_noise(outcome, answers, pool, recorded):
+    few = some(recorded, 2)
+    again, other = (
+        judged_mode("standard", FirstColumns(), answers, pool, few, seed=seed, jobs=1).simulated.mean for seed in (4, 5)
+    )
+    np.testing.assert_array_equal(again, outcome.simulated.mean)
+    assert (other != again).mean() > 0.99
+
+
+def test_mode_precise_answers_by_the_fit_and_not_by_the_networks(answers, slopes):
+    """The posterior of the linear model is known on paper; the toy networks read zeros."""
+    truth = 0.4 * even(2, len(PARAMETERS), 6)
+    rows = answers.surrogate.rows(truth)
+    found = answers_to("precise", FirstColumns(), answers, rows, 1)
+    std = STD * np.sqrt(np.diag(np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)))[:2]
+    for answer, at in zip(found, truth, strict=True):
+        np.testing.assert_allclose(answer.mean[:2], at[:2], atol=0.25 * std.max())
+        np.testing.assert_allclose(answer.spread[:2], std, rtol=0.1)
+        assert answer.spread[MODULUS] == pytest.approx(EVEN_STD, rel=0.1)

@@ -1,0 +1,86 @@
+"""The reference sampler on a linear forward model with Gaussian noise, whose posterior is known on paper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_surrogate import COLUMNS, linear_surrogate, white_noise
+
+from device.measurement.fit_press import PressPosterior
+from device.measurement.press_parameters import EVEN_STD, PARAMETERS
+from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
+from host_tools.study import mode_posterior
+from host_tools.study.mode_posterior import Sampled, sampled
+
+STD = 0.05
+TOLD = np.arange(len(PARAMETERS)) != MODULUS
+"""The modulus shows in nothing: its slope is 0."""
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
+STEPS, BURN_IN = 1200, 400
+
+
+@pytest.fixture(scope="module")
+def slopes() -> np.ndarray:
+    slopes = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), GROWTH_COLUMNS))
+    slopes[MODULUS] = 0.0
+    return slopes
+
+
+@pytest.fixture(scope="module")
+def row(slopes) -> np.ndarray:
+    return linear_surrogate(slopes).rows(TRUTH[None])[0] + np.random.default_rng(6).normal(0, STD, COLUMNS)
+
+
+@pytest.fixture(scope="module")
+def short():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mode_posterior, "STEPS", STEPS)
+        patch.setattr(mode_posterior, "BURN_IN", BURN_IN)
+        yield
+
+
+@pytest.fixture(scope="module")
+def found(short, row, slopes) -> Sampled:
+    return sampled(PressPosterior(row, linear_surrogate(slopes), white_noise(STD)), TRUTH, 1)
+
+
+def test_mean_and_spread_are_those_of_linear_algebra(found, row, slopes):
+    """The ends of the ranges are far away; chance is that of the steps over their autocorrelation."""
+    covariance = STD**2 * np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)
+    mean, std = covariance @ slopes[TOLD] @ row[GROWTH] / STD**2, np.sqrt(np.diag(covariance))
+    chance = np.sqrt(found.autocorrelation / (STEPS * mode_posterior.WALKERS))
+    assert chance < 0.1
+    assert np.abs((found.mean[:2] - mean[:2]) / std[:2]).max() < 5 * chance
+    np.testing.assert_allclose(found.std[:2], std[:2], rtol=5 * chance)
+
+
+def test_what_the_row_does_not_tell_keeps_its_even_prior(found):
+    """Walkers that begin within a hundredth of the truth find the whole range."""
+    assert found.mean[MODULUS] == pytest.approx(0.0, abs=0.1)
+    assert found.std[MODULUS] == pytest.approx(EVEN_STD, rel=0.1)
+
+
+def test_the_autocorrelation_is_far_shorter_than_the_chain(found):
+    assert 10 < found.autocorrelation < STEPS / 5
+
+
+def test_the_same_seed_gives_the_same_sample_and_another_one_another(row, slopes, monkeypatch):
+    monkeypatch.setattr(mode_posterior, "STEPS", 20)
+    monkeypatch.setattr(mode_posterior, "BURN_IN", 5)
+    posterior = PressPosterior(row, linear_surrogate(slopes), white_noise(STD))
+    first, again, other = (sampled(posterior, TRUTH, seed) for seed in (2, 2, 3))
+    np.testing.assert_array_equal(first.mean, again.mean)
+    np.testing.assert_array_equal(first.std, again.std)
+    assert (first.mean != other.mean).all()
+
+
+def test_a_truth_at_the_end_of_its_range_is_begun_inside_it(slopes, monkeypatch):
+    """Outside the posterior is nothing, and a walker that began there might never move."""
+    monkeypatch.setattr(mode_posterior, "STEPS", 200)
+    monkeypatch.setattr(mode_posterior, "BURN_IN", 100)
+    at_end = np.where(np.arange(len(PARAMETERS)) == 0, 1.0, TRUTH)
+    row = linear_surrogate(slopes).rows(at_end[None])[0]
+    found = sampled(PressPosterior(row, linear_surrogate(slopes), white_noise(STD)), at_end, 4)
+    assert 0.9 < found.mean[0] < 1
+    assert np.isfinite(found.std).all()
