@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, or analyse recordings.
+"""`python -m device`: start the daemon, analyse recordings, or look at the settings.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -27,6 +27,7 @@ from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
+from device.settings.command import add_config_command, run_config_command
 from device.simulation.scenario import Scenario, read_scenario
 from device.web.app import create_app
 
@@ -46,10 +47,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (TOML)")
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    commands = parser.add_subparsers(dest="command", metavar="analyse")
+    commands = parser.add_subparsers(dest="command", metavar="analyse | config")
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
+    add_config_command(commands)
     return parser
 
 
@@ -63,6 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command == "analyse":
             return _analyse(options)
+        if options.command == "config":
+            return run_config_command(options)
         return _serve(options)
     except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
         print(error, file=sys.stderr)

@@ -1,52 +1,53 @@
-"""The daemon's settings: each with default, bound, unit in its name, and one sentence. Read once, from one TOML file.
+"""The daemon's settings by section: each with its type, default, unit, range and one sentence, as data.
 
-Out-of-range values are refused, never clipped. Paths are relative to where the daemon is started.
+Out-of-range values are refused, never clipped. Paths are relative to where the daemon is started. docs/settings.md is
+made from here; which files are read, and in which order, is in device/settings/layers.py.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from device.errors import ConfigError
 from device.measurement.mode import MODES, RAMP_FROM_N, RAMP_TO_N, Mode
-from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.tactile_image import PixelScale
 from device.measurement.toml_record import read_toml
+from device.settings.setting import Section, conflict, setting
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
-ACTION = "correct the setting"
+RATIO = Bound(0.01, 0.9, "")
 
 
 @dataclass(frozen=True)
-class CameraSection:
-    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate.
+class CameraSection(Section):
+    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate."""
 
-    `late_frames`: a frame begun more frame times than this after it was asked for is late.
-    `tear_counts`: a step between two rows, compared with the frame before, above which one of the two is torn.
-    """
+    prefix = "camera."
 
-    width_px: int = 768
-    height_px: int = 492
-    mm_per_px_x: float = 0.03125
-    mm_per_px_y: float = 0.03646
-    exposure_us: int = 4000
-    gain: float = 1.0
-    frame_rate_hz: float = 30.0
-    index: int = 0
-    late_frames: float = 3.0
-    tear_counts: float = 10.0
+    width_px: int = setting(768, "Columns of a frame.", Bound(64, 4096, "px"))
+    height_px: int = setting(492, "Rows of a frame.", Bound(64, 4096, "px"))
+    mm_per_px_x: float = setting(0.03125, "Width of a pixel on the sensing face.", Bound(1e-4, 1.0, "mm"))
+    mm_per_px_y: float = setting(0.03646, "Height of a pixel on the sensing face.", Bound(1e-4, 1.0, "mm"))
+    exposure_us: int = setting(4000, "Exposure time of every frame, at most one frame long.", Bound(10, 1e6, "us"))
+    gain: float = setting(1.0, "Analogue gain of every frame.", Bound(1.0, 16.0, ""))
+    frame_rate_hz: float = setting(30.0, "Frames a second.", Bound(1.0, 240.0, "Hz"))
+    index: int = setting(0, "Number of the camera on this board.", Bound(0, 99, ""))
+    late_frames: float = setting(
+        3.0, "A frame begun this long after it was asked for is late.", Bound(1.5, 100.0, "frame times")
+    )
+    tear_counts: float = setting(
+        10.0,
+        "A step between two rows, compared with the frame before, above which one of the two frames is torn.",
+        Bound(0.5, 255.0, "counts"),
+    )
 
-    def __post_init__(self) -> None:
-        require("camera.width_px", self.width_px, Bound(64, 4096, "px"), ACTION)
-        require("camera.height_px", self.height_px, Bound(64, 4096, "px"), ACTION)
-        require("camera.frame_rate_hz", self.frame_rate_hz, Bound(1.0, 240.0, "Hz"), ACTION)
-        frame_us = 1e6 / self.frame_rate_hz
-        require("camera.exposure_us", self.exposure_us, Bound(10.0, frame_us, "us, one frame"), ACTION)
-        require("camera.gain", self.gain, Bound(1.0, 16.0, ""), ACTION)
-        require("camera.late_frames", self.late_frames, Bound(1.5, 100.0, "frame times"), ACTION)
-        require("camera.tear_counts", self.tear_counts, Bound(0.5, 255.0, "counts"), ACTION)
-        self.scale  # noqa: B018 - refuses an impossible pixel size
+    def conflicts(self) -> Iterator[InvalidQuantity]:
+        """Yield an exposure that is longer than a frame."""
+        bound = Bound(10, 1e6 / self.frame_rate_hz, "us, one frame")
+        yield from conflict("camera.exposure_us", self.exposure_us, bound, "camera.frame_rate_hz")
 
     @property
     def scale(self) -> PixelScale:
@@ -55,91 +56,91 @@ class CameraSection:
 
 
 @dataclass(frozen=True)
-class LightSection:
+class LightSection(Section):
     """The LED driver: I2C bus and address, the brightness of the four sides while measuring, and when light is right.
 
-    `max_dark_counts`: mean of a frame without light, black level included, above which something shines.
-    `min_side_ratio`: a side that alone gives less than this part of the brightest one's light is dark.
-    `max_dimming_ratio`: loss of a side's light, against commissioning or the first presses, that is warned of.
-    `commissioned_counts`: mean counts above dark at the target force of each side alone at full brightness.
-    `min_contrast_ratio`: how much of a press's light must have come with the force; gel and sweat leave less.
+    Lists have one number a side: +x, +y, -x, -y.
     """
 
-    bus: int = 1
-    address: int = 0x60
-    ratio: tuple[float, ...] = (0.6, 0.6, 0.6, 0.6)
-    max_dark_counts: float = 12.0
-    min_side_ratio: float = 0.3
-    max_dimming_ratio: float = 0.07
-    commissioned_counts: tuple[float, ...] | None = None
-    min_contrast_ratio: float = 0.3
+    prefix = "light."
 
-    def __post_init__(self) -> None:
-        require("light.address", self.address, Bound(0x08, 0x77, ""), ACTION)
-        if len(self.ratio) != 4:
-            raise InvalidQuantity("light.ratio", self.ratio, "four numbers, one a side", ACTION)
-        for value in self.ratio:
-            require("light.ratio", value, Bound(0.0, 1.0, "", low_included=False), ACTION)
-        require("light.max_dark_counts", self.max_dark_counts, Bound(0.0, 100.0, "counts"), ACTION)
-        require("light.min_side_ratio", self.min_side_ratio, Bound(0.01, 0.9, ""), ACTION)
-        require("light.max_dimming_ratio", self.max_dimming_ratio, Bound(0.01, 0.9, ""), ACTION)
-        require("light.min_contrast_ratio", self.min_contrast_ratio, Bound(0.01, 0.9, ""), ACTION)
-        self._require_commissioned()
-
-    def _require_commissioned(self) -> None:
-        if self.commissioned_counts is None:
-            return
-        if len(self.commissioned_counts) != 4:
-            raise InvalidQuantity("light.commissioned_counts", self.commissioned_counts, "four numbers", ACTION)
-        for value in self.commissioned_counts:
-            require("light.commissioned_counts", value, Bound(1.0, 255.0, "counts"), ACTION)
+    bus: int = setting(1, "I2C bus of the LED driver.", Bound(0, 99, ""))
+    address: int = setting(0x60, "I2C address of the LED driver.", Bound(0x08, 0x77, ""), base=16)
+    ratio: tuple[float, ...] = setting(
+        (0.6, 0.6, 0.6, 0.6),
+        "Brightness of each side while measuring.",
+        Bound(0.0, 1.0, "", low_included=False),
+        count=4,
+    )
+    max_dark_counts: float = setting(
+        12.0,
+        "Mean of a frame without light, black level included, above which something shines.",
+        Bound(0.0, 100.0, "counts"),
+    )
+    min_side_ratio: float = setting(
+        0.3, "A side that alone gives less than this part of the brightest one's light is dark.", RATIO
+    )
+    max_dimming_ratio: float = setting(
+        0.07, "Loss of a side's light, against commissioning or the first presses, that is warned of.", RATIO
+    )
+    commissioned_counts: tuple[float, ...] | None = setting(
+        None,
+        "Mean counts above dark at the target force of each side alone at full brightness.",
+        Bound(1.0, 255.0, "counts"),
+        count=4,
+    )
+    min_contrast_ratio: float = setting(
+        0.3, "How much of a press's light must have come with the force; gel and sweat leave less.", RATIO
+    )
 
 
 @dataclass(frozen=True)
-class CellSection:
+class CellSection(Section):
     """The load cell: its serial line and its sensitivity."""
 
-    device: str = "/dev/tsis-force"
-    baud: int = 115_200
-    sensitivity_counts_per_n: float = 100_000.0
-    tare_spread_n: float = 0.02
+    prefix = "cell."
 
-    def __post_init__(self) -> None:
-        require("cell.baud", self.baud, Bound(300, 4_000_000, ""), ACTION)
-        bound = Bound(1.0, 1e7, "counts/N")
-        require("cell.sensitivity_counts_per_n", self.sensitivity_counts_per_n, bound, ACTION)
-        require("cell.tare_spread_n", self.tare_spread_n, Bound(0.0001, 1.0, "N"), ACTION)
+    device: str = setting("/dev/tsis-force", "Serial line of the load cell's amplifier.")
+    baud: int = setting(115_200, "Speed of the serial line.", Bound(300, 4_000_000, "baud"))
+    sensitivity_counts_per_n: float = setting(
+        100_000.0, "Change of the amplifier's reading by one newton.", Bound(1.0, 1e7, "counts/N")
+    )
+    tare_spread_n: float = setting(
+        0.02, "Readings that spread more than this while taring are not of an untouched probe.", Bound(0.0001, 1.0, "N")
+    )
 
 
 @dataclass(frozen=True)
-class PressSection:
-    """The press: mode unless asked otherwise, target force and its band, what is contact, steady, and too much.
+class PressSection(Section):
+    """The press: mode unless asked otherwise, target force and its band, what is contact, steady, and too much."""
 
-    `max_rate_n_per_s`: a ramp's force may not change faster, or it would not be known at the exposure.
-    """
+    prefix = "press."
 
-    mode: Mode = "paper"
-    target_n: float = 0.5
-    band_ratio: float = 0.05
-    contact_n: float = 0.05
-    steady_n: float = 0.02
-    overload_n: float = 1.0
-    max_rate_n_per_s: float = 0.35
-    timeout_s: float = 60.0
+    mode: Mode = setting("paper", "How a press is measured unless it is asked for in another mode.", choices=MODES)
+    target_n: float = setting(0.5, "Force of a hold.", Bound(0.1, 20.0, "N"))
+    band_ratio: float = setting(
+        0.05, "Frames of a hold are taken this near to the target, as a part of it.", Bound(0.005, 0.2, "")
+    )
+    contact_n: float = setting(
+        0.05, "Force that is contact, at most half the target.", Bound(0.005, 0.75 * RAMP_FROM_N, "N")
+    )
+    steady_n: float = setting(0.02, "Change of force within which a hold is steady.", Bound(0.001, 1.0, "N"))
+    overload_n: float = setting(
+        1.0, "Force that is too much, at least a fifth above the target.", Bound(1.2 * RAMP_TO_N, 50.0, "N")
+    )
+    max_rate_n_per_s: float = setting(
+        0.35,
+        "A ramp's force may not change faster, or it would not be known at the exposure.",
+        Bound(0.05, 5.0, "N/s"),
+    )
+    timeout_s: float = setting(60.0, "A press that takes longer is given up.", Bound(1.0, 3600.0, "s"))
 
-    def __post_init__(self) -> None:
-        if self.mode not in MODES:
-            raise InvalidQuantity("press.mode", repr(self.mode), f"one of {', '.join(MODES)}", ACTION)
-        require("press.target_n", self.target_n, Bound(0.1, 20.0, "N"), ACTION)
-        require("press.band_ratio", self.band_ratio, Bound(0.005, 0.2, ""), ACTION)
-        highest_n = min(self.target_n / 2, 0.75 * RAMP_FROM_N)
-        bound = Bound(0.005, highest_n, "N, half the target and below every ramp")
-        require("press.contact_n", self.contact_n, bound, ACTION)
-        require("press.steady_n", self.steady_n, Bound(0.001, 1.0, "N"), ACTION)
-        lowest_n = 1.2 * max(self.target_n, RAMP_TO_N)
-        require("press.overload_n", self.overload_n, Bound(lowest_n, 50.0, "N, a fifth above hold and ramp"), ACTION)
-        require("press.max_rate_n_per_s", self.max_rate_n_per_s, Bound(0.05, 5.0, "N/s"), ACTION)
-        require("press.timeout_s", self.timeout_s, Bound(1.0, 3600.0, "s"), ACTION)
+    def conflicts(self) -> Iterator[InvalidQuantity]:
+        """Yield a contact that is too near to the target from below, and an overload from above."""
+        contact = Bound(0.005, self.target_n / 2, "N, half the target")
+        yield from conflict("press.contact_n", self.contact_n, contact, "press.target_n")
+        overload = Bound(1.2 * self.target_n, 50.0, "N, a fifth above the target")
+        yield from conflict("press.overload_n", self.overload_n, overload, "press.target_n")
 
     @property
     def band_n(self) -> tuple[float, float]:
@@ -148,50 +149,50 @@ class PressSection:
 
 
 @dataclass(frozen=True)
-class StoreSection:
+class StoreSection(Section):
     """The disk: how much must be left before a press is taken."""
 
-    min_free_mb: float = 50.0
+    prefix = "store."
 
-    def __post_init__(self) -> None:
-        require("store.min_free_mb", self.min_free_mb, Bound(1.0, 1e6, "MB"), ACTION)
+    min_free_mb: float = setting(50.0, "Space that must be left before a press is taken.", Bound(1.0, 1e6, "MB"))
 
 
 @dataclass(frozen=True)
-class ClockSection:
+class ClockSection(Section):
     """The wall clock: by how much it may be set before `taken_at` is doubted."""
 
-    max_jump_s: float = 2.0
+    prefix = "clock."
 
-    def __post_init__(self) -> None:
-        require("clock.max_jump_s", self.max_jump_s, Bound(0.1, 3600.0, "s"), ACTION)
+    max_jump_s: float = setting(
+        2.0, "The clock may be set by so much before the time of a press is doubted.", Bound(0.1, 3600.0, "s")
+    )
 
 
 @dataclass(frozen=True)
-class ServerSection:
+class ServerSection(Section):
     """Where the screen and the REST API are served; loopback unless told otherwise."""
 
-    host: str = "127.0.0.1"
-    port: int = 8000
+    prefix = "server."
 
-    def __post_init__(self) -> None:
-        require("server.port", self.port, Bound(0, 65535, "(0: any free one)"), ACTION)
+    host: str = setting("127.0.0.1", "Address at which screen and REST API are served; 0.0.0.0 serves the network.")
+    port: int = setting(8000, "Port of screen and REST API; 0 takes any free one.", Bound(0, 65535, ""))
 
 
 @dataclass(frozen=True)
-class Config:
-    """All settings of the daemon.
+class Config(Section):
+    """All settings of the daemon."""
 
-    `model` answers in mode paper; `quick_model` in quick and `profile_model` in standard and precise, where they are
-    installed and for this probe.
-    """
-
-    serial: str = "TSIS-0000"
-    model: Path = MODELS / "paper"
-    quick_model: Path = MODELS / "quick"
-    profile_model: Path = MODELS / "standard"
-    calibration: Path = Path("/var/lib/tsis/calibration.json")
-    data: Path = Path("/var/lib/tsis")
+    serial: str = setting("TSIS-0000", "Serial number of this probe; model and certificate are for it.")
+    model: Path = setting(MODELS / "paper", "Folder of the model that answers in mode paper.")
+    quick_model: Path = setting(
+        MODELS / "quick", "Folder of the model of mode quick, offered where it is installed and for this probe."
+    )
+    profile_model: Path = setting(
+        MODELS / "standard",
+        "Folder of the model of modes standard and precise, offered where it is installed and for this probe.",
+    )
+    calibration: Path = setting(Path("/var/lib/tsis/calibration.json"), "Calibration certificate of this probe.")
+    data: Path = setting(Path("/var/lib/tsis"), "Folder of measurements and recordings.")
     camera: CameraSection = field(default_factory=CameraSection)
     light: LightSection = field(default_factory=LightSection)
     cell: CellSection = field(default_factory=CellSection)

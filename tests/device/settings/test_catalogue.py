@@ -1,0 +1,80 @@
+"""Every setting is known by name, default, range and sentence; a value is written so that TOML reads it back."""
+
+import tomllib
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import get_type_hints
+
+import pytest
+from daemon_process import ROOT
+
+from device.config import Config, LightSection
+from device.settings.catalogue import SETTINGS, Known, markdown
+from device.settings.setting import Setting
+
+WORDS = Known("w", "", Setting("A word."))
+
+
+def test_the_page_of_the_settings_is_the_one_the_program_writes():
+    assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == markdown()
+
+
+def test_every_field_of_every_section_is_a_setting():
+    sections = {one.name: get_type_hints(Config)[one.name] for one in fields(Config)}
+    names = [name for name, kind in sections.items() if not is_dataclass(kind)]
+    names += [f"{name}.{one.name}" for name, kind in sections.items() if is_dataclass(kind) for one in fields(kind)]
+    assert list(SETTINGS) == names
+
+
+@pytest.mark.parametrize("known", SETTINGS.values(), ids=lambda known: known.name)
+def test_a_setting_has_a_sentence_and_a_number_has_a_range(known):
+    assert known.setting.sentence.endswith(".")
+    numbers = isinstance(known.default, int | float | tuple) or known.default is None
+    assert numbers == (known.setting.bound is not None)
+
+
+@pytest.mark.parametrize("known", SETTINGS.values(), ids=lambda known: known.name)
+def test_a_section_checks_its_settings_under_their_own_names(known):
+    """A prefix copied from another section would blame a setting that does not exist."""
+    section, _, _ = known.name.rpartition(".")
+    holder = getattr(Config(), section) if section else Config()
+    assert holder.prefix == (f"{section}." if section else "")
+
+
+@pytest.mark.parametrize("text", ["TSIS-0001", 'a "b" \\c', "Größe µ 𝜇", "tab\tnewline\n", "\x7f\x01"])
+def test_a_text_is_written_as_toml_reads_it(text):
+    assert tomllib.loads(f"text = {WORDS.written(text)}") == {"text": text}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "written"),
+    [
+        ("model", Path("/opt/m"), '"/opt/m"'),
+        ("light.address", 0x0A, "0x0a"),
+        ("light.ratio", (0.5, 1), "[0.5, 1]"),
+        ("light.commissioned_counts", None, "not set"),
+        ("cell.sensitivity_counts_per_n", 1e-5, "1e-05"),
+        ("press.mode", "paper", '"paper"'),
+    ],
+)
+def test_each_type_has_its_way_to_be_written(name, value, written):
+    assert SETTINGS[name].written(value) == written
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("light.address", "0x08 to 0x77"),
+        ("light.ratio", "4 numbers, above 0 to 1"),
+        ("cell.baud", "300 to 4000000"),
+        ("press.mode", "quick, standard, precise, paper"),
+        ("serial", ""),
+    ],
+)
+def test_the_range_is_told_in_words(name, words):
+    assert SETTINGS[name].range == words
+
+
+def test_the_value_of_a_configuration_is_found_by_the_full_name():
+    config = Config(serial="TSIS-0009", light=LightSection(bus=3))
+    assert [SETTINGS[name].value(config) for name in ("serial", "light.bus")] == ["TSIS-0009", 3]
