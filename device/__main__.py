@@ -19,7 +19,7 @@ import uvicorn
 
 from device.answers import answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
-from device.config import Config, read_config, simulated_config
+from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import read_calibration
@@ -28,6 +28,7 @@ from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
 from device.settings.command import add_config_command, run_config_command
+from device.settings.layers import ROOT, layer_files, read_config, read_layers
 from device.simulation.scenario import Scenario, read_scenario
 from device.web.app import create_app
 
@@ -44,7 +45,10 @@ def _parser() -> argparse.ArgumentParser:
         description="The probe's daemon: screen and REST API of a tactile probe, real or simulated.",
     )  # fmt: skip
     parser.add_argument("--simulate", action="store_true", help="emulate LED chip, load cell and camera")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (TOML)")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (TOML) over all others")
+    parser.add_argument(
+        "--root", type=Path, metavar="DIR", default=ROOT, help="folder that holds etc/tsis and usr/lib/tsis"
+    )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
     commands = parser.add_subparsers(dest="command", metavar="analyse | config")
@@ -74,10 +78,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _config(options: argparse.Namespace, scenario: Scenario | None) -> Config:
-    """Return the settings: a file's, or the simulated probe's own."""
-    config = simulated_config(scenario.serial) if scenario else Config()
-    if options.config:
+    """Return the settings: those of this machine's files, or the simulated probe's own, or what its one file says."""
+    if not scenario:
+        config = read_layers(layer_files(options.root, options.config)).config()
+    elif options.config:
         config = read_config(options.config)
+    else:
+        config = simulated_config(scenario.serial)
     if options.port is not None:
         config = replace(config, server=replace(config.server, port=options.port))
     return config

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 
-from device.errors import ConfigError
 from device.measurement.mode import MODES, RAMP_FROM_N, RAMP_TO_N, Mode
-from device.measurement.quantities import Bound, InvalidQuantity
+from device.measurement.quantities import Bound
 from device.measurement.tactile_image import PixelScale
-from device.measurement.toml_record import read_toml
-from device.settings.setting import Section, conflict, setting
+from device.settings.setting import Conflict, Section, conflict, setting
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 RATIO = Bound(0.01, 0.9, "")
@@ -44,7 +43,7 @@ class CameraSection(Section):
         Bound(0.5, 255.0, "counts"),
     )
 
-    def conflicts(self) -> Iterator[InvalidQuantity]:
+    def conflicts(self) -> Iterator[Conflict]:
         """Yield an exposure that is longer than a frame."""
         bound = Bound(10, 1e6 / self.frame_rate_hz, "us, one frame")
         yield from conflict("camera.exposure_us", self.exposure_us, bound, "camera.frame_rate_hz")
@@ -135,7 +134,7 @@ class PressSection(Section):
     )
     timeout_s: float = setting(60.0, "A press that takes longer is given up.", Bound(1.0, 3600.0, "s"))
 
-    def conflicts(self) -> Iterator[InvalidQuantity]:
+    def conflicts(self) -> Iterator[Conflict]:
         """Yield a contact that is too near to the target from below, and an overload from above."""
         contact = Bound(0.005, self.target_n / 2, "N, half the target")
         yield from conflict("press.contact_n", self.contact_n, contact, "press.target_n")
@@ -201,6 +200,15 @@ class Config(Section):
     clock: ClockSection = field(default_factory=ClockSection)
     server: ServerSection = field(default_factory=ServerSection)
 
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a chip that has the bus and address of another."""
+        sections = {name: vars(part) for name, part in vars(self).items() if isinstance(part, Section)}
+        chips = {name: part for name, part in sections.items() if {"bus", "address"} <= set(part)}
+        for (other, theirs), (name, ours) in combinations(chips.items(), 2):
+            if (ours["bus"], ours["address"]) == (theirs["bus"], theirs["address"]):
+                bound = f"another than that of {other} on the same bus"
+                yield Conflict(f"{name}.address", hex(ours["address"]), bound, (f"{other}.address",))
+
 
 SIMULATED: dict[str, tuple[str, Mode]] = {
     "SIM-0001": ("calibration.json", "standard"),
@@ -217,11 +225,3 @@ def simulated_config(serial: str = "SIM-0001") -> Config:
     certificate, mode = SIMULATED.get(serial, SIMULATED["SIM-0001"])
     calibration = MODELS / "simulated_probe" / certificate
     return Config(serial=serial, calibration=calibration, data=Path("var"), press=PressSection(mode=mode))
-
-
-def read_config(path: Path) -> Config:
-    """Read a configuration file; raise `ConfigError` naming the setting, its value and its bound."""
-    try:
-        return read_toml(Config, path)
-    except InvalidQuantity as error:
-        raise ConfigError(f"{path}: {error}", "Then start the daemon again.") from error

@@ -1,4 +1,4 @@
-"""All settings in the order of the sections: name, type, default and what is known of each, and their page in docs/."""
+"""All settings in the order of the sections: name, type, default and what is known of each."""
 
 from __future__ import annotations
 
@@ -9,17 +9,8 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from device.config import MODELS, Config
+from device.config import Config
 from device.settings.setting import Setting
-
-PAGE = """# Settings
-
-Written by `python -m device config show --markdown > docs/settings.md`.
-A setting is written in a TOML file under its section: `press.target_n` is `target_n = 0.5` below `[press]`.
-What is out of its range is refused, never clipped.
-
-"""
-HEADER = "| setting | default | unit | range | what it is |\n|---|---|---|---|---|\n"
 
 
 @dataclass(frozen=True)
@@ -74,22 +65,3 @@ def _known(kind: type, prefix: str = "") -> Iterator[Known]:
 
 SETTINGS = {known.name: known for known in _known(Config)}
 """Every setting of the daemon by its full name."""
-
-
-def markdown() -> str:
-    """Return the page of all settings, docs/settings.md."""
-    lines, section = [PAGE, HEADER], ""
-    for known in SETTINGS.values():
-        if known.section != section:
-            section = known.section
-            lines += [f"\n## {section.capitalize()}\n\n", HEADER]
-        lines.append(_row(known))
-    return "".join(lines)
-
-
-def _row(known: Known) -> str:
-    default = known.default
-    if isinstance(default, Path) and default.is_relative_to(MODELS.parent):
-        default = default.relative_to(MODELS.parent)  # where the program is installed is not the reader's business
-    cells = known.name, known.written(default), known.setting.unit, known.range, known.setting.sentence
-    return f"| `{cells[0]}` | `{cells[1]}` | {' | '.join(cells[2:])} |\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from device.settings.catalogue import markdown
+from device.settings.page import markdown
 
 EXAMPLES = """example:
   python -m device config show --markdown          the page docs/settings.md

@@ -86,7 +86,7 @@ class Section:
     """What stands before each name: the section and a full stop."""
 
     def __post_init__(self) -> None:
-        problems = [*self._alone()] or [*self.conflicts()]
+        problems: list[InvalidQuantity] = [*self._alone()] or [*self.conflicts()]
         if problems:
             raise InvalidSettings(problems)
 
@@ -96,6 +96,6 @@ class Section:
             if known:
                 yield from known.problems(self.prefix + one.name, getattr(self, one.name))
 
-    def conflicts(self) -> Iterator[InvalidQuantity]:
+    def conflicts(self) -> Iterator[Conflict]:
         """Yield what does not fit together of settings that hold alone."""
         yield from ()

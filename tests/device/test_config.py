@@ -14,11 +14,11 @@ from device.config import (
     PressSection,
     ServerSection,
     StoreSection,
-    read_config,
     simulated_config,
 )
 from device.errors import ConfigError
 from device.measurement.quantities import InvalidQuantity
+from device.settings.layers import read_config
 
 SECTIONS = {
     "camera": CameraSection,
@@ -185,3 +185,15 @@ def test_a_file_that_is_wrong_is_refused_with_path_setting_and_fault_code(read, 
 def test_a_missing_file_is_refused_by_its_path(tmp_path):
     with pytest.raises(ConfigError, match=r"none\.toml.*No such file"):
         read_config(tmp_path / "none.toml")
+
+
+def test_two_chips_at_one_address_of_one_bus_are_refused_by_both_names():
+    chips = {"light": LightSection(bus=1, address=0x2A), "cell": LightSection(bus=1, address=0x2A)}
+    with pytest.raises(InvalidQuantity, match=r"^cell\.address is 0x2a, .*correct it or light\.address"):
+        Config(**chips)
+
+
+@pytest.mark.parametrize("other", [{"bus": 2, "address": 0x2A}, {"bus": 1, "address": 0x2B}])
+def test_chips_may_share_a_bus_or_an_address(other):
+    chips = {"light": LightSection(bus=1, address=0x2A), "cell": LightSection(**other)}
+    assert Config(**chips).cell.bus == other["bus"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.toml_record import from_table, read_toml
+from device.measurement.toml_record import from_table, read_toml, table_problems
 
 
 @dataclass(frozen=True)
@@ -129,3 +129,10 @@ def test_a_toml_error_says_in_which_line(tmp_path):
     (tmp_path / "bad.toml").write_text("name = 'a'\npolarised = maybe\n")
     with pytest.raises(InvalidQuantity, match="line 2"):
         read_toml(Optics, tmp_path / "bad.toml")
+
+
+def test_all_unknown_keys_and_wrong_types_are_found_at_once_in_their_order():
+    table = {"nam": "b", "ratio": [1, "x", True], "lens": {"focal_mm": "8", "stop": 4}, "name": "good"}
+    assert [problem.quantity for problem in table_problems(Optics, table)] == [
+        "nam", "ratio[1]", "ratio[2]", "lens.focal_mm", "lens.stop",
+    ]  # fmt: skip

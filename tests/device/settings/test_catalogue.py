@@ -9,7 +9,8 @@ import pytest
 from daemon_process import ROOT
 
 from device.config import Config, LightSection
-from device.settings.catalogue import SETTINGS, Known, markdown
+from device.settings.catalogue import SETTINGS, Known
+from device.settings.page import markdown
 from device.settings.setting import Setting
 
 WORDS = Known("w", "", Setting("A word."))

@@ -1,0 +1,163 @@
+"""Settings files to one configuration: later files over earlier ones, each setting with the file that it comes from.
+
+The built-in defaults lie below the vendor's file, that below /etc/tsis/config.toml, its drop-ins in the order of their
+names, and the file that the command line states. A bad value is a problem also where a later file overrides it, and
+nothing is used before every file holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from device.config import Config
+from device.errors import ConfigError
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.toml_record import from_table, read_table, table_problems
+from device.settings.catalogue import SETTINGS
+from device.settings.setting import Conflict, InvalidSettings
+
+ROOT = Path("/")
+VENDOR, LOCAL, DROP_INS = "usr/lib/tsis/config.toml", "etc/tsis/config.toml", "etc/tsis/config.d"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong with one setting, or with a whole file."""
+
+    file: Path
+    what: InvalidQuantity
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.what}"
+
+
+@dataclass(frozen=True)
+class Layers:
+    """What files set: `values` as in TOML and `origins` by the full names of the settings, or else `problems`.
+
+    With problems there are still the values that hold alone.
+    """
+
+    files: tuple[Path, ...]
+    values: Mapping[str, Any]
+    origins: Mapping[str, Path]
+    problems: tuple[Problem, ...]
+
+    def config(self) -> Config:
+        """Return the configuration; raise `ConfigError` with every problem of every file."""
+        if self.problems:
+            cause = "\n".join(str(problem) for problem in self.problems)
+            raise ConfigError(cause, "Then start the daemon again.")
+        return from_table(Config, _nested(self.values))
+
+
+def layer_files(root: Path = ROOT, stated: Path | None = None) -> list[Path]:
+    """Return the settings files that there are, lowest first; `root` stands for / and `stated` has to be there."""
+    installed = [path for path in (root / VENDOR, root / LOCAL) if _is_there(path)]
+    return [*installed, *_drop_ins(root / DROP_INS), *([stated] if stated else [])]
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether there is something to read, also when it may not be read: then reading says why."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _drop_ins(folder: Path) -> list[Path]:
+    try:
+        paths = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except OSError:
+        return [folder]  # reading it says why
+    return [path for path in paths if path.suffix == ".toml" and not path.name.startswith(".")]
+
+
+def read_config(path: Path) -> Config:
+    """Return the configuration of one file over the defaults; raise `ConfigError` with all that is wrong in it."""
+    return read_layers([path]).config()
+
+
+def read_layers(files: Iterable[Path]) -> Layers:
+    """Return what these files set, each over those before it, and everything that is wrong with them."""
+    read: list[Path] = []
+    problems: list[Problem] = []
+    values: dict[str, Any] = {}
+    origins: dict[str, Path] = {}
+    for path in files:
+        read.append(path)
+        try:
+            table = read_table(path)
+        except InvalidQuantity as error:
+            problems.append(Problem(path, error))
+            continue
+        wrong = list(_table_problems(table))
+        problems += [Problem(path, error) for error in wrong]
+        held = {name: value for name, value in _flat(table) if name not in _names(wrong)}
+        values |= held
+        origins |= dict.fromkeys(held, path)
+    problems += _conflict_problems(values, origins, refused=_names(problem.what for problem in problems))
+    return Layers(tuple(read), values, origins, tuple(problems))
+
+
+def _table_problems(table: Mapping[str, Any]) -> Iterator[InvalidQuantity]:
+    """Yield unknown keys, wrong types and values out of their bounds."""
+    mistyped = list(table_problems(Config, table))
+    yield from mistyped
+    for name, value in _flat(table):
+        if name not in _names(mistyped):
+            yield from SETTINGS[name].setting.problems(name, value)
+
+
+def _names(problems: Iterable[InvalidQuantity]) -> set[str]:
+    """Return the settings that have problems; an item of a list is named by its number, as `light.ratio[2]`."""
+    return {problem.quantity.partition("[")[0] for problem in problems}
+
+
+def _conflict_problems(values: Mapping[str, Any], origins: Mapping[str, Path], refused: set[str]) -> Iterator[Problem]:
+    """Yield what does not fit together, at the file of the first that a file sets; what is refused fits nothing."""
+    for conflict in _conflicts(_nested(values)):
+        involved = (conflict.quantity, *conflict.others)
+        if refused.isdisjoint(involved):
+            yield Problem(next(origins[name] for name in involved if name in origins), conflict)
+
+
+def _conflicts(table: dict[str, Any]) -> Iterator[Conflict]:
+    """Yield what does not fit together inside each section, then between those sections that hold."""
+    for name in list(table):
+        found = _conflicts_of({name: table[name]})
+        if found:
+            yield from found
+            del table[name]
+    yield from _conflicts_of(table)
+
+
+def _conflicts_of(table: Mapping[str, Any]) -> list[Conflict]:
+    try:
+        from_table(Config, table)
+    except InvalidSettings as error:
+        return [problem for problem in error.problems if isinstance(problem, Conflict)]
+    return []
+
+
+def _flat(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the settings of a file by their full names, those that exist."""
+    for key, value in table.items():
+        entries = {f"{key}.{name}": one for name, one in value.items()} if isinstance(value, Mapping) else {key: value}
+        yield from ((name, one) for name, one in entries.items() if name in SETTINGS)
+
+
+def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    for name, value in values.items():
+        section, _, key = name.rpartition(".")
+        (table.setdefault(section, {}) if section else table)[key] = value
+    return table

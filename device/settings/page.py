@@ -1,0 +1,53 @@
+"""The catalogue of settings as the page docs/settings.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from device.config import MODELS
+from device.settings.catalogue import SETTINGS, Known
+
+PAGE = """# Settings
+
+Written by `python -m device config show --markdown > docs/settings.md`.
+A setting is written in a TOML file under its section: `press.target_n` is `target_n = 0.5` below `[press]`.
+What is out of its range is refused, never clipped.
+
+## Files
+
+Each setting comes from the last of these that sets it:
+
+1. the default below,
+2. `/usr/lib/tsis/config.toml`, of the vendor, never edited,
+3. `/etc/tsis/config.toml`,
+4. `/etc/tsis/config.d/*.toml`, in the order of their names,
+5. the file of `--config FILE`.
+
+All of them have to hold, and to fit together, before any is used: else the start is refused
+with every problem of every file, each with file, setting, value, bound and hint.
+The simulated probe has settings of its own; `--simulate --config FILE` reads that file alone.
+`--root DIR` takes the files of 2 to 4 from below another folder.
+
+## Above all sections
+
+"""
+HEADER = "| setting | default | unit | range | what it is |\n|---|---|---|---|---|\n"
+
+
+def markdown() -> str:
+    """Return the page of all settings, docs/settings.md."""
+    lines, section = [PAGE, HEADER], ""
+    for known in SETTINGS.values():
+        if known.section != section:
+            section = known.section
+            lines += [f"\n## {section.capitalize()}\n\n", HEADER]
+        lines.append(_row(known))
+    return "".join(lines)
+
+
+def _row(known: Known) -> str:
+    default = known.default
+    if isinstance(default, Path) and default.is_relative_to(MODELS.parent):
+        default = default.relative_to(MODELS.parent)  # where the program is installed is not the reader's business
+    cells = known.name, known.written(default), known.setting.unit, known.range, known.setting.sentence
+    return f"| `{cells[0]}` | `{cells[1]}` | {' | '.join(cells[2:])} |\n"
