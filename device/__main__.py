@@ -36,6 +36,7 @@ EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
   python -m device --simulate --scene scene.toml   the same on another inclusion
   python -m device analyse recording/ press.zip    JSON estimates, one a line
+  python -m device config check                    every problem of the settings files
 """
 
 

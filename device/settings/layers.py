@@ -33,6 +33,17 @@ class Problem:
     def __str__(self) -> str:
         return f"{self.file}: {self.what}"
 
+    def as_record(self) -> dict[str, str]:
+        """Return the problem as JSON object."""
+        what = self.what
+        return {
+            "file": str(self.file),
+            "setting": what.quantity,
+            "value": str(what.value),
+            "bound": what.bound,
+            "hint": what.action,
+        }
+
 
 @dataclass(frozen=True)
 class Layers:

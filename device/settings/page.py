@@ -28,6 +28,10 @@ with every problem of every file, each with file, setting, value, bound and hint
 The simulated probe has settings of its own; `--simulate --config FILE` reads that file alone.
 `--root DIR` takes the files of 2 to 4 from below another folder.
 
+`python -m device config check` prints the problems of these files, or of the files that it is given,
+before the daemon is started;
+`python -m device config show --changed` prints what is not as by default, and which file says so. Both take `--json`.
+
 ## Above all sections
 
 """
