@@ -28,6 +28,7 @@ from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
 from device.settings.command import add_config_command, run_config_command
+from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, read_config, read_layers
 from device.simulation.scenario import Scenario, read_scenario
 from device.web.app import create_app
@@ -78,17 +79,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-def _config(options: argparse.Namespace, scenario: Scenario | None) -> Config:
+def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> StartSettings:
     """Return the settings: those of this machine's files, or the simulated probe's own, or what its one file says."""
     if not scenario:
-        config = read_layers(layer_files(options.root, options.config)).config()
+        settings = start_settings(read_layers(layer_files(options.root, options.config)))
     elif options.config:
-        config = read_config(options.config)
+        settings = start_settings(read_layers([options.config]))
     else:
-        config = simulated_config(scenario.serial)
-    if options.port is not None:
-        config = replace(config, server=replace(config.server, port=options.port))
-    return config
+        settings = StartSettings(simulated_config(scenario.serial))
+    if options.port is None:
+        return settings
+    config = settings.config
+    return replace(settings, config=replace(config, server=replace(config.server, port=options.port)))
 
 
 def _analyse(options: argparse.Namespace) -> int:
@@ -112,12 +114,16 @@ def _serve(options: argparse.Namespace) -> int:
     scenario = None
     if options.simulate:
         scenario = read_scenario(options.scene) if options.scene else Scenario()
-    config = _config(options, scenario)
+    settings = _start_settings(options, scenario)
+    config = settings.config
     listening = _listen(config)
     with listening:
         procedure = open_simulated_probe(config, scenario) if scenario else open_probe(config)
+        if settings.warning:
+            procedure.board.update(warnings=(settings.warning,))
         procedure.start()
         try:
+            settings.keep()
             _run_server(procedure, listening)
         finally:
             procedure.close()

@@ -1,11 +1,12 @@
 """The daemon's errors: each class one fault, each with the code that the screen and the API show.
 
-The hundreds are the part: 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request (E803 and
-E804, a malformed one and an unknown path, are device/web/problems.py's own).
+The hundreds are the part: 0 settings, 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request
+(E803 and E804, a malformed one and an unknown path, are device/web/problems.py's own).
 docs/simulated_probe.md lists how each fault is provoked and seen.
 
 DeviceError
 ├── ConfigError              E001  a setting is missing, unknown or out of its bound
+│   └── LastGoodConfigError  E002  the settings files are bad, the last good ones are used (a warning)
 ├── CameraError              E101  no frame, or a frame of the wrong shape
 │   ├── LateFrameError       E102  the camera leaves out most of its frames
 │   └── TornFrameError       E103  frames are put together from two exposures
@@ -40,6 +41,8 @@ class DeviceError(Exception):
     code = "E000"
     status = 500
     severity: Literal["fault", "warning"] = "fault"
+    is_lasting = False
+    """Whether a warning is true as long as the daemon runs, not of one press only."""
 
     def __init__(self, cause: str, remedy: str) -> None:
         self.cause, self.remedy = cause, remedy
@@ -54,6 +57,14 @@ class ConfigError(DeviceError):
     """A setting is missing, unknown or out of its bound."""
 
     code = "E001"
+
+
+class LastGoodConfigError(ConfigError):
+    """The settings files are bad; the probe runs on those with which it last started well."""
+
+    code = "E002"
+    severity = "warning"
+    is_lasting = True
 
 
 class CameraError(DeviceError):

@@ -161,7 +161,7 @@ class Procedure:
     def _warnings_since_last_press(self) -> tuple[DeviceError, ...]:
         last = self.board.now.press
         told = last.warnings if last else ()
-        return tuple(warning for warning in self.board.now.warnings if warning.as_record() not in told)
+        return tuple(one for one in self.board.now.warnings if one.is_lasting or one.as_record() not in told)
 
     def _new_job(self, mode: Mode) -> PressJob:
         self._capture.cancelled.clear()  # here and not when the job begins: it may be cancelled before that

@@ -41,7 +41,7 @@ class Status:
     """One moment of the procedure.
 
     `wanted_n`: forces at which the press under way still wants frames. `warnings`: those of the last press, or of the
-    time since.
+    time since, and the lasting ones.
     """
 
     step: Step = "starting"

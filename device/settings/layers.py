@@ -60,18 +60,22 @@ class Layers:
     def config(self) -> Config:
         """Return the configuration; raise `ConfigError` with every problem of every file."""
         if self.problems:
-            cause = "\n".join(str(problem) for problem in self.problems)
-            raise ConfigError(cause, "Then start the daemon again.")
+            raise self.refusal()
         return from_table(Config, _nested(self.values))
+
+    def refusal(self, *more: Problem) -> ConfigError:
+        """Return the error that tells all problems of these files, and those beside them."""
+        cause = "\n".join(str(problem) for problem in (*self.problems, *more))
+        return ConfigError(cause, "Then start the daemon again.")
 
 
 def layer_files(root: Path = ROOT, stated: Path | None = None) -> list[Path]:
     """Return the settings files that there are, lowest first; `root` stands for / and `stated` has to be there."""
-    installed = [path for path in (root / VENDOR, root / LOCAL) if _is_there(path)]
+    installed = [path for path in (root / VENDOR, root / LOCAL) if is_there(path)]
     return [*installed, *_drop_ins(root / DROP_INS), *([stated] if stated else [])]
 
 
-def _is_there(path: Path) -> bool:
+def is_there(path: Path) -> bool:
     """Return whether there is something to read, also when it may not be read: then reading says why."""
     try:
         path.lstat()

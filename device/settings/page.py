@@ -23,14 +23,19 @@ Each setting comes from the last of these that sets it:
 4. `/etc/tsis/config.d/*.toml`, in the order of their names,
 5. the file of `--config FILE`.
 
-All of them have to hold, and to fit together, before any is used: else the start is refused
-with every problem of every file, each with file, setting, value, bound and hint.
+All of them have to hold, and to fit together, before any is used: else the start
+is refused with every problem of every file, each with file, setting, value, bound and hint.
 The simulated probe has settings of its own; `--simulate --config FILE` reads that file alone.
 `--root DIR` takes the files of 2 to 4 from below another folder.
 
 `python -m device config check` prints the problems of these files, or of the files that it is given,
 before the daemon is started;
 `python -m device config show --changed` prints what is not as by default, and which file says so. Both take `--json`.
+
+After a start with good files, what they set is kept in `config.last_good.toml` in the data folder.
+When the files are bad at a later start, the daemon starts with that instead: every problem is in its log,
+and warning E002 is on the screen, in the status and with each press and measurement until a start with good files.
+Without last good settings the start is refused.
 
 ## Above all sections
 

@@ -7,9 +7,12 @@ import socket
 import pytest
 from daemon_process import ROOT
 
+from device import __main__ as command_line
 from device.__main__ import main
 from device.measurement.estimate import estimate_recording
 from device.measurement.recording import write_recording
+from device.settings.last_good import NAME
+from device.web.events import snapshot
 
 
 @pytest.fixture
@@ -37,6 +40,14 @@ def models(tmp_path):
         'data = "var"\n'
     )
     return tmp_path / "models"
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """Statuses of the daemons that have started; each ends where it would begin to serve."""
+    statuses = []
+    monkeypatch.setattr(command_line, "_run_server", lambda procedure, listening: statuses.append(snapshot(procedure)))
+    return statuses
 
 
 @pytest.fixture
@@ -84,7 +95,7 @@ def test_an_inclusion_outside_the_table_is_one_sentence(run, tmp_path):
 
 def test_a_setting_out_of_its_bound_is_one_sentence_with_file_and_setting(run, tmp_path):
     (tmp_path / "probe.toml").write_text("[press]\ntarget_n = 99\n")
-    code, _, errors = run("--config", "probe.toml")
+    code, _, errors = run("--root", ".", "--config", "probe.toml")
     assert code == 1
     [line] = errors
     assert line.startswith("probe.toml: press.target_n is 99")
@@ -128,7 +139,7 @@ def test_a_real_probe_lists_every_part_that_failed_at_once(run, models, tmp_path
         (tmp_path / "probe.toml").read_text()
         + f'[light]\nbus = 97\n[camera]\nindex = 97\n[cell]\ndevice = "{tmp_path}/none"\n'
     )
-    code, _, errors = run("--config", "probe.toml", "--port", 0)
+    code, _, errors = run("--root", ".", "--config", "probe.toml", "--port", 0)
     assert code == 1
     assert sorted(line.split()[0] for line in errors) == ["E101", "E201", "E304", "E401"]
     assert any("bus 97" in line for line in errors)
@@ -202,3 +213,25 @@ def test_a_camera_of_ten_bits_is_refused_for_the_daemon(run, models, tmp_path):
     code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")
     assert code == 1
     assert errors == ["E001 sensor.bits is 10, but the daemon's camera takes 8. Set it to 8."]
+
+
+def test_with_bad_settings_the_probe_starts_on_its_last_good_ones_and_warns(run, models, started, tmp_path):
+    good = (tmp_path / "probe.toml").read_text() + "[press]\ntarget_n = 0.51\n"
+    for settings in (good, good.replace("0.51", "99"), good):
+        (tmp_path / "probe.toml").write_text(settings)
+        assert run("--simulate", "--port", 0, "--config", "probe.toml")[0] == 0
+    assert [[fault["code"] for fault in status["faults"]] for status in started] == [[], ["E002"], []]
+    assert [status["target_n"] for status in started] == [0.51] * 3
+    assert started[1]["faults"][0]["severity"] == "warning"
+    assert "press.target_n in probe.toml" in started[1]["faults"][0]["cause"]
+
+
+def test_settings_with_which_the_probe_did_not_start_are_not_kept_as_good(run, models, started, tmp_path):
+    (models / "paper" / "model.json").unlink()
+    assert run("--simulate", "--port", 0, "--config", "probe.toml")[0] == 1
+    assert not (tmp_path / "var" / NAME).exists()
+
+
+def test_without_a_settings_file_the_simulated_probe_keeps_none(run, started, tmp_path):
+    assert run("--simulate", "--port", 0)[0] == 0
+    assert not (tmp_path / "var" / NAME).exists()
