@@ -63,7 +63,7 @@ class LightSection(Section):
 
     prefix = "light."
 
-    bus: int = setting(1, "I2C bus of the LED driver.", Bound(0, 99, ""))
+    bus: int = setting(1, "I2C bus of the LED driver.", Bound(0, 255, ""))
     address: int = setting(0x60, "I2C address of the LED driver.", Bound(0x08, 0x77, ""), base=16)
     ratio: tuple[float, ...] = setting(
         (0.6, 0.6, 0.6, 0.6),

@@ -58,8 +58,8 @@ def setting(default: Any, sentence: str, bound: Bound | None = None, **more: Any
 class Conflict(InvalidQuantity):
     """A value that holds alone but not beside `others`, the full names of the settings it has to fit."""
 
-    def __init__(self, quantity: str, value: object, bound: str, others: tuple[str, ...]) -> None:
-        super().__init__(quantity, value, bound, f"correct it or {' or '.join(others)}")
+    def __init__(self, quantity: str, value: object, bound: str, others: tuple[str, ...], action: str = "") -> None:
+        super().__init__(quantity, value, bound, action or f"correct it or {' or '.join(others)}")
         self.others = others
 
 

@@ -39,7 +39,7 @@ BOUNDS = [
     ("camera.index", 0, 99),
     ("camera.late_frames", 1.5, 100.0),
     ("camera.tear_counts", 0.5, 255.0),
-    ("light.bus", 0, 99),
+    ("light.bus", 0, 255),
     ("light.address", 0x08, 0x77),
     ("light.max_dark_counts", 0.0, 100.0),
     ("light.min_side_ratio", 0.01, 0.9),

@@ -65,6 +65,12 @@ def test_what_does_not_fit_together_names_the_setting_and_those_it_has_to_fit():
     assert str(problem).endswith("at most 50 mm: correct it or tank.height_mm.")
 
 
+def test_what_does_not_fit_together_may_say_better_what_to_do():
+    assert str(Conflict("tank.level_mm", 60, "below the wall", ("tank.height_mm",), "drain it")) == (
+        "tank.level_mm is 60, but must be below the wall: drain it."
+    )
+
+
 def test_settings_that_do_not_hold_alone_are_not_compared():
     [problem] = problems_of(height_mm=5.0)
     assert problem.quantity == "tank.height_mm"
