@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from device.config import Config
 from device.errors import ConfigError
@@ -119,7 +119,12 @@ def read_layers(files: Iterable[Path]) -> Layers:
         held = {name: value for name, value in _flat(table) if name not in _names(wrong)}
         values |= held
         origins |= dict.fromkeys(held, path)
-    problems += _conflict_problems(values, origins, refused=_names(problem.what for problem in problems))
+    refused = _names(problem.what for problem in problems)
+    for conflict in _conflicts(_nested(values)):
+        involved = (conflict.quantity, *conflict.others)
+        if refused.isdisjoint(involved):
+            file = next((origins[name] for name in involved if name in origins), read[-1])
+            problems.append(Problem(file, conflict))
     return Layers(tuple(read), values, origins, tuple(problems))
 
 
@@ -137,27 +142,24 @@ def _names(problems: Iterable[InvalidQuantity]) -> set[str]:
     return {problem.quantity.partition("[")[0] for problem in problems}
 
 
-def _conflict_problems(values: Mapping[str, Any], origins: Mapping[str, Path], refused: set[str]) -> Iterator[Problem]:
-    """Yield what does not fit together, at the file of the first that a file sets; what is refused fits nothing."""
-    for conflict in _conflicts(_nested(values)):
-        involved = (conflict.quantity, *conflict.others)
-        if refused.isdisjoint(involved):
-            yield Problem(next(origins[name] for name in involved if name in origins), conflict)
-
-
 def _conflicts(table: dict[str, Any]) -> Iterator[Conflict]:
-    """Yield what does not fit together inside each section, then between those sections that hold."""
-    for name in list(table):
-        found = _conflicts_of({name: table[name]})
-        if found:
+    """Yield what does not fit together inside each section, then between those that hold."""
+    types, broken = get_type_hints(Config), set()
+    for section, part in table.items():
+        if isinstance(part, Mapping):
+            found = _conflicts_of(types[section], part)
             yield from found
-            del table[name]
-    yield from _conflicts_of(table)
+            broken |= {section} if found else set()
+    held = {name: part for name, part in table.items() if name not in broken}
+    for conflict in _conflicts_of(Config, held):
+        involved = (conflict.quantity, *conflict.others)
+        if broken.isdisjoint(name.partition(".")[0] for name in involved):
+            yield conflict
 
 
-def _conflicts_of(table: Mapping[str, Any]) -> list[Conflict]:
+def _conflicts_of(kind: type, table: Mapping[str, Any]) -> list[Conflict]:
     try:
-        from_table(Config, table)
+        from_table(kind, table)
     except InvalidSettings as error:
         return [problem for problem in error.problems if isinstance(problem, Conflict)]
     return []

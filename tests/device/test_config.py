@@ -188,12 +188,12 @@ def test_a_missing_file_is_refused_by_its_path(tmp_path):
 
 
 def test_two_chips_at_one_address_of_one_bus_are_refused_by_both_names():
-    chips = {"light": LightSection(bus=1, address=0x2A), "cell": LightSection(bus=1, address=0x2A)}
-    with pytest.raises(InvalidQuantity, match=r"^cell\.address is 0x2a, .*correct it or light\.address"):
+    chips = {"light": LightSection(bus=1, address=0x62), "cell": LightSection(bus=1, address=0x62)}
+    with pytest.raises(InvalidQuantity, match=r"^cell\.address is 0x62, .*correct it or light\.address"):
         Config(**chips)
 
 
-@pytest.mark.parametrize("other", [{"bus": 2, "address": 0x2A}, {"bus": 1, "address": 0x2B}])
+@pytest.mark.parametrize("other", [{"bus": 2, "address": 0x62}, {"bus": 1, "address": 0x63}])
 def test_chips_may_share_a_bus_or_an_address(other):
-    chips = {"light": LightSection(bus=1, address=0x2A), "cell": LightSection(**other)}
+    chips = {"light": LightSection(bus=1, address=0x62), "cell": LightSection(**other)}
     assert Config(**chips).cell.bus == other["bus"]

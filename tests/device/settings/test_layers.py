@@ -9,8 +9,10 @@ from hypothesis import HealthCheck, given, settings
 
 from device.config import Config
 from device.errors import ConfigError
+from device.measurement.quantities import Bound
 from device.settings.catalogue import SETTINGS
 from device.settings.layers import DROP_INS, LOCAL, VENDOR, layer_files, read_layers
+from device.settings.setting import conflict
 
 SCALARS = st.one_of(st.integers(-10, 10**6), st.floats(), st.booleans(), st.text(max_size=5), st.just("paper"))
 VALUES = st.one_of(SCALARS, st.lists(SCALARS, max_size=5), st.dictionaries(st.sampled_from(["bus", "x"]), SCALARS))
@@ -99,6 +101,30 @@ def test_what_does_not_fit_together_is_told_for_every_section(write):
     low = write("low.toml", "[press]\ntarget_n = 2.0\n[camera]\nexposure_us = 20000\n")
     high = write("high.toml", "[camera]\nframe_rate_hz = 100\n")
     assert problems_of(low, high) == [(low, "press.overload_n"), (low, "camera.exposure_us")]
+
+
+@pytest.fixture
+def between_sections(monkeypatch):
+    """As if a frame had to be lit by as many milliseconds as the bus has for its number."""
+
+    def conflicts(config):
+        bound = Bound(1, 1000 * config.light.bus, "us, the light's")
+        return conflict("camera.exposure_us", config.camera.exposure_us, bound, "light.bus")
+
+    monkeypatch.setattr(Config, "conflicts", conflicts)
+
+
+def test_sections_are_compared_as_all_files_together_leave_them(write, between_sections):
+    low = write("low.toml", "[light]\nbus = 2\n")
+    high = write("high.toml", "[camera]\nexposure_us = 2000\n")
+    assert read_layers([low, high]).config().camera.exposure_us == 2000
+    assert problems_of(low) == [(low, "camera.exposure_us")]
+
+
+def test_a_section_that_does_not_hold_is_not_compared_with_others(write, between_sections):
+    path = write("a.toml", "[light]\nbus = 2\n[camera]\nexposure_us = 20000\nframe_rate_hz = 100\n")
+    [problem] = read_layers([path]).problems
+    assert problem.what.bound.endswith("one frame")
 
 
 def test_a_default_that_no_longer_fits_is_told_at_the_file_that_changed_the_other_setting(write):
