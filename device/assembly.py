@@ -16,7 +16,7 @@ from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.interfaces import Camera, ForceScale, Lights, LoadCell
-from device.hardware.led_driver import Tlc59116, open_led_driver
+from device.hardware.led_driver import led_driver, open_led_driver
 from device.hardware.load_cell import measure_tare, open_load_cell
 from device.instrument.bench import Bench
 from device.instrument.clock_watch import ClockWatch
@@ -32,9 +32,11 @@ from device.records.disk import Disk
 from device.records.store import Store
 from device.simulation.faults import FaultTimeline
 from device.simulation.full_disk import EmulatedDisk
-from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
+from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
+from device.simulation.pca9685_chip import Pca9685Chip
 from device.simulation.scenario import Scenario
 from device.simulation.serial_line import EmulatedOpenScale
+from device.simulation.tlc59116_chip import Tlc59116Chip
 from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from device.simulation.virtual_request import ExposureRequest
@@ -94,7 +96,7 @@ def _camera_settings(config: Config) -> dict[str, Any]:
 def open_probe(config: Config) -> Procedure:
     """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
     parts = _Parts()
-    lights = parts.open(lambda: open_led_driver(config.light.bus, address=config.light.address))
+    lights = parts.open(lambda: open_led_driver(config.light))
     camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
     cell = parts.open(lambda: open_load_cell(config.cell.device, config.cell.baud))
     return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
@@ -109,7 +111,7 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, config.camera.scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
-    chip = Tlc59116Chip()
+    chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip()
     picam2 = VirtualPicamera2(
         partial(_render, probe, faults),
         width_px=config.camera.width_px,
@@ -125,8 +127,8 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
         faults=faults,
     )
     parts.opened.callback(line.close)
-    bus = EmulatedI2cBus({config.light.address: chip}, faults=faults)
-    lights = parts.open(lambda: Tlc59116(bus, address=config.light.address))
+    bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
+    lights = parts.open(lambda: led_driver(config.light, bus))
     camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
     cell = parts.open(lambda: open_load_cell(line.device_path, config.cell.baud))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)

@@ -14,10 +14,10 @@ from pathlib import Path
 from device.measurement.mode import MODES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.quantities import Bound
 from device.measurement.tactile_image import PixelScale
+from device.settings.light_section import LightSection
 from device.settings.setting import Conflict, Section, conflict, setting
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
-RATIO = Bound(0.01, 0.9, "")
 
 
 @dataclass(frozen=True)
@@ -52,45 +52,6 @@ class CameraSection(Section):
     def scale(self) -> PixelScale:
         """Size of a pixel on the face."""
         return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
-
-
-@dataclass(frozen=True)
-class LightSection(Section):
-    """The LED driver: I2C bus and address, the brightness of the four sides while measuring, and when light is right.
-
-    Lists have one number a side: +x, +y, -x, -y.
-    """
-
-    prefix = "light."
-
-    bus: int = setting(1, "I2C bus of the LED driver.", Bound(0, 255, ""))
-    address: int = setting(0x60, "I2C address of the LED driver.", Bound(0x08, 0x77, ""), base=16)
-    ratio: tuple[float, ...] = setting(
-        (0.6, 0.6, 0.6, 0.6),
-        "Brightness of each side while measuring.",
-        Bound(0.0, 1.0, "", low_included=False),
-        count=4,
-    )
-    max_dark_counts: float = setting(
-        12.0,
-        "Mean of a frame without light, black level included, above which something shines.",
-        Bound(0.0, 100.0, "counts"),
-    )
-    min_side_ratio: float = setting(
-        0.3, "A side that alone gives less than this part of the brightest one's light is dark.", RATIO
-    )
-    max_dimming_ratio: float = setting(
-        0.07, "Loss of a side's light, against commissioning or the first presses, that is warned of.", RATIO
-    )
-    commissioned_counts: tuple[float, ...] | None = setting(
-        None,
-        "Mean counts above dark at the target force of each side alone at full brightness.",
-        Bound(1.0, 255.0, "counts"),
-        count=4,
-    )
-    min_contrast_ratio: float = setting(
-        0.3, "How much of a press's light must have come with the force; gel and sweat leave less.", RATIO
-    )
 
 
 @dataclass(frozen=True)
@@ -201,13 +162,13 @@ class Config(Section):
     server: ServerSection = field(default_factory=ServerSection)
 
     def conflicts(self) -> Iterator[Conflict]:
-        """Yield a chip that has the bus and address of another."""
-        sections = {name: vars(part) for name, part in vars(self).items() if isinstance(part, Section)}
-        chips = {name: part for name, part in sections.items() if {"bus", "address"} <= set(part)}
+        """Yield an exposure that the light does not allow, and a chip that has the bus and address of another."""
+        yield from self.light.exposure_conflicts(self.camera.exposure_us, 1e6 / self.camera.frame_rate_hz)
+        chips = {name: part for name, part in vars(self).items() if hasattr(part, "chip_address")}
         for (other, theirs), (name, ours) in combinations(chips.items(), 2):
-            if (ours["bus"], ours["address"]) == (theirs["bus"], theirs["address"]):
+            if (ours.bus, ours.chip_address) == (theirs.bus, theirs.chip_address):
                 bound = f"another than that of {other} on the same bus"
-                yield Conflict(f"{name}.address", hex(ours["address"]), bound, (f"{other}.address",))
+                yield Conflict(f"{name}.address", hex(ours.chip_address), bound, (f"{other}.address",))
 
 
 SIMULATED: dict[str, tuple[str, Mode]] = {

@@ -40,7 +40,9 @@ BOUNDS = [
     ("camera.late_frames", 1.5, 100.0),
     ("camera.tear_counts", 0.5, 255.0),
     ("light.bus", 0, 255),
-    ("light.address", 0x08, 0x77),
+    ("light.address", 0x60, 0x6F),
+    ("light.pwm_hz", 24.0, 1526.0),
+    ("light.oscillator_hz", 20e6, 30e6),
     ("light.max_dark_counts", 0.0, 100.0),
     ("light.min_side_ratio", 0.01, 0.9),
     ("light.max_dimming_ratio", 0.01, 0.9),
@@ -155,6 +157,35 @@ def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
         CameraSection(frame_rate_hz=100.0, exposure_us=10_001)
 
 
+def test_a_pca9685_has_the_address_of_the_common_board_unless_given():
+    assert LightSection(chip="pca9685").chip_address == 0x40
+    assert LightSection(chip="pca9685", address=0x41).chip_address == 0x41
+
+
+def test_an_exposure_of_whole_periods_of_the_pca9685_is_taken_and_any_other_refused_with_the_nearest(read):
+    assert read('[light]\nchip = "pca9685"\n[camera]\nexposure_us = 3932\n').camera.exposure_us == 3932
+    with pytest.raises(ConfigError, match=r"camera\.exposure_us is 4000, .* periods of 655\.36 us: set .*, 3932\."):
+        read('[light]\nchip = "pca9685"\n')
+
+
+def test_the_period_is_that_of_the_oscillator_as_measured(read):
+    """6 periods at 25.6 MHz are 3840 us."""
+    settings = '[light]\nchip = "pca9685"\noscillator_hz = 25.6e6\n[camera]\nexposure_us = '
+    assert read(settings + "3840\n").light.pwm_clock.period_us == pytest.approx(640.0)
+    with pytest.raises(ConfigError, match=r"set the nearest one, 3840\."):
+        read(settings + "3932\n")
+
+
+def test_a_period_longer_than_a_frame_is_refused(read):
+    with pytest.raises(ConfigError, match=r"light\.pwm_hz is 24, .* fits into a frame of 33333 us"):
+        read('[light]\nchip = "pca9685"\npwm_hz = 24\n')
+
+
+def test_a_tlc59116_takes_any_exposure(read):
+    """At 97 kHz any exposure sees hundreds of periods."""
+    assert read("[camera]\nexposure_us = 4001\n").camera.exposure_us == 4001
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -162,6 +193,11 @@ def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
         ("[pres]\ntarget_n = 0.5\n", "did you mean press"),
         ("[camera]\nwidth_px = 768.0\n", r"camera\.width_px is 768\.0, but must be of type int"),
         ("[camera]\nmm_per_px_x = 0.0\n", "mm_per_px_x is 0"),
+        ('[light]\nchip = "tlc59108"\n', r"light\.chip is 'tlc59108', but must be one of tlc59116, pca9685"),
+        ("[light]\nchip = []\n", r"light\.chip is \[\]"),
+        ("[light]\naddress = 0x68\n", r"light\.address is 0x68, but must be not one that every tlc59116 answers at"),
+        ("[light]\naddress = 0x40\n", r"light\.address is 64, but must be at least 96 and at most 111 of a tlc59116"),
+        ('[light]\nchip = "pca9685"\naddress = 0x70\n', r"light\.address is 0x70, .*every pca9685"),
         ("[light]\nratio = [0.6, 0.6, 0.6]\n", r"light\.ratio is .*4 numbers"),
         ("[light]\nratio = 0.6\n", r"light\.ratio is 0\.6, but must be of type list"),
         ("[light]\nratio = [0.6, 0.6, 0.6, 0.0]\n", r"light\.ratio is 0\.0, but must be above 0"),
@@ -187,9 +223,10 @@ def test_a_missing_file_is_refused_by_its_path(tmp_path):
         read_config(tmp_path / "none.toml")
 
 
-def test_two_chips_at_one_address_of_one_bus_are_refused_by_both_names():
-    chips = {"light": LightSection(bus=1, address=0x62), "cell": LightSection(bus=1, address=0x62)}
-    with pytest.raises(InvalidQuantity, match=r"^cell\.address is 0x62, .*correct it or light\.address"):
+@pytest.mark.parametrize("address", [0x60, None])
+def test_two_chips_at_one_address_of_one_bus_are_refused_by_both_names(address):
+    chips = {"light": LightSection(bus=1, address=0x60), "cell": LightSection(bus=1, address=address)}
+    with pytest.raises(InvalidQuantity, match=r"^cell\.address is 0x60, .*correct it or light\.address"):
         Config(**chips)
 
 

@@ -19,7 +19,7 @@ from daemon_process import ROOT
 
 from device import errors
 from device.assembly import open_simulated_probe
-from device.config import CameraSection, PressSection, simulated_config
+from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError
 from device.instrument import bench, force_recorder, procedure
 from device.instrument.procedure import Procedure
@@ -70,7 +70,7 @@ class Device:
 
 
 @pytest.fixture
-def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Scenario], object]:
+def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., object]:
     monkeypatch.setattr(bench, "FRAME_TIMEOUT_S", TIME_RATIO * bench.FRAME_TIMEOUT_S)
     monkeypatch.setattr(force_recorder, "SILENCE_S", TIME_RATIO * force_recorder.SILENCE_S)
     monkeypatch.setattr(procedure, "AFTER_FAULT_S", 0.1)
@@ -78,12 +78,12 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Scenar
     config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
     @contextmanager
-    def run(scenario: Scenario) -> Iterator[Device]:
+    def run(scenario: Scenario, **settings: object) -> Iterator[Device]:
         faults = tuple(
             replace(fault, from_s=TIME_RATIO * fault.from_s, until_s=TIME_RATIO * fault.until_s)
             for fault in scenario.faults
         )
-        opened = open_simulated_probe(config, replace(scenario, hand=QUICK_HAND, faults=faults))
+        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=QUICK_HAND, faults=faults))
         opened.start()
         try:
             yield Device(opened)
@@ -140,3 +140,12 @@ def test_the_fault_in_the_document_is_one():
     page = (ROOT / "docs" / "simulated_probe.md").read_text(encoding="utf-8")
     [example] = [text for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "[[faults]]" in text]
     assert from_table(Scenario, tomllib.loads(example)).faults == (Fault("led_dead", 0.0, 4.0, 1, "+x"),)
+
+
+def test_a_probe_with_the_other_led_chip_measures_without_a_fault(running):
+    """Six periods of the PCA9685 are 3932 us."""
+    pca9685 = {"light": LightSection(chip="pca9685"), "camera": CameraSection(frame_rate_hz=60.0, exposure_us=3932)}
+    with running(Scenario(), **pca9685) as device:
+        device.press()
+        assert device.board.now.press.state == "done"
+        assert device.codes() == set()

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera, open_camera
-from device.hardware.led_driver import Tlc59116
+from device.hardware.tlc59116 import Tlc59116
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.led_chip import EmulatedI2cBus, LedRatio, Tlc59116Chip
+from device.measurement.tactile_image import LedRatio
+from device.simulation.i2c_bus import EmulatedI2cBus
+from device.simulation.tlc59116_chip import Tlc59116Chip
 from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_request import ExposureRequest
 

@@ -1,153 +1,31 @@
-"""The LED driver as a transcript of I2C bytes, against the emulated chip."""
+"""Which chip the settings open, and what a missing bus says."""
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
+from device.config import LightSection
 from device.errors import LightError
-from device.hardware.led_driver import Tlc59116, open_led_driver
-from device.measurement.quantities import InvalidQuantity
-from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
-
-
-@pytest.fixture
-def chip() -> Tlc59116Chip:
-    return Tlc59116Chip()
-
-
-@pytest.fixture
-def bus(chip: Tlc59116Chip) -> EmulatedI2cBus:
-    return EmulatedI2cBus({0x60: chip})
-
-
-@pytest.fixture
-def lights(bus: EmulatedI2cBus) -> Tlc59116:
-    lights = Tlc59116(bus)
-    bus.log.clear()
-    return lights
-
-
-def written(bus: EmulatedI2cBus) -> list[str]:
-    return [data.hex(" ") for _address, data in bus.log]
-
-
-def test_start_wakes_the_oscillator_darkens_every_output_then_enables_the_four_sides(chip, bus):
-    Tlc59116(bus)
-    assert written(bus) == [
-        "00 00",
-        "a2" + " 00" * 16,
-        "94 aa 00 00 00",
-        "94",
-    ]
-    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
-
-
-def test_four_sides_change_in_one_transaction_and_are_read_back(chip, bus, lights):
-    """0.6 * 255 = 153 = 0x99, 0.2 * 255 = 51 = 0x33."""
-    lights.set_ratio((0.6, 0.0, 1.0, 0.2))
-    assert written(bus) == ["a2 99 00 ff 33", "80"]
-    assert chip.led_ratio() == (0.6, 0.0, 1.0, 0.2)
-
-
-def test_acknowledged_time_is_not_before_the_light_changed(chip, lights):
-    before_s = time.monotonic()
-    acknowledged_s = lights.set_ratio((1.0, 1.0, 1.0, 1.0))
-    assert before_s <= acknowledged_s <= time.monotonic()
-    assert chip.ratio_at(acknowledged_s) == (1.0, 1.0, 1.0, 1.0)
-    assert chip.ratio_at(before_s) == (0.0, 0.0, 0.0, 0.0)
-
-
-def test_close_darkens_all_sides_before_it_releases_the_bus(chip, bus, lights):
-    lights.set_ratio((1.0, 1.0, 1.0, 1.0))
-    bus.log.clear()
-    lights.close()
-    assert written(bus) == ["a2 00 00 00 00", "80"]
-    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
-    assert bus.is_closed
-
-
-def test_close_releases_the_bus_even_when_the_chip_is_gone(chip, bus, lights):
-    chip.nacks_to_come = 1
-    with pytest.raises(LightError):
-        lights.close()
-    assert bus.is_closed
+from device.hardware.led_driver import led_driver, open_led_driver
+from device.simulation.i2c_bus import EmulatedI2cBus
+from device.simulation.pca9685_chip import Pca9685Chip
+from device.simulation.tlc59116_chip import Tlc59116Chip
 
 
 @pytest.mark.parametrize(
-    ("ratio", "named"),
+    ("light", "address", "chip"),
     [
-        ((0.5, 1.2, 0.0, 0.0), r"led_ratio\[1\] is 1.2"),
-        ((-0.1, 0.0, 0.0, 0.0), r"led_ratio\[0\] is -0.1"),
-        ((0.0, 0.0, 0.0, float("nan")), r"led_ratio\[3\] is nan"),
-        ((0.5, 0.5, 0.5), "4 numbers"),
+        (LightSection(), 0x60, Tlc59116Chip()),
+        (LightSection(address=0x63), 0x63, Tlc59116Chip()),
+        (LightSection(chip="pca9685"), 0x40, Pca9685Chip()),
+        (LightSection(chip="pca9685", address=0x60), 0x60, Pca9685Chip()),
     ],
 )
-def test_a_ratio_out_of_bounds_never_reaches_the_bus(bus, lights, ratio, named):
-    with pytest.raises(InvalidQuantity, match=named):
-        lights.set_ratio(ratio)
-    assert written(bus) == []
-
-
-def test_a_nack_is_a_light_error_with_address_and_errno_and_the_next_set_works(chip, lights):
-    chip.nacks_to_come = 1
-    with pytest.raises(LightError, match=r"0x60 does not answer: Remote I/O error \(errno 121\)"):
-        lights.set_ratio((1.0, 0.0, 0.0, 0.0))
-    lights.set_ratio((1.0, 0.0, 0.0, 0.0))
-    assert chip.led_ratio() == (1.0, 0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(("number", "code"), [(110, "E202"), (16, "E202"), (11, "E202"), (121, "E201"), (5, "E201")])
-def test_a_stuck_bus_is_told_from_a_chip_that_does_not_answer(bus, lights, monkeypatch, number, code):
-    """ETIMEDOUT, EBUSY and EAGAIN are the bus; EREMOTEIO and EIO are the chip."""
-
-    def fail(*_messages):
-        raise OSError(number, "I2C")
-
-    monkeypatch.setattr(bus, "i2c_rdwr", fail)
-    with pytest.raises(LightError, match=f"errno {number}") as error:
-        lights.set_ratio((1.0, 0.0, 0.0, 0.0))
-    assert error.value.code == code
-
-
-class ChipWithStuckRegister(Tlc59116Chip):
-    """Register `stuck` always reads 0."""
-
-    stuck = 0x03
-
-    def read(self, count: int) -> bytes:
-        self._registers[self.stuck] = 0
-        return super().read(count)
-
-
-def test_brightness_that_the_chip_does_not_hold_is_a_light_error():
-    lights = Tlc59116(EmulatedI2cBus({0x60: ChipWithStuckRegister()}))
-    with pytest.raises(LightError, match=r"holds brightness \[255, 0, 255, 255\] instead of \[255, 255, 255, 255\]"):
-        lights.set_ratio((1.0, 1.0, 1.0, 1.0))
-
-
-def test_output_modes_that_the_chip_does_not_hold_are_refused_at_start():
-    chip = ChipWithStuckRegister()
-    chip.stuck = 0x14
-    with pytest.raises(LightError, match="holds output modes"):
-        Tlc59116(EmulatedI2cBus({0x60: chip}))
-
-
-def test_a_chip_that_lost_its_supply_is_noticed_although_it_holds_the_brightness(chip, lights):
-    chip.power_on()
-    with pytest.raises(LightError, match="had lost its set-up"):
-        lights.set_ratio((1.0, 1.0, 1.0, 1.0))
-    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
-    lights.set_ratio((1.0, 1.0, 1.0, 1.0))  # set up again, it lights again
-    assert chip.led_ratio() == (1.0, 1.0, 1.0, 1.0)
-
-
-def test_a_chip_at_another_address_is_a_light_error(bus):
-    with pytest.raises(LightError, match="0x61 does not answer"):
-        Tlc59116(bus, address=0x61)
+def test_the_chip_of_the_settings_is_driven_at_its_address(light, address, chip):
+    led_driver(light, EmulatedI2cBus({address: chip})).set_ratio((1.0, 0.0, 0.0, 1.0))
+    assert chip.led_ratio() == (1.0, 0.0, 0.0, 1.0)
 
 
 def test_a_missing_bus_is_a_light_error_naming_it():
-    with pytest.raises(LightError, match=r"I2C bus 987 cannot be opened: No such file or directory \(errno 2\)"):
-        open_led_driver(987)
+    with pytest.raises(LightError, match=r"I2C bus 254 cannot be opened: No such file or directory \(errno 2\)"):
+        open_led_driver(LightSection(bus=254))

@@ -1,4 +1,4 @@
-"""The emulated LED chip: registers in, light out, as its datasheet says."""
+"""The emulated TLC59116 and its bus: registers in, light out, as its datasheet says."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import pytest
 from smbus2 import i2c_msg
 
 from device.simulation.faults import Fault, FaultTimeline
-from device.simulation.led_chip import EmulatedI2cBus, Tlc59116Chip
+from device.simulation.i2c_bus import EmulatedI2cBus
+from device.simulation.tlc59116_chip import Tlc59116Chip
 
 DARK = (0.0, 0.0, 0.0, 0.0)
 

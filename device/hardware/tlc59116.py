@@ -1,0 +1,85 @@
+"""Brightness of the four sides to registers of a TLC59116, every write read back.
+
+Easy to get wrong: after a drop of its supply the chip still acknowledges and holds brightness values, but its
+oscillator sleeps and it stays dark; so the read-back covers MODE1 as well.
+Source: Texas Instruments TLC59116 datasheet SLDS157E, section 9.5 "Register Maps".
+"""
+
+from __future__ import annotations
+
+import time
+from enum import IntEnum
+
+from device.errors import LightError
+from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
+from device.hardware.interfaces import LED_COUNT
+from device.measurement.tactile_image import LedRatio
+
+
+class Register(IntEnum):
+    """Addresses of the registers used here (datasheet 9.5.1, 9.5.3, 9.5.6, 9.5.7)."""
+
+    MODE1 = 0x00
+    PWM0 = 0x02
+    LEDOUT0 = 0x14
+    SUBADR1 = 0x18
+
+
+AUTO_INCREMENT_ALL = 0x80
+"""Control register (9.5.11): step through all registers."""
+AUTO_INCREMENT_PWM = 0xA0
+"""Control register (9.5.11): step through the individual brightness registers."""
+OSCILLATOR_OFF = 0x10
+"""OSC bit of MODE1 (9.5.1): set after power-on, and then every output is dark."""
+OSCILLATOR_START_S = 0.0005
+"""Outputs are not guaranteed until the oscillator has run this long (9.5.1, note)."""
+PWM_CHANNELS = 16
+SIDES_IN_PWM_MODE = (0b10_10_10_10, 0, 0, 0)
+"""LEDOUT0..3 (9.5.6): outputs 0-3 follow their own brightness register, outputs 4-15 are off."""
+IDENTITY = (0xD2, 0xD4, 0xD8, 0xD0)
+"""SUBADR1..3 and ALLCALLADR after power-on (9.5.7, 9.5.8); nothing here writes them."""
+FULL_SCALE = 255
+
+
+class Tlc59116:
+    """The four sides (+x, +y, -x, -y) on outputs 0-3 of one TLC59116. Implements `Lights`."""
+
+    def __init__(self, bus: I2cBus, *, address: int = 0x60) -> None:
+        """Start the chip with all sides dark; raise `LightError` when it does not answer or hold its set-up."""
+        self._chip = I2cChip(bus, address)
+        self._set_up()
+
+    def _set_up(self) -> None:
+        self._chip.write(Register.MODE1, [0])
+        time.sleep(OSCILLATOR_START_S)
+        # Brightness before output mode: whatever the registers held, no side flashes.
+        self._chip.write(AUTO_INCREMENT_PWM | Register.PWM0, [0] * PWM_CHANNELS)
+        self._chip.write(AUTO_INCREMENT_ALL | Register.LEDOUT0, SIDES_IN_PWM_MODE)
+        self._chip.require_identity("TLC59116", AUTO_INCREMENT_ALL | Register.SUBADR1, IDENTITY)
+        held = self._chip.read(AUTO_INCREMENT_ALL | Register.LEDOUT0, len(SIDES_IN_PWM_MODE))
+        self._chip.require_held("output modes", SIDES_IN_PWM_MODE, held)
+
+    def set_ratio(self, ratio: LedRatio) -> float:
+        """Set the four sides (each 0..1 of full scale) at one instant; return when they changed (s, monotonic).
+
+        Outputs change together at the STOP of the write (9.5.2, OCH = 0), which ends before the returned time.
+        Raises `InvalidQuantity` before the bus is touched, `LightError` when the chip does not answer or hold it,
+        `LightBusError` when the bus is stuck.
+        """
+        pwm = brightness_counts(ratio, FULL_SCALE)
+        self._chip.write(AUTO_INCREMENT_PWM | Register.PWM0, pwm)
+        acknowledged_s = time.monotonic()
+        mode1, _mode2, *held = self._chip.read(AUTO_INCREMENT_ALL | Register.MODE1, Register.PWM0 + LED_COUNT)
+        if mode1 & OSCILLATOR_OFF:
+            self._set_up()
+            cause = f"LED chip {self._chip.address:#04x} had lost its set-up: its supply has dipped."
+            raise LightError(cause, REMEDY)
+        self._chip.require_held("brightness", pwm, held)
+        return acknowledged_s
+
+    def close(self) -> None:
+        """Darken all sides and release the bus, also when darkening fails (`LightError`)."""
+        try:
+            self.set_ratio((0.0, 0.0, 0.0, 0.0))
+        finally:
+            self._chip.close()
