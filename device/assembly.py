@@ -111,7 +111,7 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, config.camera.scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
-    chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip()
+    chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
     picam2 = VirtualPicamera2(
         partial(_render, probe, faults),
         width_px=config.camera.width_px,

@@ -15,7 +15,9 @@ DeviceError
 │   ├── DarkSideError        E203  a side gives no light although its register is set
 │   ├── StuckLightError      E204  a side cannot be switched off
 │   ├── AmbientLightError    E205  foreign light reaches the camera
-│   └── DimLightError        E206  a side is dimmer than it was (a warning)
+│   ├── DimLightError        E206  a side is dimmer than it was (a warning)
+│   ├── OpenLedError         E207  no current flows through the LED of a side
+│   └── HotLedDriverError    E208  the LED chip is too hot, or no side is connected
 ├── LoadCellError            E301  no force
 │   ├── UnreadableCellError  E302  lines come, but none that can be read
 │   ├── SaturatedCellError   E303  the amplifier is at the end of its range
@@ -122,6 +124,18 @@ class DimLightError(LightError):
 
     code = "E206"
     severity = "warning"
+
+
+class OpenLedError(LightError):
+    """No current flows through the LED of a side although its output is on."""
+
+    code = "E207"
+
+
+class HotLedDriverError(LightError):
+    """The LED chip has switched off because it is too hot, or none of the sides is connected."""
+
+    code = "E208"
 
 
 class LoadCellError(DeviceError):

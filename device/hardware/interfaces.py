@@ -53,6 +53,9 @@ class Lights(Protocol):
     def set_ratio(self, ratio: LedRatio) -> float:
         """Set all four sides in one transaction; return the time (s) at which the chip acknowledged it."""
 
+    def check_outputs(self) -> None:
+        """Raise `OpenLedError` or `HotLedDriverError` when the chip can tell that current does not flow; end dark."""
+
     def close(self) -> None:
         """Switch all sides off and release the bus."""
 

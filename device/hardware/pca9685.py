@@ -88,6 +88,9 @@ class Pca9685:
         self._chip.require_held("brightness", outputs, rest[Register.LED0_ON_L - 1 :])
         return acknowledged_s + 1e-6 * self._clock.period_us
 
+    def check_outputs(self) -> None:
+        """Do nothing: this chip does not measure the current of its outputs."""
+
     def close(self) -> None:
         """Darken all outputs and release the bus, also when darkening fails (`LightError`)."""
         try:

@@ -1,7 +1,8 @@
 """Brightness of the four sides to registers of a TLC59116, every write read back.
 
 Easy to get wrong: after a drop of its supply the chip still acknowledges and holds brightness values, but its
-oscillator sleeps and it stays dark; so the read-back covers MODE1 as well.
+oscillator sleeps and it stays dark; so the read-back covers MODE1 as well. An error flag of 0 is the error: tables 1
+and 2 say so and parts behave so (TI E2E forum 467320), the text of 9.5.10 says the opposite.
 Source: Texas Instruments TLC59116 datasheet SLDS157E, section 9.5 "Register Maps".
 """
 
@@ -10,19 +11,21 @@ from __future__ import annotations
 import time
 from enum import IntEnum
 
-from device.errors import LightError
+from device.errors import HotLedDriverError, LightError, OpenLedError
 from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
 from device.hardware.interfaces import LED_COUNT
-from device.measurement.tactile_image import LedRatio
+from device.measurement.tactile_image import SIDES, LedRatio
 
 
 class Register(IntEnum):
-    """Addresses of the registers used here (datasheet 9.5.1, 9.5.3, 9.5.6, 9.5.7)."""
+    """Addresses of the registers used here (datasheet 9.5.1-9.5.3, 9.5.6, 9.5.7, 9.5.10)."""
 
     MODE1 = 0x00
+    MODE2 = 0x01
     PWM0 = 0x02
     LEDOUT0 = 0x14
     SUBADR1 = 0x18
+    EFLAG1 = 0x1D
 
 
 AUTO_INCREMENT_ALL = 0x80
@@ -36,6 +39,12 @@ OSCILLATOR_START_S = 0.0005
 PWM_CHANNELS = 16
 SIDES_IN_PWM_MODE = (0b10_10_10_10, 0, 0, 0)
 """LEDOUT0..3 (9.5.6): outputs 0-3 follow their own brightness register, outputs 4-15 are off."""
+SIDES_FULLY_ON = 0b01_01_01_01
+"""LEDOUT0 (9.5.6): an open circuit is only detected at an output that is on without PWM (9.3.1)."""
+CLEAR_ERRORS = 0x80
+"""EFCLR bit of MODE2 (9.5.2): forgets that the chip was too hot; 0 lets it notice again (9.3.2)."""
+FLAGS_SETTLE_S = 0.001
+"""The datasheet gives no time for the flags; this is a hundred PWM periods."""
 IDENTITY = (0xD2, 0xD4, 0xD8, 0xD0)
 """SUBADR1..3 and ALLCALLADR after power-on (9.5.7, 9.5.8); nothing here writes them."""
 FULL_SCALE = 255
@@ -76,6 +85,35 @@ class Tlc59116:
             raise LightError(cause, REMEDY)
         self._chip.require_held("brightness", pwm, held)
         return acknowledged_s
+
+    def check_outputs(self) -> None:
+        """Light all sides fully for some milliseconds, and end dark; the chip tells where no current flows.
+
+        Raises `OpenLedError` naming the sides; `HotLedDriverError` when the flags come back once they are cleared, or
+        when no side has current: overheating switches all off (9.3.2). Raises `LightError` as `set_ratio` does.
+        """
+        self.set_ratio((0.0, 0.0, 0.0, 0.0))
+        before = self._sides_without_current()
+        if not before:
+            return
+        self._chip.write(Register.MODE2, [CLEAR_ERRORS])
+        self._chip.write(Register.MODE2, [0])
+        still = self._sides_without_current()
+        if len(still) in (0, LED_COUNT):
+            cause = f"LED chip {self._chip.address:#04x} had switched off {' and '.join(before)}: it is too hot"
+            cause += "." if not still else ", or the LEDs are not connected."
+            raise HotLedDriverError(cause, "Let the probe cool down; if it stays, check the LED board's cable.")
+        cause = f"No current flows through the LED at {' and '.join(still)}: its circuit is open."
+        raise OpenLedError(cause, "Check the LED board's cable; have the LED replaced.")
+
+    def _sides_without_current(self) -> list[str]:
+        self._chip.write(Register.LEDOUT0, [SIDES_FULLY_ON])
+        try:
+            time.sleep(FLAGS_SETTLE_S)
+            [flags] = self._chip.read(Register.EFLAG1, 1)
+        finally:
+            self._chip.write(Register.LEDOUT0, SIDES_IN_PWM_MODE[:1])
+        return [side for number, side in enumerate(SIDES) if not flags >> number & 1]
 
     def close(self) -> None:
         """Darken all sides and release the bus, also when darkening fails (`LightError`)."""

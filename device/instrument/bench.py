@@ -38,6 +38,11 @@ class Bench:
             self._not_before_s = self.lights.set_ratio(ratio)
             self._light = ratio
 
+    def check_lights(self) -> None:
+        """Raise `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not flow; ends dark."""
+        self._not_before_s = 0.0
+        self.lights.check_outputs()
+
     def take(self, role: Role) -> Frame:
         """Return the next frame under the present light, with the force in the middle of its exposure.
 

@@ -53,11 +53,13 @@ class Capture:
     def unloaded(self) -> list[Frame]:
         """Return dark and lit frames of the untouched probe; waits until it is untouched.
 
-        Raises `StuckLightError` or `AmbientLightError` when the dark ones are not dark.
+        Raises `StuckLightError` or `AmbientLightError` when the dark ones are not dark, `OpenLedError` or
+        `HotLedDriverError` when the LED chip says that current does not flow.
         """
         self.bench.light(DARK)
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
             time.sleep(POLL_S)
+        self.bench.check_lights()
         dark = self._agreeing("dark", DARK)
         require_dark(dark[-1], self.light.max_dark_counts)
         self._dark_counts = level_counts(dark[-1])
@@ -69,10 +71,11 @@ class Capture:
         """Return the frames of one press, as many as the mode needs.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
-        depend on it.
+        depend on it, `OpenLedError` or `HotLedDriverError` when the light fails before it.
         """
         wanted, begin = self._wanted(role, mode), before_contact(role, mode)
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
+        self.bench.check_lights()
         self.bench.light(self.lit)
         last_contact_s = time.monotonic()
         while not wanted.is_complete:

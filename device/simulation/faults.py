@@ -25,6 +25,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "led_dead": ("side",),
     "led_stuck_on": ("side",),
     "led_dimmed": ("side", "ratio"),
+    "led_open": ("side",),
+    "led_driver_hot": (),
     "ambient_light": ("ratio",),
     "wet_face": ("ratio",),
     "cell_silent": (),
@@ -36,7 +38,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 }
 """Every kind of fault, and what it takes besides its times."""
 
-REQUIRED = {"led_dead": ("side",), "led_stuck_on": ("side",), "clock_jump": ("step_s",)}
+REQUIRED = {"led_dead": ("side",), "led_stuck_on": ("side",), "led_open": ("side",), "clock_jump": ("step_s",)}
 DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0}
 I2C_ERRNO = {"i2c_nack": 121, "i2c_stuck": errno.ETIMEDOUT}
 """What Linux answers: EREMOTEIO (121; macOS does not name it) for no acknowledgement, ETIMEDOUT for a line held low."""
@@ -110,6 +112,10 @@ class FaultTimeline:
         """Return whether a fault of that kind is there at a time (s, monotonic), now unless given."""
         return next(self._active(kind, self._clock() if t_s is None else t_s), None) is not None
 
+    def is_open(self, side: str) -> bool:
+        """Return whether the circuit of a side's LED is open now."""
+        return any(fault.side == side for fault in self._active("led_open", self._clock()))
+
     def led_output(self, ratio: LedRatio, t_s: float) -> LedRatio:
         """Return the light of the four sides when the chip's outputs ask for `ratio`: 0..1 of full light."""
         light = list(ratio)
@@ -149,6 +155,8 @@ LIGHT_FAULTS: dict[str, Callable[[float, Fault], float]] = {
     "led_dimmed": lambda light, fault: light * fault.strength,
     "led_dead": lambda light, fault: 0.0,
     "led_stuck_on": lambda light, fault: 1.0,
+    "led_open": lambda light, fault: 0.0,
+    "led_driver_hot": lambda light, fault: 0.0,
 }
 """What each fault of an LED makes of its output's light."""
 

@@ -6,9 +6,10 @@ import time
 
 import pytest
 
-from device.errors import LightError
+from device.errors import HotLedDriverError, LightError, OpenLedError
 from device.hardware.tlc59116 import Tlc59116
 from device.measurement.quantities import InvalidQuantity
+from device.simulation.faults import Fault, FaultTimeline
 from device.simulation.i2c_bus import EmulatedI2cBus
 from device.simulation.pca9685_chip import Pca9685Chip
 from device.simulation.tlc59116_chip import Tlc59116Chip
@@ -181,3 +182,61 @@ def test_two_devices_on_one_address_are_refused_and_the_chip_is_dark(chip):
 def test_a_chip_of_another_kind_is_refused():
     with pytest.raises(LightError, match="At 0x60 is no TLC59116"):
         Tlc59116(EmulatedI2cBus({0x60: Pca9685Chip()}))
+
+
+def with_faults(*faults: Fault, clock=time.monotonic) -> tuple[Tlc59116, EmulatedI2cBus, Tlc59116Chip]:
+    chip = Tlc59116Chip(faults=FaultTimeline(faults, clock=clock))
+    bus = EmulatedI2cBus({0x60: chip})
+    lights = Tlc59116(bus)
+    bus.log.clear()
+    return lights, bus, chip
+
+
+def test_the_currents_are_checked_with_all_sides_fully_on_and_the_check_ends_dark():
+    lights, bus, chip = with_faults()
+    lights.set_ratio((0.6, 0.6, 0.6, 0.6))
+    bus.log.clear()
+    lights.check_outputs()
+    assert written(bus) == ["a2 00 00 00 00", "80", "14 55", "1d", "14 aa"]
+    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_sides_without_current_are_named_after_the_flags_were_cleared_once():
+    lights, bus, chip = with_faults(Fault("led_open", side="+y"), Fault("led_open", side="-y"))
+    with pytest.raises(OpenLedError, match=r"No current flows through the LED at \+y and -y"):
+        lights.check_outputs()
+    assert written(bus)[2:] == ["14 55", "1d", "14 aa", "01 80", "01 00", "14 55", "1d", "14 aa"]
+    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_chip_that_stays_hot_has_no_current_at_any_side():
+    with pytest.raises(HotLedDriverError, match="too hot, or the LEDs are not connected"):
+        with_faults(Fault("led_driver_hot"))[0].check_outputs()
+
+
+def test_a_chip_that_has_cooled_down_still_says_that_it_was_hot_once():
+    """It is hot at 1 s only: the flags it set then go away when they are cleared."""
+    now_s = [0.0]
+    lights, _, chip = with_faults(Fault("led_driver_hot", from_s=1.0, until_s=2.0), clock=lambda: now_s[0])
+    now_s[0] = 1.0
+    chip.read(1)
+    now_s[0] = 3.0
+    with pytest.raises(HotLedDriverError, match=r"had switched off \+x and \+y and -x and -y: it is too hot\."):
+        lights.check_outputs()
+    lights.check_outputs()
+
+
+def test_a_check_that_fails_on_the_bus_leaves_no_side_fully_on():
+    """The read of the flags is not acknowledged; the write of the output modes after it is."""
+    lights, bus, chip = with_faults()
+    carry = bus.i2c_rdwr
+
+    def fail_on_flags(*messages):
+        if bytes(messages[0].buf[:1]) == b"\x1d":
+            raise OSError(121, "Remote I/O error")
+        carry(*messages)
+
+    bus.i2c_rdwr = fail_on_flags
+    with pytest.raises(LightError, match="does not answer"):
+        lights.check_outputs()
+    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)

@@ -24,6 +24,9 @@ class FakeHardware:
         self.log.append(ratio)
         return 10.0
 
+    def check_outputs(self):
+        self.log.append("check")
+
     def capture(self, *, begun_after_s, timeout_s):
         start_s = np.ceil(begun_after_s * 10) / 10
         self.log.append(("frame", round(float(start_s), 3)))
@@ -95,6 +98,14 @@ def test_after_an_error_of_the_light_it_is_set_again_even_to_what_it_was(bench, 
             bench.light(LIT)
     bench.light(DARK)
     assert hardware.log == [DARK, DARK]
+
+
+def test_after_the_currents_were_checked_the_light_is_set_again_even_to_what_it_was(bench, hardware):
+    """The check flashes: frames from before the new setting must not be taken."""
+    bench.light(DARK)
+    bench.check_lights()
+    bench.light(DARK)
+    assert hardware.log == [DARK, "check", DARK]
 
 
 def test_a_camera_that_leaves_out_frames_is_at_fault(hardware, monkeypatch):

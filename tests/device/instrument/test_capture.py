@@ -37,11 +37,15 @@ class ScriptedBench:
         self.rate = rate_n_per_s
         self.forces, self.shaking, self.torn = list(forces), set(shaking), set(torn)
         self.dead, self.glow, self.image_before = dead, glow, None
-        self.taken, self.lights, self.now_s = 0, [], 0.0
+        self.taken, self.checks, self.lights, self.now_s = 0, 0, [], 0.0
         self.force = self
 
     def light(self, ratio):
         self.lights.append(ratio)
+
+    def check_lights(self):
+        self.checks += 1
+        self.light(DARK)
 
     def take(self, role):
         self.now_s += FRAME_S
@@ -229,6 +233,16 @@ def test_unloaded_frames_are_dark_then_lit_and_the_light_goes_off(capture_of):
     assert {frame.led_ratio for frame in frames if frame.role == "dark"} == {DARK}
     assert {frame.led_ratio for frame in frames if frame.role == "reference"} == {(0.1, 0.2, 0.3, 0.4)}
     assert capture.bench.lights[-1] == DARK
+
+
+def test_the_leds_currents_are_checked_with_the_unloaded_frames_and_before_each_press(capture_of):
+    capture = capture_of(0.0, 0.0)
+    capture.unloaded()
+    assert capture.bench.checks == 1
+    for role in ("reference", "press"):
+        capture.bench.forces = [0.5]
+        capture.loaded(role, "paper")
+    assert capture.bench.checks == 3
 
 
 def test_unloaded_frames_wait_in_the_dark_until_the_probe_is_lifted(capture_of):

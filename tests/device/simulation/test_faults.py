@@ -52,6 +52,8 @@ def test_a_fault_of_a_press_waits_for_that_press(clock):
         (Fault("led_dead", side="-y"), (0.6, 0.5, 0.4, 0.0)),
         (Fault("led_stuck_on", side="+y"), (0.6, 1.0, 0.4, 0.3)),
         (Fault("led_dimmed", side="-x", ratio=0.5), (0.6, 0.5, 0.2, 0.3)),
+        (Fault("led_open", side="+x"), (0.0, 0.5, 0.4, 0.3)),
+        (Fault("led_driver_hot"), (0.0, 0.0, 0.0, 0.0)),
         (Fault("led_dimmed"), (0.54, 0.45, 0.36, 0.27)),
     ],
 )

@@ -117,3 +117,30 @@ def test_a_closed_bus_carries_nothing_and_leaves_the_light_as_it_is(chip):
     with pytest.raises(OSError, match="Bad file descriptor"):
         bus.i2c_rdwr(i2c_msg.write(0x60, [0x02, 0]))
     assert chip.led_ratio() == (1.0, 0.0, 0.0, 0.0)
+
+
+def flags(chip: Tlc59116Chip) -> int:
+    chip.write(b"\x1d")
+    return chip.read(1)[0]
+
+
+def test_an_error_flag_is_1_where_an_output_is_on_without_pwm_and_current_flows():
+    chip = Tlc59116Chip(faults=FaultTimeline([Fault("led_open", side="+y")]))
+    send(chip, "14 55")
+    assert flags(chip) == 0  # the oscillator is off
+    send(chip, "00 00")
+    assert flags(chip) == 0b1101
+    send(chip, "14 64")  # 0 off, 1 full, 2 PWM, 3 full
+    assert flags(chip) == 0b1000
+
+
+def test_overheating_is_remembered_until_it_is_cleared():
+    now_s = [0.0]
+    faults = FaultTimeline([Fault("led_driver_hot", until_s=1.0)], clock=lambda: now_s[0])
+    chip = Tlc59116Chip(faults=faults)
+    send(chip, "00 00", "14 55")
+    assert flags(chip) == 0
+    now_s[0] = 2.0
+    assert flags(chip) == 0
+    send(chip, "01 80", "01 00")
+    assert flags(chip) == 0b1111
