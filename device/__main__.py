@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse recordings, or look at the settings.
+"""`python -m device`: start the daemon, analyse recordings, look at the settings, or darken the LEDs.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -22,6 +22,7 @@ from device.assembly import StartFailed, open_probe, open_simulated_probe
 from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.procedure import Procedure
+from device.led_off import led_off
 from device.measurement.calibration import read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
@@ -38,6 +39,7 @@ EXAMPLES = """examples:
   python -m device --simulate --scene scene.toml   the same on another inclusion
   python -m device analyse recording/ press.zip    JSON estimates, one a line
   python -m device config check                    every problem of the settings files
+  python -m device led-off                         darken the LEDs of a daemon that was killed
 """
 
 
@@ -53,11 +55,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    commands = parser.add_subparsers(dest="command", metavar="analyse | config")
+    commands = parser.add_subparsers(dest="command", metavar="analyse | config | led-off")
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
     add_config_command(commands)
+    commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
 
@@ -67,12 +70,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.scene and not options.simulate:
         parser.error("--scene says what the *simulated* probe is pressed on: add --simulate")
+    if options.command == "led-off" and options.simulate:
+        parser.error("led-off darkens the chip of a real probe: leave out --simulate")
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     try:
         if options.command == "analyse":
             return _analyse(options)
         if options.command == "config":
             return run_config_command(options)
+        if options.command == "led-off":
+            led_off(_start_settings(options, None).config.light)
+            return 0
         return _serve(options)
     except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
         print(error, file=sys.stderr)

@@ -16,8 +16,8 @@ from dataclasses import replace
 from typing import Any
 
 from device.config import Config
-from device.errors import BusyError, DeviceError, ModeUnavailable, NoContrastError, UnknownResource
-from device.instrument.bench import Bench
+from device.errors import BusyError, DeviceError, LightError, ModeUnavailable, NoContrastError, UnknownResource
+from device.instrument.bench import DARK, Bench
 from device.instrument.capture import POLL_S, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
@@ -179,6 +179,7 @@ class Procedure:
             self._set_job(job, state="capturing", progress=0.5)
             self.board.update(step="lesion")
             press = self._capture.loaded("press", job.mode)
+            self._darken()
             self.board.update(step="computing", guidance=Guidance.LIFT)
             self._warn(self._clock.warning())
             self._set_job(job, state="computing", progress=0.9)
@@ -231,7 +232,15 @@ class Procedure:
         # The fault first: whoever is told that the press has ended finds out why.
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
         self._fail_press(error)
+        self._darken()
         self._capture.stopping.wait(AFTER_FAULT_S)
+
+    def _darken(self) -> None:
+        """Switch the light off; when that fails nothing is lost by it, and the next round raises the fault."""
+        try:
+            self.bench.light(DARK)
+        except LightError as error:
+            log.error("%s %s", error.code, error)
 
     def _fail_press(self, end: DeviceError) -> None:
         """End the press that is under way or asked for, so that the next may begin: also when the store is at fault."""

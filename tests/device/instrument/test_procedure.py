@@ -13,6 +13,7 @@ from device.errors import (
     ClockJumpError,
     DiskFullError,
     LastGoodConfigError,
+    LightError,
     ModeUnavailable,
     StorageError,
     UnknownResource,
@@ -132,6 +133,38 @@ def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
     assert rig.store.recording_folder(kept["recording_id"]).is_dir()
     steps = [Guidance.HOLD_STILL, Guidance.LIFT, Guidance.PRESS_LESION, Guidance.HOLD_STILL, Guidance.LIFT]
     assert [guidance for guidance in told if guidance is not Guidance.PRESS_BESIDE][:6] == [*steps, Guidance.DONE]
+
+
+def test_the_light_is_off_while_the_result_is_computed(rig):
+    light = []
+    rig.estimator = lambda recording: light.append(rig.bench.ratio) or ANSWER
+    rig.press()
+    assert light == [(0.0, 0.0, 0.0, 0.0)]
+
+
+def test_a_light_that_cannot_be_switched_off_costs_no_measurement(rig, monkeypatch):
+    set_light, failing = rig.bench.light, []
+
+    def light(ratio):
+        if failing and not any(ratio):
+            raise failing.pop()
+        set_light(ratio)
+
+    monkeypatch.setattr(rig.bench, "light", light)
+    rig.board.on_guidance(
+        lambda guidance: guidance is Guidance.PRESS_LESION and failing.append(LightError("No answer.", "Mend it."))
+    )
+    assert rig.press()["state"] == "done"
+    assert failing == []
+
+
+def test_a_fault_darkens_the_probe_at_once(rig, monkeypatch):
+    """Not only in the next round, which begins after 30 s here."""
+    monkeypatch.setattr(procedure_module, "AFTER_FAULT_S", 30.0)
+    rig.bench.breaks = [CameraError("No frame came.", "Check the ribbon cable.")]
+    rig.press()
+    rig.until(lambda: rig.bench.ratio == (0.0, 0.0, 0.0, 0.0))
+    assert rig.board.now.fault.code == "E101"
 
 
 def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig):
