@@ -23,6 +23,7 @@ from device.instrument.clock_watch import ClockWatch
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance, before_contact
+from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
@@ -204,7 +205,13 @@ def _procedure(
     assert store is not None
     return Procedure(
         config,
-        Bench(lights, camera, force, FramePace(config.camera.late_frames / config.camera.frame_rate_hz)),
+        Bench(
+            lights,
+            camera,
+            force,
+            FramePace(config.camera.late_frames / config.camera.frame_rate_hz),
+            LightBudget(config.light.max_on_s),
+        ),
         answers.estimator,
         store,
         modes=answers.modes,

@@ -17,7 +17,8 @@ DeviceError
 │   ├── AmbientLightError    E205  foreign light reaches the camera
 │   ├── DimLightError        E206  a side is dimmer than it was (a warning)
 │   ├── OpenLedError         E207  no current flows through the LED of a side
-│   └── HotLedDriverError    E208  the LED chip is too hot, or no side is connected
+│   ├── HotLedDriverError    E208  the LED chip is too hot, or no side is connected
+│   └── LightBudgetError     E209  the light was on for too long in one press
 ├── LoadCellError            E301  no force
 │   ├── UnreadableCellError  E302  lines come, but none that can be read
 │   ├── SaturatedCellError   E303  the amplifier is at the end of its range
@@ -136,6 +137,12 @@ class HotLedDriverError(LightError):
     """The LED chip has switched off because it is too hot, or none of the sides is connected."""
 
     code = "E208"
+
+
+class LightBudgetError(LightError):
+    """The light was on for too long in one press; it goes off, and the next press may begin."""
+
+    code = "E209"
 
 
 class LoadCellError(DeviceError):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from device.hardware.interfaces import Camera, Lights
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
+from device.instrument.light_budget import LightBudget
 from device.measurement.tactile_image import Frame, LedRatio, Role
 
 DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
@@ -25,6 +26,7 @@ class Bench:
     camera: Camera
     force: ForceRecorder
     pace: FramePace = field(default_factory=lambda: FramePace(LATE_S))
+    budget: LightBudget = field(default_factory=LightBudget)
     _light: LedRatio = DARK
     _not_before_s: float = 0.0
 
@@ -35,13 +37,18 @@ class Bench:
         """
         if ratio != self._light or not self._not_before_s:
             self._not_before_s = 0.0
+            if any(ratio):
+                self.budget.note_lit()
             self._not_before_s = self.lights.set_ratio(ratio)
             self._light = ratio
+            if not any(ratio):
+                self.budget.note_dark()
 
     def check_lights(self) -> None:
         """Raise `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not flow; ends dark."""
         self._not_before_s = 0.0
         self.lights.check_outputs()
+        self.budget.note_dark()
 
     def take(self, role: Role) -> Frame:
         """Return the next frame under the present light, with the force in the middle of its exposure.

@@ -71,7 +71,8 @@ class Capture:
         """Return the frames of one press, as many as the mode needs.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
-        depend on it, `OpenLedError` or `HotLedDriverError` when the light fails before it.
+        depend on it, `OpenLedError` or `HotLedDriverError` when the light fails before it,
+        `LightBudgetError` when it was on for too long.
         """
         wanted, begin = self._wanted(role, mode), before_contact(role, mode)
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
@@ -149,6 +150,7 @@ class Capture:
         return frames[-1]
 
     def _require_going_on(self) -> None:
+        self.bench.budget.require_left()
         if self.cancelled.is_set():
             raise PressEnded("cancelled", "Cancelled by the operator.")
         if self.stopping.is_set():

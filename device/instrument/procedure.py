@@ -36,6 +36,8 @@ log = logging.getLogger(__name__)
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
+SAVE_LIGHT_EVERY_S = 10.0
+"""So much light may be missing from the hours counter after a power cut, and that of the press under way."""
 
 Estimator = Callable[[Recording, Mode], Estimate]
 
@@ -127,6 +129,13 @@ class Procedure:
             self._capture.cancelled.set()
 
     def _run(self) -> None:
+        self._run_presses()
+        try:
+            self._save_light_hours()
+        except DeviceError as error:
+            log.error("%s %s", error.code, error)
+
+    def _run_presses(self) -> None:
         while not self._capture.stopping.is_set():
             try:
                 self._one_press()
@@ -138,6 +147,8 @@ class Procedure:
 
     def _one_press(self) -> None:
         self.store.require_space(self.config.store.min_free_mb)
+        if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
+            self._save_light_hours()
         self._warn(self._clock.warning())
         unloaded = self._capture.unloaded()
         if self.board.now.step in ("starting", "fault"):
@@ -169,6 +180,7 @@ class Procedure:
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
         started_at = self._clock.now()
+        self.bench.budget.begin_press()
         try:
             self._set_job(job, state="capturing", progress=0.1)
             self.board.update(step="reference", measurement_id=None)
@@ -195,6 +207,11 @@ class Procedure:
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
             self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
 
+    def _save_light_hours(self) -> None:
+        seconds = self.bench.budget.unsaved_s
+        self.store.add_light_on_s(seconds)
+        self.bench.budget.note_saved(seconds)
+
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
         self._set_job(job, state=state, reason=reason, code=code)
@@ -208,7 +225,8 @@ class Procedure:
 
     def _set_job(self, job: PressJob, **changes: Any) -> None:
         warnings = tuple(warning.as_record() for warning in self.board.now.warnings)
-        changed = replace(self.board.now.press or job, warnings=warnings, **changes)
+        light_on_s = round(self.bench.budget.press_s, 2)
+        changed = replace(self.board.now.press or job, warnings=warnings, light_on_s=light_on_s, **changes)
         self.store.save_press(changed.as_record())
         self.board.update(press=changed)
 
@@ -245,10 +263,12 @@ class Procedure:
     def _fail_press(self, end: DeviceError) -> None:
         """End the press that is under way or asked for, so that the next may begin: also when the store is at fault."""
         with self._lock:
-            job, self._requested = self._requested or self.board.now.press, None
+            waiting, self._requested = self._requested, None
+            job = waiting or self.board.now.press
         if job is None or job.state in ENDED:
             return
-        failed = replace(job, state="failed", reason=str(end), code=end.code)
+        light_on_s = 0.0 if waiting else round(self.bench.budget.press_s, 2)
+        failed = replace(job, state="failed", reason=str(end), code=end.code, light_on_s=light_on_s)
         self.board.update(press=failed)
         try:
             self.store.save_press(failed.as_record())

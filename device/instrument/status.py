@@ -19,7 +19,8 @@ JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "can
 class PressJob:
     """One press as a resource: POSTed by a client or begun by the operator's hand, in a mode.
 
-    `code` is that of the fault that ended it; `warnings` are the records of errors that did not.
+    `code` is that of the fault that ended it; `warnings` are the records of errors that did not. `light_on_s`: how
+    long the LEDs have been on in it.
     """
 
     id: str
@@ -30,6 +31,7 @@ class PressJob:
     code: str | None = None
     measurement_id: str | None = None
     warnings: tuple[dict[str, str], ...] = ()
+    light_on_s: float = 0.0
 
     def as_record(self) -> dict[str, Any]:
         """Return the job as JSON object."""

@@ -27,6 +27,7 @@ TABLES = """
 CREATE TABLE IF NOT EXISTS measurement
   (seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, record TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS press (id TEXT PRIMARY KEY, ended INTEGER NOT NULL, record TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS counter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
 
 
@@ -136,6 +137,18 @@ class Store:
         """Return the newest measurements before a sequence number, newest first."""
         query = "SELECT record FROM measurement WHERE seq < ? ORDER BY seq DESC LIMIT ?"
         return self._records(query, before_seq, limit)
+
+    def add_light_on_s(self, seconds: float) -> None:
+        """Add to the time that the LEDs have been on in their life."""
+        with self._transaction() as db:
+            db.execute("INSERT OR IGNORE INTO counter VALUES ('light_on_s', 0)")
+            db.execute("UPDATE counter SET value = value + ? WHERE name = 'light_on_s'", (seconds,))
+
+    @property
+    def light_on_s(self) -> float:
+        """Return how long the LEDs have been on in their life, as far as it was kept."""
+        with self._transaction() as db:
+            return float(sum(row[0] for row in db.execute("SELECT value FROM counter WHERE name = 'light_on_s'")))
 
     def recording_folder(self, recording_id: str) -> Path:
         """Return where a recording lies; raise `StorageError` when it is not there any more."""

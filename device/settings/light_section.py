@@ -83,6 +83,11 @@ class LightSection(Section):
     min_contrast_ratio: float = setting(
         0.3, "How much of a press's light must have come with the force; gel and sweat leave less.", RATIO
     )
+    max_on_s: float = setting(
+        300.0,
+        "Time with light in one press, both of its parts together, after which the light goes off.",
+        Bound(1.0, 3600.0, "s"),
+    )
 
     @property
     def chip_address(self) -> int:

@@ -41,7 +41,7 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
         title="TSIS probe", version=__version__, openapi_url=f"{API}/openapi.json", docs_url=None, redoc_url=None
     )
     install_problems(app)
-    _add_state(app, procedure)
+    _add_state(app, procedure, store)
     _add_presses(app, procedure, store)
     _add_measurements(app, store)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
@@ -53,15 +53,16 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
     return app
 
 
-def _add_state(app: FastAPI, procedure: Procedure) -> None:
+def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
     @app.get(f"{API}/device")
     def device() -> dict[str, Any]:
-        """Say which probe this is, and in which modes it measures at what cost."""
+        """Say which probe this is, how long its LEDs have been on, and in which modes it measures at what cost."""
         config = procedure.config
         return {
             "serial": config.serial,
             "software": __version__,
             "simulated": procedure.is_simulated,
+            "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
             "modes": [asdict(press_cost(mode, config)) for mode in procedure.modes],
         }

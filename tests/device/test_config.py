@@ -47,6 +47,7 @@ BOUNDS = [
     ("light.min_side_ratio", 0.01, 0.9),
     ("light.max_dimming_ratio", 0.01, 0.9),
     ("light.min_contrast_ratio", 0.01, 0.9),
+    ("light.max_on_s", 1.0, 3600.0),
     ("cell.baud", 300, 4_000_000),
     ("cell.sensitivity_counts_per_n", 1.0, 1e7),
     ("cell.tare_spread_n", 0.0001, 1.0),

@@ -149,3 +149,12 @@ def test_a_probe_with_the_other_led_chip_measures_without_a_fault(running):
         device.press()
         assert device.board.now.press.state == "done"
         assert device.codes() == set()
+
+
+def test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_recovers(running):
+    """A press of ramps lights the probe for longer than a second."""
+    with running(Scenario(), light=LightSection(max_on_s=1.0)) as device:
+        device.press()
+        device.until(lambda: "E209" in device.codes())
+        device.until(lambda: device.board.now.step == "ready")
+        assert device.board.now.press.light_on_s > 1.0

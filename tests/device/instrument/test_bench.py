@@ -10,6 +10,7 @@ from device.hardware.interfaces import CameraFrame
 from device.instrument import bench as bench_module
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import LATE_FRAMES, FramePace
+from device.instrument.light_budget import LightBudget
 
 LIT = (0.6, 0.6, 0.6, 0.6)
 
@@ -122,3 +123,25 @@ def test_a_camera_that_leaves_out_frames_is_at_fault(hardware, monkeypatch):
 
 def late_frame(start_s):
     return CameraFrame(np.zeros((16, 16), np.uint8), start_s, 4000.0, 1.0)
+
+
+def test_light_counts_from_when_it_is_asked_for_until_darkness_is_acknowledged(hardware, monkeypatch):
+    """Lit at 1 s, another brightness at 2 s, an error at 3 s, dark at 5 s, lit at 6 s, checked at 8 s: 4 s and 2 s."""
+    now_s = [0.0]
+    bench = Bench(hardware, hardware, hardware, budget=LightBudget(clock=lambda: now_s[0]))
+    for now_s[0], ratio in ((0.5, DARK), (1.0, LIT), (2.0, (0.1, 0.0, 0.0, 0.0))):
+        bench.light(ratio)
+    now_s[0] = 3.0
+    with monkeypatch.context() as broken:
+        broken.setattr(hardware, "set_ratio", lambda ratio: (_ for _ in ()).throw(LightError("No answer.", "Mend it.")))
+        with pytest.raises(LightError):
+            bench.light(DARK)
+    now_s[0] = 5.0
+    bench.light(DARK)
+    assert bench.budget.press_s == 4.0
+    now_s[0] = 6.0
+    bench.light(LIT)
+    now_s[0] = 8.0
+    bench.check_lights()
+    now_s[0] = 9.0
+    assert bench.budget.press_s == 6.0

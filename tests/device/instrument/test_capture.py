@@ -11,6 +11,7 @@ from device.instrument import capture as capture_module
 from device.instrument.bench import DARK
 from device.instrument.capture import UNLOADED_FRAMES, Capture, PressEnded
 from device.instrument.guidance import Guidance
+from device.instrument.light_budget import LightBudget
 from device.instrument.status import StatusBoard
 from device.measurement.mode import FRAMES, Frames
 from device.measurement.tactile_image import Frame
@@ -39,6 +40,7 @@ class ScriptedBench:
         self.dead, self.glow, self.image_before = dead, glow, None
         self.taken, self.checks, self.lights, self.now_s = 0, 0, [], 0.0
         self.force = self
+        self.budget = LightBudget()
 
     def light(self, ratio):
         self.lights.append(ratio)

@@ -20,6 +20,7 @@ from device.errors import (
 )
 from device.instrument import procedure as procedure_module
 from device.instrument.guidance import Guidance
+from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
@@ -38,6 +39,7 @@ class ObedientBench:
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work = self.is_closed = False
+        self.budget = LightBudget()
 
     @property
     def latest_n(self):
@@ -165,6 +167,40 @@ def test_a_fault_darkens_the_probe_at_once(rig, monkeypatch):
     rig.press()
     rig.until(lambda: rig.bench.ratio == (0.0, 0.0, 0.0, 0.0))
     assert rig.board.now.fault.code == "E101"
+
+
+def test_the_light_of_a_press_is_told_with_it_and_the_hours_are_kept(rig):
+    """A clock that stands still but for 12.5 s in the lesion press."""
+    now_s = [0.0]
+    rig.bench.budget._clock = lambda: now_s[0]
+
+    def light(guidance):
+        if guidance is Guidance.PRESS_LESION:
+            rig.bench.budget.note_lit()
+            now_s[0] += 12.5
+            rig.bench.budget.note_dark()
+
+    rig.board.on_guidance(light)
+    assert rig.press()["light_on_s"] == 12.5
+    rig.until(lambda: rig.store.light_on_s == 12.5)
+    assert rig.press()["light_on_s"] == 12.5
+    rig.until(lambda: rig.store.light_on_s == 25.0)
+
+
+def test_what_the_counter_was_not_told_yet_is_kept_at_the_end(rig):
+    rig.bench.budget._before_s = 3.0
+    assert rig.store.light_on_s == 0.0
+    rig.procedure.close()
+    assert rig.store.light_on_s == 3.0
+
+
+def test_a_press_that_ran_out_of_light_fails_with_its_code_and_seconds(rig):
+    rig.bench.budget._max_on_s = 1.0
+    rig.board.on_guidance(
+        lambda guidance: guidance is Guidance.PRESS_LESION and setattr(rig.bench.budget, "_before_s", 2.0)
+    )
+    job = rig.press()
+    assert (job["state"], job["code"], job["light_on_s"]) == ("failed", "E209", 2.0)
 
 
 def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig):

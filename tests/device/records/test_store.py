@@ -229,3 +229,12 @@ def test_a_recording_that_has_gone_missing_is_a_storage_error_with_its_id(store)
     (store.recording_folder("r-1") / "recording.json").unlink()
     with pytest.raises(StorageError, match="r-1 is missing or damaged"):
         store.recording_folder("r-1")
+
+
+def test_the_hours_of_light_add_up_over_restarts(tmp_path):
+    for kept_s in (0.0, 2.5):
+        store = Store(tmp_path)
+        assert store.light_on_s == kept_s
+        store.add_light_on_s(1.0)
+        store.add_light_on_s(1.5)
+        store.close()

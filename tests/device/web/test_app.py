@@ -32,7 +32,7 @@ def procedure():
 
 @pytest.fixture
 def ask(procedure):
-    app = create_app(procedure, types.SimpleNamespace())
+    app = create_app(procedure, types.SimpleNamespace(light_on_s=12.34))
 
     def asking(method, path, **content):
         async def answer():
@@ -68,9 +68,10 @@ def test_a_mode_without_a_model_is_refused_with_its_own_code(ask):
     assert (answer.status_code, answer.json()["code"]) == (422, "E805")
 
 
-def test_the_device_says_in_which_modes_it_measures_at_what_cost(ask):
+def test_the_device_says_how_long_its_leds_were_on_and_in_which_modes_it_measures_at_what_cost(ask):
     device = ask("GET", "/api/v1/device").json()
     assert device["default_mode"] == "paper"
+    assert device["light_on_s"] == 12.3
     assert device["modes"] == [
         {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5},
         {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0},
