@@ -9,20 +9,20 @@ from __future__ import annotations
 import logging
 import threading
 import time
-import uuid
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
 from device.config import Config
-from device.errors import BusyError, DeviceError, LightError, ModeUnavailable, NoContrastError, UnknownResource
+from device.errors import DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
 from device.instrument.capture import POLL_S, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
 from device.instrument.press_record import measurement_record, recording_of
+from device.instrument.press_requests import PressRequests
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
@@ -66,9 +66,9 @@ class Procedure:
         self._capture = Capture(bench, config, self.board)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
-        self._requested: PressJob | None = None
-        self._on_request: list[Callable[[Mode], None]] = []
-        self._lock = threading.Lock()
+        self._requests = PressRequests(
+            self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
+        )
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
 
     @property
@@ -93,40 +93,16 @@ class Procedure:
         self._opened.close()
 
     def request(self, mode: Mode | None = None) -> PressJob:
-        """Ask for a measurement in a mode, that of the settings unless given.
-
-        Raises `ModeUnavailable`, `BusyError` when one is under way, or the `DeviceError` that the probe is at fault by.
-        """
-        mode = mode or self.config.press.mode
-        if mode not in self.modes:
-            remedy = f"Choose one of those it has: {', '.join(self.modes)}."
-            raise ModeUnavailable(f"This probe has no model for the mode {mode}.", remedy)
-        with self._lock:
-            status = self.board.now
-            if status.fault:
-                raise status.fault
-            if self._requested or (status.press and status.press.state not in ENDED):
-                raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
-            job = self._new_job(mode)
-            self.store.save_press(job.as_record())
-            self._requested = job
-        for listener in self._on_request:
-            listener(mode)
-        return job
+        """Ask for a measurement in a mode, that of the settings unless given; see `PressRequests.ask`."""
+        return self._requests.ask(mode)
 
     def on_request(self, listener: Callable[[Mode], None]) -> None:
         """Call `listener` with the mode whenever a press is requested."""
-        self._on_request.append(listener)
+        self._requests.on_request(listener)
 
     def cancel(self, press_id: str) -> None:
-        """Cancel the press under way; raise `UnknownResource` when it is not that one."""
-        with self._lock:
-            job = self._requested or self.board.now.press
-            if job is None or job.id != press_id or job.state in ENDED:
-                raise UnknownResource(f"Press {press_id} is not under way.", "Only a running press can be cancelled.")
-            if job.state == "computing":
-                raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
-            self._capture.cancelled.set()
+        """Cancel the press under way; see `PressRequests.cancel`."""
+        self._requests.cancel(press_id)
 
     def _run(self) -> None:
         self._run_presses()
@@ -160,23 +136,11 @@ class Procedure:
 
     def _next_job(self, until_s: float) -> PressJob | None:
         while time.monotonic() < until_s and not self._capture.stopping.is_set():
-            pressed = self.bench.force.latest_n >= self.config.press.contact_n
-            with self._lock:
-                if self._requested or pressed:
-                    job, self._requested = self._requested or self._new_job(self.config.press.mode), None
-                    self.board.update(press=job, warnings=self._warnings_since_last_press())
-                    return job
+            is_touched = self.bench.force.latest_n >= self.config.press.contact_n
+            if job := self._requests.begin(is_touched=is_touched):
+                return job
             time.sleep(POLL_S)
         return None
-
-    def _warnings_since_last_press(self) -> tuple[DeviceError, ...]:
-        last = self.board.now.press
-        told = last.warnings if last else ()
-        return tuple(one for one in self.board.now.warnings if one.is_lasting or one.as_record() not in told)
-
-    def _new_job(self, mode: Mode) -> PressJob:
-        self._capture.cancelled.clear()  # here and not when the job begins: it may be cancelled before that
-        return PressJob(id=str(uuid.uuid4()), mode=mode)
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
         started_at = self._clock.now()
@@ -262,9 +226,8 @@ class Procedure:
 
     def _fail_press(self, end: DeviceError) -> None:
         """End the press that is under way or asked for, so that the next may begin: also when the store is at fault."""
-        with self._lock:
-            waiting, self._requested = self._requested, None
-            job = waiting or self.board.now.press
+        waiting = self._requests.withdraw()
+        job = waiting or self.board.now.press
         if job is None or job.state in ENDED:
             return
         light_on_s = 0.0 if waiting else round(self.bench.budget.press_s, 2)

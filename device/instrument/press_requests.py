@@ -1,0 +1,94 @@
+"""Requests for a press, and touches of the probe, to the one press that may be under way.
+
+Clients ask and cancel from any thread; the procedure's own takes what they ask for, and says on the board what became
+of it. Without a request a press begins in the mode of the settings.
+"""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import Callable
+
+from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
+from device.instrument.status import PressJob, StatusBoard
+from device.measurement.mode import Mode
+from device.records.store import ENDED, Store
+
+
+class PressRequests:
+    """At most one press that waits; none while another is under way."""
+
+    def __init__(
+        self, board: StatusBoard, store: Store, *, modes: tuple[Mode, ...], mode: Mode, cancelled: threading.Event
+    ) -> None:
+        """Take `modes`, those that the probe has, `mode`, that of a press unless asked otherwise, and what ends one."""
+        self._board, self._store, self._modes, self._mode, self._cancelled = board, store, modes, mode, cancelled
+        self._waiting: PressJob | None = None
+        self._listeners: list[Callable[[Mode], None]] = []
+        self._lock = threading.Lock()
+
+    def on_request(self, listener: Callable[[Mode], None]) -> None:
+        """Call `listener` with the mode whenever a press is requested."""
+        self._listeners.append(listener)
+
+    def ask(self, mode: Mode | None) -> PressJob:
+        """Ask for a press in a mode, that of the settings unless given.
+
+        Raises `ModeUnavailable`, `BusyError` when one is under way, or the `DeviceError` that the probe is at fault by.
+        """
+        mode = mode or self._mode
+        if mode not in self._modes:
+            remedy = f"Choose one of those it has: {', '.join(self._modes)}."
+            raise ModeUnavailable(f"This probe has no model for the mode {mode}.", remedy)
+        with self._lock:
+            status = self._board.now
+            if status.fault:
+                raise status.fault
+            if self._waiting or (status.press and status.press.state not in ENDED):
+                raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
+            job = self._new_job(mode)
+            self._store.save_press(job.as_record())
+            self._waiting = job
+        for listener in self._listeners:
+            listener(mode)
+        return job
+
+    def cancel(self, press_id: str) -> None:
+        """Cancel the press that waits or is under way; raise `UnknownResource` when it is not that one."""
+        with self._lock:
+            job = self._waiting or self._board.now.press
+            if job is None or job.id != press_id or job.state in ENDED:
+                raise UnknownResource(f"Press {press_id} is not under way.", "Only a running press can be cancelled.")
+            if job.state == "computing":
+                raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
+            self._cancelled.set()
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a press has been asked for that has not begun."""
+        return self._waiting is not None
+
+    def begin(self, *, is_touched: bool) -> PressJob | None:
+        """Put the press that was asked for, or that the touched probe begins, on the board and return it."""
+        with self._lock:
+            if not (self._waiting or is_touched):
+                return None
+            job, self._waiting = self._waiting or self._new_job(self._mode), None
+            self._board.update(press=job, warnings=self._warnings_since_last_press())
+            return job
+
+    def withdraw(self) -> PressJob | None:
+        """Return the press that waits and forget it: it will not begin."""
+        with self._lock:
+            job, self._waiting = self._waiting, None
+            return job
+
+    def _new_job(self, mode: Mode) -> PressJob:
+        self._cancelled.clear()  # here and not when the job begins: it may be cancelled before that
+        return PressJob(id=str(uuid.uuid4()), mode=mode)
+
+    def _warnings_since_last_press(self) -> tuple[DeviceError, ...]:
+        last = self._board.now.press
+        told = last.warnings if last else ()
+        return tuple(one for one in self._board.now.warnings if one.is_lasting or one.as_record() not in told)
