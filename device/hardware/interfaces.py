@@ -1,13 +1,14 @@
 """What the instrument asks of its hardware: set the light, take a frame, read the force.
 
-Raw and calibrated are different types: a load cell gives counts, and only a `ForceScale` turns counts into newtons.
+Raw and calibrated are different types: a load cell gives `CellCounts`, and only a `ForceScale` makes `Newtons` of
+them. Both are plain floats while the program runs; it is the type check that keeps one from being taken for the other.
 All times are seconds of the one monotonic clock (`time.monotonic`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NewType, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,11 @@ from numpy.typing import NDArray
 from device.measurement.tactile_image import SIDES, LedRatio
 
 LED_COUNT = len(SIDES)
+
+CellCounts = NewType("CellCounts", float)
+"""What the load cell's converter reads, its zero and all."""
+Newtons = NewType("Newtons", float)
+"""Normal force, positive when the probe is pressed."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,7 @@ class CellSample:
     """One reading of the load cell in ADC counts, stamped when its line was complete."""
 
     t_s: float
-    counts: float
+    counts: CellCounts
 
 
 @dataclass(frozen=True)
@@ -40,11 +46,11 @@ class ForceScale:
     """Turns load-cell counts into newtons: (counts - tare) / sensitivity."""
 
     sensitivity_counts_per_n: float
-    tare_counts: float
+    tare_counts: CellCounts
 
-    def newtons(self, counts: float) -> float:
+    def newtons(self, counts: CellCounts) -> Newtons:
         """Return the normal force in N, positive when the probe is pressed."""
-        return (counts - self.tare_counts) / self.sensitivity_counts_per_n
+        return Newtons((counts - self.tare_counts) / self.sensitivity_counts_per_n)
 
 
 class Lights(Protocol):

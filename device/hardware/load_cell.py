@@ -18,7 +18,7 @@ from collections.abc import Callable
 import serial
 
 from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
-from device.hardware.interfaces import CellSample, LoadCell
+from device.hardware.interfaces import CellCounts, CellSample, LoadCell
 from device.measurement.quantities import Bound, require
 
 LINE = re.compile(rb"\d+,-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
@@ -47,7 +47,7 @@ class LineBuffer:
         return kept
 
 
-def parse_counts(line: bytes) -> float:
+def parse_counts(line: bytes) -> CellCounts:
     """Return raw24 (counts) of one line; raise `ValueError` when it is no complete reading."""
     match = LINE.fullmatch(line)
     if match is None:
@@ -55,7 +55,7 @@ def parse_counts(line: bytes) -> float:
     counts = int(match["raw24"])
     if not RAW24_LOW_COUNTS <= counts <= RAW24_HIGH_COUNTS:
         raise ValueError(f"{line!r} holds {counts} counts, outside 24 bit")
-    return float(counts)
+    return CellCounts(float(counts))
 
 
 class OpenScale:
@@ -91,7 +91,7 @@ class OpenScale:
             for line in self._buffer.feed(self._receive()):
                 self._keep(line, time.monotonic())
         sample = self._samples.popleft()
-        if sample.counts in (RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS):
+        if not RAW24_LOW_COUNTS < sample.counts < RAW24_HIGH_COUNTS:
             self._samples.clear()  # those behind it are as old as the wait for them will be long
             cause = f"Load cell on {self._name} reads {sample.counts:.0f} counts, the end of its range."
             raise SaturatedCellError(cause, "Take the load off the probe; if it stays, check the cell's four wires.")
@@ -149,7 +149,7 @@ def open_load_cell(device: str, baud: int = 9600) -> OpenScale:
     return OpenScale(device, lambda: serial.Serial(device, baudrate=baud, exclusive=True))
 
 
-def measure_tare(cell: LoadCell, *, samples: int, max_spread_counts: float, timeout_s: float) -> float:
+def measure_tare(cell: LoadCell, *, samples: int, max_spread_counts: float, timeout_s: float) -> CellCounts:
     """Return the mean of `samples` readings (counts) of the unloaded probe; `timeout_s` is for each reading.
 
     Raises `LoadCellError` when largest minus smallest exceeds `max_spread_counts`: the probe was touched.
@@ -162,4 +162,4 @@ def measure_tare(cell: LoadCell, *, samples: int, max_spread_counts: float, time
     if spread_counts > max_spread_counts:
         cause = f"Load cell varies by {spread_counts:g} counts during tare, above the {max_spread_counts:g} allowed."
         raise LoadCellError(cause, "Hold the probe free and still, and tare again.")
-    return sum(counts) / samples
+    return CellCounts(sum(counts) / samples)

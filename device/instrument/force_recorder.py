@@ -12,7 +12,7 @@ from collections import deque
 import numpy as np
 
 from device.errors import LoadCellError
-from device.hardware.interfaces import ForceScale, LoadCell
+from device.hardware.interfaces import ForceScale, LoadCell, Newtons
 
 KEPT_SAMPLES = 1000
 SILENCE_S = 1.0
@@ -25,7 +25,7 @@ class ForceRecorder:
     def __init__(self, cell: LoadCell, scale: ForceScale) -> None:
         """Start recording; there is a sample when this returns. Raises `LoadCellError` when none comes."""
         self._cell, self._scale = cell, scale
-        self._samples: deque[tuple[float, float]] = deque(maxlen=KEPT_SAMPLES)
+        self._samples: deque[tuple[float, Newtons]] = deque(maxlen=KEPT_SAMPLES)
         self._news, self._stopping = threading.Condition(), threading.Event()
         self.fault: LoadCellError | None = None
         self._thread = threading.Thread(target=self._run, name="force", daemon=True)
@@ -55,14 +55,14 @@ class ForceRecorder:
                 self._news.notify_all()
 
     @property
-    def latest_n(self) -> float:
+    def latest_n(self) -> Newtons:
         """Return the newest force; raise `LoadCellError` when the cell is at fault."""
         with self._news:
             if self.fault:
                 raise self.fault
             return self._samples[-1][1]
 
-    def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> float:
+    def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> Newtons:
         """Return the force at a time on the monotonic clock, waiting until a later sample has come.
 
         Raises `LoadCellError` when none comes, or when the history does not reach back so far.
@@ -77,13 +77,13 @@ class ForceRecorder:
             times, forces = np.array(self._samples).T
         if t_s < times[0]:
             raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
-        return float(np.interp(t_s, times, forces))
+        return Newtons(float(np.interp(t_s, times, forces)))
 
-    def range_n(self, t_s: float, *, window_s: float) -> float:
+    def range_n(self, t_s: float, *, window_s: float) -> Newtons:
         """Return by how much the force varied in a window that ends at a time."""
         with self._news:
             inside = [force for t, force in self._samples if t_s - window_s <= t <= t_s]
-        return max(inside) - min(inside) if inside else float("inf")
+        return Newtons(max(inside) - min(inside) if inside else float("inf"))
 
     def close(self) -> None:
         """Stop the thread and release the cell."""
