@@ -5,9 +5,11 @@ Every part that fails to open is listed at once, each with its fault code, and w
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -15,7 +17,7 @@ from device.answers import answers_for
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.camera import RawMonoCamera, open_camera
-from device.hardware.interfaces import Camera, ForceScale, Lights, LoadCell
+from device.hardware.interfaces import Camera, CellCounts, ForceScale, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.hardware.load_cell import measure_tare, open_load_cell
 from device.instrument.bench import Bench
@@ -24,6 +26,7 @@ from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_budget import LightBudget
+from device.instrument.load_limit import LoadLimit
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
@@ -35,12 +38,14 @@ from device.simulation.faults import FaultTimeline
 from device.simulation.full_disk import EmulatedDisk
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
-from device.simulation.scenario import Scenario
+from device.simulation.scenario import CellSettings, Scenario
 from device.simulation.serial_line import EmulatedOpenScale
 from device.simulation.tlc59116_chip import Tlc59116Chip
 from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from device.simulation.virtual_request import ExposureRequest
+
+log = logging.getLogger(__name__)
 
 TARE_SAMPLES = 20
 FIRST_SAMPLE_S = 5.0
@@ -105,6 +110,7 @@ def open_probe(config: Config) -> Procedure:
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
+    config = _commissioned(config)
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
     parts.open(lambda: _require_own_serial(config, scenario))
     table_folder = config.calibration.parent
@@ -148,6 +154,13 @@ def _require_own_serial(config: Config, scenario: Scenario) -> None:
         )
     if scenario.sensor.bits != 8:
         raise ConfigError(f"sensor.bits is {scenario.sensor.bits}, but the daemon's camera takes 8.", "Set it to 8.")
+
+
+def _commissioned(config: Config) -> Config:
+    """Return the settings with the commissioning tare that every virtual probe left its maker with, unless they say."""
+    if config.cell.commissioned_tare_counts is not None:
+        return config
+    return replace(config, cell=replace(config.cell, commissioned_tare_counts=CellSettings().zero_counts))
 
 
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:
@@ -223,14 +236,19 @@ def _procedure(
 
 
 def _tared(config: Config, cell: LoadCell) -> ForceRecorder:
-    sensitivity = config.cell.sensitivity_counts_per_n
+    settings, sensitivity = config.cell, config.cell.sensitivity_counts_per_n
     tare_counts = measure_tare(
         cell,
         samples=TARE_SAMPLES,
-        max_spread_counts=config.cell.tare_spread_n * sensitivity,
+        max_spread_counts=settings.tare_spread_n * sensitivity,
         timeout_s=FIRST_SAMPLE_S,
     )
-    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts))
+    at_commissioning = settings.commissioned_tare_counts
+    log.info("tare %.0f counts, at commissioning %s", tare_counts, at_commissioning)
+    zero_counts = tare_counts if at_commissioning is None else CellCounts(at_commissioning)
+    limit = LoadLimit(ForceScale(sensitivity, zero_counts), settings.max_load_n, settings.tare_drift_n)
+    limit.require_tare(tare_counts)
+    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts), limit)
 
 
 def _calibration_for(config: Config, bundle: ModelBundle) -> Calibration:

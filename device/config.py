@@ -56,7 +56,7 @@ class CameraSection(Section):
 
 @dataclass(frozen=True)
 class CellSection(Section):
-    """The load cell: its serial line and its sensitivity."""
+    """The load cell: its serial line, its sensitivity, and what it bears."""
 
     prefix = "cell."
 
@@ -68,6 +68,15 @@ class CellSection(Section):
     tare_spread_n: float = setting(
         0.02, "Readings that spread more than this while taring are not of an untouched probe.", Bound(0.0001, 1.0, "N")
     )
+    commissioned_tare_counts: float | None = setting(
+        None,
+        "Reading of the free probe at commissioning; without it that of each start stands in.",
+        Bound(-(2.0**23), 2.0**23, "counts"),
+    )
+    tare_drift_n: float = setting(
+        0.2, "How far from the commissioning tare the tare of a start may be.", Bound(0.01, 5.0, "N")
+    )
+    max_load_n: float = setting(5.0, "Load, from the commissioning tare, that is an overload.", Bound(1.0, 100.0, "N"))
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,9 @@ DeviceError
 ├── LoadCellError            E301  no force
 │   ├── UnreadableCellError  E302  lines come, but none that can be read
 │   ├── SaturatedCellError   E303  the amplifier is at the end of its range
-│   └── UnpluggedCellError   E304  the serial line is gone
+│   ├── UnpluggedCellError   E304  the serial line is gone
+│   ├── OverloadedCellError  E305  more load than the cell bears, from its zero at commissioning
+│   └── ZeroShiftError       E306  the zero is far from that of commissioning
 ├── ModelError               E401  a bundle or calibration is missing, tampered with, or not for this probe
 ├── NoContrastError          E501  pressing does not change the image: gel, or a wet face
 ├── StorageError             E601  a measurement could not be made durable
@@ -168,6 +170,18 @@ class UnpluggedCellError(LoadCellError):
     """The load cell's serial line is gone, or was never there."""
 
     code = "E304"
+
+
+class OverloadedCellError(LoadCellError):
+    """The load cell carries more than it bears, from its zero at commissioning."""
+
+    code = "E305"
+
+
+class ZeroShiftError(LoadCellError):
+    """The load cell's zero is far from that of commissioning: under load at the start, or bent."""
+
+    code = "E306"
 
 
 class ModelError(DeviceError):

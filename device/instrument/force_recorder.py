@@ -1,6 +1,7 @@
 """The load cell's stream to force over time: newtons on the one clock, interpolated to when a frame was exposed.
 
-One thread owns the serial line. A silent or unplugged cell is a fault that is kept until samples come again.
+One thread owns the serial line. A silent, unplugged or overloaded cell is a fault that is kept until samples come that
+it can bear.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from collections import deque
 
 import numpy as np
 
-from device.errors import LoadCellError
+from device.errors import LoadCellError, OverloadedCellError
 from device.hardware.interfaces import ForceScale, LoadCell, Newtons
+from device.instrument.load_limit import LoadLimit
 
 KEPT_SAMPLES = 1000
 SILENCE_S = 1.0
@@ -22,9 +24,9 @@ RETRY_S = 0.2
 class ForceRecorder:
     """Force history of the last seconds."""
 
-    def __init__(self, cell: LoadCell, scale: ForceScale) -> None:
+    def __init__(self, cell: LoadCell, scale: ForceScale, limit: LoadLimit) -> None:
         """Start recording; there is a sample when this returns. Raises `LoadCellError` when none comes."""
-        self._cell, self._scale = cell, scale
+        self._cell, self._scale, self._limit = cell, scale, limit
         self._samples: deque[tuple[float, Newtons]] = deque(maxlen=KEPT_SAMPLES)
         self._news, self._stopping = threading.Condition(), threading.Event()
         self.fault: LoadCellError | None = None
@@ -45,6 +47,10 @@ class ForceRecorder:
         while not self._stopping.is_set():
             try:
                 sample = self._cell.read(timeout_s=SILENCE_S)
+                self._limit.require_bearable(sample.counts)
+            except OverloadedCellError as error:
+                self.fault = error  # and the next sample at once: those behind it must not grow old
+                continue
             except LoadCellError as error:
                 self.fault = error
                 self._stopping.wait(RETRY_S)

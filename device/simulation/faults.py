@@ -32,6 +32,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "cell_silent": (),
     "cell_garbage": (),
     "cell_saturated": (),
+    "cell_overloaded": (),
     "cell_unplugged": (),
     "clock_jump": ("step_s",),
     "disk_full": (),

@@ -27,6 +27,8 @@ BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics
 COUNTS_PER_KG = 100_000.0
 """The amplifier's own calibration: only shows in the field that the driver does not use."""
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
+OVERLOAD_COUNTS = 2**22
+"""A load far above what the cell bears, and far below the end of its range."""
 MAX_UNREAD_BYTES = 512
 GARBAGE_BYTES = 24
 """About one line's worth of what a wrong baud rate makes of it."""
@@ -108,6 +110,8 @@ class EmulatedOpenScale:
             return self._noise.bytes(GARBAGE_BYTES) + b"\n"
         drift_counts = self._drift_counts_per_s * (t_s - self._since_s)
         counts = round(self._counts_at(t_s) + drift_counts + self._noise.normal(0.0, self._noise_counts))
+        if self._faults.is_active("cell_overloaded", t_s):
+            counts += OVERLOAD_COUNTS
         if self._faults.is_active("cell_saturated", t_s):
             counts = RAW24_HIGH_COUNTS
         raw24 = min(max(counts, RAW24_LOW_COUNTS), RAW24_HIGH_COUNTS)

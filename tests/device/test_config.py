@@ -51,6 +51,9 @@ BOUNDS = [
     ("cell.baud", 300, 4_000_000),
     ("cell.sensitivity_counts_per_n", 1.0, 1e7),
     ("cell.tare_spread_n", 0.0001, 1.0),
+    ("cell.commissioned_tare_counts", -(2.0**23), 2.0**23),
+    ("cell.tare_drift_n", 0.01, 5.0),
+    ("cell.max_load_n", 1.0, 100.0),
     ("press.band_ratio", 0.005, 0.2),
     ("press.contact_n", 0.005, 0.06),  # three quarters of the smallest force of a ramp
     ("press.steady_n", 0.001, 1.0),

@@ -6,12 +6,15 @@ from queue import Empty, Queue
 
 import pytest
 
-from device.errors import LoadCellError
+from device.errors import LoadCellError, OverloadedCellError
 from device.hardware.interfaces import CellSample, ForceScale
 from device.instrument import force_recorder
 from device.instrument.force_recorder import ForceRecorder
+from device.instrument.load_limit import LoadLimit
 
 SCALE = ForceScale(sensitivity_counts_per_n=1000.0, tare_counts=500.0)
+LIMIT = LoadLimit(ForceScale(sensitivity_counts_per_n=1000.0, tare_counts=0.0), max_load_n=5.0, max_drift_n=1.0)
+"""At commissioning the zero was 0 counts: today's 500 counts of weight are half a newton of the load it bears."""
 UNPLUGGED = LoadCellError("The cell is gone.", "Plug it in.")
 
 
@@ -52,7 +55,7 @@ def cell():
 
 @pytest.fixture
 def recorder(cell):
-    recorder = ForceRecorder(cell, SCALE)
+    recorder = ForceRecorder(cell, SCALE, LIMIT)
     recorder.at(4.0)
     yield recorder
     closing = threading.Thread(target=recorder.close)
@@ -129,6 +132,28 @@ def test_a_fault_is_kept_until_samples_come_again(recorder, cell):
     assert recorder.latest_n == pytest.approx(0.75)
 
 
+def test_an_overload_counts_from_the_zero_of_commissioning_and_is_over_when_the_load_is_taken_off(recorder, cell):
+    """5.0 N from the first tare is borne, 5.1 N is not, though both are half a newton less by today's tare."""
+    cell.say((5.0, 5000.0))
+    assert recorder.at(5.0) == pytest.approx(4.5)
+    cell.say((6.0, 5100.0))
+    assert reached(lambda: recorder.fault)
+    with pytest.raises(OverloadedCellError, match=r"carries \+5\.10 N"):
+        _ = recorder.latest_n
+    with pytest.raises(OverloadedCellError):
+        recorder.at(6.0, timeout_s=0.02)
+    cell.say((7.0, 600.0))
+    assert recorder.at(7.0) == pytest.approx(0.1)
+    assert recorder.latest_n == pytest.approx(0.1)
+
+
+def test_the_samples_of_an_overload_are_taken_as_they_come_not_one_a_retry(recorder, cell, monkeypatch):
+    """Fifty of them would otherwise keep the fault for fifty retries after it is over."""
+    monkeypatch.setattr(force_recorder, "RETRY_S", 60.0)
+    cell.say(*((5.0 + k, 9000.0) for k in range(50)), (60.0, 500.0))
+    assert recorder.at(60.0, timeout_s=5.0) == pytest.approx(0.0)
+
+
 def test_what_was_recorded_before_a_fault_is_still_known(recorder, cell):
     cell.say(UNPLUGGED)
     assert reached(lambda: recorder.fault)
@@ -139,12 +164,12 @@ def test_a_cell_that_never_speaks_is_refused_at_the_start_and_closed(monkeypatch
     monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
     cell = ScriptedCell()
     with pytest.raises(LoadCellError, match="silent|no samples"):
-        ForceRecorder(cell, SCALE)
+        ForceRecorder(cell, SCALE, LIMIT)
     assert cell.is_closed
 
 
 def test_closing_releases_the_cell(cell, monkeypatch):
     monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
-    recorder = ForceRecorder(cell, SCALE)
+    recorder = ForceRecorder(cell, SCALE, LIMIT)
     recorder.close()
     assert cell.is_closed

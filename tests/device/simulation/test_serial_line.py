@@ -136,6 +136,15 @@ def test_a_fault_shows_in_the_bytes_and_is_over_when_it_is_over(kind, error):
     scale.close()
 
 
+def test_an_overload_adds_to_the_load_and_is_no_end_of_the_range():
+    fault = Switch("cell_overloaded")
+    fault.is_on = True
+    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
+    data = read_bytes(scale.device_path, len(BANNER) + 40)
+    scale.close()
+    assert readings(data)[0].split(b",")[3] == b"4194346"
+
+
 def test_unplugging_takes_the_path_away_and_plugging_in_again_brings_a_banner():
     fault = Switch("cell_unplugged")
     fault.is_on = True

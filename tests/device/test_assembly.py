@@ -1,0 +1,39 @@
+"""The two tares of the simulated probe: that of commissioning, and that of this start."""
+
+from dataclasses import replace
+
+import pytest
+
+from device.assembly import StartFailed, open_simulated_probe
+from device.config import simulated_config
+from device.simulation.scenario import CellSettings, Scenario
+
+
+@pytest.fixture
+def opened(tmp_path):
+    """Open a virtual probe whose cell reads so many counts when free; close it in the end."""
+    procedures = []
+
+    def open_with(zero_counts, **settings):
+        config = simulated_config()
+        config = replace(config, data=tmp_path, cell=replace(config.cell, **settings))
+        procedures.append(open_simulated_probe(config, Scenario(cell=CellSettings(zero_counts=zero_counts))))
+        procedures[-1].start()
+        return procedures[-1]
+
+    yield open_with
+    for procedure in procedures:
+        procedure.close()
+
+
+@pytest.mark.parametrize("settings", [{}, {"commissioned_tare_counts": -50_000.0}])
+def test_a_zero_far_from_that_of_commissioning_keeps_the_probe_from_starting(opened, settings):
+    """30 000 counts are 0.22 N from the virtual probe's own 8200, and 0.8 N from what the settings may say."""
+    with pytest.raises(StartFailed) as refusal:
+        opened(30_000.0, **settings)
+    assert [fault.code for fault in refusal.value.faults] == ["E306"]
+
+
+def test_a_zero_near_that_of_commissioning_is_the_zero_of_force(opened):
+    """Twenty readings of 40 counts' noise: the tare is good to 0.1 mN, and the force read to 0.4 mN."""
+    assert abs(opened(20_000.0).bench.force.latest_n) < 0.004
