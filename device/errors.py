@@ -24,7 +24,8 @@ DeviceError
 │   ├── SaturatedCellError   E303  the amplifier is at the end of its range
 │   ├── UnpluggedCellError   E304  the serial line is gone
 │   ├── OverloadedCellError  E305  more load than the cell bears, from its zero at commissioning
-│   └── ZeroShiftError       E306  the zero is far from that of commissioning
+│   ├── ZeroShiftError       E306  the zero is far from that of commissioning
+│   └── DetachedCellError    E307  the amplifier answers, but no bridge is behind it
 ├── ModelError               E401  a bundle or calibration is missing, tampered with, or not for this probe
 ├── NoContrastError          E501  pressing does not change the image: gel, or a wet face
 ├── StorageError             E601  a measurement could not be made durable
@@ -182,6 +183,12 @@ class ZeroShiftError(LoadCellError):
     """The load cell's zero is far from that of commissioning: under load at the start, or bent."""
 
     code = "E306"
+
+
+class DetachedCellError(LoadCellError):
+    """The load cell's amplifier answers, but no bridge is behind it: a plug is off or a gauge is broken."""
+
+    code = "E307"
 
 
 class ModelError(DeviceError):

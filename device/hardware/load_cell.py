@@ -4,11 +4,13 @@ The amplifier streams `millis,reading,kg,raw24,` and CR LF, with "timestamp" and
 Only raw24 is used: `reading` is in the amplifier's own calibration. Opening the port resets the amplifier, so the
 first two or three seconds are a banner. 9600 baud carries about 30 such lines a second. Nothing is ever sent:
 an `x` would open the menu and stop the stream. A line that went is opened again when it is back.
-Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement).
+Without a bridge the converter reads an end of its range, or is read where none is: always the same number.
+Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement, input noise 50-90 nV = 20-40 counts).
 """
 
 from __future__ import annotations
 
+import math
 import re
 import termios
 import time
@@ -17,13 +19,21 @@ from collections.abc import Callable
 
 import serial
 
-from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
+from device.errors import (
+    DetachedCellError,
+    LoadCellError,
+    SaturatedCellError,
+    UnpluggedCellError,
+    UnreadableCellError,
+)
 from device.hardware.interfaces import CellCounts, CellSample, LoadCell
 from device.measurement.quantities import Bound, require
 
 LINE = re.compile(rb"\d+,-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
 """One reading. A missing raw24 does not match, and neither do the words nan, inf and ovf."""
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
+MOST_ALIKE = 20
+"""A converter that is there makes this many equal readings running once in 10^30: its noise is tens of counts."""
 MAX_LINE_BYTES = 256
 POLL_S = 0.05
 """Longest wait for one byte: bounds how late a timeout is noticed."""
@@ -67,6 +77,7 @@ class OpenScale:
         self._port: serial.Serial | None = self._opened()
         self._buffer = LineBuffer()
         self._samples: deque[CellSample] = deque()
+        self._last_counts, self._alike = CellCounts(math.nan), 0
         self._unreadable_lines = 0
         self._last_unreadable = b""
 
@@ -79,8 +90,8 @@ class OpenScale:
         """Return the next reading (counts), waiting at most `timeout_s` for it.
 
         Raises `LoadCellError` when the line stays silent, `UnreadableCellError` when it holds only unreadable lines,
-        `SaturatedCellError` when the reading is an end of the range, `UnpluggedCellError` when the line is gone;
-        the next call then tries to open it again.
+        `SaturatedCellError` when the reading is an end of the range, `DetachedCellError` when it never changes,
+        `UnpluggedCellError` when the line is gone; the next call then tries to open it again.
         """
         self._port = self._port or self._opened()
         skipped_before = self.skipped_lines
@@ -91,10 +102,11 @@ class OpenScale:
             for line in self._buffer.feed(self._receive()):
                 self._keep(line, time.monotonic())
         sample = self._samples.popleft()
-        if not RAW24_LOW_COUNTS < sample.counts < RAW24_HIGH_COUNTS:
+        try:
+            self._require_working(sample.counts)
+        except LoadCellError:
             self._samples.clear()  # those behind it are as old as the wait for them will be long
-            cause = f"Load cell on {self._name} reads {sample.counts:.0f} counts, the end of its range."
-            raise SaturatedCellError(cause, "Take the load off the probe; if it stays, check the cell's four wires.")
+            raise
         return sample
 
     def close(self) -> None:
@@ -130,6 +142,16 @@ class OpenScale:
         except ValueError:
             self._unreadable_lines += 1
             self._last_unreadable = line
+
+    def _require_working(self, counts: CellCounts) -> None:
+        if not RAW24_LOW_COUNTS < counts < RAW24_HIGH_COUNTS:
+            cause = f"Load cell on {self._name} reads {counts:.0f} counts, the end of its range."
+            raise SaturatedCellError(cause, "Take the load off the probe; if it stays, check the cell's four wires.")
+        self._alike = self._alike + 1 if counts == self._last_counts else 1
+        self._last_counts = counts
+        if self._alike >= MOST_ALIKE:
+            cause = f"Load cell on {self._name} has read {counts:.0f} counts {self._alike} times running."
+            raise DetachedCellError(cause, "Plug the load cell into its amplifier; if it stays, have it replaced.")
 
     def _no_reading(self, timeout_s: float, skipped: int) -> LoadCellError:
         if skipped == 0:

@@ -33,6 +33,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "cell_garbage": (),
     "cell_saturated": (),
     "cell_overloaded": (),
+    "cell_disconnected": (),
     "cell_unplugged": (),
     "clock_jump": ("step_s",),
     "disk_full": (),

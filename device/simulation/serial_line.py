@@ -114,6 +114,8 @@ class EmulatedOpenScale:
             counts += OVERLOAD_COUNTS
         if self._faults.is_active("cell_saturated", t_s):
             counts = RAW24_HIGH_COUNTS
+        if self._faults.is_active("cell_disconnected", t_s):
+            counts = 0
         raw24 = min(max(counts, RAW24_LOW_COUNTS), RAW24_HIGH_COUNTS)
         return f"{1000 * (t_s - powered_s):.0f},{raw24 / COUNTS_PER_KG:.4f},kg,{raw24},\r\n".encode()
 

@@ -14,9 +14,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
+from device.errors import (
+    DetachedCellError,
+    LoadCellError,
+    SaturatedCellError,
+    UnpluggedCellError,
+    UnreadableCellError,
+)
 from device.hardware.interfaces import CellSample
-from device.hardware.load_cell import LineBuffer, OpenScale, measure_tare, open_load_cell, parse_counts
+from device.hardware.load_cell import MOST_ALIKE, LineBuffer, OpenScale, measure_tare, open_load_cell, parse_counts
 from device.measurement.quantities import InvalidQuantity
 
 BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics\r\nReadings:\r\n"
@@ -176,6 +182,25 @@ def test_a_reading_at_the_end_of_the_range_is_an_error_and_those_behind_it_are_n
     assert error.value.code == "E303"
     line.send(b"1,0.5,kg,7,\r\n")
     assert read_counts(line.cell, 1) == [7.0]
+
+
+def test_a_reading_that_never_changes_comes_from_no_bridge_and_is_an_error_until_it_does(line):
+    line.send(b"1,0.0,kg,0,\r\n" * (MOST_ALIKE + 3))
+    assert read_counts(line.cell, MOST_ALIKE - 1) == [0.0] * (MOST_ALIKE - 1)
+    with pytest.raises(DetachedCellError, match="has read 0 counts 20 times running") as error:
+        line.cell.read(timeout_s=0.5)
+    assert error.value.code == "E307"
+    line.send(b"1,0.0,kg,0,\r\n")
+    with pytest.raises(DetachedCellError, match="21 times"):
+        line.cell.read(timeout_s=0.5)
+    line.send(b"1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+
+
+def test_readings_that_return_to_a_number_again_and_again_are_a_cell_at_rest(line):
+    rest = [7.0, 7.0, 7.0, 8.0] * 10
+    line.send(b"".join(b"1,0.5,kg,%d,\r\n" % counts for counts in rest))
+    assert read_counts(line.cell, len(rest)) == rest
 
 
 def test_lines_that_cannot_be_read_have_a_code_of_their_own(line):

@@ -10,7 +10,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from device.errors import LoadCellError, SaturatedCellError, UnpluggedCellError, UnreadableCellError
+from device.errors import (
+    DetachedCellError,
+    LoadCellError,
+    SaturatedCellError,
+    UnpluggedCellError,
+    UnreadableCellError,
+)
 from device.hardware.load_cell import OpenScale, open_load_cell
 from device.simulation.serial_line import BANNER, MAX_UNREAD_BYTES, EmulatedOpenScale
 
@@ -118,6 +124,7 @@ class Switch:
         ("cell_silent", LoadCellError),
         ("cell_garbage", UnreadableCellError),
         ("cell_saturated", SaturatedCellError),
+        ("cell_disconnected", DetachedCellError),
         ("cell_unplugged", UnpluggedCellError),
     ],
 )
