@@ -1,0 +1,108 @@
+"""Lines of an OpenScale-like load cell amplifier to samples in ADC counts.
+
+The amplifier streams `millis,reading,kg,raw24,` and CR LF, with "timestamp" and "raw reading" switched on in its menu.
+Only raw24 is used: `reading` is in the amplifier's own calibration. Opening the port resets the amplifier, so the
+first two or three seconds are a banner. 9600 baud carries about 30 such lines a second. Nothing is ever sent:
+an `x` would open the menu and stop the stream. A line that went is opened again when it is back.
+Without a bridge the converter reads an end of its range, or is read where none is: always the same number.
+Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement, input noise 50-90 nV = 20-40 counts).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections import deque
+
+from device.errors import DetachedCellError, LoadCellError, SaturatedCellError, UnreadableCellError
+from device.hardware.cell_line import CellLine
+from device.hardware.interfaces import CellCounts, CellSample
+
+LINE = re.compile(rb"\d+,-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
+"""One reading. A missing raw24 does not match, and neither do the words nan, inf and ovf."""
+RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
+MOST_ALIKE = 20
+"""A converter that is there makes this many equal readings running once in 10^30: its noise is tens of counts."""
+
+
+def parse_counts(line: bytes) -> CellCounts:
+    """Return raw24 (counts) of one line; raise `ValueError` when it is no complete reading."""
+    match = LINE.fullmatch(line)
+    if match is None:
+        raise ValueError(f"{line!r} is not of the form millis,reading,kg,raw24,")
+    counts = int(match["raw24"])
+    if not RAW24_LOW_COUNTS <= counts <= RAW24_HIGH_COUNTS:
+        raise ValueError(f"{line!r} holds {counts} counts, outside 24 bit")
+    return CellCounts(float(counts))
+
+
+class OpenScale:
+    """Reads an OpenScale-like stream from a serial line. Implements `LoadCell`."""
+
+    def __init__(self, line: CellLine) -> None:
+        self._line, self._name = line, line.name
+        self._samples: deque[CellSample] = deque()
+        self._last_counts, self._alike = CellCounts(math.nan), 0
+        self._unreadable_lines = 0
+        self._last_unreadable = b""
+
+    @property
+    def skipped_lines(self) -> int:
+        """Lines that held no reading since the port was opened: banner, torn, garbage or too long."""
+        return self._unreadable_lines + self._line.dropped_lines
+
+    def read(self, *, timeout_s: float) -> CellSample:
+        """Return the next reading (counts), waiting at most `timeout_s` for it.
+
+        Raises `LoadCellError` when the line stays silent, `UnreadableCellError` when it holds only unreadable lines,
+        `SaturatedCellError` when the reading is an end of the range, `DetachedCellError` when it never changes,
+        `UnpluggedCellError` when the line is gone; the next call then tries to open it again.
+        """
+        skipped_before = self.skipped_lines
+        deadline_s = time.monotonic() + timeout_s
+        while not self._samples:
+            if time.monotonic() >= deadline_s:
+                raise self._no_reading(timeout_s, self.skipped_lines - skipped_before)
+            for line in self._line.receive():
+                self._keep(line, time.monotonic())
+        sample = self._samples.popleft()
+        try:
+            self._require_working(sample.counts)
+        except LoadCellError:
+            self._samples.clear()  # those behind it are as old as the wait for them will be long
+            raise
+        return sample
+
+    def close(self) -> None:
+        """Release the serial line."""
+        self._line.close()
+
+    def _keep(self, line: bytes, t_s: float) -> None:
+        try:
+            self._samples.append(CellSample(t_s, parse_counts(line)))
+        except ValueError:
+            self._unreadable_lines += 1
+            self._last_unreadable = line
+
+    def _require_working(self, counts: CellCounts) -> None:
+        if not RAW24_LOW_COUNTS < counts < RAW24_HIGH_COUNTS:
+            cause = f"Load cell on {self._name} reads {counts:.0f} counts, the end of its range."
+            raise SaturatedCellError(cause, "Take the load off the probe; if it stays, check the cell's four wires.")
+        self._alike = self._alike + 1 if counts == self._last_counts else 1
+        self._last_counts = counts
+        if self._alike >= MOST_ALIKE:
+            cause = f"Load cell on {self._name} has read {counts:.0f} counts {self._alike} times running."
+            raise DetachedCellError(cause, "Plug the load cell into its amplifier; if it stays, have it replaced.")
+
+    def _no_reading(self, timeout_s: float, skipped: int) -> LoadCellError:
+        if skipped == 0:
+            cause = f"Load cell on {self._name} has sent nothing for {timeout_s:g} s."
+            return LoadCellError(cause, "Check its cable and supply, and that its menu is closed.")
+        cause = (
+            f"Load cell on {self._name} gave no reading for {timeout_s:g} s: {skipped} lines skipped, "
+            f"the last {self._last_unreadable!r}."
+        )
+        return UnreadableCellError(
+            cause, "Switch on timestamp and raw reading in its menu, and set the configured baud rate."
+        )

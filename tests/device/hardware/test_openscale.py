@@ -1,0 +1,229 @@
+"""The OpenScale driver as a transcript of bytes, through real pyserial on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import tty
+from collections.abc import Iterator
+
+import pytest
+
+from device.errors import (
+    DetachedCellError,
+    LoadCellError,
+    SaturatedCellError,
+    UnpluggedCellError,
+    UnreadableCellError,
+)
+from device.hardware.load_cell import open_load_cell
+from device.hardware.openscale import MOST_ALIKE, OpenScale, parse_counts
+
+BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics\r\nReadings:\r\n"
+
+
+class Line:
+    """The amplifier's end of a serial line."""
+
+    def __init__(self) -> None:
+        self.master, slave = os.openpty()
+        tty.setraw(slave)
+        self.path = os.ttyname(slave)
+        self.cell = open_load_cell(self.path)
+        os.close(slave)
+
+    def send(self, data: bytes) -> None:
+        os.write(self.master, data)
+
+    def unplug(self) -> None:
+        os.close(self.master)
+        self.master = -1
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    yield line
+    line.cell.close()
+    if line.master >= 0:
+        line.unplug()
+
+
+def read_counts(cell: OpenScale, samples: int) -> list[float]:
+    return [cell.read(timeout_s=0.5).counts for _ in range(samples)]
+
+
+def test_whole_lines_give_their_raw_counts_in_order(line):
+    line.send(b"1234,-0.532,kg,-53200,\r\n1246,0.001,kg,8388606,\r\n")
+    assert read_counts(line.cell, 2) == [-53200.0, 8388606.0]
+    assert line.cell.skipped_lines == 0
+
+
+def test_a_partial_line_waits_for_its_rest(line):
+    line.send(b"1234,0.5,kg,12")
+    with pytest.raises(LoadCellError):
+        line.cell.read(timeout_s=0.06)
+    line.send(b"345,\r\n")
+    assert read_counts(line.cell, 1) == [12345.0]
+
+
+def test_a_sample_is_stamped_when_its_line_is_complete(line):
+    before_s = time.monotonic()
+    line.send(b"1,0.5,kg,1,\r\n")
+    sample = line.cell.read(timeout_s=0.5)
+    assert before_s <= sample.t_s <= time.monotonic()
+
+
+def test_the_banner_is_skipped_and_counted(line):
+    line.send(BANNER + b"1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+    assert line.cell.skipped_lines == 4
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        b"\xff\x00\xfe\x80",
+        b"1234,0.5,kg,",
+        b"1234,nan,kg,100,",
+        b"1234,0.5,kg,nan,",
+        b"1234,inf,kg,100,",
+        b"1234,0.5,kg,inf,",
+        b"1234,0.5,kg,100",
+        b"1234,0.5,stone,100,",
+        b"0.5,kg,100,",
+        b"1234,0.5,kg,8388608,",
+        b"1234,0.5,kg,-8388609,",
+        b"1234,0.5,kg,99999999999,",
+        b"12,0.5,kg,1012,0.5,kg,10,",
+    ],
+)
+def test_a_line_without_a_valid_raw_reading_is_never_a_sample(line, bad):
+    line.send(bad + b"\r\n1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+    assert line.cell.skipped_lines == 1
+
+
+def test_an_over_long_line_is_dropped_up_to_its_end(line):
+    line.send(b"1,0.5,kg,9," * 100)
+    line.send(b"1,0.5,kg,9,\r\n1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+    assert line.cell.skipped_lines == 1
+
+
+def test_silence_is_a_load_cell_error_with_a_remedy(line):
+    with pytest.raises(LoadCellError, match=r"has sent nothing for 0.06 s. Check its cable"):
+        line.cell.read(timeout_s=0.06)
+
+
+def test_lines_without_raw_reading_name_the_setting_that_is_missing(line):
+    line.send(b"1234,-0.532,kg,\r\n" * 3)
+    with pytest.raises(LoadCellError, match=r"3 lines skipped, the last b'1234,-0.532,kg,\\r'. Switch on timestamp"):
+        line.cell.read(timeout_s=0.06)
+
+
+def test_unplugging_while_reading_is_a_load_cell_error(line):
+    unplug = threading.Timer(0.02, line.unplug)
+    unplug.start()
+    with pytest.raises(LoadCellError, match="is gone"):
+        line.cell.read(timeout_s=5.0)
+    unplug.join()
+
+
+def test_unplugging_between_reads_is_a_load_cell_error(line):
+    line.unplug()
+    with pytest.raises(LoadCellError, match="is gone"):
+        line.cell.read(timeout_s=5.0)
+
+
+def test_a_line_that_was_plugged_in_again_is_read_on_without_what_was_half_sent(line, tmp_path):
+    """The path stays, as udev's link does; the half line of before must not be glued to the first one after."""
+    link, again = tmp_path / "force", Line()
+    for amplifier in (line, again):
+        amplifier.cell.close()
+    link.symlink_to(line.path)
+    cell = open_load_cell(str(link))
+    line.send(b"1,0.5,kg,7,\r\n2,0.5,kg,8")
+    assert read_counts(cell, 1) == [7.0]
+    with pytest.raises(LoadCellError):
+        cell.read(timeout_s=0.06)
+    line.unplug()
+    link.unlink()
+    for words in ("is gone", "force cannot be opened"):
+        with pytest.raises(UnpluggedCellError, match=words) as error:
+            cell.read(timeout_s=0.5)
+        assert error.value.code == "E304"
+    link.symlink_to(again.path)
+    assert reads_again(cell)
+    again.send(b"8,0.5,kg,9,\r\n")
+    assert read_counts(cell, 1) == [9.0]
+    cell.close()
+    again.unplug()
+
+
+def reads_again(cell: OpenScale) -> bool:
+    """Return whether the port can be opened: then the error is that nothing has been sent yet."""
+    with pytest.raises(LoadCellError) as error:
+        cell.read(timeout_s=0.05)
+    return error.value.code == "E301"
+
+
+@pytest.mark.parametrize("end", [b"8388607", b"-8388608"])
+def test_a_reading_at_the_end_of_the_range_is_an_error_and_those_behind_it_are_not_waited_for(line, end):
+    line.send((b"1,0.5,kg," + end + b",\r\n") * 5)
+    with pytest.raises(SaturatedCellError, match="the end of its range") as error:
+        line.cell.read(timeout_s=0.5)
+    assert error.value.code == "E303"
+    line.send(b"1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+
+
+def test_a_reading_that_never_changes_comes_from_no_bridge_and_is_an_error_until_it_does(line):
+    line.send(b"1,0.0,kg,0,\r\n" * (MOST_ALIKE + 3))
+    assert read_counts(line.cell, MOST_ALIKE - 1) == [0.0] * (MOST_ALIKE - 1)
+    with pytest.raises(DetachedCellError, match="has read 0 counts 20 times running") as error:
+        line.cell.read(timeout_s=0.5)
+    assert error.value.code == "E307"
+    line.send(b"1,0.0,kg,0,\r\n")
+    with pytest.raises(DetachedCellError, match="21 times"):
+        line.cell.read(timeout_s=0.5)
+    line.send(b"1,0.5,kg,7,\r\n")
+    assert read_counts(line.cell, 1) == [7.0]
+
+
+def test_readings_that_return_to_a_number_again_and_again_are_a_cell_at_rest(line):
+    rest = [7.0, 7.0, 7.0, 8.0] * 10
+    line.send(b"".join(b"1,0.5,kg,%d,\r\n" % counts for counts in rest))
+    assert read_counts(line.cell, len(rest)) == rest
+
+
+def test_lines_that_cannot_be_read_have_a_code_of_their_own(line):
+    line.send(b"\xff\x00\n" * 5)
+    with pytest.raises(UnreadableCellError) as error:
+        line.cell.read(timeout_s=0.1)
+    assert error.value.code == "E302"
+
+
+def test_nothing_is_ever_sent_to_the_amplifier(line):
+    """An `x` would open its menu and stop the stream."""
+    line.send(b"1,0.5,kg,7,\r\n")
+    line.cell.read(timeout_s=0.5)
+    os.set_blocking(line.master, False)
+    with pytest.raises(BlockingIOError):
+        os.read(line.master, 1)
+
+
+def test_a_second_program_cannot_open_the_same_port(line):
+    with pytest.raises(LoadCellError, match="cannot be opened"):
+        open_load_cell(line.path)
+
+
+def test_a_missing_port_is_a_load_cell_error_naming_it():
+    with pytest.raises(LoadCellError, match="/dev/no-such-port cannot be opened"):
+        open_load_cell("/dev/no-such-port")
+
+
+def test_both_ends_of_24_bit_are_readings():
+    assert parse_counts(b"1,0,kg,8388607,") == 2**23 - 1
+    assert parse_counts(b"1,0,lbs,-8388608,\r") == -(2**23)
