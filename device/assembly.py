@@ -5,28 +5,24 @@ Every part that fails to open is listed at once, each with its fault code, and w
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
 from device.answers import answers_for
+from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.camera import RawMonoCamera, open_camera
-from device.hardware.interfaces import Camera, CellCounts, ForceScale, Lights, LoadCell
+from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
-from device.hardware.load_cell import measure_tare, open_load_cell
 from device.instrument.bench import Bench
 from device.instrument.clock_watch import ClockWatch
-from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_budget import LightBudget
-from device.instrument.load_limit import LoadLimit
 from device.instrument.procedure import Procedure
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
@@ -38,18 +34,11 @@ from device.simulation.faults import FaultTimeline
 from device.simulation.full_disk import EmulatedDisk
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
-from device.simulation.scenario import CellSettings, Scenario
-from device.simulation.serial_line import EmulatedOpenScale
+from device.simulation.scenario import Scenario
 from device.simulation.tlc59116_chip import Tlc59116Chip
 from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from device.simulation.virtual_request import ExposureRequest
-
-log = logging.getLogger(__name__)
-
-TARE_SAMPLES = 20
-FIRST_SAMPLE_S = 5.0
-"""Opening the port resets the amplifier: its banner may last three seconds."""
 
 Part = TypeVar("Part")
 
@@ -104,13 +93,13 @@ def open_probe(config: Config) -> Procedure:
     parts = _Parts()
     lights = parts.open(lambda: open_led_driver(config.light))
     camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
-    cell = parts.open(lambda: open_load_cell(config.cell.device, config.cell.baud))
+    cell = parts.open(lambda: open_cell(config, config.cell.device))
     return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
 
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
-    config = _commissioned(config)
+    config = commissioned(config)
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
     parts.open(lambda: _require_own_serial(config, scenario))
     table_folder = config.calibration.parent
@@ -126,18 +115,12 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
         led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
         faults=faults,
     )
-    line = EmulatedOpenScale(
-        probe.cell_counts,
-        noise_counts=scenario.cell.noise_counts,
-        drift_counts_per_s=scenario.cell.drift_counts_per_s,
-        seed=scenario.seed,
-        faults=faults,
-    )
+    line = emulated_amplifier(config, probe, faults)
     parts.opened.callback(line.close)
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
     lights = parts.open(lambda: led_driver(config.light, bus))
     camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
-    cell = parts.open(lambda: open_load_cell(line.device_path, config.cell.baud))
+    cell = parts.open(lambda: open_cell(config, line.device_path))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
     procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)
     procedure.on_request(lambda mode: faults.begin_press())
@@ -154,13 +137,6 @@ def _require_own_serial(config: Config, scenario: Scenario) -> None:
         )
     if scenario.sensor.bits != 8:
         raise ConfigError(f"sensor.bits is {scenario.sensor.bits}, but the daemon's camera takes 8.", "Set it to 8.")
-
-
-def _commissioned(config: Config) -> Config:
-    """Return the settings with the commissioning tare that every virtual probe left its maker with, unless they say."""
-    if config.cell.commissioned_tare_counts is not None:
-        return config
-    return replace(config, cell=replace(config.cell, commissioned_tare_counts=CellSettings().zero_counts))
 
 
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:
@@ -203,7 +179,7 @@ def _procedure(
     scenario: Scenario | None = None,
 ) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
-    force = parts.open(lambda: _tared(config, cell)) if cell else None
+    force = parts.open(lambda: tared(config, cell)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
     answers = parts.open(lambda: answers_for(config, bundle, calibration)) if bundle and calibration else None
@@ -233,22 +209,6 @@ def _procedure(
         clock=clock,
         simulated_truth=scenario.inclusion if scenario else None,
     )
-
-
-def _tared(config: Config, cell: LoadCell) -> ForceRecorder:
-    settings, sensitivity = config.cell, config.cell.sensitivity_counts_per_n
-    tare_counts = measure_tare(
-        cell,
-        samples=TARE_SAMPLES,
-        max_spread_counts=settings.tare_spread_n * sensitivity,
-        timeout_s=FIRST_SAMPLE_S,
-    )
-    at_commissioning = settings.commissioned_tare_counts
-    log.info("tare %.0f counts, at commissioning %s", tare_counts, at_commissioning)
-    zero_counts = tare_counts if at_commissioning is None else CellCounts(at_commissioning)
-    limit = LoadLimit(ForceScale(sensitivity, zero_counts), settings.max_load_n, settings.tare_drift_n)
-    limit.require_tare(tare_counts)
-    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts), limit)
 
 
 def _calibration_for(config: Config, bundle: ModelBundle) -> Calibration:

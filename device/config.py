@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
+from typing import Literal, get_args
 
 from device.measurement.mode import MODES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.quantities import Bound
@@ -18,6 +19,7 @@ from device.settings.light_section import LightSection
 from device.settings.setting import Conflict, Section, conflict, setting
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
+CellProtocol = Literal["openscale", "mantracourt"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,12 @@ class CellSection(Section):
 
     device: str = setting("/dev/tsis-force", "Serial line of the load cell's amplifier.")
     baud: int = setting(115_200, "Speed of the serial line.", Bound(300, 4_000_000, "baud"))
+    protocol: CellProtocol = setting(
+        "openscale",
+        "What the load cell's amplifier speaks; a mantracourt has a station, and a count of 1 nV/V.",
+        choices=get_args(CellProtocol),
+    )
+    station: int = setting(1, "Station number of a mantracourt.", Bound(1, 999, ""))
     sensitivity_counts_per_n: float = setting(
         100_000.0, "Change of the amplifier's reading by one newton.", Bound(1.0, 1e7, "counts/N")
     )

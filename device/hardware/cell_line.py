@@ -26,8 +26,12 @@ class LineBuffer:
 
     def __init__(self, end: bytes = b"\n", max_bytes: int = MAX_LINE_BYTES) -> None:
         self._end, self._max_bytes = end, max_bytes
-        self._partial = b""
-        self.dropped_lines = 0
+        self._partial, self._dropped_lines = b"", 0
+
+    @property
+    def dropped_lines(self) -> int:
+        """Lines that were too long so far, with one that has not ended yet."""
+        return self._dropped_lines + (len(self._partial) > self._max_bytes)
 
     def feed(self, data: bytes) -> list[bytes]:
         """Return the lines that are now complete, without their end."""
@@ -35,8 +39,12 @@ class LineBuffer:
         # One byte more than allowed is enough to know at its end that a line was too long.
         self._partial = partial[: self._max_bytes + 1]
         kept = [line for line in lines if len(line) <= self._max_bytes]
-        self.dropped_lines += len(lines) - len(kept)
+        self._dropped_lines += len(lines) - len(kept)
         return kept
+
+    def clear(self) -> None:
+        """Forget the partial line."""
+        self._dropped_lines, self._partial = self.dropped_lines, b""
 
 
 class CellLine:
@@ -44,13 +52,13 @@ class CellLine:
 
     def __init__(self, name: str, open_port: Callable[[], serial.Serial], *, end: bytes = b"\n") -> None:
         """Open the port; raise `UnpluggedCellError` when it is missing or in use. `end` ends a line."""
-        self.name, self._open_port, self._end = name, open_port, end
+        self.name, self._open_port = name, open_port
         self._buffer = LineBuffer(end)
         self._port: serial.Serial | None = self._opened()
 
     @property
     def dropped_lines(self) -> int:
-        """Lines that were too long since the port was opened."""
+        """Lines that were too long so far."""
         return self._buffer.dropped_lines
 
     def receive(self) -> list[bytes]:
@@ -75,7 +83,7 @@ class CellLine:
             port.write(request)
         except (OSError, termios.error) as error:
             raise self._gone(error) from error
-        self._buffer = LineBuffer(self._end)
+        self._buffer.clear()
 
     def close(self) -> None:
         """Release the serial line."""
@@ -95,5 +103,5 @@ class CellLine:
 
     def _gone(self, error: Exception) -> UnpluggedCellError:
         self.close()
-        self._buffer = LineBuffer(self._end)
+        self._buffer.clear()
         return UnpluggedCellError(f"Load cell on {self.name} is gone: {error}.", "Plug its USB cable in again.")

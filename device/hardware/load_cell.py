@@ -7,13 +7,23 @@ import serial
 from device.errors import LoadCellError
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, LoadCell
+from device.hardware.mantracourt import Mantracourt
 from device.hardware.openscale import OpenScale
 from device.measurement.quantities import Bound, require
 
 
-def open_load_cell(device: str, baud: int = 9600) -> OpenScale:
-    """Open the serial port for this program alone; raise `UnpluggedCellError` when it is missing or in use."""
-    return OpenScale(CellLine(device, lambda: serial.Serial(device, baudrate=baud, exclusive=True)))
+def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", station: int = 1) -> LoadCell:
+    """Open the serial port for this program alone; raise `UnpluggedCellError` when it is missing or in use.
+
+    `protocol` is "openscale" or "mantracourt"; only the latter has a `station`.
+    """
+
+    def open_port() -> serial.Serial:
+        return serial.Serial(device, baudrate=baud, exclusive=True)
+
+    if protocol == "mantracourt":
+        return Mantracourt(CellLine(device, open_port, end=b"\r"), station)
+    return OpenScale(CellLine(device, open_port))
 
 
 def measure_tare(cell: LoadCell, *, samples: int, max_spread_counts: float, timeout_s: float) -> CellCounts:

@@ -49,7 +49,7 @@ class OpenScale:
 
     @property
     def skipped_lines(self) -> int:
-        """Lines that held no reading since the port was opened: banner, torn, garbage or too long."""
+        """Lines that held no reading so far: banner, torn, garbage or too long."""
         return self._unreadable_lines + self._line.dropped_lines
 
     def read(self, *, timeout_s: float) -> CellSample:

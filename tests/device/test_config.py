@@ -49,6 +49,7 @@ BOUNDS = [
     ("light.min_contrast_ratio", 0.01, 0.9),
     ("light.max_on_s", 1.0, 3600.0),
     ("cell.baud", 300, 4_000_000),
+    ("cell.station", 1, 999),
     ("cell.sensitivity_counts_per_n", 1.0, 1e7),
     ("cell.tare_spread_n", 0.0001, 1.0),
     ("cell.commissioned_tare_counts", -(2.0**23), 2.0**23),
@@ -148,6 +149,12 @@ def test_the_mode_is_one_of_those_there_are(read):
     assert read('[press]\nmode = "precise"\n').press.mode == "precise"
     with pytest.raises(ConfigError, match="press.mode is 'fast', but must be one of quick, standard, precise, paper"):
         read('[press]\nmode = "fast"\n')
+
+
+def test_the_load_cells_protocol_is_one_of_those_there_are(read):
+    assert read('[cell]\nprotocol = "mantracourt"\n').cell.protocol == "mantracourt"
+    with pytest.raises(ConfigError, match="cell.protocol is 'modbus', but must be one of openscale, mantracourt"):
+        read('[cell]\nprotocol = "modbus"\n')
 
 
 @pytest.mark.parametrize("rate_hz", [0.9, 240.1])

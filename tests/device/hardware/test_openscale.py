@@ -205,6 +205,12 @@ def test_lines_that_cannot_be_read_have_a_code_of_their_own(line):
     assert error.value.code == "E302"
 
 
+def test_babble_without_line_ends_is_unreadable_not_silent(line):
+    line.send(b"1,0.5,kg,9," * 100)
+    with pytest.raises(UnreadableCellError, match="1 lines skipped"):
+        line.cell.read(timeout_s=0.1)
+
+
 def test_nothing_is_ever_sent_to_the_amplifier(line):
     """An `x` would open its menu and stop the stream."""
     line.send(b"1,0.5,kg,7,\r\n")

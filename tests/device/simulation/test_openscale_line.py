@@ -20,7 +20,15 @@ from device.errors import (
 )
 from device.hardware.load_cell import open_load_cell
 from device.hardware.openscale import OpenScale
-from device.simulation.serial_line import BANNER, MAX_UNREAD_BYTES, EmulatedOpenScale
+from device.simulation.emulated_amplifier import MAX_UNREAD_BYTES, EmulatedBridge
+from device.simulation.faults import NO_FAULTS, FaultTimeline
+from device.simulation.openscale_line import BANNER, EmulatedOpenScale
+
+
+def streaming(
+    counts_at: Callable[[float], float], *, rate_hz: float = 80.0, faults: FaultTimeline = NO_FAULTS, **bridge: float
+) -> EmulatedOpenScale:
+    return EmulatedOpenScale(EmulatedBridge(counts_at, faults=faults, **bridge), rate_hz=rate_hz, faults=faults)
 
 
 def read_bytes(path: str, count: int) -> bytes:
@@ -62,7 +70,7 @@ def first_reading(cell: OpenScale) -> float:
 
 
 def test_the_banner_comes_first_and_ends_in_readings():
-    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1)
+    scale = streaming(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1)
     data = read_bytes(scale.device_path, len(BANNER) + 40)
     scale.close()
     assert data.startswith(BANNER)
@@ -70,7 +78,7 @@ def test_the_banner_comes_first_and_ends_in_readings():
 
 
 def test_the_driver_reads_the_counts_of_the_load():
-    scale = EmulatedOpenScale(lambda _t_s: -12345.0, rate_hz=400.0, noise_counts=0.0, seed=1)
+    scale = streaming(lambda _t_s: -12345.0, rate_hz=400.0, noise_counts=0.0, seed=1)
     cell = open_load_cell(scale.device_path)
     samples = [cell.read(timeout_s=1.0) for _ in range(5)]
     assert [sample.counts for sample in samples] == [-12345.0] * 5
@@ -81,7 +89,7 @@ def test_the_driver_reads_the_counts_of_the_load():
 
 def test_noise_is_the_same_for_the_same_seed_and_differs_for_another():
     def counts(seed: int) -> list[bytes]:
-        scale = EmulatedOpenScale(lambda _t_s: 0.0, rate_hz=400.0, noise_counts=1000.0, seed=seed)
+        scale = streaming(lambda _t_s: 0.0, rate_hz=400.0, noise_counts=1000.0, seed=seed)
         lines = read_bytes(scale.device_path, len(BANNER) + 120)[len(BANNER) :].split(b"\r\n")[:-1]
         scale.close()
         return [line.split(b",")[3] for line in lines]
@@ -93,7 +101,7 @@ def test_noise_is_the_same_for_the_same_seed_and_differs_for_another():
 
 @pytest.mark.parametrize(("load_counts", "raw24"), [(1e9, 8388607), (-1e9, -8388608)])
 def test_an_overload_saturates_at_24_bit(load_counts, raw24):
-    scale = EmulatedOpenScale(lambda _t_s: load_counts, rate_hz=400.0, noise_counts=0.0, seed=1)
+    scale = streaming(lambda _t_s: load_counts, rate_hz=400.0, noise_counts=0.0, seed=1)
     data = read_bytes(scale.device_path, len(BANNER) + 40)
     scale.close()
     assert readings(data)[0].split(b",")[3] == str(raw24).encode()
@@ -101,7 +109,7 @@ def test_an_overload_saturates_at_24_bit(load_counts, raw24):
 
 def test_the_zero_drifts_from_the_start_on():
     """10 counts a millisecond, by the amplifier's own time, which its lines round to whole milliseconds."""
-    scale = EmulatedOpenScale(lambda _t_s: 1000.0, rate_hz=200.0, noise_counts=0.0, drift_counts_per_s=10_000.0, seed=1)
+    scale = streaming(lambda _t_s: 1000.0, rate_hz=200.0, noise_counts=0.0, drift_counts_per_s=10_000.0, seed=1)
     lines = readings(read_bytes(scale.device_path, len(BANNER) + 120))[:-1]
     scale.close()
     since_power_ms, counts = (np.array([int(line.split(b",")[field]) for line in lines]) for field in (0, 3))
@@ -132,7 +140,7 @@ class Switch:
 )
 def test_a_fault_shows_in_the_bytes_and_is_over_when_it_is_over(kind, error):
     fault = Switch(kind)
-    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
+    scale = streaming(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
     cell = open_load_cell(scale.device_path)
     assert cell.read(timeout_s=1.0).counts == 42.0
     fault.is_on = True
@@ -148,16 +156,16 @@ def test_a_fault_shows_in_the_bytes_and_is_over_when_it_is_over(kind, error):
 def test_an_overload_adds_to_the_load_and_is_no_end_of_the_range():
     fault = Switch("cell_overloaded")
     fault.is_on = True
-    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
+    scale = streaming(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
     data = read_bytes(scale.device_path, len(BANNER) + 40)
     scale.close()
-    assert readings(data)[0].split(b",")[3] == b"4194346"
+    assert readings(data)[0].split(b",")[3] == b"2097194"
 
 
 def test_unplugging_takes_the_path_away_and_plugging_in_again_brings_a_banner():
     fault = Switch("cell_unplugged")
     fault.is_on = True
-    scale = EmulatedOpenScale(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
+    scale = streaming(lambda _t_s: 42.0, rate_hz=400.0, noise_counts=0.0, seed=1, faults=fault)
     assert reached(lambda: not os.path.exists(scale.device_path))
     fault.is_on = False
     assert reached(lambda: os.path.exists(scale.device_path))
@@ -175,7 +183,7 @@ def test_lines_that_nobody_reads_are_lost_not_kept():
             enough_sent.set()
         return float(number)
 
-    scale = EmulatedOpenScale(count_up, rate_hz=2000.0, noise_counts=0.0, seed=1)
+    scale = streaming(count_up, rate_hz=2000.0, noise_counts=0.0, seed=1)
     assert enough_sent.wait(5.0)
     line = os.open(scale.device_path, os.O_RDONLY | os.O_NOCTTY)
     assert len(os.read(line, 65536)) <= MAX_UNREAD_BYTES
@@ -184,7 +192,7 @@ def test_lines_that_nobody_reads_are_lost_not_kept():
 
 
 def test_closing_is_unplugging_for_the_reader_and_ends_the_thread():
-    scale = EmulatedOpenScale(lambda _t_s: 0.0, noise_counts=0.0, seed=1)
+    scale = streaming(lambda _t_s: 0.0, noise_counts=0.0, seed=1)
     cell = open_load_cell(scale.device_path)
     scale.close()
     scale.close()

@@ -1,4 +1,4 @@
-"""The two tares of the simulated probe: that of commissioning, and that of this start."""
+"""The load cell of the simulated probe: its tares, that of commissioning and that of this start, on either protocol."""
 
 from dataclasses import replace
 
@@ -34,6 +34,7 @@ def test_a_zero_far_from_that_of_commissioning_keeps_the_probe_from_starting(ope
     assert [fault.code for fault in refusal.value.faults] == ["E306"]
 
 
-def test_a_zero_near_that_of_commissioning_is_the_zero_of_force(opened):
+@pytest.mark.parametrize("protocol", ["openscale", "mantracourt"])
+def test_a_zero_near_that_of_commissioning_is_the_zero_of_force(opened, protocol):
     """Twenty readings of 40 counts' noise: the tare is good to 0.1 mN, and the force read to 0.4 mN."""
-    assert abs(opened(20_000.0).bench.force.latest_n) < 0.004
+    assert abs(opened(20_000.0, protocol=protocol).bench.force.latest_n) < 0.004

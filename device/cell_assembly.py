@@ -1,0 +1,72 @@
+"""Puts the load cell together: its line, real or emulated, its two tares, and the recorder of force on top."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+from device.config import Config
+from device.hardware.interfaces import CellCounts, ForceScale, LoadCell
+from device.hardware.load_cell import measure_tare, open_load_cell
+from device.instrument.force_recorder import ForceRecorder
+from device.instrument.load_limit import LoadLimit
+from device.simulation.emulated_amplifier import EmulatedAmplifier, EmulatedBridge
+from device.simulation.faults import FaultTimeline
+from device.simulation.mantracourt_line import EmulatedMantracourt
+from device.simulation.openscale_line import EmulatedOpenScale
+from device.simulation.scenario import CellSettings
+from device.simulation.virtual_probe import VirtualProbe
+
+log = logging.getLogger(__name__)
+
+TARE_SAMPLES = 20
+FIRST_SAMPLE_S = 5.0
+"""Opening the port resets an OpenScale: its banner may last three seconds."""
+
+
+def open_cell(config: Config, device: str) -> LoadCell:
+    """Open the line at a path by the settings' protocol; raise `UnpluggedCellError` when it is missing or in use."""
+    settings = config.cell
+    return open_load_cell(device, settings.baud, settings.protocol, settings.station)
+
+
+def emulated_amplifier(config: Config, probe: VirtualProbe, faults: FaultTimeline) -> EmulatedAmplifier:
+    """Return the virtual probe's amplifier: it speaks what the settings expect."""
+    cell = probe.scenario.cell
+    bridge = EmulatedBridge(
+        probe.cell_counts,
+        noise_counts=cell.noise_counts,
+        drift_counts_per_s=cell.drift_counts_per_s,
+        seed=probe.scenario.seed,
+        faults=faults,
+    )
+    if config.cell.protocol == "mantracourt":
+        return EmulatedMantracourt(bridge, station=config.cell.station, faults=faults)
+    return EmulatedOpenScale(bridge, faults=faults)
+
+
+def commissioned(config: Config) -> Config:
+    """Return the settings with the commissioning tare that every virtual probe left its maker with, unless they say."""
+    if config.cell.commissioned_tare_counts is not None:
+        return config
+    return replace(config, cell=replace(config.cell, commissioned_tare_counts=CellSettings().zero_counts))
+
+
+def tared(config: Config, cell: LoadCell) -> ForceRecorder:
+    """Take the tare of this start and begin to record; raise the `LoadCellError` that forbids it.
+
+    Newtons count from this tare, overload from that of commissioning.
+    """
+    settings, sensitivity = config.cell, config.cell.sensitivity_counts_per_n
+    tare_counts = measure_tare(
+        cell,
+        samples=TARE_SAMPLES,
+        max_spread_counts=settings.tare_spread_n * sensitivity,
+        timeout_s=FIRST_SAMPLE_S,
+    )
+    at_commissioning = settings.commissioned_tare_counts
+    log.info("tare %.0f counts, at commissioning %s", tare_counts, at_commissioning)
+    zero_counts = tare_counts if at_commissioning is None else CellCounts(at_commissioning)
+    limit = LoadLimit(ForceScale(sensitivity, zero_counts), settings.max_load_n, settings.tare_drift_n)
+    limit.require_tare(tare_counts)
+    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts), limit)
