@@ -48,7 +48,7 @@ def modes(
         "dial": lambda: dial_chapter(trained, held, paper, calibration, tables),
         "coverage": lambda: coverage_chapter(trained),
         "posterior": lambda: posterior_chapter(trained),
-        "noise-free": lambda: noise_free_chapter(trained.answers.surrogate, tables),
+        "noise-free": lambda: noise_free_chapter(trained.answers, tables),
         "outside": lambda: outside_chapter(trained, kinds(tables, 60), RAMP_MODES),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip

@@ -21,7 +21,7 @@ PAPER_SCENES = 134
 
 def train(
     profile: Annotated[str, typer.Option(help="paper, standard (and precise), or quick (after standard).")] = "paper",
-    data: Annotated[Path | None, typer.Option(help="Data set of `host_tools sweep`; swept anew when missing.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Data set of `host_tools sweep`; swept unless given.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the model bundle.")] = None,
     trials: Annotated[int, typer.Option(help="Networks of the paper that are averaged.")] = 100,
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
@@ -33,7 +33,7 @@ def train(
     Example: host_tools train --profile standard --out models/standard
     """
     if profile == "paper":
-        _paper(data or SWEPT, out or MODELS / "paper", trials, seed)
+        _paper(data or _swept(), out or MODELS / "paper", trials, seed)
     elif profile == "standard":
         _standard(table, out or MODELS / "standard", seed, quick)
     elif profile == "quick":
@@ -42,15 +42,21 @@ def train(
         raise InvalidQuantity("profile", repr(profile), "paper, standard or quick", "choose one of them")
 
 
-def _paper(data: Path, out: Path, trials: int, seed: int) -> None:
+def _swept() -> Path:
+    """Return the paper's data set, swept anew when it is not there."""
     from host_tools.commands.sweep import sweep
+
+    if not SWEPT.exists():
+        note.print(f"{SWEPT} is missing: sweeping {PAPER_SCENES} scenes.")
+        sweep(out=SWEPT, scenes=PAPER_SCENES, seed=1)
+    return SWEPT
+
+
+def _paper(data: Path, out: Path, trials: int, seed: int) -> None:
     from host_tools.data.dataset import training_rows
     from host_tools.inverse.export import export
     from host_tools.inverse.train import train as run_training
 
-    if not data.exists():
-        note.print(f"{data} is missing: sweeping {PAPER_SCENES} scenes.")
-        sweep(out=data, scenes=PAPER_SCENES, seed=1)
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
     with progress("networks") as bar:

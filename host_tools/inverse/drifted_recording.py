@@ -19,6 +19,8 @@ from device.measurement.recording import Recording
 from device.measurement.tactile_image import Frame, Image, PixelScale
 
 DRIFTING = "reference", "press"
+BELOW_ONE = 0.99
+"""Parts of a count are less than one also after single precision has rounded their sum."""
 GRID_MM = 0.5
 """Smooth errors are drawn on a grid this fine, far finer than they vary, and interpolated to the pixels."""
 
@@ -45,8 +47,8 @@ def drifted(recording: Recording, rng: np.random.Generator, levels: ErrorLevels)
     def with_errors(frame: Frame) -> Frame:
         if frame.role not in DRIFTING:
             return frame
-        counts = np.floor(frame.counts + (frame.counts - dark) * error_of(frame) + rng.random(shape, dtype=np.float32))
-        clipped = np.clip(counts, 0, top)
+        part = np.float32(BELOW_ONE) * rng.random(shape, dtype=np.float32)
+        clipped = np.clip(np.floor(frame.counts + (frame.counts - dark) * error_of(frame) + part), 0, top)
         whole = clipped.astype(np.uint8) if top == 255 else clipped.astype(np.uint16)
         drift_n = zero_n if frame.role == "press" else 0.0
         return replace(frame, counts=whole, force_n=frame.force_n + drift_n)

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 
 from device.measurement.press_parameters import from_unit, to_unit
 from device.measurement.press_surrogate import DEPTH, MODULUS, SIZE, PressSurrogate
+from device.measurement.profile_model import ProfileAnswers
 from device.measurement.quantities import UNKNOWNS
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.press_samples import draw_parameters, profile_rows
@@ -31,12 +32,13 @@ STARTS = (-0.7, 0.0, 0.7)
 """Coordinates of the modulus from which a fit is begun: it has local minima."""
 
 
-def noise_free_chapter(surrogate: PressSurrogate, tables: ProbeTables, *, seed: int = 7, jobs: int = -1) -> Chapter:
-    """Return the errors of size, depth and modulus from exact rows."""
+def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: int = 7, jobs: int = -1) -> Chapter:
+    """Return the errors of size, depth and modulus from exact rows, columns weighed as the camera knows them."""
+    surrogate, std = answers.surrogate, np.sqrt(np.diag(answers.noise["precise"].camera))
     parameters = _parameters(seed)
     unit = to_unit(parameters)
     rows = in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], PRESSES, jobs)
-    found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], unit[i]), PRESSES, jobs))
+    found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], unit[i], std), PRESSES, jobs))
     percent = 100 * np.abs(found - parameters[:, : len(UNKNOWNS)]) / parameters[:, : len(UNKNOWNS)]
     inside = _between(parameters[:, SIZE], DETERMINED_SIZES_MM) & _between(parameters[:, DEPTH], DETERMINED_DEPTHS_MM)
     parts = [percent[:, SIZE], percent[:, DEPTH], percent[inside, MODULUS]]
@@ -59,8 +61,11 @@ def noise_free_chapter(surrogate: PressSurrogate, tables: ProbeTables, *, seed: 
     )
 
 
-def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array) -> Array:
-    """Return size, depth and modulus that fit a row [P] best, the nuisances of coordinates [9] being known."""
+def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array, std: Array) -> Array:
+    """Return size, depth and modulus that fit a row [P] best, the nuisances of coordinates [9] being known.
+
+    Columns count by their standard deviations `std` [P].
+    """
     known = unit[len(UNKNOWNS) :]
 
     def whole(at: Array) -> Array:
@@ -68,9 +73,9 @@ def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array) -> A
 
     fits = [
         least_squares(
-            lambda at: surrogate.rows(whole(at)[None])[0] - row,
+            lambda at: (surrogate.rows(whole(at)[None])[0] - row) / std,
             np.array([0.0, 0.0, start]),
-            jac=lambda at: surrogate.rows_and_jacobian(whole(at))[1][:, : len(UNKNOWNS)],
+            jac=lambda at: surrogate.rows_and_jacobian(whole(at))[1][:, : len(UNKNOWNS)] / std[:, None],
             bounds=(-1.0, 1.0),
             x_scale=1e-2,
             xtol=1e-10,

@@ -155,6 +155,6 @@ def test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_reco
     """A press of ramps lights the probe for longer than a second."""
     with running(Scenario(), light=LightSection(max_on_s=1.0)) as device:
         device.press()
-        device.until(lambda: "E209" in device.codes())
         device.until(lambda: device.board.now.step == "ready")
+        assert device.board.now.press.code == "E209"
         assert device.board.now.press.light_on_s > 1.0

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_surrogate import linear_surrogate
+from small_surrogate import COLUMNS, linear_surrogate
 
 from device.measurement.press_parameters import HIGH, LOW, PARAMETERS, from_unit
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
 from host_tools.study.mode_noise_free import known_nuisances_fit
 
 GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+ALIKE = np.ones(COLUMNS)
 TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
 SIDE = 1e-6
 
@@ -24,7 +25,7 @@ def slopes() -> np.ndarray:
 def test_an_exact_row_gives_back_size_depth_and_modulus(slopes, modulus):
     unit = np.where(np.arange(len(PARAMETERS)) == MODULUS, modulus, TRUTH)
     surrogate = linear_surrogate(slopes)
-    found = known_nuisances_fit(surrogate, surrogate.rows(unit[None])[0], unit)
+    found = known_nuisances_fit(surrogate, surrogate.rows(unit[None])[0], unit, ALIKE)
     np.testing.assert_allclose(found, from_unit(unit)[:3], rtol=1e-6)
 
 
@@ -41,7 +42,7 @@ def test_a_row_that_does_not_fit_is_fitted_by_least_squares(slopes):
     assert np.abs(moved).min() > 0.005
     unit = TRUTH.copy()
     unit[:2] += moved
-    np.testing.assert_allclose(known_nuisances_fit(surrogate, row, TRUTH), from_unit(unit)[:3], rtol=1e-5)
+    np.testing.assert_allclose(known_nuisances_fit(surrogate, row, TRUTH, ALIKE), from_unit(unit)[:3], rtol=1e-5)
 
 
 def test_nuisances_are_believed_and_not_fitted(slopes):
@@ -49,7 +50,7 @@ def test_nuisances_are_believed_and_not_fitted(slopes):
     surrogate = linear_surrogate(slopes)
     row = surrogate.rows(TRUTH[None])[0]
     wrong = np.where(np.array(PARAMETERS) == "albedo", TRUTH + 0.5, TRUTH)
-    found = known_nuisances_fit(surrogate, row, wrong)
+    found = known_nuisances_fit(surrogate, row, wrong, ALIKE)
     assert np.abs(found / from_unit(TRUTH)[:3] - 1).max() > 0.01
 
 
@@ -57,7 +58,7 @@ def test_the_true_unknowns_are_not_looked_at(slopes):
     surrogate = linear_surrogate(slopes)
     row = surrogate.rows(TRUTH[None])[0]
     hidden = np.where(np.arange(len(PARAMETERS)) < 3, np.nan, TRUTH)
-    np.testing.assert_allclose(known_nuisances_fit(surrogate, row, hidden), from_unit(TRUTH)[:3], rtol=1e-6)
+    np.testing.assert_allclose(known_nuisances_fit(surrogate, row, hidden, ALIKE), from_unit(TRUTH)[:3], rtol=1e-6)
 
 
 def test_a_fit_stays_inside_the_trained_ranges(slopes):
@@ -65,7 +66,7 @@ def test_a_fit_stays_inside_the_trained_ranges(slopes):
     surrogate = linear_surrogate(slopes)
     row = surrogate.rows(TRUTH[None])[0]
     row[GROWTH] += 2.0 * slopes[0]
-    found = known_nuisances_fit(surrogate, row, TRUTH)
+    found = known_nuisances_fit(surrogate, row, TRUTH, ALIKE)
     assert found[0] == pytest.approx(HIGH[0], rel=1e-3)
     assert (found >= LOW[:3] - SIDE).all()
     assert (found <= HIGH[:3] + SIDE).all()
