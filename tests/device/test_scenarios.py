@@ -157,4 +157,4 @@ def test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_reco
         device.press()
         device.until(lambda: device.board.now.step == "ready")
         assert device.board.now.press.code == "E209"
-        assert device.board.now.press.light_on_s > 1.0
+        assert device.board.now.press.light_on_s >= 1.0  # to a tenth
