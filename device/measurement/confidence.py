@@ -53,13 +53,18 @@ class Bands:
         if spread >= IDENTIFIABLE_RATIO * EVEN_STD:
             return Interval(-1.0, 1.0, False)
         truth = np.linspace(-1, 1, GRID)
-        low, high = (self._at(truth, np.log(spread), table) for table in (self.low, self.high))
+        low, high = self.bounds(truth, spread)
         usual = truth[(low <= (truth - mean) / spread) & ((truth - mean) / spread <= high)]
         if not len(usual):  # an answer that is unusual for every truth: nothing narrower may be said
             at = min(max(mean, -1.0), 1.0)
             return Interval(max(-1.0, at - 2 * spread), min(1.0, at + 2 * spread), True)
         half_step = 1 / (GRID - 1)
         return Interval(max(-1.0, usual[0] - half_step), min(1.0, usual[-1] + half_step), True)
+
+    def bounds(self, truth: Array, spread: float) -> tuple[Array, Array]:
+        """Return the lowest and highest usual (truth - mean) / spread [n] at truths [n]."""
+        log_spread = float(np.log(spread))
+        return self._at(truth, log_spread, self.low), self._at(truth, log_spread, self.high)
 
     def _at(self, truth: Array, log_spread: float, table: Array) -> Array:
         at_spread = np.array([np.interp(log_spread, self.log_spread, row) for row in table])

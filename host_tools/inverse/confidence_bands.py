@@ -1,6 +1,8 @@
 """Simulated presses with noise to the bands behind every interval, one set for each unknown.
 
 Bounds are quantiles of (truth - mean) / spread over the presses nearest in truth and in the logarithm of the spread.
+Recordings hold what the forward model and its noise do not know of: where they are covered less often than chance
+explains, bands are widened by one factor. Source of the factor: split conformal prediction, Lei et al., JASA 113, 2018.
 """
 
 from __future__ import annotations
@@ -41,3 +43,27 @@ def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
             near = np.argpartition(distance, neighbours - 1)[:neighbours]
             table[i, j] = np.quantile(unusual[near], tails, method="weibull")  # covers the share, of few presses too
     return Bands(truths, spreads, table[..., 0], table[..., 1])
+
+
+def widened(bands: tuple[Bands, ...], truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
+    """Return bands wide enough, about their middles, for truths, means and spreads [n, 3] of recorded presses.
+
+    Wide enough is a coverage at most one standard error of chance below the promised one.
+    """
+    return tuple(_widened(one, *columns) for one, *columns in zip(bands, truth.T, mean.T, spread.T, strict=True))
+
+
+def _widened(bands: Bands, truth: Array, mean: Array, spread: Array) -> Bands:
+    known = spread < IDENTIFIABLE_RATIO * EVEN_STD
+    if not known.any():
+        return bands
+    ends = np.array([
+        np.ravel(bands.bounds(np.array([at]), float(width)))
+        for at, width in zip(truth[known], spread[known], strict=True)
+    ])  # fmt: skip
+    middle, half = ends.mean(axis=1), np.diff(ends, axis=1)[:, 0] / 2
+    needed = np.abs((truth - mean)[known] / spread[known] - middle) / half
+    by_chance = np.sqrt(COVERAGE * (1 - COVERAGE) / len(needed))
+    factor = max(1.0, float(np.quantile(needed, max(COVERAGE - by_chance, 0.0))))
+    middles, halves = (bands.low + bands.high) / 2, (bands.high - bands.low) / 2
+    return Bands(bands.truth, bands.log_spread, middles - factor * halves, middles + factor * halves)

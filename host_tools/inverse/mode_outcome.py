@@ -1,11 +1,13 @@
 """What a mode makes of presses nobody has learned from: answers, bands of its intervals, coverage, and usual doubts.
 
 Bands come from one half of the simulated presses and are counted on the other. What is usual of misfit and elongation
-comes from recordings, because only they hold all that a recording does to a profile.
+comes from recordings, because only they hold all that a recording does to a profile; so does a factor that widens the
+bands where recordings need it, from one half of them; coverage is counted on the other.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +17,7 @@ from device.measurement.mode import Mode
 from device.measurement.press_parameters import to_unit
 from device.measurement.profile_model import Answer, ProfileAnswers
 from device.measurement.quantities import UNKNOWNS
-from host_tools.inverse.confidence_bands import confidence_bands
+from host_tools.inverse.confidence_bands import confidence_bands, widened
 from host_tools.inverse.noisy_presses import Pool
 from host_tools.inverse.press_samples import Array
 from host_tools.inverse.recorded_presses import RecordedPresses, in_parallel
@@ -24,6 +26,7 @@ from host_tools.inverse.train_ensemble import DenseEnsemble
 USUAL_RATIO = 0.985
 """Share of recorded presses inside the trained ranges whose misfit, and whose elongation, count as usual."""
 THREE = len(UNKNOWNS)
+Networks = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,25 +77,36 @@ def judged_mode(
     truth = pool.unit[:, :THREE].astype(np.float64)
     simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
     half = len(rows) // 2
-    found = answers_to(mode, ensemble, answers, recorded.rows, jobs)
-    misfit = np.array([answer.misfit_ratio for answer in found])
     seen = simulated.part(slice(half))
+    bands = confidence_bands(seen.truth, seen.mean, seen.spread)
+    found = answers_to(mode, ensemble.estimate, answers, recorded.rows, jobs)
+    return outcome_of(bands, simulated.part(slice(half, None)), recorded, found)
+
+
+def outcome_of(
+    bands: tuple[Bands, ...], simulated: Answered, recorded: RecordedPresses, found: Sequence[Answer]
+) -> ModeOutcome:
+    """Return the outcome of a mode: bands of simulated presses, and the answers to recorded ones."""
+    usual = slice(len(found) // 2)
+    answered = Answered(
+        to_unit(recorded.parameters)[:, :THREE],
+        np.array([answer.mean for answer in found]),
+        np.array([answer.spread for answer in found]),
+    )
+    seen = answered.part(usual)
+    misfit = np.array([answer.misfit_ratio for answer in found])
     return ModeOutcome(
-        confidence_bands(seen.truth, seen.mean, seen.spread),
+        widened(bands, seen.truth, seen.mean, seen.spread),
         float(np.quantile(misfit, USUAL_RATIO)),
         float(np.quantile(recorded.elongation, USUAL_RATIO)),
-        simulated.part(slice(half, None)),
-        Answered(
-            to_unit(recorded.parameters)[:, :THREE],
-            np.array([answer.mean for answer in found]),
-            np.array([answer.spread for answer in found]),
-        ),
+        simulated,
+        answered.part(slice(usual.stop, None)),
     )
 
 
-def answers_to(mode: Mode, ensemble: DenseEnsemble, answers: ProfileAnswers, rows: Array, jobs: int) -> list[Answer]:
-    """Return what a mode makes of rows [n, P], best fit and all."""
-    mean, spread = ensemble.estimate(rows)
+def answers_to(mode: Mode, networks: Networks, answers: ProfileAnswers, rows: Array, jobs: int) -> list[Answer]:
+    """Return what a mode makes of rows [n, P] for which `networks` give mean and spread, best fit and all."""
+    mean, spread = networks(rows)
     return in_parallel(lambda i: answers.answer(rows[i], mode, mean[i], spread[i]), len(rows), jobs)
 
 
@@ -102,5 +116,5 @@ def _answered(
     """Return mean and spread [n, 3]; mode standard needs no fit for them."""
     if mode == "standard":
         return ensemble.estimate(rows)
-    found = answers_to(mode, ensemble, answers, rows, jobs)
+    found = answers_to(mode, ensemble.estimate, answers, rows, jobs)
     return np.array([answer.mean for answer in found]), np.array([answer.spread for answer in found])

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from device.measurement.confidence import Bands
 from device.measurement.quantities import InvalidQuantity
-from host_tools.inverse.confidence_bands import confidence_bands
+from host_tools.inverse.confidence_bands import confidence_bands, widened
 
 
 def shrunk_answers(count, seed, noise=0.15):
@@ -34,3 +35,30 @@ def test_too_few_presses_that_determine_an_unknown_are_refused():
     truth = np.linspace(-1, 1, 1000)[:, None]
     with pytest.raises(InvalidQuantity, match="presses that determine an unknown is 0, but must be at least 120"):
         confidence_bands(truth, truth, np.full_like(truth, 0.5))
+
+
+def flat_bands(bound: float) -> tuple[Bands, ...]:
+    ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
+    return (Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
+
+
+def test_bands_widen_by_the_factor_that_covers_as_many_recordings_as_chance_lets_be_told():
+    """Errors of 0.1, 0.2 ... 10 spreads in bands of 1: of a hundred, 90 less 3 by chance: the 87th, 8.7."""
+    error = np.repeat(np.arange(0.1, 10.05, 0.1)[:, None], 3, axis=1)
+    spread = np.full_like(error, 0.05)
+    wide = widened(flat_bands(1.0), error * spread, np.zeros_like(error), spread)
+    for one in wide:
+        np.testing.assert_allclose(one.high, 8.7, atol=0.05)
+        np.testing.assert_allclose(one.low, -one.high)
+
+
+def test_bands_that_hold_recordings_stay_what_they_are():
+    error = np.repeat(np.linspace(-1, 1, 50)[:, None], 3, axis=1)
+    spread = np.full_like(error, 0.05)
+    same = widened(flat_bands(2.0), error * spread, np.zeros_like(error), spread)
+    np.testing.assert_allclose(same[0].high, 2.0)
+
+
+def test_recordings_that_determine_nothing_widen_nothing():
+    bands, none = flat_bands(1.0), np.zeros((20, 3))
+    assert widened(bands, none + 5.0, none, none + 1.0) == bands

@@ -71,8 +71,9 @@ def pool() -> Pool:
 
 @pytest.fixture(scope="module")
 def recorded(answers) -> RecordedPresses:
-    """Presses of the surrogate, seen with its noise; elongations 1 to 150."""
+    """Presses of unknowns in the middle, seen with the surrogate's noise; elongations 1 to 150."""
     unit = even(RECORDED, len(PARAMETERS), 2) * 0.8
+    unit[:, :3] = 0.0
     rows = answers.surrogate.rows(unit) + np.random.default_rng(3).normal(0, STD, (RECORDED, COLUMNS))
     return RecordedPresses(from_unit(unit), rows, np.arange(1.0, RECORDED + 1))
 
@@ -116,15 +117,18 @@ def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome,
     np.testing.assert_array_equal(outcome.simulated.truth, pool.unit[COUNT // 2 :, :3])
     error = outcome.simulated.mean - outcome.simulated.truth
     np.testing.assert_allclose(error.std(axis=0), STD * np.sqrt(4 / 3), rtol=0.05)
-    np.testing.assert_allclose(outcome.simulated.covered(outcome.bands)[0].mean(axis=0), 0.9, atol=0.025)
+    assert (outcome.simulated.covered(outcome.bands)[0].mean(axis=0) > 0.875).all()
 
 
-def test_bands_come_from_the_first_half_alone(outcome, answers, pool, recorded):
-    """Truths that lie elsewhere in the second half leave the bands what they were."""
+def test_bands_come_from_the_first_halves_alone(outcome, answers, pool, recorded):
+    """Truths that lie elsewhere in the second half, simulated or recorded, leave the bands what they were."""
+    parameters = recorded.parameters.copy()
+    parameters[RECORDED // 2 :, :3] = from_unit(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
+    elsewhere = RecordedPresses(parameters, recorded.rows, recorded.elongation)
     unit = pool.unit.copy()
     unit[COUNT // 2 :] *= -1
     turned = Pool(unit, pool.rows, pool.sampler)
-    other = judged_mode("standard", FirstColumns(), answers, turned, some(recorded, 2), seed=4, jobs=1)
+    other = judged_mode("standard", FirstColumns(), answers, turned, elsewhere, seed=4, jobs=1)
     for one, again in zip(outcome.bands, other.bands, strict=True):
         np.testing.assert_array_equal(one.low, again.low)
         np.testing.assert_array_equal(one.high, again.high)
@@ -132,16 +136,14 @@ def test_bands_come_from_the_first_half_alone(outcome, answers, pool, recorded):
 
 
 def test_recorded_answers_keep_their_truth_and_the_networks_mean(outcome, recorded):
-    unit = even(RECORDED, len(PARAMETERS), 2) * 0.8
-    np.testing.assert_allclose(outcome.recorded.truth, unit[:, :3], atol=1e-12)
-    np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[:, :3])
+    np.testing.assert_allclose(outcome.recorded.truth, np.zeros((RECORDED // 2, 3)), atol=1e-12)
+    np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[RECORDED // 2 :, :3])
     np.testing.assert_array_equal(outcome.recorded.spread, STD)
 
 
 def test_a_usual_elongation_is_one_that_few_recordings_pass(outcome, recorded):
     """Elongations of 1, 2 ... 150: the quantile 0.985 lies at 1 + 0.985 x 149."""
     assert outcome.elongation_ratio == pytest.approx(1 + USUAL_RATIO * (RECORDED - 1))
-    assert np.mean(recorded.elongation > outcome.elongation_ratio) == pytest.approx(1 - USUAL_RATIO, abs=0.01)
 
 
 def test_a_usual_misfit_is_a_high_quantile_of_chi_square(outcome):
@@ -165,7 +167,7 @@ def test_mode_precise_answers_by_the_fit_and_not_by_the_networks(answers, slopes
     """The posterior of the linear model is known on paper; the toy networks read zeros."""
     truth = 0.4 * even(2, len(PARAMETERS), 6)
     rows = answers.surrogate.rows(truth)
-    found = answers_to("precise", FirstColumns(), answers, rows, 1)
+    found = answers_to("precise", FirstColumns().estimate, answers, rows, 1)
     std = STD * np.sqrt(np.diag(np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)))[:2]
     for answer, at in zip(found, truth, strict=True):
         np.testing.assert_allclose(answer.mean[:2], at[:2], atol=0.25 * std.max())
