@@ -17,7 +17,7 @@ from pathlib import Path
 
 import uvicorn
 
-from device.answers import answers_for
+from device.answers import Answers, answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
 from device.config import Config, simulated_config
 from device.errors import DeviceError
@@ -104,16 +104,15 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
 def _analyse(options: argparse.Namespace) -> int:
     """Estimate recordings by the settings of a file, or those of the simulated probe that made them."""
     stated = read_config(options.config) if options.config else None
+    of_probe: dict[str, Answers] = {}
     for path in options.recordings:
         recording = read_recording(path)
-        config = stated or simulated_config(recording.serial)
+        if recording.serial not in of_probe:
+            config = stated or simulated_config(recording.serial)
+            bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
+            of_probe[recording.serial] = answers_for(config, bundle, calibration)
         mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
-        answers = answers_for(
-            replace(config, press=replace(config.press, mode=mode)),
-            ModelBundle.load(config.model),
-            read_calibration(config.calibration),
-        )
-        estimate = answers.estimator(recording, mode)
+        estimate = of_probe[recording.serial].estimator(recording, mode)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))
     return 0
 

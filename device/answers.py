@@ -5,21 +5,15 @@ A mode is offered only when its model is there; the mode of the settings must be
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple
 
 from device.config import Config
 from device.errors import ConfigError
 from device.instrument.procedure import Estimator
 from device.measurement.calibration import Calibration
-from device.measurement.estimate import Estimate, estimate_recording
-from device.measurement.held_estimate import HeldModel, estimate_held
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
-from device.measurement.profile_estimate import estimate_profile
-from device.measurement.profile_model import RAMP_MODES, ProfileModel
-from device.measurement.recording import Recording
+from device.measurement.mode_models import with_models
 
 
 class Answers(NamedTuple):
@@ -36,40 +30,9 @@ class Answers(NamedTuple):
 
 
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
-    """Return what a probe can answer; raise `ConfigError` when the mode of its settings is not among it.
+    """Return what a probe can answer.
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
-    held = _for_probe(config, config.quick_model, HeldModel.load)
-    profile = _for_probe(config, config.profile_model, ProfileModel.load)
-
-    def estimate(recording: Recording, mode: Mode) -> Estimate:
-        if held and mode == "quick":
-            return estimate_held(recording, held, calibration)
-        if profile and mode in RAMP_MODES:
-            return estimate_profile(recording, mode, profile, calibration)
-        return estimate_recording(recording, bundle, calibration)
-
-    quick: tuple[Mode, ...] = ("quick",) if held else ()
-    answers = Answers((*quick, *(RAMP_MODES if profile else ()), "paper"), estimate)
-    answers.require(config.press.mode)
-    return answers
-
-
-class _OfProbes(Protocol):
-    """A model that says in its card for which probes it is."""
-
-    @property
-    def bundle(self) -> ModelBundle:
-        """Its bundle."""
-
-
-Model = TypeVar("Model", bound=_OfProbes)
-
-
-def _for_probe(config: Config, folder: Path, load: Callable[[Path], Model]) -> Model | None:
-    """Return the model of a folder, or None where there is none for this probe."""
-    if not folder.exists():
-        return None
-    model = load(folder)
-    return model if config.serial in model.bundle.card.get("serials", []) else None
+    models = with_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
+    return Answers(models.modes, lambda recording, mode: models.estimate(recording, mode, calibration))

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Any, TypeVar
 
-from device.answers import answers_for
+from device.answers import Answers, answers_for
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
@@ -182,7 +182,7 @@ def _procedure(
     force = parts.open(lambda: tared(config, cell)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
-    answers = parts.open(lambda: answers_for(config, bundle, calibration)) if bundle and calibration else None
+    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle and calibration else None
     store = parts.open(lambda: Store(config.data, disk))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.
@@ -209,6 +209,12 @@ def _procedure(
         clock=clock,
         simulated_truth=scenario.inclusion if scenario else None,
     )
+
+
+def _answers(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
+    answers = answers_for(config, bundle, calibration)
+    answers.require(config.press.mode)
+    return answers
 
 
 def _calibration_for(config: Config, bundle: ModelBundle) -> Calibration:

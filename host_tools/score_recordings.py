@@ -17,10 +17,11 @@ from rich.table import Table
 from device.measurement.estimate import SPOKEN, Estimate
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
+from host_tools.inverse.mode_statistics import OCTILES, octile_ends, octile_of
 
 Array = NDArray[np.float64]
 
-OCTILES, FEWEST_A_OCTILE = 8, 5
+FEWEST_A_OCTILE = 5
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,7 @@ def _by_octiles(presses: Sequence[ScoredPress]) -> Table:
         column = _Column(presses, name)
         if len(column.truth) < OCTILES * FEWEST_A_OCTILE:
             continue
-        ends = np.quantile(column.truth, np.linspace(0, 1, OCTILES + 1))
-        octile = np.clip(np.searchsorted(ends, column.truth, side="right") - 1, 0, OCTILES - 1)
+        ends, octile = octile_ends(column.truth), octile_of(column.truth)
         for number in range(OCTILES):
             inside = octile == number
             if not inside.any():  # equal truths, all in one octile

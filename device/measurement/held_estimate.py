@@ -12,13 +12,13 @@ from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
 from device.measurement.held_profile import held_row
 from device.measurement.interval_estimate import (
-    coordinates_of,
     origin_of,
     saturation,
     with_numbers,
     without_numbers,
 )
 from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.press_parameters import unknowns_to_unit
 from device.measurement.profile_model import bands_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording
@@ -74,4 +74,4 @@ def estimate_held(recording: Recording, model: HeldModel, calibration: Calibrati
         return without_numbers("outside_range", " ".join(outside), origin)
     raw = model.bundle.estimate(row[None])
     features = dict(zip(model.bundle.feature_names, map(float, row), strict=True))
-    return with_numbers(coordinates_of(raw.estimate)[0], raw.spread[0], model.bands, features, origin)
+    return with_numbers(unknowns_to_unit(raw.estimate[0]), raw.spread[0], model.bands, features, origin)

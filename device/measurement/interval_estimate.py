@@ -16,7 +16,7 @@ from device.measurement.confidence import Bands, Interval
 from device.measurement.estimate import SATURATED_RATIO, SPOKEN, UNKNOWN_QUANTITY, Estimate, Quantity, Status
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
-from device.measurement.press_parameters import NUISANCES, from_unit, to_unit
+from device.measurement.press_parameters import unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording import Recording
 from device.measurement.tactile_image import saturated_ratio
@@ -75,23 +75,13 @@ def without_numbers(status: Status, reason: str, origin: Origin) -> Estimate:
     return Estimate(**unknown, status=status, reason=reason, features={}, **origin)
 
 
-def coordinates_of(values: Array) -> Array:
-    """Return the coordinates [n, 3] of size, depth and modulus [n, 3]."""
-    return to_unit(np.hstack([values, np.ones((len(values), len(NUISANCES)))]))[:, : len(UNKNOWNS)]
-
-
 def _quantities(mean: Array, spread: Array, intervals: Sequence[Interval]) -> dict[str, Any]:
-    low, high = (_values(np.array([one[end] for one in intervals])) for end in (0, 1))
-    value = np.clip(_values(mean), low, high)
-    below, above = (_values(mean + sign * spread) for sign in (-1, 1))
+    low, high = (unknowns_from_unit(np.array([one[end] for one in intervals])) for end in (0, 1))
+    value = np.clip(unknowns_from_unit(mean), low, high)
+    below, above = (unknowns_from_unit(mean + sign * spread) for sign in (-1, 1))
     return {
         name: Quantity(
             float(value[i]), float(low[i]), float(high[i]), float(above[i] - below[i]) / 2, one.is_identifiable
         )
         for i, (name, one) in enumerate(zip(UNKNOWNS, intervals, strict=True))
     }
-
-
-def _values(unit: Array) -> Array:
-    """Return size, depth and modulus at coordinates [3]."""
-    return from_unit(np.concatenate([unit, np.zeros(len(NUISANCES))]))[: len(UNKNOWNS)]

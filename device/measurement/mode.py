@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.reference_light import RAMP_RATIO
 
 Mode = Literal["quick", "standard", "precise", "paper"]
 MODES: tuple[Mode, ...] = get_args(Mode)
@@ -34,10 +35,6 @@ FRAMES: dict[Mode, Frames] = {
     "precise": Frames(40, is_ramp=True),
     "paper": Frames(10, is_ramp=False),
 }
-
-
-RAMP_RATIO = 2.0
-"""Press frames whose largest force is this many times the smallest are of a ramp."""
 
 
 def mode_of(force_n: Sequence[float]) -> Mode:

@@ -96,18 +96,23 @@ _SLOPE_PER_N = _slope_per_n()
 @lru_cache(maxsize=4)
 def smooth_errors(levels: ErrorLevels) -> Array:
     """Return the covariance [P, P] of smooth errors of the light, for a light ratio of 1 everywhere."""
-    flat, model = (
-        ratio**2 * ring_correlation(length_mm, harmonic=0)
-        for ratio, length_mm in ((levels.flat_field_ratio, levels.flat_field_mm), (levels.model_ratio, levels.model_mm))
-    )
+    flat, model = smooth_ring_errors(levels, harmonic=0)
     contrast = np.kron(np.ones((LOADS, LOADS)), flat) + np.kron(np.eye(LOADS), model)
     growth = np.kron(np.eye(LOADS - 1) + 1, model)
-    first = levels.flat_field_ratio**2 * ring_correlation(levels.flat_field_mm, harmonic=1)
-    first += levels.model_ratio**2 / LOADS * ring_correlation(levels.model_mm, harmonic=1)
+    first_flat, first_model = smooth_ring_errors(levels, harmonic=1)
+    first = first_flat + first_model / LOADS
     covariance = np.zeros(2 * (CONTRAST_COLUMNS + GROWTH_COLUMNS + OFFSET_COLUMNS,))
     a, b = CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS
     covariance[:a, :a], covariance[a:b, a:b], covariance[b:, b:] = contrast, growth, first[1:, 1:]
     return covariance
+
+
+def smooth_ring_errors(levels: ErrorLevels, *, harmonic: int) -> tuple[Array, Array]:
+    """Return the covariances [J, J] of ring means (0) or first harmonics (1) of one load: flat field, and model."""
+    return (
+        levels.flat_field_ratio**2 * ring_correlation(levels.flat_field_mm, harmonic=harmonic),
+        levels.model_ratio**2 * ring_correlation(levels.model_mm, harmonic=harmonic),
+    )
 
 
 def ring_correlation(length_mm: float, *, harmonic: int) -> Array:

@@ -38,7 +38,8 @@ RANGES: dict[str, Range] = {
 }
 """Tissue +-20 %, slab +-10 % about the paper's; skin +-30 % in its contact law, +-20 % in its light."""
 PARAMETERS = tuple(RANGES)
-NUISANCES = PARAMETERS[len(UNKNOWNS) :]
+COUNT = len(UNKNOWNS)
+NUISANCES = PARAMETERS[COUNT:]
 LOW: Array = np.array([entry.low for entry in RANGES.values()])
 HIGH: Array = np.array([entry.high for entry in RANGES.values()])
 BY_RATIO = np.array([entry.by_ratio for entry in RANGES.values()])
@@ -66,6 +67,18 @@ def from_unit(unit: Array) -> Array:
     values = low + (unit + 1) / 2 * (high - low)
     values[..., BY_RATIO] = np.exp(values[..., BY_RATIO])
     return np.asarray(values)
+
+
+def unknowns_to_unit(values: Array) -> Array:
+    """Return size, depth and modulus [..., 3] as coordinates."""
+    others = np.broadcast_to(HIGH[COUNT:], (*values.shape[:-1], len(NUISANCES)))
+    return to_unit(np.concatenate([values, others], axis=-1))[..., :COUNT]
+
+
+def unknowns_from_unit(unit: Array) -> Array:
+    """Return size, depth and modulus [..., 3] of coordinates."""
+    others = np.zeros((*unit.shape[:-1], len(NUISANCES)))
+    return from_unit(np.concatenate([unit, others], axis=-1))[..., :COUNT]
 
 
 def slope_of_unit(values: Array) -> Array:

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.legendre import Array, LegendreSum
 from device.measurement.press_parameters import HIGH, LOW, PARAMETERS, from_unit, slope_of_unit
@@ -63,14 +65,11 @@ class PressSurrogate:
         lump_slope = factor * lump_slope + _factor_slope(parameters[0]) * lump
         return assemble(factor * lump, bare)[0], assemble(lump_slope, bare_slope).T
 
-    def save(self, path: Path) -> None:
-        """Write the polynomials to one .npz, single precision."""
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the polynomials by the names in `ARRAYS`, as a file holds them: single precision."""
         values = (self.lump.degrees, self.lump.coefficients, self.bare.degrees, self.bare.coefficients)
         kinds = (np.uint8, np.float32, np.uint8, np.float32)
-        with path.open("wb") as file:
-            np.savez(
-                file, allow_pickle=False, **{n: np.asarray(v, k) for n, v, k in zip(ARRAYS, values, kinds, strict=True)}
-            )
+        return {name: np.asarray(value, kind) for name, value, kind in zip(ARRAYS, values, kinds, strict=True)}
 
 
 def load_surrogate(path: Path) -> PressSurrogate:

@@ -21,10 +21,10 @@ from device.measurement.fit_press import PressPosterior, best_fit, beyond_range
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.press_noise import PressNoise
-from device.measurement.press_parameters import NUISANCES, from_unit, slope_of_unit, to_unit
+from device.measurement.press_parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
 from device.measurement.press_surrogate import TISSUE, PressSurrogate, load_surrogate
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.sample_press import fit_press
+from device.measurement.sample_press import sample_press
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class ProfileAnswers:
         start = np.concatenate([np.clip(mean, -WELL_INSIDE, WELL_INSIDE), np.zeros(len(NUISANCES))])
         if mode != "precise":
             return _answer(posterior, best_fit(posterior, start), mean, spread)
-        fit = fit_press(posterior, start)
+        fit = sample_press(posterior, start)
         values = from_unit(fit.mean)
         tissue_kpa = float(values[TISSUE]), float((fit.spread * slope_of_unit(values))[TISSUE])
         unknowns = slice(len(UNKNOWNS))
@@ -113,8 +113,7 @@ class ProfileModel:
     def networks(self, rows: Array) -> tuple[Array, Array]:
         """Return the networks' mean and spread [n, 3] of the unknowns' coordinates, for rows [n, P]."""
         raw = self.bundle.estimate(rows)
-        values = np.hstack([raw.estimate, np.ones((len(rows), len(NUISANCES)))])
-        return to_unit(values)[:, : len(UNKNOWNS)], raw.spread
+        return unknowns_to_unit(raw.estimate), raw.spread
 
 
 def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:

@@ -73,7 +73,7 @@ class _Cells:
         return samples, log - (FREEDOM + rest) / 2 * np.log1p(np.sum(standard**2, axis=1) / FREEDOM)
 
 
-def fit_press(posterior: PressPosterior, start: Array) -> PressFit:
+def sample_press(posterior: PressPosterior, start: Array) -> PressFit:
     """Return best fit, mean and spread of a press's posterior, begun at coordinates [9] of an estimate."""
     best = best_fit(posterior, start)
     samples, log_proposal = _cells(posterior, best).draw(SAMPLES, np.random.default_rng(SEED))

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
 
 from device.measurement.calibration import Calibration, read_calibration
-from device.measurement.estimate import Estimate, estimate_recording
-from device.measurement.held_estimate import HeldModel, estimate_held
+from device.measurement.estimate import Estimate
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode, mode_named, mode_of
-from device.measurement.profile_estimate import estimate_profile
-from device.measurement.profile_model import RAMP_MODES, ProfileModel
+from device.measurement.mode_models import with_models
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording, read_recording
 from device.simulation.scenario import Scenario
@@ -56,47 +53,14 @@ def evaluate(
     if not recordings and asked in (None, "paper"):
         _print_paper(ModelBundle.load(model), certificate, table, light, scenes, seed, out)
         return
-    answer = _Answers(Folders(model, quick_model, profile_model), certificate, asked)
+    models = with_models(ModelBundle.load(model), quick_model, profile_model)
+
+    def answer(recording: Recording) -> Estimate:
+        of_frames = mode_of([frame.force_n for frame in recording.with_role("press")])
+        return models.estimate(recording, asked or of_frames, certificate)
+
     named = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
     print_score(list(score(named, answer, note.print)), out)
-
-
-class Folders(NamedTuple):
-    """Where the bundles of the modes are."""
-
-    paper: Path
-    quick: Path
-    ramps: Path
-
-
-class _Answers:
-    """What the device answers to a recording, in one mode or in the one that its frames are for.
-
-    Bundles are loaded when they are first asked.
-    """
-
-    def __init__(self, folders: Folders, calibration: Calibration, mode: Mode | None) -> None:
-        self._folders, self._calibration, self._mode = folders, calibration, mode
-
-    @cached_property
-    def _paper(self) -> ModelBundle:
-        return ModelBundle.load(self._folders.paper)
-
-    @cached_property
-    def _held(self) -> HeldModel:
-        return HeldModel.load(self._folders.quick)
-
-    @cached_property
-    def _profile(self) -> ProfileModel:
-        return ProfileModel.load(self._folders.ramps)
-
-    def __call__(self, recording: Recording) -> Estimate:
-        mode = self._mode or mode_of([frame.force_n for frame in recording.with_role("press")])
-        if mode == "quick":
-            return estimate_held(recording, self._held, self._calibration)
-        if mode in RAMP_MODES:
-            return estimate_profile(recording, mode, self._profile, self._calibration)
-        return estimate_recording(recording, self._paper, self._calibration)
 
 
 def _certificate(light: str) -> str:

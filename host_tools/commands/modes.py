@@ -10,6 +10,7 @@ import typer
 from device.measurement.calibration import read_calibration
 from device.measurement.held_estimate import HeldModel
 from device.measurement.inversion import ModelBundle
+from device.measurement.mode_models import ModeModels
 from device.measurement.profile_model import RAMP_MODES, ProfileModel
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.virtual_probe import ProbeTables
@@ -41,11 +42,11 @@ def modes(
 
     if out:
         require_writable(out, (".md",))
-    trained, paper, tables = ProfileModel.load(model), ModelBundle.load(MODELS / "paper"), ProbeTables.load(table)
-    held = HeldModel.load(MODELS / "quick")
+    trained, tables = ProfileModel.load(model), ProbeTables.load(table)
+    models = ModeModels(ModelBundle.load(MODELS / "paper"), HeldModel.load(MODELS / "quick"), trained)
     calibration = read_calibration(table / "calibration.json")
     chapters = {
-        "dial": lambda: dial_chapter(trained, held, paper, calibration, tables),
+        "dial": lambda: dial_chapter(models, trained.bundle, calibration, tables),
         "coverage": lambda: coverage_chapter(trained),
         "posterior": lambda: posterior_chapter(trained),
         "noise-free": lambda: noise_free_chapter(trained.answers, tables),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from device.measurement.inversion import open_session
-from device.measurement.press_parameters import BY_RATIO, HIGH, LOW, NUISANCES, from_unit
+from device.measurement.press_parameters import BY_RATIO, HIGH, LOW, unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS
 from host_tools.inverse.dense_network import LARGEST_LOG_VARIANCE, Array
 from host_tools.inverse.export import AGREEMENT, ExportRefused, OnnxGraph
@@ -58,8 +58,7 @@ def _add_physical(graph: OnnxGraph, mean: str) -> None:
 def physical_estimate(ensemble: DenseEnsemble, rows: Array) -> tuple[Array, Array]:
     """Return estimate (mm, mm, kPa) and spread (coordinates) [n, 3], as the exported network gives them."""
     mean, spread = ensemble.estimate(rows)
-    padded = np.hstack([mean, np.zeros((len(mean), len(NUISANCES)))])
-    return from_unit(padded)[:, : len(UNKNOWNS)], spread
+    return unknowns_from_unit(mean), spread
 
 
 def golden_vectors(ensemble: DenseEnsemble, network: bytes, rows: Array) -> dict[str, list[list[float]]]:

@@ -119,14 +119,8 @@ def _text(card: dict[str, Any]) -> bytes:
 
 
 def _surrogate_file(trained: TrainedProfile) -> bytes:
-    lump, bare = trained.surrogate.lump, trained.surrogate.bare
-    arrays: dict[str, Any] = {
-        "lump_degrees": lump.degrees,
-        "lump_coefficients": lump.coefficients.astype(np.float32),
-        "bare_degrees": bare.degrees,
-        "bare_coefficients": bare.coefficients.astype(np.float32),
-        **{f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()},
-    }
+    arrays: dict[str, Any] = trained.surrogate.arrays()
+    arrays |= {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()}
     content = io.BytesIO()
     np.savez(content, **arrays)
     return content.getvalue()

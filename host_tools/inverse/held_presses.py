@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from device.measurement.press_noise import ErrorLevels, ring_correlation
+from device.measurement.press_noise import ErrorLevels, smooth_ring_errors
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS
 from device.measurement.reference_light import EXPONENT
@@ -54,13 +54,7 @@ class HeldPool:
         return covariance
 
     def _smooth(self) -> Array:
-        flat, model = (
-            ratio**2 * ring_correlation(length_mm, harmonic=0)
-            for ratio, length_mm in (
-                (self.levels.flat_field_ratio, self.levels.flat_field_mm),
-                (self.levels.model_ratio, self.levels.model_mm),
-            )
-        )
+        flat, model = smooth_ring_errors(self.levels, harmonic=0)
         return flat + model + 1e-14 * np.eye(RINGS)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from device.measurement.confidence import Bands
-from device.measurement.press_parameters import EVEN_STD, NUISANCES, from_unit
+from device.measurement.press_parameters import EVEN_STD, unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS
 from host_tools.inverse.mode_outcome import Answered
 from host_tools.inverse.press_samples import Array
@@ -24,7 +24,7 @@ DIGITS = 4
 def statistics(answered: Answered, bands: tuple[Bands, ...]) -> dict[str, Any]:
     """Return the statistics of presses by unknown."""
     covered, known = answered.covered(bands)
-    truth, mean = physical(answered.truth), physical(answered.mean)
+    truth, mean = unknowns_from_unit(answered.truth), unknowns_from_unit(answered.mean)
     percent = 100 * (mean - truth) / truth
     error = answered.mean - answered.truth
     return {"presses": len(truth)} | {
@@ -33,15 +33,14 @@ def statistics(answered: Answered, bands: tuple[Bands, ...]) -> dict[str, Any]:
     }
 
 
-def physical(unit: Array) -> Array:
-    """Return size, depth and modulus [n, 3] at coordinates [n, 3]."""
-    return from_unit(np.hstack([unit, np.zeros((len(unit), len(NUISANCES)))]))[:, : len(UNKNOWNS)]
+def octile_ends(truth: Array) -> Array:
+    """Return the ends [9] of the octiles of truths [n]."""
+    return np.asarray(np.quantile(truth, np.linspace(0, 1, OCTILES + 1)))
 
 
 def octile_of(truth: Array) -> Array:
     """Return the octile [n], 0 to 7, in which each truth lies."""
-    ends = np.quantile(truth, np.linspace(0, 1, OCTILES + 1))
-    return np.clip(np.searchsorted(ends, truth, side="right") - 1, 0, OCTILES - 1)
+    return np.clip(np.searchsorted(octile_ends(truth), truth, side="right") - 1, 0, OCTILES - 1)
 
 
 def _of_unknown(truth: Array, percent: Array, error: Array, covered: Array, known: Array) -> dict[str, Any]:
@@ -55,7 +54,7 @@ def _of_unknown(truth: Array, percent: Array, error: Array, covered: Array, know
         "skill": _rounded(1 - _rms(error) / EVEN_STD),
         "determined": _rounded(known.mean()),
         "coverage": _coverage(covered, known),
-        "octile_ends": [_rounded(end) for end in np.quantile(truth, np.linspace(0, 1, OCTILES + 1))],
+        "octile_ends": [_rounded(end) for end in octile_ends(truth)],
         "mean_percent_per_octile": [_mean(np.abs(percent[one])) for one in of_octile],
         "rms_coordinate_per_octile": [_rounded(_rms(error[one])) if one.any() else None for one in of_octile],
         "coverage_per_octile": [_coverage(covered[one], known[one]) for one in of_octile],

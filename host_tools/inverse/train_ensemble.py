@@ -24,7 +24,7 @@ from host_tools.inverse.dense_network import (
 )
 from host_tools.inverse.noisy_presses import Presses
 
-MEMBERS, STEPS, BATCH, RATE = 5, 16_000, 1024, 3e-3
+BATCH, RATE = 1024, 3e-3
 SCALED_ON = 20_000
 """Rows of which the scaling of the inputs is taken."""
 FEWEST_PRESSES = 1000
@@ -50,8 +50,8 @@ def train_ensemble(
     pool: Presses,
     *,
     seed: int,
-    members: int = MEMBERS,
-    steps: int = STEPS,
+    members: int,
+    steps: int,
     columns: slice = slice(None),
     jobs: int = -1,
 ) -> DenseEnsemble:

@@ -1,7 +1,7 @@
-"""Speed and accuracy as one dial: what each mode asks of the hand, what it computes, and how far off it is.
+"""Speed and accuracy as one dial: how many frames each mode takes, what it computes, and how far off it is.
 
 The same inclusions, skins and tissues are recorded in the frames of each mode, with every drift. Times are of this
-machine and single-threaded; the hand's is a ramp at an easy rate.
+machine.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.calibration import Calibration
-from device.measurement.estimate import SPOKEN, Estimate, estimate_recording
-from device.measurement.held_estimate import HeldModel, estimate_held
+from device.measurement.estimate import SPOKEN, Estimate
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import FRAMES, Mode
+from device.measurement.mode_models import ModeModels
 from device.measurement.press_noise import ErrorLevels
-from device.measurement.profile_estimate import estimate_profile
-from device.measurement.profile_model import RAMP_MODES, ProfileModel
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.recording import Recording
 from device.simulation.virtual_probe import ProbeTables
@@ -28,7 +26,6 @@ from host_tools.inverse.recorded_presses import recorded_press
 from host_tools.study.benchmark import Chapter, Table, at_most
 
 PRESSES = 48
-MODES: tuple[Mode, ...] = ("paper", "quick", *RAMP_MODES)
 CALLS, LONGEST_CALL_S = 200, 0.5e-3
 
 
@@ -41,34 +38,24 @@ class Timed(NamedTuple):
 
 
 def dial_chapter(
-    model: ProfileModel,
-    held: HeldModel,
-    paper: ModelBundle,
-    calibration: Calibration,
-    tables: ProbeTables,
-    *,
-    seed: int = 80,
+    models: ModeModels, network: ModelBundle, calibration: Calibration, tables: ProbeTables, *, seed: int = 80
 ) -> Chapter:
-    """Return error, coverage and time of each mode on the same inclusions."""
+    """Return error and time of each mode on the same inclusions, and the time of the ensemble `network` alone."""
 
     def answer(recording: Recording, mode: Mode) -> Estimate:
-        if mode == "quick":
-            return estimate_held(recording, held, calibration)
-        if mode in RAMP_MODES:
-            return estimate_profile(recording, mode, model, calibration)
-        return estimate_recording(recording, paper, calibration)
+        return models.estimate(recording, mode, calibration)
 
-    seen = {mode: timed_presses(answer, mode, tables, seed) for mode in MODES}
+    seen = {mode: timed_presses(answer, mode, tables, seed) for mode in models.modes}
     header = ("mode", "frames a press", "compute (ms)", "answered", *_columns("error"), *_columns("determined"))
     return Chapter(
         title="Speed and accuracy",
         claim=(
             f"{PRESSES} random presses over the trained ranges (10-160 kPa), the same ones in every mode: median error "
-            "of what is answered, and how often the unknown is called determined. A guess in the middle of the range "
-            "would have the errors of the last row."
+            "of what is answered, and how often the unknown is called determined. The last row guesses the median "
+            "of the truths."
         ),
         source="host_tools/study/mode_dial.py; seconds of a press: `GET /api/v1/device`",
-        benchmarks=(at_most("ensemble of one press", "median time of one call (ms)", *_network_ms(model)),),
+        benchmarks=(at_most("ensemble of one press", "median time of one call (ms)", *_network_ms(network)),),
         tables=(Table("The dial", header, (*(_row(mode, found) for mode, found in seen.items()), _guess(seen))),),
     )
 
@@ -87,13 +74,13 @@ def timed_presses(
     return timed
 
 
-def _network_ms(model: ProfileModel) -> tuple[float, float]:
+def _network_ms(bundle: ModelBundle) -> tuple[float, float]:
     """Return the median time of one call of the exported networks, and its bound."""
-    row = np.array(model.bundle.card["golden"]["features"][:1])
+    row = np.array(bundle.card["golden"]["features"][:1])
     seconds = []
     for _ in range(CALLS):
         began = time.perf_counter()
-        model.bundle.estimate(row)
+        bundle.estimate(row)
         seconds.append(time.perf_counter() - began)
     return 1e3 * float(np.median(seconds)), 1e3 * LONGEST_CALL_S
 

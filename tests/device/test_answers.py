@@ -5,10 +5,12 @@ from dataclasses import replace
 import pytest
 
 from device.answers import Answers, answers_for
+from device.assembly import StartFailed, open_simulated_probe
 from device.config import PressSection, simulated_config
 from device.errors import ConfigError
 from device.measurement.estimate import estimate_recording
 from device.measurement.mode import MODES
+from device.simulation.scenario import Scenario
 
 
 def test_the_estimate_of_a_paper_press_is_that_of_its_model(bundle, calibration, recording):
@@ -35,3 +37,9 @@ def test_a_mode_without_a_model_is_no_default():
     with pytest.raises(ConfigError, match=r"press\.mode is precise, but .* models for quick, paper only") as refusal:
         answers.require("precise")
     assert refusal.value.code == "E001"
+
+
+def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tmp_path):
+    config = replace(simulated_config(), data=tmp_path, profile_model=tmp_path / "none")
+    with pytest.raises(StartFailed, match=r"press\.mode is standard, but this probe has models for quick, paper only"):
+        open_simulated_probe(config, Scenario())

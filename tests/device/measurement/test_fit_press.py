@@ -2,37 +2,22 @@
 
 import numpy as np
 import pytest
-from small_surrogate import COLUMNS, linear_surrogate, random_surrogate, white_noise
+from linear_press import GROWTH, NOISE, START, STD, TOLD, TRUTH, noisy_row, on_paper, random_slopes
+from small_surrogate import COLUMNS, linear_surrogate, random_surrogate
 
 from device.measurement.fit_press import PressPosterior, best_fit, beyond_range
 from device.measurement.press_parameters import EVEN_STD, PARAMETERS
-from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS, OFFSET
-
-STD = 0.05
-TOLD = np.arange(len(PARAMETERS)) != MODULUS
-"""The modulus shows in nothing: its slope is 0."""
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
-TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
-START = np.zeros(len(PARAMETERS))
-NOISE = white_noise(STD)
+from device.measurement.press_surrogate import CONTRAST_COLUMNS, OFFSET
 
 
 @pytest.fixture(scope="module")
 def slopes() -> np.ndarray:
-    slopes = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), GROWTH_COLUMNS))
-    slopes[MODULUS] = 0.0
-    return slopes
+    return random_slopes()
 
 
 @pytest.fixture(scope="module")
 def row(slopes) -> np.ndarray:
-    return linear_surrogate(slopes).rows(TRUTH[None])[0] + np.random.default_rng(6).normal(0, STD, COLUMNS)
-
-
-def on_paper(row: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and covariance of the Gaussian posterior of what the row tells of; the ends of the ranges are far away."""
-    covariance = STD**2 * np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)
-    return covariance @ slopes[TOLD] @ row[GROWTH] / STD**2, covariance
+    return noisy_row(slopes)
 
 
 def test_the_best_fit_of_a_linear_model_is_its_ridge_regression(row, slopes):

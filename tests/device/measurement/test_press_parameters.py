@@ -13,6 +13,8 @@ from device.measurement.press_parameters import (
     from_unit,
     slope_of_unit,
     to_unit,
+    unknowns_from_unit,
+    unknowns_to_unit,
 )
 from device.measurement.quantities import UNKNOWNS
 
@@ -59,3 +61,11 @@ def test_the_slope_is_the_parameters_by_the_coordinates(unit):
 def test_what_is_nominal_lies_inside_its_range():
     assert set(NOMINAL) == set(NUISANCES)
     assert all(RANGES[name].low <= value <= RANGES[name].high for name, value in NOMINAL.items())
+
+
+def test_the_unknowns_alone_have_the_same_coordinates_as_among_all():
+    """Ends of the ranges and their middle, 40 kPa being the middle of 10 and 160 by ratio."""
+    unit, values = np.array([[-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array([[2.0, 12.0, 40.0], [8.5, 8.0, 160.0]])
+    np.testing.assert_allclose(unknowns_from_unit(unit), values)
+    np.testing.assert_allclose(unknowns_to_unit(values), unit, atol=1e-12)
+    np.testing.assert_allclose(unknowns_to_unit(values[0]), unit[0], atol=1e-12)

@@ -7,7 +7,7 @@ from device.measurement.confidence import Bands
 from device.measurement.press_parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
 from host_tools.inverse.mode_outcome import Answered
-from host_tools.inverse.mode_statistics import OCTILES, octile_of, physical, statistics
+from host_tools.inverse.mode_statistics import OCTILES, octile_of, statistics
 
 COUNT = 4000
 ENDS, NONE = np.array([-1.0, 1.0]), np.zeros((2, 2))
@@ -83,11 +83,6 @@ def test_every_octile_holds_as_many_truths_and_the_largest_is_in_the_last():
     octile = octile_of(np.random.default_rng(1).permutation(800.0 + np.arange(800)))
     np.testing.assert_array_equal(np.bincount(octile), [100] * OCTILES)
     np.testing.assert_array_equal(octile_of(np.arange(9.0)), [0, 1, 2, 3, 4, 5, 6, 7, 7])
-
-
-def test_coordinates_become_millimetres_and_kilopascals():
-    """The modulus counts by ratio: the middle of 10 to 160 kPa is 40."""
-    np.testing.assert_allclose(physical(np.array([[-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])), [[2, 12, 40], [8.5, 8, 160]])
 
 
 def test_numbers_are_rounded_to_four_digits():

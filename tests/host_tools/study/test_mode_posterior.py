@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_surrogate import COLUMNS, linear_surrogate, white_noise
+from linear_press import STD, TRUTH, noisy_row, on_paper, random_slopes
+from small_surrogate import linear_surrogate, white_noise
 
 from device.measurement.fit_press import PressPosterior
 from device.measurement.press_parameters import EVEN_STD, PARAMETERS
-from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
+from device.measurement.press_surrogate import MODULUS
 from host_tools.study import mode_posterior
 from host_tools.study.mode_posterior import Sampled, sampled
 
-STD = 0.05
-TOLD = np.arange(len(PARAMETERS)) != MODULUS
-"""The modulus shows in nothing: its slope is 0."""
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
-TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
 STEPS, BURN_IN = 1200, 400
 
 
 @pytest.fixture(scope="module")
 def slopes() -> np.ndarray:
-    slopes = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), GROWTH_COLUMNS))
-    slopes[MODULUS] = 0.0
-    return slopes
+    return random_slopes()
 
 
 @pytest.fixture(scope="module")
 def row(slopes) -> np.ndarray:
-    return linear_surrogate(slopes).rows(TRUTH[None])[0] + np.random.default_rng(6).normal(0, STD, COLUMNS)
+    return noisy_row(slopes)
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +41,8 @@ def found(short, row, slopes) -> Sampled:
 
 def test_mean_and_spread_are_those_of_linear_algebra(found, row, slopes):
     """The ends of the ranges are far away; chance is that of the steps over their autocorrelation."""
-    covariance = STD**2 * np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)
-    mean, std = covariance @ slopes[TOLD] @ row[GROWTH] / STD**2, np.sqrt(np.diag(covariance))
+    mean, covariance = on_paper(row, slopes)
+    std = np.sqrt(np.diag(covariance))
     chance = np.sqrt(found.autocorrelation / (STEPS * mode_posterior.WALKERS))
     assert chance < 0.1
     assert np.abs((found.mean[:2] - mean[:2]) / std[:2]).max() < 5 * chance

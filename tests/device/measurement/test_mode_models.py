@@ -1,0 +1,33 @@
+"""Which model answers in which mode, and for which probe."""
+
+import pytest
+
+from device.measurement.held_estimate import estimate_held
+from device.measurement.mode import MODES
+from device.measurement.mode_models import ModeModels, with_models
+from device.measurement.profile_estimate import estimate_profile
+from device.measurement.quantities import InvalidQuantity
+
+
+@pytest.fixture(scope="module")
+def models(bundle, held_model, profile_model):
+    return ModeModels(bundle, held_model, profile_model)
+
+
+def test_each_mode_is_answered_by_its_own_model(models, held_model, profile_model, calibration, pressed):
+    quick, standard = pressed("quick"), pressed("standard")
+    assert models.estimate(quick, "quick", calibration) == estimate_held(quick, held_model, calibration)
+    expected = estimate_profile(standard, "standard", profile_model, calibration)
+    assert models.estimate(standard, "standard", calibration) == expected
+    assert models.estimate(pressed("paper"), "paper", calibration).mode == "paper"
+
+
+def test_models_of_another_probe_are_left_out_but_for_the_papers(models):
+    assert models.for_probe("SIM-0001").modes == MODES
+    assert models.for_probe("TSIS-0042").modes == ("paper",)
+
+
+def test_a_mode_without_a_model_is_refused_and_not_answered_by_another(bundle, calibration, pressed, tmp_path):
+    paper_only = with_models(bundle, tmp_path / "quick", tmp_path / "standard")
+    with pytest.raises(InvalidQuantity, match="mode is standard, but must be one of paper"):
+        paper_only.estimate(pressed("standard"), "standard", calibration)
