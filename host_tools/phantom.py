@@ -28,16 +28,17 @@ CAMERA = CameraSettings(
 LIT, DARK = (0.6, 0.6, 0.6, 0.6), (0.0, 0.0, 0.0, 0.0)
 UNLOADED_FRAMES, PRESS_FRAMES = 4, 10
 TARGET_N, HOLD_STD_N = 0.5, 0.006
-"""Force the hand aims at, and how far it strays while it holds."""
+"""Force the hand aims at, and how far it strays while it holds: standard deviations."""
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """How a phantom is pressed: `frames` at each of the forces, and where beside the lesion's middle."""
+    """How a phantom is pressed: `frames` at each of the forces, how far they stray, and where beside the lesion."""
 
     forces_n: Sequence[float] = (TARGET_N,)
     frames: int = PRESS_FRAMES
     place: Placement = field(default_factory=Placement)
+    stray_n: float = HOLD_STD_N
 
     def __post_init__(self) -> None:
         action = "press a phantom as one would a patient"
@@ -45,6 +46,7 @@ class Protocol:
             raise InvalidQuantity("forces_n", "empty", "at least one force", action)
         for force_n in self.forces_n:
             require("forces_n", force_n, Bound(0.0, 5.0, "N", low_included=False), action)
+        require("stray_n", self.stray_n, Bound(0.0, 0.1, "N"), action)
         require("frames", self.frames, Bound(1, 1000, "frames a force"), action)
 
 
@@ -61,11 +63,11 @@ class _Recorder:
 
     def pressed(self, role: Role, protocol: Protocol, place: Placement) -> list[Frame]:
         loads = [force_n for force_n in protocol.forces_n for _ in range(protocol.frames)]
-        return [self._frame(role, force_n, place) for force_n in loads]
+        return [self._frame(role, force_n, place, protocol.stray_n) for force_n in loads]
 
-    def _frame(self, role: Role, target_n: float, place: Placement) -> Frame:
+    def _frame(self, role: Role, target_n: float, place: Placement, stray_n: float = 0.0) -> Frame:
         self.number += 1
-        force_n = max(0.0, self.rng.normal(target_n, HOLD_STD_N)) if target_n else 0.0
+        force_n = max(0.0, self.rng.normal(target_n, stray_n)) if target_n else 0.0
         light = DARK if role == "dark" else LIT
         counts = self.probe.frame_counts(
             force_n=force_n,

@@ -89,8 +89,9 @@ def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator
     from device.measurement.press_noise import ErrorLevels
     from host_tools.inverse.press_samples import draw_parameters
     from host_tools.inverse.recorded_presses import recorded_press
+    from host_tools.inverse.seeds import press_seed
 
     tables = ProbeTables.load(table)
     for number, parameters in enumerate(draw_parameters(scenes, np.random.default_rng([seed, 3]))):
-        recording = recorded_press(tables, parameters, mode, 100_000 * seed + number, levels=ErrorLevels())
+        recording = recorded_press(tables, parameters, mode, press_seed(seed, number), levels=ErrorLevels())
         yield f"press {number}", recording

@@ -30,6 +30,7 @@ def modes(
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
+    from host_tools.inverse.seeds import derived_seed
     from host_tools.study.document import write_document
     from host_tools.study.mode_breast_imager import breast_imager_chapter
     from host_tools.study.mode_coverage import coverage_chapter
@@ -50,7 +51,7 @@ def modes(
         "coverage": lambda: coverage_chapter(trained),
         "posterior": lambda: posterior_chapter(trained),
         "noise-free": lambda: noise_free_chapter(trained.answers, tables),
-        "outside": lambda: outside_chapter(trained, kinds(tables, 60), RAMP_MODES),
+        "outside": lambda: outside_chapter(trained, kinds(tables, derived_seed(1, "outside")), RAMP_MODES),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip
     measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})

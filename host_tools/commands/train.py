@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -15,31 +15,49 @@ from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.commands.output import note, note_left_out, progress
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
+TABLE = MODELS / "simulated_probe"
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
+TRIALS = 100
+OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--quick"), "quick": ("--table",)}
+"""Options of each profile beside --out and --seed."""
 
 
 def train(
     profile: Annotated[str, typer.Option(help="paper, standard (and precise), or quick (after standard).")] = "paper",
-    data: Annotated[Path | None, typer.Option(help="Data set of `host_tools sweep`; swept unless given.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the model bundle.")] = None,
-    trials: Annotated[int, typer.Option(help="Networks of the paper that are averaged.")] = 100,
-    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
+    data: Annotated[Path | None, typer.Option(help="Of paper: data set of `sweep`; swept unless given.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/PROFILE unless given.")] = None,
+    trials: Annotated[int | None, typer.Option(help="Of paper: networks that are averaged; 100 unless given.")] = None,
+    table: Annotated[Path | None, typer.Option(help="Of the others: folder of the probe's tables.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of weights, splits, presses and noise.")] = 1,
-    quick: Annotated[bool, typer.Option(help="A tenth of the presses: to try the chain, not to use.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Of standard: a tenth of the presses, to try the chain, not to use.")
+    ] = False,
 ) -> None:
     """Train a model and export its bundle.
 
     Example: host_tools train --profile standard --out models/standard
     """
+    given = {"--data": data, "--trials": trials, "--table": table, "--quick": quick or None}
+    if profile not in OWN_OPTIONS:
+        raise InvalidQuantity("profile", repr(profile), f"one of {', '.join(OWN_OPTIONS)}", "choose one of them")
+    for option, value in given.items():
+        if value is not None and option not in OWN_OPTIONS[profile]:
+            raise InvalidQuantity("option", option, f"one of profile {profile}", "leave it out")
+    command = _command({"--profile": profile, **given, "--out": out, "--seed": seed})
+    folder = out or MODELS / profile
     if profile == "paper":
-        _paper(data or _swept(), out or MODELS / "paper", trials, seed)
+        _paper(data or _swept(), folder, trials or TRIALS, seed, command)
     elif profile == "standard":
-        _standard(table, out or MODELS / "standard", seed, quick)
-    elif profile == "quick":
-        _quick(table, out or MODELS / "quick", seed)
+        _standard(table or TABLE, folder, seed, quick, command)
     else:
-        raise InvalidQuantity("profile", repr(profile), "paper, standard or quick", "choose one of them")
+        _quick(table or TABLE, folder, seed, command)
+
+
+def _command(options: Mapping[str, object]) -> str:
+    """Return the command line that trains the same again."""
+    words = [f"{name} {value}" if value is not True else name for name, value in options.items() if value is not None]
+    return " ".join(["host_tools train", *words])
 
 
 def _swept() -> Path:
@@ -52,7 +70,7 @@ def _swept() -> Path:
     return SWEPT
 
 
-def _paper(data: Path, out: Path, trials: int, seed: int) -> None:
+def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
     from host_tools.data.dataset import training_rows
     from host_tools.inverse.export import export
     from host_tools.inverse.train import train as run_training
@@ -64,7 +82,6 @@ def _paper(data: Path, out: Path, trials: int, seed: int) -> None:
         trained = run_training(
             rows, trials=trials, seed=seed, progress=lambda done, _: bar.update(task, completed=done)
         )
-    command = f"host_tools train --data {data} --out {out} --trials {trials} --seed {seed}"
     with _refusals():
         export(trained, out, software_version=__version__, training_command=command)
     bundle = ModelBundle.load(out)
@@ -74,7 +91,7 @@ def _paper(data: Path, out: Path, trials: int, seed: int) -> None:
             print(f"{unknown:20} " + "  ".join(f"{name} {value:6.2f} %" for name, value in errors.items()))
 
 
-def _standard(table: Path, out: Path, seed: int, quick: bool) -> None:
+def _standard(table: Path, out: Path, seed: int, quick: bool, command: str) -> None:
     from device.measurement.profile_model import ProfileModel
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
@@ -83,7 +100,6 @@ def _standard(table: Path, out: Path, seed: int, quick: bool) -> None:
 
     effort = QUICK_EFFORT if quick else Effort()
     trained = train_profile(ProbeTables.load(table), effort=effort, seed=seed, say=note.print)
-    command = f"host_tools train --profile standard --seed {seed}{' --quick' if quick else ''}"
     with _refusals():
         export_profile(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
@@ -91,7 +107,7 @@ def _standard(table: Path, out: Path, seed: int, quick: bool) -> None:
     _print_modes(out, ProfileModel.load(out).bundle)
 
 
-def _quick(table: Path, out: Path, seed: int) -> None:
+def _quick(table: Path, out: Path, seed: int, command: str) -> None:
     from device.measurement.held_estimate import HeldModel
     from device.measurement.profile_model import ProfileModel
     from device.simulation.scenario import SERIALS
@@ -99,12 +115,17 @@ def _quick(table: Path, out: Path, seed: int) -> None:
     from host_tools.inverse.export_profile import export_quick
     from host_tools.inverse.quick_training import train_quick
 
-    ramps = ProfileModel.load(MODELS / "standard").answers
+    standard = ProfileModel.load(MODELS / "standard")
+    ramps = standard.answers
     trained = train_quick(ProbeTables.load(table), ramps.surrogate, ramps.noise["standard"], seed=seed, say=note.print)
-    command = f"host_tools train --profile quick --seed {seed}"
     with _refusals():
         export_quick(
-            trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
+            trained,
+            out,
+            surrogate_sha256=standard.bundle.card["surrogate_sha256"],
+            serials=(SERIALS["physical"],),
+            software_version=__version__,
+            training_command=command,
         )
     _print_modes(out, HeldModel.load(out).bundle)
 

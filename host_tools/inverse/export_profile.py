@@ -25,6 +25,7 @@ from host_tools.inverse.mode_outcome import ModeOutcome
 from host_tools.inverse.mode_statistics import statistics
 from host_tools.inverse.profile_training import TrainedProfile
 from host_tools.inverse.quick_training import TrainedQuick
+from host_tools.inverse.seeds import derived_seed
 
 GOLDEN_ROWS = 8
 
@@ -66,15 +67,22 @@ def export_profile(
 
 
 def export_quick(
-    trained: TrainedQuick, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
+    trained: TrainedQuick,
+    folder: Path,
+    *,
+    surrogate_sha256: str,
+    serials: tuple[str, ...],
+    software_version: str,
+    training_command: str,
 ) -> None:
-    """Write the bundle of mode quick; as `export_profile`."""
+    """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_profile`."""
     rows = trained.pool.rows[:GOLDEN_ROWS]
     network = build_network(trained.ensemble)
     card = {
         **_card(folder, network, serials, software_version, training_command),
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.pool.rows.tobytes()).hexdigest(),
+        "surrogate_sha256": surrogate_sha256,
         "effort": vars(trained.effort),
         "features": [{"name": name, "unit": unit} for name, unit in HELD_UNITS.items()],
         "training_range": _training_range(dict(zip(HELD_UNITS, _usual(trained).T, strict=True))),
@@ -87,7 +95,9 @@ def export_quick(
 def _usual(trained: TrainedQuick) -> Array:
     """Return the ends [2, 12] between which rows with noise lie, but for one in two thousand at each."""
     pool = trained.pool
-    noisy = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([trained.seed, 55]))
+    noisy = pool.noisy(
+        np.arange(len(pool.rows)), np.random.default_rng(derived_seed(trained.seed, "usual rows of quick"))
+    )
     return np.quantile(noisy.astype(np.float64), [0.0005, 0.9995], axis=0)
 
 

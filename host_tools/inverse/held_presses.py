@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from device.measurement.held_profile import HELD_FORCES_N
 from device.measurement.press_noise import ErrorLevels, smooth_ring_errors
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS
@@ -18,9 +19,6 @@ from device.measurement.ring_means import RINGS
 from host_tools.inverse.dense_network import Single
 from host_tools.inverse.noisy_presses import Index, Pool
 from host_tools.inverse.press_samples import Array
-
-FORCES_N = 0.46, 0.54
-"""Forces of the holds: `press.target_n` and its band, with a little to spare."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +45,7 @@ class HeldPool:
 
     def typical_noise(self) -> Array:
         """Return the covariance [12, 12] of the noise of a row without a lump."""
-        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(FORCES_N))
+        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(HELD_FORCES_N))
         covariance = np.zeros((RINGS + 1, RINGS + 1))
         covariance[:RINGS, :RINGS] = self.camera + self._smooth() + self.levels.gain_ratio**2 + zero_ratio**2
         covariance[RINGS, RINGS] = self.levels.zero_n**2
@@ -60,7 +58,7 @@ class HeldPool:
 
 def held_pool(pool: Pool, camera: Array, seed: int) -> HeldPool:
     """Return a pool of ramps as held presses, each at a random force."""
-    force_n = np.random.default_rng([seed, 2]).uniform(*FORCES_N, len(pool.rows))
+    force_n = np.random.default_rng([seed, 2]).uniform(*HELD_FORCES_N, len(pool.rows))
     return HeldPool(pool.unit, held_rows(pool.rows, force_n).astype(np.float32), camera)
 
 

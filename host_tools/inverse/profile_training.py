@@ -23,12 +23,13 @@ from host_tools.inverse.mode_outcome import ModeOutcome, judged_mode
 from host_tools.inverse.noisy_presses import random_pool
 from host_tools.inverse.press_samples import Array, PressSamples, draw_parameters, sample_presses
 from host_tools.inverse.recorded_presses import record_presses
+from host_tools.inverse.seeds import derived_seed
 from host_tools.inverse.train_ensemble import DenseEnsemble, train_ensemble
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How many presses go into each step; the defaults take some half an hour on two cores."""
+    """How many presses go into each step; the defaults take some forty minutes on two cores."""
 
     presses: int = 10_000
     held_out: int = 600
@@ -37,11 +38,11 @@ class Effort:
     members: int = 4
     steps: int = 9_000
     judged: int = 30_000
-    fitted: int = 1_600
-    test_recordings: int = 400
+    fitted: int = 6_000
+    test_recordings: int = 600
 
 
-QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 4_000, 900, 40)
+QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40)
 """Enough to try the chain; the model is a poor one."""
 
 
@@ -70,16 +71,20 @@ def train_profile(
     """Return the trained parts; `say` hears what begins. The same seed gives the same ones whatever `jobs`."""
     asked = effort or Effort()
     say(f"{asked.presses} random presses")
-    samples = sample_presses(tables, asked.presses + asked.held_out, seed=seed, jobs=jobs)
+    samples = sample_presses(tables, asked.presses + asked.held_out, seed=derived_seed(seed, "surrogate"), jobs=jobs)
     learned, kept = samples.split(asked.presses)
     surrogate = fit_surrogate(learned)
     say(f"{asked.noise_recordings} recordings for the noise of each mode")
     noise = {
-        mode: PressNoise(camera_covariance(tables, mode, asked.noise_recordings, seed=seed + 10 + number, jobs=jobs))
-        for number, mode in enumerate(RAMP_MODES)
+        mode: PressNoise(
+            camera_covariance(
+                tables, mode, asked.noise_recordings, seed=derived_seed(seed, f"camera of {mode}"), jobs=jobs
+            )
+        )
+        for mode in RAMP_MODES
     }
     say(f"{asked.members} networks")
-    pool = random_pool(surrogate, noise["standard"], asked.pool, seed + 20)
+    pool = random_pool(surrogate, noise["standard"], asked.pool, derived_seed(seed, "training presses"))
     ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     outcomes = judged(tables, ensemble, ProfileAnswers(surrogate, noise), asked, seed=seed, jobs=jobs, say=say)
     return TrainedProfile(surrogate, held_out_error(surrogate, kept), noise, ensemble, outcomes, samples, asked, seed)
@@ -96,11 +101,12 @@ def judged(
     say: Callable[[str], None] = lambda step: None,
 ) -> dict[Mode, ModeOutcome]:
     """Return what each mode makes of random presses with noise, and of recordings that drift."""
-    parameters = draw_parameters(effort.test_recordings, np.random.default_rng(seed + 40))
+    simulating, recording = derived_seed(seed, "judged presses"), derived_seed(seed, "judged recordings")
+    parameters = draw_parameters(effort.test_recordings, np.random.default_rng(recording))
     outcomes: dict[Mode, ModeOutcome] = {}
     for mode, simulated in zip(RAMP_MODES, (effort.judged, effort.fitted), strict=True):
         say(f"{simulated} presses and {len(parameters)} recordings for the limits of mode {mode}")
-        pool = random_pool(answers.surrogate, answers.noise[mode], simulated, seed + 30)
-        recorded = record_presses(tables, parameters, mode, seed=seed + 40, levels=ErrorLevels(), jobs=jobs)
-        outcomes[mode] = judged_mode(mode, ensemble, answers, pool, recorded, seed=seed + 30, jobs=jobs)
+        pool = random_pool(answers.surrogate, answers.noise[mode], simulated, simulating)
+        recorded = record_presses(tables, parameters, mode, seed=recording, levels=ErrorLevels(), jobs=jobs)
+        outcomes[mode] = judged_mode(mode, ensemble, answers, pool, recorded, seed=simulating, jobs=jobs)
     return outcomes

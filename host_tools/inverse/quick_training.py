@@ -27,6 +27,7 @@ from host_tools.inverse.mode_outcome import Answered
 from host_tools.inverse.noisy_presses import random_pool
 from host_tools.inverse.press_samples import Array, draw_parameters, profile_rows
 from host_tools.inverse.recorded_presses import EXACT, in_parallel, recorded_press
+from host_tools.inverse.seeds import derived_seed, press_seed
 from host_tools.inverse.train_ensemble import DenseEnsemble, train_ensemble
 
 
@@ -68,19 +69,22 @@ def train_quick(
     """Return the trained parts; `noise` is of mode standard, whose camera's part is replaced by that of one frame."""
     asked = effort or QuickEffort()
     say(f"{asked.recordings} recordings of held presses")
-    parameters = draw_parameters(asked.recordings, np.random.default_rng(seed + 50))
-    camera = _camera(tables, parameters, seed + 50, jobs)
+    recording = derived_seed(seed, "camera of quick")
+    parameters = draw_parameters(asked.recordings, np.random.default_rng(recording))
+    camera = _camera(tables, parameters, recording, jobs)
     say(f"{asked.members} networks")
-    pool = held_pool(random_pool(surrogate, noise, asked.pool, seed + 51), camera, seed + 51)
+    pool = _pool(surrogate, noise, camera, asked.pool, derived_seed(seed, "training presses of quick"))
     ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     say(f"{asked.judged} presses for the bands")
-    fresh = held_pool(random_pool(surrogate, noise, asked.judged, seed + 52), camera, seed + 52)
-    noisy = fresh.noisy(np.arange(asked.judged), np.random.default_rng([seed, 53]))
+    judging = derived_seed(seed, "judged presses of quick")
+    fresh = _pool(surrogate, noise, camera, asked.judged, judging)
+    noisy = fresh.noisy(np.arange(asked.judged), np.random.default_rng([judging, 1]))
     simulated = _answered(ensemble, noisy.astype(np.float64), fresh.unit.astype(np.float64))
     half = asked.judged // 2
     seen = simulated.part(slice(half))
-    others = draw_parameters(asked.recordings, np.random.default_rng(seed + 54))
-    rows = recorded_rows(tables, others, seed + 54, ErrorLevels(), jobs)
+    judging = derived_seed(seed, "judged recordings of quick")
+    others = draw_parameters(asked.recordings, np.random.default_rng(judging))
+    rows = recorded_rows(tables, others, judging, ErrorLevels(), jobs)
     none = pool.typical_noise()[:RINGS, :RINGS]
     return TrainedQuick(
         ensemble,
@@ -94,11 +98,15 @@ def train_quick(
     )
 
 
+def _pool(surrogate: PressSurrogate, noise: PressNoise, camera: Array, count: int, seed: int) -> HeldPool:
+    return held_pool(random_pool(surrogate, noise, count, seed), camera, seed)
+
+
 def recorded_rows(tables: ProbeTables, parameters: Array, seed: int, levels: ErrorLevels, jobs: int) -> Array:
     """Return the rows [n, 12] that mode quick reads of recorded presses with parameters [n, 9]."""
     return np.array(
         in_parallel(
-            lambda i: held_row(recorded_press(tables, parameters[i], "quick", 100_000 * seed + i, levels=levels)),
+            lambda i: held_row(recorded_press(tables, parameters[i], "quick", press_seed(seed, i), levels=levels)),
             len(parameters),
             jobs,
         )

@@ -28,9 +28,13 @@ from device.simulation.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.drifted_recording import drifted
 from host_tools.inverse.press_samples import Array
+from host_tools.inverse.seeds import press_seed
 from host_tools.phantom import TARGET_N, Protocol, phantom_recording
 
 Result = TypeVar("Result")
+
+HELD_STRAY_N = 0.0125
+"""Frames of a hold may lie within 5 % of 0.5 N (`press.band_ratio`): spread over that band, twice this each way."""
 
 EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
 
@@ -67,7 +71,7 @@ def protocol_of(mode: Mode, offset_mm: float, angle_rad: float) -> Protocol:
     count = FRAMES[mode].count
     if FRAMES[mode].is_ramp:
         return Protocol(tuple(np.linspace(RAMP_FROM_N, RAMP_TO_N, count)), frames=1, place=place)
-    return Protocol((TARGET_N,), frames=count, place=place)
+    return Protocol((TARGET_N,), frames=count, place=place, stray_n=HELD_STRAY_N)
 
 
 def recorded_press(
@@ -100,7 +104,7 @@ def record_presses(
     """Return rows and elongation of presses with parameters [n, 9] in a ramp mode; the same whatever `jobs`."""
 
     def read(number: int) -> tuple[Array, float]:
-        recording = recorded_press(tables, parameters[number], mode, 100_000 * seed + number, levels=levels)
+        recording = recorded_press(tables, parameters[number], mode, press_seed(seed, number), levels=levels)
         profile = press_profile(recording)
         return profile.as_row(), elongation_ratio(profile)
 

@@ -21,6 +21,7 @@ from device.measurement.profile_model import ProfileModel
 from device.simulation.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.recorded_presses import in_parallel, recorded_press
+from host_tools.inverse.seeds import derived_seed, press_seed
 from host_tools.phantom_sets import BREAST_IMAGER_SLAB_MM, Phantom, breast_imager
 from host_tools.study.benchmark import Benchmark, Chapter, Table, at_least, at_most
 
@@ -37,9 +38,10 @@ def breast_imager_chapter(
     ramps = in_parallel(lambda i: phantoms[i].ramps(), len(phantoms), jobs)
     benchmarks: list[Benchmark] = []
     rows: list[tuple[str, ...]] = []
+    seed = derived_seed(1, "breast imager")
     for mode in modes:
         found = [
-            estimates(model, calibration, tables, mode, phantom, solved, 7000 + REPEATS * number)
+            estimates(model, calibration, tables, mode, phantom, solved, press_seed(seed, REPEATS * number))
             for number, (phantom, solved) in enumerate(zip(phantoms, ramps, strict=True))
         ]
         benchmarks += _judged(mode, phantoms, found)
@@ -48,7 +50,8 @@ def breast_imager_chapter(
         title="The Breast Mechanical Imager's eight inclusions",
         claim=(
             f"Spheres 10 mm deep in 35 mm of 5 kPa, {REPEATS} recordings each with every drift. Scored are the "
-            "recordings that are answered, and of these the unknowns that are called determined."
+            "recordings that are answered: sizes that are called determined, and all intervals of the modulus. One "
+            "that is not determined has the whole range, 10-160 kPa, as its interval, and is counted too."
         ),
         source="Egorov & Sarvazyan, IEEE Trans. Medical Imaging 27 (2008), table II",
         benchmarks=tuple(benchmarks),
@@ -56,7 +59,8 @@ def breast_imager_chapter(
     )
 
 
-HEADER = ("mode", "size (mm)", "modulus (kPa)", "answered", "size found", "size determined", "90 % interval of E (kPa)")
+HEADER = ("mode", "size (mm)", "modulus (kPa)", "answered", "size found", "size determined", "E determined",
+          "90 % interval of E (kPa)")  # fmt: skip
 
 
 def estimates(
@@ -82,21 +86,22 @@ def _judged(mode: Mode, phantoms: Sequence[Phantom], found: Sequence[Sequence[Es
     pairs = [(p.inclusion, one) for p, of_one in zip(phantoms, found, strict=True) for one in of_one if one.features]
     error = [100 * abs(e.size_mm.value / t.size_mm - 1) for t, e in pairs if e.size_mm.identifiable and e.size_mm.value]
     moduli = [(t.youngs_modulus_kpa, e.youngs_modulus_kpa) for t, e in pairs]
-    covered = [q.low <= truth <= q.high for truth, q in moduli if q.identifiable and q.low and q.high]
+    covered = [q.low <= truth <= q.high for truth, q in moduli if q.low and q.high]
     return [
         at_most(f"{mode}, size", "mean error (%)", float(np.mean(error)) if error else float("nan"), PUBLISHED_PERCENT),
-        *([at_least(f"{mode}, Young's modulus", "covered", float(np.mean(covered)), 0.9)] if covered else []),
+        at_least(f"{mode}, Young's modulus", "covered", float(np.mean(covered)) if covered else float("nan"), 0.9),
     ]
 
 
 def _row(mode: Mode, phantom: Phantom, found: Sequence[Estimate]) -> tuple[str, ...]:
     answered = [one for one in found if one.features]
     known = [one for one in answered if one.size_mm.identifiable]
+    moduli = [one for one in answered if one.youngs_modulus_kpa.identifiable]
     size = f"{np.mean([one.size_mm.value for one in answered]):.2f}" if answered else "-"
     ends = [(one.youngs_modulus_kpa.low, one.youngs_modulus_kpa.high) for one in answered]
     interval = "{:.0f} to {:.0f}".format(*np.mean(np.array(ends, dtype=float), axis=0)) if ends else "-"
     truth = phantom.inclusion
     return (
         mode, f"{truth.size_mm:g}", f"{truth.youngs_modulus_kpa:g}", f"{len(answered)} of {len(found)}", size,
-        f"{len(known)}", interval,
+        f"{len(known)}", f"{len(moduli)}", interval,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from device.measurement.quantities import UNKNOWNS
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.press_samples import draw_parameters, profile_rows
 from host_tools.inverse.recorded_presses import in_parallel
+from host_tools.inverse.seeds import derived_seed
 from host_tools.study.benchmark import Chapter, Table, at_most
 
 Array = NDArray[np.float64]
@@ -32,10 +33,10 @@ STARTS = (-0.7, 0.0, 0.7)
 """Coordinates of the modulus from which a fit is begun: it has local minima."""
 
 
-def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: int = 7, jobs: int = -1) -> Chapter:
+def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: int = 1, jobs: int = -1) -> Chapter:
     """Return the errors of size, depth and modulus from exact rows, columns weighed as the camera knows them."""
     surrogate, std = answers.surrogate, np.sqrt(np.diag(answers.noise["precise"].camera))
-    parameters = _parameters(seed)
+    parameters = _parameters(derived_seed(seed, "noise-free"))
     unit = to_unit(parameters)
     rows = in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], PRESSES, jobs)
     found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], unit[i], std), PRESSES, jobs))

@@ -20,6 +20,7 @@ from device.simulation.neighbour import Neighbour
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.press_samples import Array, draw_parameters
 from host_tools.inverse.recorded_presses import in_parallel, recorded_press
+from host_tools.inverse.seeds import press_seed
 from host_tools.scene import Placement, Scene
 from host_tools.solved_lump import solved_lump
 from host_tools.surface_table import press_ramps
@@ -56,7 +57,7 @@ def kinds(tables: ProbeTables, seed: int, jobs: int = -1) -> list[Kind]:
     wet_ratios = rng.uniform(*WET_RATIO, len(wet))
 
     def simple(parameters: Array) -> Record:
-        return lambda mode, i: record(tables, parameters[i], mode, _seed(seed, i))
+        return lambda mode, i: record(tables, parameters[i], mode, press_seed(seed, i))
 
     return [
         Kind("ordinary", ORDINARY, simple(ordinary)),
@@ -64,12 +65,12 @@ def kinds(tables: ProbeTables, seed: int, jobs: int = -1) -> list[Kind]:
         Kind(
             "two inclusions",
             PRESSES,
-            lambda mode, i: record(tables, two[i], mode, _seed(seed, i), neighbour=neighbours[i]),
+            lambda mode, i: record(tables, two[i], mode, press_seed(seed, i), neighbour=neighbours[i]),
         ),
         Kind(
             "gel on the face",
             PRESSES,
-            lambda mode, i: record(tables, wet[i], mode, _seed(seed, i), wet_ratio=float(wet_ratios[i])),
+            lambda mode, i: record(tables, wet[i], mode, press_seed(seed, i), wet_ratio=float(wet_ratios[i])),
         ),
         _oblong(tables, rng, seed, jobs),
         _solved("larger than trained (17.5-20 mm)", tables, LARGE_MM, CLEAR_DEPTH_MM, rng, seed, jobs),
@@ -106,7 +107,7 @@ def _oblong(tables: ProbeTables, rng: np.random.Generator, seed: int, jobs: int)
         "ellipsoid, 1.6-2.4 times as long as wide",
         len(parameters),
         lambda mode, i: recorded_press(
-            solved[i // SKINS_A_SOLUTION], parameters[i], mode, _seed(seed, i), levels=ErrorLevels()
+            solved[i // SKINS_A_SOLUTION], parameters[i], mode, press_seed(seed, i), levels=ErrorLevels()
         ),
     )
 
@@ -130,10 +131,6 @@ def _solved(
         name,
         len(parameters),
         lambda mode, i: recorded_press(
-            tables, parameters[i], mode, _seed(seed, i), levels=ErrorLevels(), ramps=ramps[i // SKINS_A_SOLUTION]
+            tables, parameters[i], mode, press_seed(seed, i), levels=ErrorLevels(), ramps=ramps[i // SKINS_A_SOLUTION]
         ),
     )
-
-
-def _seed(seed: int, number: int) -> int:
-    return 100_000 * seed + number

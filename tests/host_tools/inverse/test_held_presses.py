@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from small_surrogate import COLUMNS, random_surrogate, white_noise
 
+from device.measurement.held_profile import HELD_FORCES_N
 from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS
 from device.measurement.ring_means import RINGS
-from host_tools.inverse.held_presses import FORCES_N, HeldPool, held_pool, held_rows
+from host_tools.inverse.held_presses import HeldPool, held_pool, held_rows
 from host_tools.inverse.noisy_presses import random_pool
 
 DRAWS = 40_000
@@ -26,9 +27,9 @@ def test_a_contrast_that_is_a_cubic_of_the_force_is_read_exactly():
 
 def test_every_press_is_held_within_the_forces():
     pool = held_pool(random_pool(random_surrogate(), white_noise(1e-3), 500, 1), np.eye(RINGS), seed=2)
-    assert pool.rows[:, RINGS].min() >= np.float32(FORCES_N[0])
-    assert pool.rows[:, RINGS].max() <= np.float32(FORCES_N[1])
-    assert np.ptp(pool.rows[:, RINGS]) > 0.9 * np.ptp(FORCES_N)
+    assert pool.rows[:, RINGS].min() >= np.float32(HELD_FORCES_N[0])
+    assert pool.rows[:, RINGS].max() <= np.float32(HELD_FORCES_N[1])
+    assert np.ptp(pool.rows[:, RINGS]) > 0.9 * np.ptp(HELD_FORCES_N)
 
 
 @pytest.mark.parametrize("levels", [ErrorLevels(), ErrorLevels(gain_ratio=0.0), ErrorLevels(model_ratio=0.0)])

@@ -1,0 +1,30 @@
+"""Which options of `host_tools train` go together, and the command that the card keeps."""
+
+from __future__ import annotations
+
+import pytest
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.commands import train as command
+
+
+@pytest.mark.parametrize(
+    ("profile", "options"),
+    [("quick", {"quick": True}), ("standard", {"trials": 3}), ("paper", {"quick": True}), ("quick", {"trials": 3})],
+)
+def test_an_option_of_another_profile_is_refused_before_anything_is_trained(profile, options):
+    with pytest.raises(InvalidQuantity, match=f"one of profile {profile}"):
+        command.train(profile=profile, **options)
+
+
+def test_an_unknown_profile_is_refused_with_the_known_ones():
+    with pytest.raises(InvalidQuantity, match="paper, standard, quick"):
+        command.train(profile="fast")
+
+
+def test_the_card_keeps_every_option_that_was_given(monkeypatch, tmp_path):
+    kept = {}
+    monkeypatch.setattr(command, "_standard", lambda table, out, seed, quick, line: kept.update(line=line, out=out))
+    command.train(profile="standard", out=tmp_path, quick=True, seed=4)
+    assert kept["line"] == f"host_tools train --profile standard --quick --out {tmp_path} --seed 4"
+    assert kept["out"] == tmp_path
