@@ -1,7 +1,7 @@
 """A recording of held presses to its estimate in mode quick: one network, one call.
 
-It answers in the time of a frame, and knows less of presses that are not of one round inclusion: only a contrast
-outside what it has learnt from gets no numbers. Source: docs/modes.md on what that costs.
+It answers in the time of a frame, and knows less of presses that are not of one round inclusion: at one force gel is
+a lump. Only an oblong spot and a contrast outside what it has learnt from get no numbers. Source: docs/modes.md.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
-from device.measurement.held_profile import held_row
+from device.measurement.held_profile import held_press
 from device.measurement.interval_estimate import (
     origin_of,
     saturation,
@@ -23,6 +23,7 @@ from device.measurement.profile_model import bands_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording
 from device.measurement.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS, Array
+from device.measurement.roundness import doubt_about_roundness
 
 SEEN_BY = MIDDLE, MIDDLE_LESS_RIM
 """Where a lump shows: in the middle by itself, or in the middle against the rim."""
@@ -31,15 +32,16 @@ SEEN_BY = MIDDLE, MIDDLE_LESS_RIM
 class HeldModel:
     """A verified bundle whose network reads one held press, with the bands of its intervals.
 
-    `faintest_contrast`: of each of `SEEN_BY`, what is more than noise.
+    `faintest_contrast`: of each of `SEEN_BY`, what is more than noise. `elongation_ratio`: the largest usual one.
     """
 
     def __init__(self, bundle: ModelBundle) -> None:
-        """Use `load`. Raises `BundleRefused` when the card lacks bands or the faintest contrast."""
+        """Use `load`. Raises `BundleRefused` when the card lacks bands or a limit."""
         self.bundle = bundle
         try:
             entry = bundle.card["modes"]["quick"]
             self.bands = bands_of(entry)
+            self.elongation_ratio = float(entry["elongation_ratio"])
             self.faintest_contrast = tuple(float(entry["faintest_contrast"][i]) for i in range(len(SEEN_BY)))
         except (IndexError, KeyError, TypeError, ValueError, InvalidQuantity) as error:
             raise BundleRefused(Path(bundle.name), "modes.quick", f"incomplete ({error})", "complete") from error
@@ -66,12 +68,12 @@ def estimate_held(recording: Recording, model: HeldModel, calibration: Calibrati
     origin = origin_of(recording, "quick", model.bundle, calibration)
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin)
-    row = held_row(recording)
+    row, ratio = held_press(recording)
     if not model.sees(row[:RINGS]):
         return without_numbers("not_identifiable", "No inclusion stands out.", origin)
-    outside = model.bundle.outside_training_range(row)
-    if outside:
-        return without_numbers("outside_range", " ".join(outside), origin)
+    doubts = [*doubt_about_roundness(ratio, model.elongation_ratio), *model.bundle.outside_training_range(row)]
+    if doubts:
+        return without_numbers("outside_range", " ".join(doubts), origin)
     raw = model.bundle.estimate(row[None])
-    features = dict(zip(model.bundle.feature_names, map(float, row), strict=True))
+    features = dict(zip(model.bundle.feature_names, map(float, row), strict=True)) | {"elongation_ratio": ratio}
     return with_numbers(unknowns_to_unit(raw.estimate[0]), raw.spread[0], model.bands, features, origin)

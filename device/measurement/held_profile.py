@@ -6,13 +6,16 @@ as in `press_profile`, and the reference light follows the power law that a hold
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from device.measurement.press_profile import FLOOR_COUNTS, Array, contrast_and_valid, lights_of
+from device.measurement.press_profile import FLOOR_COUNTS, Array, contrast_and_valid, harmonic, lights_of
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording import Recording
 from device.measurement.reference_light import reference_light
-from device.measurement.ring_means import RING_RADII_MM, ring_weights
+from device.measurement.ring_means import RING_RADII_MM, RingMeans, ring_weights
+from device.measurement.roundness import elongation_ratio
 
 HELD_FORCES_N = 0.44, 0.56
 """Mean forces of a hold that the network has learnt from; `press.target_n` is 0.5 N."""
@@ -20,8 +23,15 @@ AGAIN = "hold 0.5 N beside the lesion and on it"
 HELD_NAMES = (*(f"contrast_{r:.1f}_mm" for r in RING_RADII_MM), "force_n")
 
 
-def held_row(recording: Recording) -> Array:
-    """Return contrast on the rings and mean force, in the order of `HELD_NAMES`, mean over the press frames.
+class HeldPress(NamedTuple):
+    """Contrast on the rings and mean force [12], in the order of `HELD_NAMES`; and the `roundness.elongation_ratio`."""
+
+    row: Array
+    elongation_ratio: float
+
+
+def held_press(recording: Recording) -> HeldPress:
+    """Return what a recording shows, mean over its press frames.
 
     Raises `InvalidQuantity` when a role is missing or a press was not held within `HELD_FORCES_N`.
     """
@@ -32,8 +42,10 @@ def held_row(recording: Recording) -> Array:
         require(f"mean {name} force", float(np.mean(force_n)), Bound(*HELD_FORCES_N, "N"), AGAIN)
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
     weights = ring_weights(press.images[0].shape, press.scale)
-    rings = [
-        weights.means(*contrast_and_valid(image, light, float(force))).mean
+    frames = [
+        weights.means(*contrast_and_valid(image, light, float(force)))
         for force, image in zip(press.force_n, press.images, strict=True)
     ]
-    return np.append(np.mean(rings, axis=0), np.mean(press.force_n))
+    rings = RingMeans(*(np.array(part) for part in zip(*frames, strict=True)))
+    row = np.append(rings.mean.mean(axis=0), np.mean(press.force_n))
+    return HeldPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))

@@ -76,6 +76,7 @@ class ModelBundle:
 
     def __init__(self, folder: Path, card: bytes, network: bytes) -> None:
         """Use `load`: it alone reads the files. Raises `BundleRefused`."""
+        self._made_of = folder, card, network
         self.card, self.card_sha256 = _parsed(folder, card), hashlib.sha256(card).hexdigest()
         fields = _Fields(folder, self.card)
         self.name = str(fields.of("name", str))
@@ -86,6 +87,9 @@ class ModelBundle:
         self._session = _open_session(fields, network)
         _verify_contract(fields, self._session, len(self.feature_names))
         self._verify_golden(fields)
+
+    def __reduce__(self) -> tuple[type[ModelBundle], tuple[Path, bytes, bytes]]:
+        return ModelBundle, self._made_of  # another process opens and verifies it again: a session cannot be sent
 
     @classmethod
     def load(cls, folder: Path) -> ModelBundle:

@@ -19,13 +19,12 @@ from device.measurement.profile_model import RAMP_MODES, Answer, ModeLimits, Pro
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording
 from device.measurement.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS
+from device.measurement.roundness import doubt_about_roundness, elongation_ratio
 
 VISIBLE_DEVIATIONS = 4.0
 """A lump stands out when its contrast lies so many standard deviations above none."""
 BEYOND_DEVIATIONS = 3.0
 """A size or depth that would lie this far outside its range, were it free to, is outside."""
-OFFSETS_SHARE, NOISE_CONTRAST = 0.3, 0.004
-"""The second harmonic of a round lump off the axis is at most this share of its first, and noise is this contrast."""
 
 
 def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, calibration: Calibration) -> Estimate:
@@ -48,7 +47,7 @@ def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, cali
         return without_numbers("outside_range", " ".join(doubts), origin)
     features = {
         "misfit_ratio": answer.misfit_ratio,
-        "elongation_ratio": elongation_ratio(profile),
+        "elongation_ratio": elongation_ratio(profile.elongation, profile.offset),
         "residual": profile.residual,
     }
     if answer.tissue_kpa:
@@ -67,12 +66,6 @@ def stands_out(profile: PressProfile, noise: PressNoise) -> bool:
     )
 
 
-def elongation_ratio(profile: PressProfile) -> float:
-    """Return the second harmonic over the most that a round lump as far off the axis shows; both root mean squares."""
-    oblong, aside = (float(np.sqrt(np.mean(part**2))) for part in (profile.elongation, profile.offset))
-    return oblong / (NOISE_CONTRAST + OFFSETS_SHARE * aside)
-
-
 def doubts_about(profile: PressProfile, answer: Answer, limits: ModeLimits) -> list[str]:
     """Return a sentence for every reason why this is not one round inclusion inside the trained ranges; [] is good."""
     found = []
@@ -81,8 +74,7 @@ def doubts_about(profile: PressProfile, answer: Answer, limits: ModeLimits) -> l
             f"No single round inclusion explains this press: misfit {answer.misfit_ratio:.2f}, "
             f"above the usual {limits.misfit_ratio:.2f}."
         )
-    if (ratio := elongation_ratio(profile)) > limits.elongation_ratio:
-        found.append(f"The lump is not round: elongation {ratio:.2f}, above the usual {limits.elongation_ratio:.2f}.")
+    found += doubt_about_roundness(elongation_ratio(profile.elongation, profile.offset), limits.elongation_ratio)
     if answer.beyond_deviations > BEYOND_DEVIATIONS:
         found.append("Size or depth lies outside the trained range.")
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -43,15 +44,19 @@ def modes(
 
     if out:
         require_writable(out, (".md",))
-    trained, tables = ProfileModel.load(model), ProbeTables.load(table)
-    models = ModeModels(ModelBundle.load(MODELS / "paper"), HeldModel.load(MODELS / "quick"), trained)
+    held, trained, tables = HeldModel.load(MODELS / "quick"), ProfileModel.load(model), ProbeTables.load(table)
+    models = ModeModels(ModelBundle.load(MODELS / "paper"), held, trained)
     calibration = read_calibration(table / "calibration.json")
     chapters = {
         "dial": lambda: dial_chapter(models, trained.bundle, calibration, tables),
-        "coverage": lambda: coverage_chapter(trained),
+        "coverage": lambda: coverage_chapter(
+            {"quick": held.bundle.card} | dict.fromkeys(RAMP_MODES, trained.bundle.card)
+        ),
         "posterior": lambda: posterior_chapter(trained),
         "noise-free": lambda: noise_free_chapter(trained.answers, tables),
-        "outside": lambda: outside_chapter(trained, kinds(tables, derived_seed(1, "outside")), RAMP_MODES),
+        "outside": lambda: outside_chapter(
+            partial(models.estimate, calibration=calibration), kinds(tables, derived_seed(1, "outside"))
+        ),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip
     measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})

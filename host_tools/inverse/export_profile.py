@@ -24,7 +24,7 @@ from host_tools.inverse.export import write_folder
 from host_tools.inverse.mode_outcome import ModeOutcome
 from host_tools.inverse.mode_statistics import statistics
 from host_tools.inverse.profile_training import TrainedProfile
-from host_tools.inverse.quick_training import TrainedQuick
+from host_tools.inverse.quick_training import QuickOutcome, TrainedQuick
 from host_tools.inverse.seeds import derived_seed
 
 GOLDEN_ROWS = 8
@@ -86,7 +86,13 @@ def export_quick(
         "effort": vars(trained.effort),
         "features": [{"name": name, "unit": unit} for name, unit in HELD_UNITS.items()],
         "training_range": _training_range(dict(zip(HELD_UNITS, _usual(trained).T, strict=True))),
-        "modes": {"quick": {"faintest_contrast": list(trained.faintest_contrast), **_answers(trained)}},
+        "modes": {
+            "quick": {
+                "faintest_contrast": list(trained.faintest_contrast),
+                "elongation_ratio": trained.outcome.elongation_ratio,
+                **_answers(trained.outcome),
+            }
+        },
         "golden": golden_vectors(trained.ensemble, network, rows.astype(np.float64)),
     }
     write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card)})
@@ -136,7 +142,7 @@ def _surrogate_file(trained: TrainedProfile) -> bytes:
     return content.getvalue()
 
 
-def _answers(outcome: ModeOutcome | TrainedQuick) -> dict[str, Any]:
+def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
     """Return bands and statistics of a mode."""
     return {
         "bands": {

@@ -57,6 +57,7 @@ def _of_unknown(truth: Array, percent: Array, error: Array, covered: Array, know
         "octile_ends": [_rounded(end) for end in octile_ends(truth)],
         "mean_percent_per_octile": [_mean(np.abs(percent[one])) for one in of_octile],
         "rms_coordinate_per_octile": [_rounded(_rms(error[one])) if one.any() else None for one in of_octile],
+        "determined_per_octile": [_mean(known[one]) for one in of_octile],
         "coverage_per_octile": [_coverage(covered[one], known[one]) for one in of_octile],
     }
 

@@ -17,9 +17,9 @@ from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_parameters import PARAMETERS
 from device.measurement.press_profile import press_profile
-from device.measurement.profile_estimate import elongation_ratio
 from device.measurement.quantities import Inclusion
 from device.measurement.recording import Recording
+from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario
@@ -106,7 +106,7 @@ def record_presses(
     def read(number: int) -> tuple[Array, float]:
         recording = recorded_press(tables, parameters[number], mode, press_seed(seed, number), levels=levels)
         profile = press_profile(recording)
-        return profile.as_row(), elongation_ratio(profile)
+        return profile.as_row(), elongation_ratio(profile.elongation, profile.offset)
 
     rows, elongation = zip(*in_parallel(read, len(parameters), jobs), strict=True)
     return RecordedPresses(parameters, np.array(rows), np.array(elongation))

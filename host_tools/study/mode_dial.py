@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -43,9 +44,7 @@ def dial_chapter(
 ) -> Chapter:
     """Return error and time of each mode on the same inclusions, and the time of the ensemble `network` alone."""
 
-    def answer(recording: Recording, mode: Mode) -> Estimate:
-        return models.estimate(recording, mode, calibration)
-
+    answer = partial(models.estimate, calibration=calibration)
     seen = {mode: timed_presses(answer, mode, tables, derived_seed(seed, "dial")) for mode in models.modes}
     header = ("mode", "frames a press", "compute (ms)", "answered", *_columns("error"), *_columns("determined"))
     return Chapter(

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from device.measurement.held_estimate import HeldModel, estimate_held
-from device.measurement.held_profile import HELD_NAMES, held_row
+from device.measurement.held_profile import HELD_NAMES, held_press
 from device.measurement.inversion import BundleRefused
 from device.measurement.press_profile import press_profile
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ring_means import RINGS
+from device.simulation.neighbour import Neighbour
 
 
 @pytest.fixture(scope="module")
@@ -25,12 +26,12 @@ def test_one_frame_is_answered_and_each_truth_lies_in_its_interval(held, held_mo
         quantity = getattr(estimate, name)
         assert quantity.low <= quantity.value <= quantity.high
         assert quantity.low <= truth <= quantity.high
-    assert tuple(estimate.features) == HELD_NAMES
+    assert tuple(estimate.features) == (*HELD_NAMES, "elongation_ratio")
 
 
 def test_the_row_is_the_contrast_that_a_ramp_shows_at_that_force(held, pressed):
     """Between 0.40 and 0.55 N the contrast on each ring lies between what the ramp's profile says there."""
-    row, profile = held_row(held), press_profile(pressed("precise"))
+    row, profile = held_press(held).row, press_profile(pressed("precise"))
     low, high = np.sort(profile.contrast[2:], axis=0)
     assert (row[:RINGS] > low - 0.01).all()
     assert (row[:RINGS] < high + 0.01).all()
@@ -68,3 +69,10 @@ def test_a_bundle_without_bands_is_refused(held_model):
     bundle = type("Bundle", (), {"card": {"modes": {}}, "name": "bare"})()
     with pytest.raises(BundleRefused, match=r"modes\.quick is incomplete"):
         HeldModel(bundle)
+
+
+def test_two_inclusions_are_not_round_at_one_force_either(pressed, held_model, calibration):
+    two = pressed("quick", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
+    estimate = estimate_held(two, held_model, calibration)
+    assert (estimate.status, estimate.size_mm.value) == ("outside_range", None)
+    assert "not round" in estimate.reason

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -202,3 +203,9 @@ def test_each_feature_outside_the_training_range_is_named_with_value_and_range(f
     first, second = ModelBundle.load(folder).outside_training_range(np.array([0.5, 0.8, np.nan]))
     assert first.startswith("Max deformation is 0.5 mm, outside the trained 0.00")
     assert second.startswith("Deformation area is nan mm2, outside the trained")
+
+
+def test_a_bundle_answers_the_same_in_another_process(bundle):
+    features = np.array(bundle.card["golden"]["features"])
+    again = pickle.loads(pickle.dumps(bundle))
+    np.testing.assert_array_equal(again.estimate(features).estimate, bundle.estimate(features).estimate)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from device.measurement.press_profile import press_profile
-from device.measurement.profile_estimate import doubts_about, elongation_ratio, estimate_profile
+from device.measurement.profile_estimate import doubts_about, estimate_profile
 from device.measurement.profile_model import RAMP_MODES, Answer
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 
 NO_DOUBT = Answer(np.zeros(3), np.ones(3), 0.0, 0.0)
@@ -91,7 +92,7 @@ def test_a_lump_beside_the_axis_is_not_called_oblong(pressed, profile_model):
     """2 mm aside the second harmonic of a sphere is far above noise; its first explains it."""
     aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
     assert np.abs(aside.elongation).max() > 0.005
-    assert elongation_ratio(aside) < profile_model.limits["precise"].elongation_ratio
+    assert elongation_ratio(aside.elongation, aside.offset) < profile_model.limits["precise"].elongation_ratio
 
 
 def test_full_scale_pixels_are_refused(ramp, profile_model, calibration):

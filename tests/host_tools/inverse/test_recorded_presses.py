@@ -7,9 +7,9 @@ from device.measurement.mode import FRAMES, MODES, RAMP_FROM_N, RAMP_TO_N, mode_
 from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_parameters import NOMINAL, PARAMETERS
 from device.measurement.press_profile import press_profile
-from device.measurement.profile_estimate import elongation_ratio
 from device.measurement.quantities import Inclusion
 from device.measurement.recording import Recording
+from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 from device.simulation.skin import Skin
 from host_tools.inverse.press_samples import draw_parameters
@@ -100,7 +100,7 @@ def test_rows_are_those_of_each_press_alone_with_its_own_seed(tables):
     for number, one in enumerate(parameters):
         profile = press_profile(recorded_press(tables, one, "standard", 300_000 + number))
         np.testing.assert_array_equal(found.rows[number], profile.as_row())
-        assert found.elongation[number] == elongation_ratio(profile)
+        assert found.elongation[number] == elongation_ratio(profile.elongation, profile.offset)
     assert found.parameters is parameters
 
 

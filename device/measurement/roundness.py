@@ -1,0 +1,31 @@
+"""How far from round the bright spot is: the second harmonic of the contrast, against the most a round lump shows.
+
+A round lump off the axis has a second harmonic too, so it is compared with the first. Source of the share: random
+presses up to 2 mm off the axis; docs/modes.md counts how often oblong lumps and pairs of lumps are told by it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+OFFSETS_SHARE, NOISE_CONTRAST = 0.3, 0.004
+"""The second harmonic of a round lump off the axis is at most this share of its first, and noise is this contrast."""
+
+
+def elongation_ratio(elongation: Array, offset: Array) -> float:
+    """Return the second harmonic [J] over the most that a round lump as far off the axis shows.
+
+    `offset` [J] is the first harmonic; of both the root mean square over the rings counts.
+    """
+    oblong, aside = (float(np.sqrt(np.mean(part**2))) for part in (elongation, offset))
+    return oblong / (NOISE_CONTRAST + OFFSETS_SHARE * aside)
+
+
+def doubt_about_roundness(ratio: float, usual_ratio: float) -> list[str]:
+    """Return a sentence when an `elongation_ratio` is above the usual one; [] is good."""
+    if ratio <= usual_ratio:
+        return []
+    return [f"The lump is not round: elongation {ratio:.2f}, above the usual {usual_ratio:.2f}."]
