@@ -30,7 +30,7 @@ run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCEN
 	@exec $(PY) -m device --simulate --port $(PORT) $(if $(SCENE),--scene $(SCENE))
 
 test: .venv/all.stamp ## run all tests
-	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile
+	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadgroup
 
 check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 	.venv/bin/ruff check .

@@ -1,4 +1,8 @@
-"""Shared fixtures: the committed model and table, a recording of the simulated probe, and a running daemon."""
+"""Shared fixtures: the committed model and table, a recording of the simulated probe, and a running daemon.
+
+Run in parallel (`-n`), the tests of a file stay together, and those in which a virtual hand presses in real time are
+one group: two hands at once would each see frames come late.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,15 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.phantom import Protocol, phantom_recording
 
 MODELS = ROOT / "models"
+IN_REAL_TIME = ("browser/", "device/test_modes", "device/test_scenarios", "test_press_to_result", "test_watchdog_restart")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put every test into the group of its file, or of all that run in real time."""
+    for item in items:
+        path = item.path.relative_to(ROOT / "tests").as_posix()
+        item.add_marker(pytest.mark.xdist_group("real time" if path.startswith(IN_REAL_TIME) else path))
 
 
 @pytest.fixture(scope="session")
