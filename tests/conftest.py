@@ -20,7 +20,7 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.phantom import Protocol, phantom_recording
 
 MODELS = ROOT / "models"
-IN_REAL_TIME = ("browser/", "device/test_modes", "device/test_scenarios", "test_press_to_result", "test_watchdog_restart")
+IN_REAL_TIME = "browser/", "device/test_modes", "device/test_scenarios", "test_press_to_result", "test_watchdog"
 
 
 @pytest.hookimpl(tryfirst=True)
