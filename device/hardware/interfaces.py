@@ -35,7 +35,7 @@ class CameraFrame:
 
 @dataclass(frozen=True)
 class CellSample:
-    """One reading of the load cell in ADC counts, stamped when its line was complete."""
+    """One reading of the load cell in ADC counts, and when it was measured."""
 
     t_s: float
     counts: CellCounts

@@ -1,9 +1,10 @@
 """Lines of an OpenScale-like load cell amplifier to samples in ADC counts.
 
 The amplifier streams `millis,reading,kg,raw24,` and CR LF, with "timestamp" and "raw reading" switched on in its menu.
-Only raw24 is used: `reading` is in the amplifier's own calibration. Opening the port resets the amplifier, so the
-first two or three seconds are a banner. 9600 baud carries about 30 such lines a second. Nothing is ever sent:
-an `x` would open the menu and stop the stream. A line that went is opened again when it is back.
+`millis` tells when, however late the line is read; raw24 how much: `reading` is in the amplifier's own calibration.
+Opening the port resets the amplifier, so the first two or three seconds are a banner. 9600 baud carries about 30 such
+lines a second. Nothing is ever sent: an `x` would open the menu and stop the stream. A line that went is opened again
+when it is back.
 Without a bridge the converter reads an end of its range, or is read where none is: always the same number.
 Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement, input noise 50-90 nV = 20-40 counts).
 """
@@ -18,23 +19,27 @@ from collections import deque
 from device.errors import DetachedCellError, LoadCellError, SaturatedCellError, UnreadableCellError
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, CellSample
+from device.hardware.sender_clock import SenderClock
 
-LINE = re.compile(rb"\d+,-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
+LINE = re.compile(rb"(?P<millis>\d{1,10}),-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
 """One reading. A missing raw24 does not match, and neither do the words nan, inf and ovf."""
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
 MOST_ALIKE = 20
 """A converter that is there makes this many equal readings running once in 10^30: its noise is tens of counts."""
 
 
-def parse_counts(line: bytes) -> CellCounts:
-    """Return raw24 (counts) of one line; raise `ValueError` when it is no complete reading."""
+def parse_reading(line: bytes) -> tuple[float, CellCounts]:
+    """Return time (s, of the amplifier's clock) and raw24 (counts) of one line.
+
+    Raises `ValueError` when it is no complete reading.
+    """
     match = LINE.fullmatch(line)
     if match is None:
         raise ValueError(f"{line!r} is not of the form millis,reading,kg,raw24,")
     counts = int(match["raw24"])
     if not RAW24_LOW_COUNTS <= counts <= RAW24_HIGH_COUNTS:
         raise ValueError(f"{line!r} holds {counts} counts, outside 24 bit")
-    return CellCounts(float(counts))
+    return int(match["millis"]) / 1000, CellCounts(float(counts))
 
 
 class OpenScale:
@@ -43,6 +48,7 @@ class OpenScale:
     def __init__(self, line: CellLine) -> None:
         self._line, self._name = line, line.name
         self._samples: deque[CellSample] = deque()
+        self._clock = SenderClock()
         self._last_counts, self._alike = CellCounts(math.nan), 0
         self._unreadable_lines = 0
         self._last_unreadable = b""
@@ -78,9 +84,10 @@ class OpenScale:
         """Release the serial line."""
         self._line.close()
 
-    def _keep(self, line: bytes, t_s: float) -> None:
+    def _keep(self, line: bytes, arrival_s: float) -> None:
         try:
-            self._samples.append(CellSample(t_s, parse_counts(line)))
+            amplifier_s, counts = parse_reading(line)
+            self._samples.append(CellSample(self._clock.measured_s(amplifier_s, arrival_s), counts))
         except ValueError:
             self._unreadable_lines += 1
             self._last_unreadable = line

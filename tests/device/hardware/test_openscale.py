@@ -18,7 +18,7 @@ from device.errors import (
     UnreadableCellError,
 )
 from device.hardware.load_cell import open_load_cell
-from device.hardware.openscale import MOST_ALIKE, OpenScale, parse_counts
+from device.hardware.openscale import MOST_ALIKE, OpenScale, parse_reading
 
 BANNER = b"\r\nSerial Load Cell Converter version 1.2\r\nBy SparkFun Electronics\r\nReadings:\r\n"
 
@@ -73,6 +73,15 @@ def test_a_sample_is_stamped_when_its_line_is_complete(line):
     line.send(b"1,0.5,kg,1,\r\n")
     sample = line.cell.read(timeout_s=0.5)
     assert before_s <= sample.t_s <= time.monotonic()
+
+
+def test_samples_that_are_read_late_are_as_far_apart_as_the_amplifier_says(line):
+    line.send(b"1000,0.5,kg,1,\r\n")
+    first = line.cell.read(timeout_s=0.5)
+    time.sleep(0.1)  # the reader is busy with something else
+    line.send(b"1012,0.5,kg,2,\r\n1025,0.5,kg,3,\r\n")
+    times_s = [first.t_s, *(line.cell.read(timeout_s=0.5).t_s for _ in range(2))]
+    assert times_s == pytest.approx([first.t_s, first.t_s + 0.012, first.t_s + 0.025], abs=2e-4)
 
 
 def test_the_banner_is_skipped_and_counted(line):
@@ -231,5 +240,5 @@ def test_a_missing_port_is_a_load_cell_error_naming_it():
 
 
 def test_both_ends_of_24_bit_are_readings():
-    assert parse_counts(b"1,0,kg,8388607,") == 2**23 - 1
-    assert parse_counts(b"1,0,lbs,-8388608,\r") == -(2**23)
+    assert parse_reading(b"1,0,kg,8388607,") == (0.001, 2**23 - 1)
+    assert parse_reading(b"4294967295,0,lbs,-8388608,\r") == (4294967.295, -(2**23))
