@@ -23,6 +23,7 @@ from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
 from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
+from device.instrument.progress import ProgressBoard
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
@@ -56,14 +57,15 @@ class Procedure:
         calibration_id: str,
         opened: ExitStack,
         clock: ClockWatch | None = None,
+        progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them."""
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes = modes
-        self.board = StatusBoard()
+        self.board, self.progress = StatusBoard(), progress or ProgressBoard()
         self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
-        self._capture = Capture(bench, config, self.board)
+        self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._requests = PressRequests(
@@ -78,8 +80,8 @@ class Procedure:
 
     def require_ready(self) -> None:
         """Raise the fault that keeps a press from being measured, if there is one."""
-        if self.board.now.fault:
-            raise self.board.now.fault
+        if self.board.now.hindrance:
+            raise self.board.now.hindrance
         _ = self.bench.force.latest_n
 
     def start(self) -> None:
@@ -122,6 +124,7 @@ class Procedure:
                 self._at_fault(DeviceError(f"The daemon failed: {error!r}.", "Restart it and report the log."))
 
     def _one_press(self) -> None:
+        self.progress.beat()
         self.store.require_space(self.config.store.min_free_mb)
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
@@ -139,6 +142,7 @@ class Procedure:
             is_touched = self.bench.force.latest_n >= self.config.press.contact_n
             if job := self._requests.begin(is_touched=is_touched):
                 return job
+            self.progress.beat()
             time.sleep(POLL_S)
         return None
 

@@ -21,8 +21,10 @@ from device import errors
 from device.assembly import open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError
-from device.instrument import bench, force_recorder, procedure
+from device.instrument import bench, force_recorder, procedure, watchdog
 from device.instrument.procedure import Procedure
+from device.instrument.restart_note import RestartNote
+from device.instrument.watchdog import Watchdog
 from device.measurement.toml_record import from_table
 from device.records.store import ENDED
 from device.simulation.faults import PARAMETERS, Fault
@@ -46,7 +48,7 @@ class Device:
     def codes(self) -> set[str]:
         """Codes of fault, press and warnings that are shown now."""
         status = self.board.now
-        shown = [fault.code for fault in (status.fault, *status.warnings) if fault]
+        shown = [fault.code for fault in (status.fault, status.stall, *status.warnings) if fault]
         if status.press:
             shown += [warning["code"] for warning in status.press.warnings]
             shown += [status.press.code] if status.press.code else []
@@ -57,7 +59,7 @@ class Device:
         assert any(condition() or self._pause.wait(0.01) for _ in range(tries)), (self.board.now, self.codes())
 
     def is_ready(self) -> bool:
-        return self.board.now.step != "starting" and self.board.now.fault is None
+        return self.board.now.step != "starting" and self.board.now.hindrance is None
 
     def has_ended(self, press_id: str) -> bool:
         press = self.board.now.press
@@ -66,7 +68,7 @@ class Device:
     def press(self) -> None:
         self.until(self.is_ready)
         job = self.procedure.request()
-        self.until(lambda: self.has_ended(job.id) or self.board.now.fault is not None)
+        self.until(lambda: self.has_ended(job.id) or self.board.now.hindrance is not None)
 
 
 @pytest.fixture
@@ -74,6 +76,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
     monkeypatch.setattr(bench, "FRAME_TIMEOUT_S", TIME_RATIO * bench.FRAME_TIMEOUT_S)
     monkeypatch.setattr(force_recorder, "SILENCE_S", TIME_RATIO * force_recorder.SILENCE_S)
     monkeypatch.setattr(procedure, "AFTER_FAULT_S", 0.1)
+    monkeypatch.setattr(watchdog, "WITHOUT_SYSTEMD_S", TIME_RATIO * watchdog.WITHOUT_SYSTEMD_S)
     camera = CameraSection(frame_rate_hz=60.0)
     config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
@@ -85,9 +88,12 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
         )
         opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=QUICK_HAND, faults=faults))
         opened.start()
+        watching = Watchdog(opened.progress, opened.board, RestartNote(tmp_path))
+        watching.start()
         try:
             yield Device(opened)
         finally:
+            watching.close()
             opened.close()
 
     return run
@@ -101,7 +107,7 @@ def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(p
             device.press()
         device.until(lambda: scenario.expects in device.codes())
         if all(fault.until_s < float("inf") for fault in scenario.faults):
-            device.until(lambda: device.board.now.step == "ready")
+            device.until(device.is_ready)
             device.procedure.require_ready()
 
 
