@@ -18,7 +18,8 @@ DeviceError
 │   ├── DimLightError        E206  a side is dimmer than it was (a warning)
 │   ├── OpenLedError         E207  no current flows through the LED of a side
 │   ├── HotLedDriverError    E208  the LED chip is too hot, or no side is connected
-│   └── LightBudgetError     E209  the light was on for too long in one press
+│   ├── LightBudgetError     E209  the light was on for too long in one press
+│   └── LightLimitError      E210  a side cannot hold its level of light (a warning)
 ├── LoadCellError            E301  no force
 │   ├── UnreadableCellError  E302  lines come, but none that can be read
 │   ├── SaturatedCellError   E303  the amplifier is at the end of its range
@@ -148,6 +149,13 @@ class LightBudgetError(LightError):
     """The light was on for too long in one press; it goes off, and the next press may begin."""
 
     code = "E209"
+
+
+class LightLimitError(LightError):
+    """A side is at an end of its brightness and does not give its share of the light; the measurement stands."""
+
+    code = "E210"
+    severity = "warning"
 
 
 class LoadCellError(DeviceError):

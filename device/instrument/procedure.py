@@ -17,6 +17,7 @@ from typing import Any
 from device.config import Config
 from device.errors import DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
+from device.instrument.brightness_loop import BrightnessLoop
 from device.instrument.capture import POLL_S, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
@@ -68,6 +69,7 @@ class Procedure:
         self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
+        self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
             self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
         )
@@ -129,6 +131,7 @@ class Procedure:
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
         self._warn(self._clock.warning())
+        self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
@@ -153,7 +156,9 @@ class Procedure:
             self._set_job(job, state="capturing", progress=0.1)
             self.board.update(step="reference", measurement_id=None)
             reference = self._capture.loaded("reference", job.mode)
-            self._warn(self._dimming.warning(self._capture.side_levels(reference)))
+            levels = self._capture.side_levels(reference)
+            self._warn(self._dimming.warning(levels))
+            self._warn(self._brightness.saw(levels))
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)

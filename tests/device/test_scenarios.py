@@ -22,9 +22,12 @@ from device.assembly import open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError
 from device.instrument import bench, force_recorder, procedure, watchdog
+from device.instrument.light_check import level_counts
 from device.instrument.procedure import Procedure
 from device.instrument.restart_note import RestartNote
 from device.instrument.watchdog import Watchdog
+from device.measurement.mode import Mode
+from device.measurement.recording import Recording, read_recording
 from device.measurement.toml_record import from_table
 from device.records.store import ENDED
 from device.simulation.faults import PARAMETERS, Fault
@@ -65,9 +68,9 @@ class Device:
         press = self.board.now.press
         return press is not None and press.id == press_id and press.state in ENDED
 
-    def press(self) -> None:
+    def press(self, mode: Mode | None = None) -> None:
         self.until(self.is_ready)
-        job = self.procedure.request()
+        job = self.procedure.request(mode)
         self.until(lambda: self.has_ended(job.id) or self.board.now.hindrance is not None)
 
 
@@ -164,3 +167,29 @@ def test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_reco
         device.until(lambda: device.board.now.step == "ready")
         assert device.board.now.press.code == "E209"
         assert device.board.now.press.light_on_s >= 1.0  # to a tenth
+
+
+def test_light_that_is_lost_between_two_presses_is_back_in_the_third_and_the_same_in_both_parts_of_each(running):
+    """Three tenths are lost before the second press; the level is that of the first press, 61 counts."""
+    dimmed = Scenario(faults=(Fault("led_dimmed", ratio=0.7, from_press=2),))
+    with running(dimmed, light=LightSection(target_counts=61.0)) as device:
+        presses = [recorded(device) for _ in range(3)]
+        assert "E206" in device.codes()
+    levels = [reference_counts(press) for press in presses]
+    assert levels == pytest.approx([61.0, 0.7 * 61.0, 61.0], rel=0.03)
+    lit = [{frame.led_ratio for frame in press.frames if frame.role != "dark"} for press in presses]
+    assert [len(ratios) for ratios in lit] == [1, 1, 1]
+    assert lit[2].pop() == pytest.approx([0.6 / 0.7] * 4, rel=0.03)
+
+
+def recorded(device: Device) -> Recording:
+    device.press("paper")
+    store, press = device.procedure.store, device.board.now.press
+    return read_recording(store.recording_folder(store.measurement(press.measurement_id)["recording_id"]))
+
+
+def reference_counts(press: Recording) -> float:
+    """Mean counts above dark of the reference press at the target force, light taken as proportional to the force."""
+    dark = level_counts(press.with_role("dark")[-1])
+    held = [frame for frame in press.with_role("reference") if frame.force_n > 0.4]
+    return sum((level_counts(frame) - dark) * 0.5 / frame.force_n for frame in held) / len(held)
