@@ -62,10 +62,10 @@ def test_every_run_of_a_watched_answer_is_progress_of_the_inference():
     now_s, begun = [0.0], []
     progress = ProgressBoard(lambda: now_s[0])
     answers = Answers(("paper",), lambda recording, mode: mode).watched(progress, lambda: begun.append(now_s[0]))
-    now_s[0] = 30.0
+    now_s[0] = 40.0
     assert answers.estimator(None, "paper") == "paper"
     assert "inference" not in progress.stall(15.0).parts
-    now_s[0] = 60.0
+    now_s[0] = 80.0
     answers.prove()
     assert "inference" not in progress.stall(15.0).parts
-    assert begun == [30.0, 60.0]
+    assert begun == [40.0, 80.0]

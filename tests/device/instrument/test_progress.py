@@ -8,7 +8,7 @@ from device.errors import CameraError, LightError, ModelError
 from device.instrument.progress import BEAT_S, PARTS, ProgressBoard
 
 WATCHDOG_S = 10.0
-"""Camera and LED chip may be silent for 5 s, the load cell for 3 s, the inference for 10 s."""
+"""Camera and LED chip may be silent for 5 s, the load cell for 3 s, the inference for 20 s."""
 
 
 class Clock:
@@ -41,7 +41,7 @@ def stalled(board):
     return stall.parts if stall else ()
 
 
-@pytest.mark.parametrize(("part", "limit_s"), [("camera", 5.0), ("light", 5.0), ("force", 3.0), ("inference", 10.0)])
+@pytest.mark.parametrize(("part", "limit_s"), [("camera", 5.0), ("light", 5.0), ("force", 3.0), ("inference", 20.0)])
 def test_a_part_is_stalled_after_its_own_time(board, clock, part, limit_s):
     clock.now_s += limit_s
     assert part not in stalled(board)
@@ -51,7 +51,7 @@ def test_a_part_is_stalled_after_its_own_time(board, clock, part, limit_s):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_a_part_that_is_used_goes_on_and_the_others_do_not_live_on_it(board, clock, part):
-    for _ in range(11):
+    for _ in range(21):
         clock.now_s += 1.0
         use(board, clock, part)
     assert set(stalled(board)) == set(PARTS) - {part}
@@ -61,7 +61,7 @@ def test_a_part_that_is_used_goes_on_and_the_others_do_not_live_on_it(board, clo
 def test_the_part_in_which_a_loop_hangs_is_the_one_that_is_named(board, clock, part):
     """The others of its loop wait for it; the load cell has a loop of its own."""
     with board.inside(part):
-        for _ in range(12):
+        for _ in range(21):
             clock.now_s += 1.0
             use(board, clock, "force")
         assert stalled(board) == (part,)
@@ -69,7 +69,7 @@ def test_the_part_in_which_a_loop_hangs_is_the_one_that_is_named(board, clock, p
 
 def test_the_load_cells_loop_hangs_alone(board, clock):
     with board.inside("force"):
-        for _ in range(12):
+        for _ in range(21):
             clock.now_s += 1.0
             for part in ("camera", "light", "inference"):
                 use(board, clock, part)
@@ -96,14 +96,16 @@ def test_a_fault_that_a_chip_answers_with_is_progress_but_a_camera_without_frame
     assert board.stall(WATCHDOG_S).comes_back
 
 
-def test_a_camera_that_hangs_does_not_come_back(board, clock):
+def test_a_camera_that_hangs_for_the_watchdogs_time_does_not_come_back(board, clock):
     with board.inside("camera"):
-        clock.now_s += 5.1
+        clock.now_s += 10.0
+        assert board.stall(WATCHDOG_S).comes_back
+        clock.now_s += 0.1
         assert not board.stall(WATCHDOG_S).comes_back
 
 
 def test_a_stall_is_told_in_words(board, clock):
-    use(board, clock, "inference", 20.0)
+    use(board, clock, "inference", 15.0)
     clock.now_s += 5.25
     use(board, clock, "force")
     assert str(board.stall(WATCHDOG_S)) == "the camera and the LED chip made no progress for 5.2 s"
