@@ -6,6 +6,7 @@ Exit codes: 0 ok, 1 failed, 2 usage.
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import json
 import logging
 import signal
@@ -22,6 +23,8 @@ from device.assembly import StartFailed, open_probe, open_simulated_probe
 from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.procedure import Procedure
+from device.instrument.restart_note import RestartNote
+from device.instrument.watchdog import Watchdog
 from device.led_off import led_off
 from device.measurement.calibration import read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
@@ -126,13 +129,17 @@ def _serve(options: argparse.Namespace) -> int:
     listening = _listen(config)
     with listening:
         procedure = open_simulated_probe(config, scenario) if scenario else open_probe(config)
-        if settings.warning:
-            procedure.board.update(warnings=(settings.warning,))
+        note = RestartNote(config.data)
+        warnings = tuple(warning for warning in (settings.warning, note.warning()) if warning)
+        procedure.board.update(warnings=warnings)
+        watchdog = Watchdog(procedure.progress, procedure.board, note)
         procedure.start()
+        watchdog.start()
         try:
             settings.keep()
             _run_server(procedure, listening)
         finally:
+            watchdog.close()
             procedure.close()
     return 0
 
@@ -166,4 +173,5 @@ def _run_server(procedure: Procedure, listening: socket.socket) -> None:
 
 
 if __name__ == "__main__":
+    faulthandler.enable()  # the watchdog's SIGABRT then writes where every thread was
     sys.exit(main())

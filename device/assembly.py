@@ -24,13 +24,15 @@ from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
+from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
-from device.simulation.faults import FaultTimeline
+from device.simulation.faults import NO_FAULTS, FaultTimeline
+from device.simulation.frozen_cell import FreezingCell
 from device.simulation.full_disk import EmulatedDisk
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
@@ -120,9 +122,9 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
     lights = parts.open(lambda: led_driver(config.light, bus))
     camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
-    cell = parts.open(lambda: open_cell(config, line.device_path))
+    cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
-    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)
+    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario, faults)
     procedure.on_request(lambda mode: faults.begin_press())
     _lead_by_hand(procedure, probe)
     return procedure
@@ -177,9 +179,11 @@ def _procedure(
     clock: ClockWatch,
     disk: Disk | None = None,
     scenario: Scenario | None = None,
+    faults: FaultTimeline = NO_FAULTS,
 ) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
-    force = parts.open(lambda: tared(config, cell)) if cell else None
+    progress = ProgressBoard()
+    force = parts.open(lambda: tared(config, cell, progress)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
     answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle and calibration else None
@@ -192,6 +196,8 @@ def _procedure(
     assert answers is not None
     assert calibration is not None
     assert store is not None
+    answers = answers.watched(progress, begin=partial(faults.hold_up, "inference_frozen"))
+    progress.exercise("inference", answers.prove)
     return Procedure(
         config,
         Bench(
@@ -200,6 +206,7 @@ def _procedure(
             force,
             FramePace(config.camera.late_frames / config.camera.frame_rate_hz),
             LightBudget(config.light.max_on_s),
+            progress,
         ),
         answers.estimator,
         store,
@@ -207,6 +214,7 @@ def _procedure(
         calibration_id=calibration.id,
         opened=parts.opened,
         clock=clock,
+        progress=progress,
         simulated_truth=scenario.inclusion if scenario else None,
     )
 

@@ -1,7 +1,7 @@
 """The daemon's errors: each class one fault, each with the code that the screen and the API show.
 
-The hundreds are the part: 0 settings, 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request
-(E803 and E804, a malformed one and an unknown path, are device/web/problems.py's own).
+The hundreds are the part: 0 settings, 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request,
+9 the daemon itself (E803 and E804, a malformed one and an unknown path, are device/web/problems.py's own).
 docs/simulated_probe.md lists how each fault is provoked and seen.
 
 DeviceError
@@ -18,7 +18,8 @@ DeviceError
 │   ├── DimLightError        E206  a side is dimmer than it was (a warning)
 │   ├── OpenLedError         E207  no current flows through the LED of a side
 │   ├── HotLedDriverError    E208  the LED chip is too hot, or no side is connected
-│   └── LightBudgetError     E209  the light was on for too long in one press
+│   ├── LightBudgetError     E209  the light was on for too long in one press
+│   └── LightLimitError      E210  a side cannot hold its level of light (a warning)
 ├── LoadCellError            E301  no force
 │   ├── UnreadableCellError  E302  lines come, but none that can be read
 │   ├── SaturatedCellError   E303  the amplifier is at the end of its range
@@ -33,7 +34,9 @@ DeviceError
 ├── ClockJumpError           E701  the wall clock was set (a warning)
 ├── BusyError                E801  a press is already under way
 ├── UnknownResource          E802  no such press or measurement
-└── ModeUnavailable          E805  this probe cannot answer in that mode
+├── ModeUnavailable          E805  this probe cannot answer in that mode
+├── StalledError             E901  a part makes no progress: the watchdog restarts the daemon
+└── RestartedError           E902  the watchdog has restarted the daemon (a warning)
 """
 
 from __future__ import annotations
@@ -148,6 +151,13 @@ class LightBudgetError(LightError):
     code = "E209"
 
 
+class LightLimitError(LightError):
+    """A side is at an end of its brightness and does not give its share of the light; the measurement stands."""
+
+    code = "E210"
+    severity = "warning"
+
+
 class LoadCellError(DeviceError):
     """The load cell is silent."""
 
@@ -244,3 +254,17 @@ class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller 
 
     code = "E805"
     status = 422
+
+
+class StalledError(DeviceError):
+    """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
+
+    code = "E901"
+    status = 503
+
+
+class RestartedError(DeviceError):
+    """The watchdog has restarted the daemon; shown until a press has told of it."""
+
+    code = "E902"
+    severity = "warning"

@@ -23,6 +23,7 @@ from device.instrument.light_check import (
     require_dark,
     require_every_side,
 )
+from device.instrument.progress import ProgressBoard
 from device.instrument.ramp_frames import RampFrames, ramp_targets_n
 from device.instrument.status import StatusBoard
 from device.measurement.mode import FRAMES, Mode
@@ -43,7 +44,8 @@ class PressEnded(Exception):  # noqa: N818 - not every end is an error
 class Capture:
     """The part of the procedure that moves the light and takes frames."""
 
-    def __init__(self, bench: Bench, config: Config, board: StatusBoard) -> None:
+    def __init__(self, bench: Bench, config: Config, board: StatusBoard, progress: ProgressBoard | None = None) -> None:
+        self._progress = progress or ProgressBoard()
         self.bench, self.press, self.light, self.board = bench, config.press, config.light, board
         self.lit = (self.light.ratio[0], self.light.ratio[1], self.light.ratio[2], self.light.ratio[3])
         self.cancelled, self.stopping = threading.Event(), threading.Event()
@@ -58,6 +60,7 @@ class Capture:
         """
         self.bench.light(DARK)
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
+            self._progress.beat()
             time.sleep(POLL_S)
         self.bench.check_lights()
         dark = self._agreeing("dark", DARK)
@@ -150,6 +153,7 @@ class Capture:
         return frames[-1]
 
     def _require_going_on(self) -> None:
+        self._progress.beat()
         self.bench.budget.require_left()
         if self.cancelled.is_set():
             raise PressEnded("cancelled", "Cancelled by the operator.")

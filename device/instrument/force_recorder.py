@@ -15,6 +15,7 @@ import numpy as np
 from device.errors import LoadCellError, OverloadedCellError
 from device.hardware.interfaces import ForceScale, LoadCell, Newtons
 from device.instrument.load_limit import LoadLimit
+from device.instrument.progress import ProgressBoard
 
 KEPT_SAMPLES = 1000
 SILENCE_S = 1.0
@@ -24,12 +25,15 @@ RETRY_S = 0.2
 class ForceRecorder:
     """Force history of the last seconds."""
 
-    def __init__(self, cell: LoadCell, scale: ForceScale, limit: LoadLimit) -> None:
+    def __init__(
+        self, cell: LoadCell, scale: ForceScale, limit: LoadLimit, progress: ProgressBoard | None = None
+    ) -> None:
         """Start recording; there is a sample when this returns. Raises `LoadCellError` when none comes."""
         self._cell, self._scale, self._limit = cell, scale, limit
         self._samples: deque[tuple[float, Newtons]] = deque(maxlen=KEPT_SAMPLES)
         self._news, self._stopping = threading.Condition(), threading.Event()
         self.fault: LoadCellError | None = None
+        self._progress = progress or ProgressBoard()
         self._thread = threading.Thread(target=self._run, name="force", daemon=True)
         self._thread.start()
         try:
@@ -46,7 +50,8 @@ class ForceRecorder:
     def _run(self) -> None:
         while not self._stopping.is_set():
             try:
-                sample = self._cell.read(timeout_s=SILENCE_S)
+                with self._progress.inside("force"):
+                    sample = self._cell.read(timeout_s=SILENCE_S)
                 self._limit.require_bearable(sample.counts)
             except OverloadedCellError as error:
                 self.fault = error  # and the next sample at once: those behind it must not grow old

@@ -43,8 +43,8 @@ class PressRequests:
             raise ModeUnavailable(f"This probe has no model for the mode {mode}.", remedy)
         with self._lock:
             status = self._board.now
-            if status.fault:
-                raise status.fault
+            if status.hindrance:
+                raise status.hindrance
             if self._waiting or (status.press and status.press.state not in ENDED):
                 raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
             job = self._new_job(mode)

@@ -17,12 +17,14 @@ from typing import Any
 from device.config import Config
 from device.errors import DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
+from device.instrument.brightness_loop import BrightnessLoop
 from device.instrument.capture import POLL_S, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
 from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
+from device.instrument.progress import ProgressBoard
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
@@ -56,16 +58,18 @@ class Procedure:
         calibration_id: str,
         opened: ExitStack,
         clock: ClockWatch | None = None,
+        progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them."""
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes = modes
-        self.board = StatusBoard()
+        self.board, self.progress = StatusBoard(), progress or ProgressBoard()
         self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
-        self._capture = Capture(bench, config, self.board)
+        self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
+        self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
             self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
         )
@@ -78,8 +82,8 @@ class Procedure:
 
     def require_ready(self) -> None:
         """Raise the fault that keeps a press from being measured, if there is one."""
-        if self.board.now.fault:
-            raise self.board.now.fault
+        if self.board.now.hindrance:
+            raise self.board.now.hindrance
         _ = self.bench.force.latest_n
 
     def start(self) -> None:
@@ -122,10 +126,12 @@ class Procedure:
                 self._at_fault(DeviceError(f"The daemon failed: {error!r}.", "Restart it and report the log."))
 
     def _one_press(self) -> None:
+        self.progress.beat()
         self.store.require_space(self.config.store.min_free_mb)
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
         self._warn(self._clock.warning())
+        self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
@@ -139,6 +145,7 @@ class Procedure:
             is_touched = self.bench.force.latest_n >= self.config.press.contact_n
             if job := self._requests.begin(is_touched=is_touched):
                 return job
+            self.progress.beat()
             time.sleep(POLL_S)
         return None
 
@@ -149,7 +156,9 @@ class Procedure:
             self._set_job(job, state="capturing", progress=0.1)
             self.board.update(step="reference", measurement_id=None)
             reference = self._capture.loaded("reference", job.mode)
-            self._warn(self._dimming.warning(self._capture.side_levels(reference)))
+            levels = self._capture.side_levels(reference)
+            self._warn(self._dimming.warning(levels))
+            self._warn(self._brightness.saw(levels))
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)

@@ -43,7 +43,7 @@ class Status:
     """One moment of the procedure.
 
     `wanted_n`: forces at which the press under way still wants frames. `warnings`: those of the last press, or of the
-    time since, and the lasting ones.
+    time since, and the lasting ones. `stall`: a part that makes no progress, by the watchdog's thread.
     """
 
     step: Step = "starting"
@@ -54,6 +54,12 @@ class Status:
     measurement_id: str | None = None
     fault: DeviceError | None = None
     warnings: tuple[DeviceError, ...] = ()
+    stall: DeviceError | None = None
+
+    @property
+    def hindrance(self) -> DeviceError | None:
+        """What keeps a press from being measured, if anything does."""
+        return self.fault or self.stall
 
 
 class StatusBoard:

@@ -84,9 +84,9 @@ class ModelBundle:
         self.feature_names = _verified_names(fields)
         self.feature_range = fields.ranges("features", self.feature_names)
         self.box = fields.ranges("unknowns", UNKNOWNS)
-        self._session = _open_session(fields, network)
+        self._session, self._fields = _open_session(fields, network), fields
         _verify_contract(fields, self._session, len(self.feature_names))
-        self._verify_golden(fields)
+        self.prove()
 
     def __reduce__(self) -> tuple[type[ModelBundle], tuple[Path, bytes, bytes]]:
         return ModelBundle, self._made_of  # another process opens and verifies it again: a session cannot be sent
@@ -127,7 +127,9 @@ class ModelBundle:
         estimate, spread = self._session.run(["estimate", "spread"], {"features": rows})
         return Raw(np.asarray(estimate, dtype=np.float64), np.asarray(spread, dtype=np.float64))
 
-    def _verify_golden(self, fields: _Fields) -> None:
+    def prove(self) -> None:
+        """Run the golden vectors of the bundle; raise `BundleRefused` when they do not hold on this machine."""
+        fields = self._fields
         rows = fields.table("golden.features", len(self.feature_names)).astype(np.float32)
         found = self._run(rows)
         for name, values in (("estimate", found.estimate), ("spread", found.spread)):

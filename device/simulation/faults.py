@@ -22,6 +22,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_torn": (),
     "i2c_nack": (),
     "i2c_stuck": (),
+    "i2c_frozen": (),
     "led_dead": ("side",),
     "led_stuck_on": ("side",),
     "led_dimmed": ("side", "ratio"),
@@ -35,6 +36,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "cell_overloaded": (),
     "cell_disconnected": (),
     "cell_unplugged": (),
+    "cell_frozen": (),
+    "inference_frozen": (),
     "clock_jump": ("step_s",),
     "disk_full": (),
 }
@@ -45,6 +48,7 @@ DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0}
 I2C_ERRNO = {"i2c_nack": 121, "i2c_stuck": errno.ETIMEDOUT}
 """What Linux answers: EREMOTEIO (121; macOS does not name it) for no acknowledgement, ETIMEDOUT for a line held low."""
 ACTION = "describe one fault"
+FROZEN_POLL_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,11 @@ class FaultTimeline:
     def is_active(self, kind: str, t_s: float | None = None) -> bool:
         """Return whether a fault of that kind is there at a time (s, monotonic), now unless given."""
         return next(self._active(kind, self._clock() if t_s is None else t_s), None) is not None
+
+    def hold_up(self, kind: str) -> None:
+        """Return when there is no fault of that kind: stands for a call that does not return while there is one."""
+        while self.is_active(kind):
+            time.sleep(FROZEN_POLL_S)
 
     def is_open(self, side: str) -> bool:
         """Return whether the circuit of a side's LED is open now."""

@@ -21,8 +21,13 @@ from device import errors
 from device.assembly import open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError
-from device.instrument import bench, force_recorder, procedure
+from device.instrument import bench, force_recorder, procedure, watchdog
+from device.instrument.light_check import level_counts
 from device.instrument.procedure import Procedure
+from device.instrument.restart_note import RestartNote
+from device.instrument.watchdog import Watchdog
+from device.measurement.mode import Mode
+from device.measurement.recording import Recording, read_recording
 from device.measurement.toml_record import from_table
 from device.records.store import ENDED
 from device.simulation.faults import PARAMETERS, Fault
@@ -46,7 +51,7 @@ class Device:
     def codes(self) -> set[str]:
         """Codes of fault, press and warnings that are shown now."""
         status = self.board.now
-        shown = [fault.code for fault in (status.fault, *status.warnings) if fault]
+        shown = [fault.code for fault in (status.fault, status.stall, *status.warnings) if fault]
         if status.press:
             shown += [warning["code"] for warning in status.press.warnings]
             shown += [status.press.code] if status.press.code else []
@@ -57,16 +62,16 @@ class Device:
         assert any(condition() or self._pause.wait(0.01) for _ in range(tries)), (self.board.now, self.codes())
 
     def is_ready(self) -> bool:
-        return self.board.now.step != "starting" and self.board.now.fault is None
+        return self.board.now.step != "starting" and self.board.now.hindrance is None
 
     def has_ended(self, press_id: str) -> bool:
         press = self.board.now.press
         return press is not None and press.id == press_id and press.state in ENDED
 
-    def press(self) -> None:
+    def press(self, mode: Mode | None = None) -> None:
         self.until(self.is_ready)
-        job = self.procedure.request()
-        self.until(lambda: self.has_ended(job.id) or self.board.now.fault is not None)
+        job = self.procedure.request(mode)
+        self.until(lambda: self.has_ended(job.id) or self.board.now.hindrance is not None)
 
 
 @pytest.fixture
@@ -74,6 +79,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
     monkeypatch.setattr(bench, "FRAME_TIMEOUT_S", TIME_RATIO * bench.FRAME_TIMEOUT_S)
     monkeypatch.setattr(force_recorder, "SILENCE_S", TIME_RATIO * force_recorder.SILENCE_S)
     monkeypatch.setattr(procedure, "AFTER_FAULT_S", 0.1)
+    monkeypatch.setattr(watchdog, "WITHOUT_SYSTEMD_S", TIME_RATIO * watchdog.WITHOUT_SYSTEMD_S)
     camera = CameraSection(frame_rate_hz=60.0)
     config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
@@ -85,9 +91,12 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
         )
         opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=QUICK_HAND, faults=faults))
         opened.start()
+        watching = Watchdog(opened.progress, opened.board, RestartNote(tmp_path))
+        watching.start()
         try:
             yield Device(opened)
         finally:
+            watching.close()
             opened.close()
 
     return run
@@ -101,7 +110,7 @@ def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(p
             device.press()
         device.until(lambda: scenario.expects in device.codes())
         if all(fault.until_s < float("inf") for fault in scenario.faults):
-            device.until(lambda: device.board.now.step == "ready")
+            device.until(device.is_ready)
             device.procedure.require_ready()
 
 
@@ -158,3 +167,29 @@ def test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_reco
         device.until(lambda: device.board.now.step == "ready")
         assert device.board.now.press.code == "E209"
         assert device.board.now.press.light_on_s >= 1.0  # to a tenth
+
+
+def test_light_that_is_lost_between_two_presses_is_back_in_the_third_and_the_same_in_both_parts_of_each(running):
+    """Three tenths are lost before the second press; the level is that of the first press, 61 counts."""
+    dimmed = Scenario(faults=(Fault("led_dimmed", ratio=0.7, from_press=2),))
+    with running(dimmed, light=LightSection(target_counts=61.0)) as device:
+        presses = [recorded(device) for _ in range(3)]
+        assert "E206" in device.codes()
+    levels = [reference_counts(press) for press in presses]
+    assert levels == pytest.approx([61.0, 0.7 * 61.0, 61.0], rel=0.03)
+    lit = [{frame.led_ratio for frame in press.frames if frame.role != "dark"} for press in presses]
+    assert [len(ratios) for ratios in lit] == [1, 1, 1]
+    assert lit[2].pop() == pytest.approx([0.6 / 0.7] * 4, rel=0.03)
+
+
+def recorded(device: Device) -> Recording:
+    device.press("paper")
+    store, press = device.procedure.store, device.board.now.press
+    return read_recording(store.recording_folder(store.measurement(press.measurement_id)["recording_id"]))
+
+
+def reference_counts(press: Recording) -> float:
+    """Mean counts above dark of the reference press at the target force, light taken as proportional to the force."""
+    dark = level_counts(press.with_role("dark")[-1])
+    held = [frame for frame in press.with_role("reference") if frame.force_n > 0.4]
+    return sum((level_counts(frame) - dark) * 0.5 / frame.force_n for frame in held) / len(held)

@@ -11,6 +11,7 @@ from device.instrument import bench as bench_module
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import LATE_FRAMES, FramePace
 from device.instrument.light_budget import LightBudget
+from device.instrument.progress import ProgressBoard
 
 LIT = (0.6, 0.6, 0.6, 0.6)
 
@@ -145,3 +146,47 @@ def test_light_counts_from_when_it_is_asked_for_until_darkness_is_acknowledged(h
     bench.check_lights()
     now_s[0] = 9.0
     assert bench.budget.press_s == 6.0
+
+
+class Watch:
+    """Shows what a test sets."""
+
+    def __init__(self):
+        self.now_s = 0.0
+
+    def __call__(self):
+        return self.now_s
+
+
+def test_a_beat_confirms_the_light_and_takes_a_frame_and_frames_of_that_light_remain_good(hardware):
+    watch = Watch()
+    bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
+    bench.light(LIT)
+    watch.now_s = 1.0
+    bench.progress.beat()
+    assert hardware.log == [LIT, ("frame", 10.0), LIT]
+    assert bench.take("press").t_s == pytest.approx(10.102)
+
+
+def test_a_light_that_nobody_knows_is_not_confirmed_by_a_beat(hardware):
+    watch = Watch()
+    bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
+    bench.light(LIT)
+    bench.check_lights()
+    watch.now_s = 1.0
+    bench.progress.beat()
+    assert hardware.log == [LIT, "check", ("frame", 10.0)]
+
+
+def test_after_a_light_that_could_not_be_confirmed_it_is_set_again(hardware, monkeypatch):
+    watch = Watch()
+    bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
+    bench.light(DARK)
+    watch.now_s = 1.0
+    with monkeypatch.context() as broken:
+        broken.setattr(hardware, "set_ratio", lambda ratio: (_ for _ in ()).throw(LightError("No answer.", "Mend it.")))
+        with pytest.raises(LightError):
+            bench.progress.beat()
+    bench.light(DARK)
+    assert hardware.log[-1] == DARK
+    assert hardware.log.count(DARK) == 2

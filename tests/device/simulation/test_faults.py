@@ -113,3 +113,13 @@ def test_a_fault_that_makes_no_sense_is_refused_by_its_key(settings, quantity, w
     with pytest.raises(InvalidQuantity, match=words) as refusal:
         Fault(**settings)
     assert refusal.value.quantity == quantity
+
+
+def test_a_call_is_held_up_until_the_fault_is_over(clock, monkeypatch):
+    faults = FaultTimeline([Fault("i2c_frozen", until_s=0.05)], clock=clock)
+    monkeypatch.setattr(
+        "device.simulation.faults.time.sleep", lambda seconds: setattr(clock, "now_s", clock.now_s + seconds)
+    )
+    faults.hold_up("i2c_frozen")
+    assert clock.now_s >= 100.05
+    NO_FAULTS.hold_up("i2c_frozen")

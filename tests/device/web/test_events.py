@@ -5,7 +5,8 @@ import types
 import pytest
 
 from device.config import PressSection
-from device.errors import ClockJumpError, LightBusError, UnpluggedCellError
+from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
+from device.instrument.guidance import Guidance
 from device.instrument.status import PressJob, Status
 from device.web.events import snapshot
 
@@ -80,3 +81,10 @@ def test_before_a_press_the_mode_is_that_of_the_settings(told):
 def test_a_press_that_failed_has_its_code(told):
     status = told(Status(press=PressJob("p-1", "paper", "failed", code="E203", reason="No light.")), Force())
     assert (status["press"]["code"], status["press"]["warnings"]) == ("E203", ())
+
+
+def test_a_part_that_makes_no_progress_is_a_fault_whatever_the_frozen_procedure_says(told):
+    stall = StalledError("The LED chip made no progress for 7.6 s.", "Wait.")
+    status = told(Status(step="reference", guidance=Guidance.HOLD_STILL, stall=stall), Force())
+    assert (status["step"], status["guidance"]["code"]) == ("fault", "fault")
+    assert [fault["code"] for fault in status["faults"]] == ["E901"]
