@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse recordings, look at the settings, or darken the LEDs.
+"""`python -m device`: start the daemon, analyse recordings, look at settings and faults, or darken the LEDs.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -21,6 +21,7 @@ from device.answers import Answers, answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.faults.listing import add_faults_command, run_faults_command
 from device.instrument.procedure import Procedure
 from device.led_off import led_off
 from device.measurement.calibration import read_calibration
@@ -55,11 +56,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    commands = parser.add_subparsers(dest="command", metavar="analyse | config | led-off")
+    commands = parser.add_subparsers(dest="command", metavar="analyse | config | faults | led-off")
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
     add_config_command(commands)
+    add_faults_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -78,6 +80,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _analyse(options)
         if options.command == "config":
             return run_config_command(options)
+        if options.command == "faults":
+            return run_faults_command(options)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0

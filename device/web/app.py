@@ -21,6 +21,7 @@ from device.records.store import Store
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
+from device.web.schema import PROBLEM, Press, Status, answers
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -38,7 +39,12 @@ class PressRequest(BaseModel):
 def create_app(procedure: Procedure, store: Store) -> FastAPI:
     """Return the web application of a running procedure."""
     app = FastAPI(
-        title="TSIS probe", version=__version__, openapi_url=f"{API}/openapi.json", docs_url=None, redoc_url=None
+        title="TSIS probe",
+        version=__version__,
+        openapi_url=f"{API}/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        responses=PROBLEM,
     )
     install_problems(app)
     _add_state(app, procedure, store)
@@ -78,7 +84,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
         procedure.require_ready()
         return {"status": "ready"}
 
-    @app.get(f"{API}/status")
+    @app.get(f"{API}/status", responses=answers(200, Status))
     def status() -> dict[str, Any]:
         """Return what the event stream sends."""
         return snapshot(procedure)
@@ -90,18 +96,18 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
 
 
 def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
-    @app.post(f"{API}/presses", status_code=202)
+    @app.post(f"{API}/presses", status_code=202, responses=answers(202, Press))
     def start_press(request: PressRequest | None = None) -> JSONResponse:
         """Start a measurement; on the simulated probe the virtual hand takes up the probe."""
         job = procedure.request(request.mode if request else None)
         return JSONResponse(job.as_record(), status_code=202, headers={"Location": f"{API}/presses/{job.id}"})
 
-    @app.get(f"{API}/presses/{{press_id}}")
+    @app.get(f"{API}/presses/{{press_id}}", responses=answers(200, Press))
     def press(press_id: str) -> dict[str, Any]:
         """Return the state of a press."""
         return store.press(press_id)
 
-    @app.delete(f"{API}/presses/{{press_id}}", status_code=202)
+    @app.delete(f"{API}/presses/{{press_id}}", status_code=202, responses=answers(202, Press))
     def cancel_press(press_id: str) -> dict[str, Any]:
         """Cancel the press under way."""
         procedure.cancel(press_id)

@@ -153,6 +153,7 @@ def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: P
     page.locator("#press-button").click()
     warning = page.locator('.fault[data-severity="warning"]')
     expect(warning.locator(".fault-code")).to_have_text("E701", timeout=60_000)
+    expect(warning.locator(".fault-title")).to_have_text("Clock was set")
     expect(warning.locator(".fault-code")).to_have_css("background-color", "rgb(255, 190, 61)")
     expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
     expect(page.locator("#size-value")).to_have_text(re.compile(r"\d+\.\d mm"))
@@ -173,3 +174,15 @@ def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_pa
     expect(page.locator("#connection-lost")).to_be_hidden(timeout=30_000)
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
     again.stop()
+
+
+def test_a_fault_takes_the_view_with_its_code_and_title(page: Page, tmp_path: Path):
+    daemon = Daemon(tmp_path, '[[faults]]\nkind = "i2c_stuck"\nfrom_press = 1\n')
+    page.goto(daemon.url)
+    page.locator("#press-button").click()
+    fault = page.locator('.fault[data-severity="fault"]')
+    expect(fault.locator(".fault-code")).to_have_text("E202", timeout=60_000)
+    expect(fault.locator(".fault-title")).to_have_text("I2C bus stuck")
+    _shoot(page, "fault")
+    _require_fits(page)
+    daemon.stop()

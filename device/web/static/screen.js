@@ -100,12 +100,14 @@ function showProgress() {
   [...cells.children].forEach((cell, index) => cell.classList.toggle("taken", index < taken));
 }
 
-function faultItem({ code, severity, cause, remedy }) {
+function faultItem({ code, title, severity, cause, remedy }) {
   const item = element("div", "fault");
   item.dataset.severity = severity;
   const words = element("p", "fault-words");
   words.append(element("strong", "fault-cause", cause), " ", element("span", "fault-remedy", remedy));
-  item.append(element("span", "fault-code", code), words);
+  const name = element("p", "fault-name");
+  name.append(element("span", "fault-code", code), element("span", "fault-title", title));
+  item.append(name, words);
   return item;
 }
 
