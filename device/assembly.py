@@ -8,7 +8,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
@@ -30,8 +33,9 @@ from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
+from device.simulation.emulated_bundles import EmulatedBundles
+from device.simulation.emulated_disk import EmulatedDisk
 from device.simulation.faults import FaultTimeline
-from device.simulation.full_disk import EmulatedDisk
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
 from device.simulation.scenario import Scenario
@@ -99,8 +103,9 @@ def open_probe(config: Config) -> Procedure:
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
-    config = commissioned(config)
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
+    bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
+    config = replace(commissioned(config), model=bundles.folder(config.model))
     parts.open(lambda: _require_own_serial(config, scenario))
     table_folder = config.calibration.parent
     shape = config.camera.height_px, config.camera.width_px

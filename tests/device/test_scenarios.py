@@ -17,8 +17,7 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
-from device import errors
-from device.assembly import open_simulated_probe
+from device.assembly import StartFailed, open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError
 from device.instrument import bench, force_recorder, procedure
@@ -33,6 +32,8 @@ FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_sc
 TIME_RATIO = 0.4
 QUICK_HAND = HandSettings(rate_n_per_s=1.5, ramp_rate_n_per_s=0.4, reaction_s=0.05)
 QUICK_PRESS = PressSection(max_rate_n_per_s=0.6)
+SHORTER_LIMITS = {"E209": {"light": LightSection(max_on_s=3.0)}}
+"""For faults that take minutes: nobody waits 300 s for a light that is on for too long."""
 LONGEST_WAIT_S = 20.0
 
 
@@ -83,7 +84,8 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
             replace(fault, from_s=TIME_RATIO * fault.from_s, until_s=TIME_RATIO * fault.until_s)
             for fault in scenario.faults
         )
-        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=QUICK_HAND, faults=faults))
+        hand = replace(QUICK_HAND, tremor_n=scenario.hand.tremor_n)
+        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=hand, faults=faults))
         opened.start()
         try:
             yield Device(opened)
@@ -95,14 +97,18 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(path, running):
-    scenario = read_scenario(path)
-    with running(scenario) as device:
-        for _ in range(max(fault.from_press for fault in scenario.faults)):
-            device.press()
-        device.until(lambda: scenario.expects in device.codes())
-        if all(fault.until_s < float("inf") for fault in scenario.faults):
-            device.until(lambda: device.board.now.step == "ready")
-            device.procedure.require_ready()
+    scenario, refused = read_scenario(path), set()
+    try:
+        with running(scenario, **SHORTER_LIMITS.get(scenario.expects, {})) as device:
+            for _ in range(max((fault.from_press for fault in scenario.faults), default=1)):
+                device.press()
+            device.until(lambda: scenario.expects in device.codes())
+            if all(fault.until_s < float("inf") for fault in scenario.faults):
+                device.until(lambda: device.board.now.step == "ready")
+                device.procedure.require_ready()
+    except StartFailed as refusal:
+        refused = {fault.code for fault in refusal.faults}
+    assert refused <= {scenario.expects}
 
 
 def test_a_probe_without_a_fault_raises_none(running):
@@ -113,7 +119,9 @@ def test_a_probe_without_a_fault_raises_none(running):
 
 
 def test_every_kind_of_fault_has_a_scenario():
-    assert {fault.kind for path in FILES for fault in read_scenario(path).faults} == set(PARAMETERS)
+    assert {fault.kind for path in (ROOT / "scenarios").glob("*.toml") for fault in read_scenario(path).faults} == set(
+        PARAMETERS
+    )
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -121,18 +129,12 @@ def test_a_scenario_begins_with_a_sentence_and_expects_a_code_that_exists(path):
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# ")
     assert text.splitlines()[0].endswith(".")
-    known = {kind.code for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, DeviceError)}
-    assert tomllib.loads(text)["expects"] in known
-
-
-def test_no_two_faults_share_a_code():
-    kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, DeviceError)]
-    assert len({kind.code for kind in kinds}) == len(kinds)
+    assert tomllib.loads(text)["expects"] in DeviceError.by_code
 
 
 def test_the_document_lists_every_scenario_with_its_code():
     page = (ROOT / "docs" / "simulated_probe.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^\| \[`(\w+)`\]\(\.\./scenarios/\w+\.toml\) \|.*?\| (E\d+)", page, re.MULTILINE)
+    listed = re.findall(r"^\| \[`(\w+)`\]\(\.\./scenarios/\w+\.toml\).*? \|.*?\| (E\d+)", page, re.MULTILINE)
     assert dict(listed) == {path.stem: read_scenario(path).expects for path in FILES}
 
 
