@@ -127,7 +127,7 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
     cell = parts.open(lambda: open_cell(config, line.device_path))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
-    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)
+    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario, bundles.folder)
     procedure.on_request(lambda mode: faults.begin_press())
     _lead_by_hand(procedure, probe)
     return procedure
@@ -182,6 +182,7 @@ def _procedure(
     clock: ClockWatch,
     disk: Disk | None = None,
     scenario: Scenario | None = None,
+    folder_of: Callable[[Path], Path] = Path,
 ) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
     force = parts.open(lambda: tared(config, cell)) if cell else None
@@ -213,6 +214,7 @@ def _procedure(
         opened=parts.opened,
         clock=clock,
         simulated_truth=scenario.inclusion if scenario else None,
+        folder_of=folder_of,
     )
 
 

@@ -268,7 +268,7 @@ class ClockJumpError(DeviceError):
 
 
 class BusyError(DeviceError):
-    """A press is already under way."""
+    """A press or a self-test is already under way."""
 
     code = "E801"
     title = "Busy"
@@ -276,7 +276,7 @@ class BusyError(DeviceError):
 
 
 class UnknownResource(DeviceError):  # noqa: N818 - the name is what the caller reads
-    """No press or measurement of that id."""
+    """No press or measurement of that id, or no self-test yet."""
 
     code = "E802"
     title = "Not found"

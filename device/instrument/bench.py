@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from device.hardware.interfaces import Camera, Lights
+from device.hardware.interfaces import Camera, CameraFrame, Lights
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
 from device.instrument.light_budget import LightBudget
@@ -55,12 +55,17 @@ class Bench:
 
         Raises `CameraError` when none comes or most are left out, `LoadCellError` when its force is not known.
         """
+        taken = self.expose()
+        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
+        return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+
+    def expose(self) -> CameraFrame:
+        """Return the next frame under the present light, whatever the force; raises `CameraError` as `take` does."""
         asked_s = max(time.monotonic(), self._not_before_s)
         taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
         self.pace.saw(asked_s, taken.exposure_start_s)
         self._not_before_s = taken.exposure_start_s + 1e-6
-        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
-        return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        return taken
 
     def is_steady(self, t_s: float, steady_n: float) -> bool:
         """Return whether the force hardly varied just before a time: a ramp through the band is no hold."""

@@ -71,7 +71,7 @@ class ModelBundle:
 
     name; sha256 of model.onnx and card_sha256 of model.json; feature_names: order of the features; feature_range:
     training range of each, in its own unit; box: training range (low, high) of each unknown in mm, mm, kPa;
-    card: all of model.json.
+    card: all of model.json; golden_error_ratio: how far this machine is from the golden vectors.
     """
 
     def __init__(self, folder: Path, card: bytes, network: bytes) -> None:
@@ -85,7 +85,7 @@ class ModelBundle:
         self.box = fields.ranges("unknowns", UNKNOWNS)
         self._session = _open_session(fields, network)
         _verify_contract(fields, self._session, len(self.feature_names))
-        self._verify_golden(fields)
+        self.golden_error_ratio = self._verify_golden(fields)
 
     @classmethod
     def load(cls, folder: Path) -> ModelBundle:
@@ -123,7 +123,9 @@ class ModelBundle:
         estimate, spread = self._session.run(["estimate", "spread"], {"features": rows})
         return Raw(np.asarray(estimate, dtype=np.float64), np.asarray(spread, dtype=np.float64))
 
-    def _verify_golden(self, fields: _Fields) -> None:
+    def _verify_golden(self, fields: _Fields) -> float:
+        """Return the largest relative deviation from the golden vectors, or refuse the bundle for it."""
+        largest = 0.0
         rows = fields.table("golden.features", len(self.feature_names)).astype(np.float32)
         found = self._run(rows)
         for name, values in (("estimate", found.estimate), ("spread", found.spread)):
@@ -134,6 +136,8 @@ class ModelBundle:
             if not worst <= GOLDEN_TOLERANCE:
                 deviation = f"off by {worst:.2g} relative on this machine"
                 fields.refuse(f"golden.{name}", deviation, f"reproduced within {GOLDEN_TOLERANCE:g}")
+            largest = max(largest, worst)
+        return largest
 
 
 class _Fields:

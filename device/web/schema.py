@@ -10,6 +10,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 from device.faults.table import FaultCode
+from device.instrument.self_test.job import SelfTestState
+from device.instrument.self_test.result import Verdict
 from device.instrument.status import JobState, Step
 from device.measurement.mode import Mode
 
@@ -53,6 +55,42 @@ class Press(_Body):
     light_on_s: float
 
 
+class Check(_Body):
+    """One check of the self-test: the measured value in its unit, its bound in words, and what to do."""
+
+    part: str
+    check: str
+    verdict: Verdict
+    value: float | None
+    unit: str
+    bound: str
+    cause: str
+    remedy: str
+    code: FaultCode | None
+
+
+class SelfTest(_Body):
+    """A self-test; `failed` as a state means that it was not brought to its end."""
+
+    simulated: bool
+    id: str
+    started_at: str
+    on_block: bool
+    weight_n: float | None
+    state: SelfTestState
+    verdict: Verdict
+    results: list[Check]
+
+
+class SelfTestSummary(_Body):
+    """How far the self-test is: the number of checks that are done."""
+
+    id: str
+    state: SelfTestState
+    verdict: Verdict
+    checks: int
+
+
 class GuidanceLine(_Body):
     """What the operator should do now."""
 
@@ -79,6 +117,7 @@ class Status(_Body):
     frames_needed: int
     press: Press | None
     measurement_id: str | None
+    self_test: SelfTestSummary | None
     faults: list[Fault]
 
 

@@ -145,3 +145,10 @@ def test_light_counts_from_when_it_is_asked_for_until_darkness_is_acknowledged(h
     bench.check_lights()
     now_s[0] = 9.0
     assert bench.budget.press_s == 6.0
+
+
+def test_an_exposure_needs_no_force(bench, hardware):
+    """The camera can be tested while the load cell is silent."""
+    bench.force.at = None
+    bench.light(DARK)
+    assert [bench.expose().exposure_start_s for _ in range(2)] == pytest.approx([10.0, 10.1])
