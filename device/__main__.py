@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse recordings, look at the settings, or darken the LEDs.
+"""`python -m device`: start the daemon, analyse recordings, look at settings and faults, test itself, darken.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -22,6 +22,7 @@ from device.answers import Answers, answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.faults.listing import add_faults_command, run_faults_command
 from device.instrument.procedure import Procedure
 from device.instrument.restart_note import RestartNote
 from device.instrument.watchdog import Watchdog
@@ -31,6 +32,7 @@ from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
+from device.self_test_command import add_self_test_command, run_self_test_command
 from device.settings.command import add_config_command, run_config_command
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, read_config, read_layers
@@ -42,6 +44,7 @@ EXAMPLES = """examples:
   python -m device --simulate --scene scene.toml   the same on another inclusion
   python -m device analyse recording/ press.zip    JSON estimates, one a line
   python -m device config check                    every problem of the settings files
+  python -m device self-test --simulate            every part with measured value and verdict
   python -m device led-off                         darken the LEDs of a daemon that was killed
 """
 
@@ -58,11 +61,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    commands = parser.add_subparsers(dest="command", metavar="analyse | config | led-off")
+    commands = parser.add_subparsers(dest="command", metavar="analyse | config | faults | self-test | led-off")
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
     add_config_command(commands)
+    add_faults_command(commands)
+    add_self_test_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -81,6 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _analyse(options)
         if options.command == "config":
             return run_config_command(options)
+        if options.command == "faults":
+            return run_faults_command(options)
+        if options.command == "self-test":
+            return _self_test(options)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0
@@ -120,15 +129,29 @@ def _analyse(options: argparse.Namespace) -> int:
     return 0
 
 
+def _scenario(options: argparse.Namespace) -> Scenario | None:
+    if not options.simulate:
+        return None
+    return read_scenario(options.scene) if options.scene else Scenario()
+
+
+def _opened(config: Config, scenario: Scenario | None) -> Procedure:
+    return open_simulated_probe(config, scenario) if scenario else open_probe(config)
+
+
+def _self_test(options: argparse.Namespace) -> int:
+    scenario = _scenario(options)
+    config = _start_settings(options, scenario).config
+    return run_self_test_command(options, lambda: _opened(config, scenario))
+
+
 def _serve(options: argparse.Namespace) -> int:
-    scenario = None
-    if options.simulate:
-        scenario = read_scenario(options.scene) if options.scene else Scenario()
+    scenario = _scenario(options)
     settings = _start_settings(options, scenario)
     config = settings.config
     listening = _listen(config)
     with listening:
-        procedure = open_simulated_probe(config, scenario) if scenario else open_probe(config)
+        procedure = _opened(config, scenario)
         note = RestartNote(config.data)
         warnings = tuple(warning for warning in (settings.warning, note.warning()) if warning)
         procedure.board.update(warnings=warnings)

@@ -8,7 +8,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
@@ -31,9 +34,10 @@ from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
+from device.simulation.emulated_bundles import EmulatedBundles
+from device.simulation.emulated_disk import EmulatedDisk
 from device.simulation.faults import NO_FAULTS, FaultTimeline
 from device.simulation.frozen_cell import FreezingCell
-from device.simulation.full_disk import EmulatedDisk
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
 from device.simulation.scenario import Scenario
@@ -101,8 +105,9 @@ def open_probe(config: Config) -> Procedure:
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
-    config = commissioned(config)
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
+    bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
+    config = replace(commissioned(config), model=bundles.folder(config.model))
     parts.open(lambda: _require_own_serial(config, scenario))
     table_folder = config.calibration.parent
     shape = config.camera.height_px, config.camera.width_px
@@ -124,7 +129,9 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
     cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
-    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario, faults)
+    procedure = _procedure(
+        config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario, faults, bundles.folder
+    )
     procedure.on_request(lambda mode: faults.begin_press())
     _lead_by_hand(procedure, probe)
     return procedure
@@ -180,6 +187,7 @@ def _procedure(
     disk: Disk | None = None,
     scenario: Scenario | None = None,
     faults: FaultTimeline = NO_FAULTS,
+    folder_of: Callable[[Path], Path] = Path,
 ) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
     progress = ProgressBoard()
@@ -216,6 +224,7 @@ def _procedure(
         clock=clock,
         progress=progress,
         simulated_truth=scenario.inclusion if scenario else None,
+        folder_of=folder_of,
     )
 
 

@@ -63,11 +63,16 @@ class Bench:
 
         Raises `CameraError` when none comes or most are left out, `LoadCellError` when its force is not known.
         """
+        taken = self.expose()
+        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
+        return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+
+    def expose(self) -> CameraFrame:
+        """Return the next frame under the present light, whatever the force; raises `CameraError` as `take` does."""
         asked_s = max(time.monotonic(), self._not_before_s)
         taken = self._capture()
         self.pace.saw(asked_s, taken.exposure_start_s)
-        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
-        return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        return taken
 
     def _capture(self) -> CameraFrame:
         with self.progress.inside("camera"):

@@ -41,6 +41,10 @@ class PressEnded(Exception):  # noqa: N818 - not every end is an error
         super().__init__(reason)
 
 
+class CalledAway(Exception):  # noqa: N818 - not an error: something else is to be done first
+    """The wait for an untouched probe was given up."""
+
+
 class Capture:
     """The part of the procedure that moves the light and takes frames."""
 
@@ -48,19 +52,22 @@ class Capture:
         self._progress = progress or ProgressBoard()
         self.bench, self.press, self.light, self.board = bench, config.press, config.light, board
         self.lit = (self.light.ratio[0], self.light.ratio[1], self.light.ratio[2], self.light.ratio[3])
-        self.cancelled, self.stopping = threading.Event(), threading.Event()
+        self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
         self._tears = TearWatch(config.camera.tear_counts)
         self._dark_counts = 0.0
 
     def unloaded(self) -> list[Frame]:
         """Return dark and lit frames of the untouched probe; waits until it is untouched.
 
-        Raises `StuckLightError` or `AmbientLightError` when the dark ones are not dark, `OpenLedError` or
-        `HotLedDriverError` when the LED chip says that current does not flow.
+        Raises `CalledAway` when something else is to be done meanwhile, `StuckLightError` or `AmbientLightError` when
+        the dark ones are not dark, `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not
+        flow.
         """
         self.bench.light(DARK)
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
             self._progress.beat()
+            if self.called_away.is_set():
+                raise CalledAway
             time.sleep(POLL_S)
         self.bench.check_lights()
         dark = self._agreeing("dark", DARK)

@@ -90,6 +90,18 @@ class ForceRecorder:
             raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
         return Newtons(float(np.interp(t_s, times, forces)))
 
+    def mean_n(self, *, window_s: float) -> Newtons:
+        """Return the mean force of the last seconds, as far as they are known; raises as `latest_n` does."""
+        newest_n, now_s = self.latest_n, time.monotonic()
+        with self._news:
+            inside = [force for t, force in self._samples if now_s - window_s <= t]
+        return Newtons(sum(inside) / len(inside)) if inside else newest_n
+
+    @property
+    def zero_shift_n(self) -> Newtons:
+        """Return how far the tare of this start is from that of commissioning."""
+        return self._limit.commissioned.newtons(self._scale.tare_counts)
+
     def range_n(self, t_s: float, *, window_s: float) -> Newtons:
         """Return by how much the force varied in a window that ends at a time."""
         with self._news:

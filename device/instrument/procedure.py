@@ -12,23 +12,27 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from device.config import Config
-from device.errors import DeviceError, LightError, NoContrastError
+from device.errors import BusyError, DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
 from device.instrument.brightness_loop import BrightnessLoop
-from device.instrument.capture import POLL_S, Capture, PressEnded
+from device.instrument.capture import POLL_S, CalledAway, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
 from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
 from device.instrument.progress import ProgressBoard
+from device.instrument.self_test.job import SelfTestJob
+from device.instrument.self_test.requests import SelfTestRequests
+from device.instrument.self_test.run import SelfTest
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
-from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import Recording
 from device.measurement.tactile_image import Frame
 from device.records.store import ENDED, Store
@@ -60,8 +64,12 @@ class Procedure:
         clock: ClockWatch | None = None,
         progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
+        folder_of: Callable[[Path], Path] = Path,
     ) -> None:
-        """Take `modes`, those in which the estimator answers; the settings' own mode is one of them."""
+        """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
+
+        `folder_of` says where an installed model lies.
+        """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes = modes
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
@@ -73,6 +81,8 @@ class Procedure:
         self._requests = PressRequests(
             self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
         )
+        test = SelfTest(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
+        self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
 
     @property
@@ -108,6 +118,25 @@ class Procedure:
         """Cancel the press under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
 
+    def request_self_test(self, *, on_block: bool = False, weight_n: float | None = None) -> SelfTestJob:
+        """Ask for a self-test, with the probe held on the reference block and with a known weight (N) if given.
+
+        Raises `BusyError` while a press or a self-test is under way, `InvalidQuantity` for a weight that is too light
+        to be told from none, or more than the load cell bears.
+        """
+        if weight_n is not None:
+            bound = Bound(2 * self.config.press.contact_n, self.config.cell.max_load_n, "N")
+            require("weight_n", weight_n, bound, "take another weight")
+        press = self.board.now.press
+        if self._requests.is_waiting or (press and press.state not in ENDED):
+            raise BusyError("A press is under way.", "Wait until it has ended, or cancel it.")
+        return self._self_tests.ask(on_block=on_block, weight_n=weight_n)
+
+    @property
+    def self_test(self) -> SelfTestJob:
+        """The self-test under way or the last one; raises `UnknownResource` when there was none."""
+        return self._self_tests.last
+
     def _run(self) -> None:
         self._run_presses()
         try:
@@ -118,7 +147,10 @@ class Procedure:
     def _run_presses(self) -> None:
         while not self._capture.stopping.is_set():
             try:
+                self._self_tests.run_if_asked()
                 self._one_press()
+            except CalledAway:
+                continue
             except DeviceError as error:
                 self._at_fault(error)
             except Exception as error:
@@ -141,7 +173,9 @@ class Procedure:
             self._measure(job, unloaded)
 
     def _next_job(self, until_s: float) -> PressJob | None:
-        while time.monotonic() < until_s and not self._capture.stopping.is_set():
+        while time.monotonic() < until_s and not (
+            self._capture.stopping.is_set() or self._capture.called_away.is_set()
+        ):
             is_touched = self.bench.force.latest_n >= self.config.press.contact_n
             if job := self._requests.begin(is_touched=is_touched):
                 return job

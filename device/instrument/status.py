@@ -9,9 +9,10 @@ from typing import Any, Literal
 
 from device.errors import DeviceError
 from device.instrument.guidance import Guidance
+from device.instrument.self_test.job import SelfTestJob
 from device.measurement.mode import Mode
 
-Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "fault"]
+Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "self_test", "fault"]
 JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "cancelled", "failed"]
 
 
@@ -52,6 +53,7 @@ class Status:
     wanted_n: tuple[float, ...] = ()
     press: PressJob | None = None
     measurement_id: str | None = None
+    self_test: SelfTestJob | None = None
     fault: DeviceError | None = None
     warnings: tuple[DeviceError, ...] = ()
     stall: DeviceError | None = None

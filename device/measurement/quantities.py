@@ -36,6 +36,8 @@ class Bound:
         if math.isinf(self.high):
             return f"{low} {self.low:g} {self.unit}".strip()
         high = "at most" if self.high_included else "below"
+        if math.isinf(self.low):
+            return f"{high} {self.high:g} {self.unit}".strip()
         return f"{low} {self.low:g} and {high} {self.high:g} {self.unit}".strip()
 
     def holds(self, value: float) -> bool:

@@ -28,6 +28,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "led_dimmed": ("side", "ratio"),
     "led_open": ("side",),
     "led_driver_hot": (),
+    "led_swapped": ("side", "other_side"),
     "ambient_light": ("ratio",),
     "wet_face": ("ratio",),
     "cell_silent": (),
@@ -40,10 +41,18 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "inference_frozen": (),
     "clock_jump": ("step_s",),
     "disk_full": (),
+    "disk_read_only": (),
+    "bundle_tampered": (),
 }
 """Every kind of fault, and what it takes besides its times."""
 
-REQUIRED = {"led_dead": ("side",), "led_stuck_on": ("side",), "led_open": ("side",), "clock_jump": ("step_s",)}
+REQUIRED = {
+    "led_dead": ("side",),
+    "led_stuck_on": ("side",),
+    "led_open": ("side",),
+    "led_swapped": ("side", "other_side"),
+    "clock_jump": ("step_s",),
+}
 DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0}
 I2C_ERRNO = {"i2c_nack": 121, "i2c_stuck": errno.ETIMEDOUT}
 """What Linux answers: EREMOTEIO (121; macOS does not name it) for no acknowledgement, ETIMEDOUT for a line held low."""
@@ -56,8 +65,9 @@ class Fault:
     """One fault: its kind, from when until when, and what it takes.
 
     `from_s` and `until_s` count from the start of the simulation, or with `from_press` = n from the n-th press that
-    was requested. `side`: of one LED, all four without. `ratio`: light that is left (led_dimmed), added light in units
-    of full light (ambient_light), part of the face that is wet (wet_face). `step_s`: by how much the wall clock is off.
+    was requested. `side`: of one LED, all four without; `other_side`: whose plug it has (led_swapped). `ratio`: light
+    that is left (led_dimmed), added light in units of full light (ambient_light), part of the face that is wet
+    (wet_face). `step_s`: by how much the wall clock is off.
     """
 
     kind: str
@@ -65,6 +75,7 @@ class Fault:
     until_s: float = math.inf
     from_press: int = 0
     side: str | None = None
+    other_side: str | None = None
     ratio: float | None = None
     step_s: float | None = None
 
@@ -75,10 +86,11 @@ class Fault:
         if not self.until_s > self.from_s:
             raise InvalidQuantity("faults.until_s", self.until_s, f"above from_s, {self.from_s:g} s", ACTION)
         require("faults.from_press", self.from_press, Bound(0, 1000, "(0: the start)"), ACTION)
-        for name in ("side", "ratio", "step_s"):
+        for name in ("side", "other_side", "ratio", "step_s"):
             self._require_parameter(name)
-        if self.side is not None and self.side not in SIDES:
-            raise InvalidQuantity("faults.side", repr(self.side), f"one of {', '.join(SIDES)}", ACTION)
+        for name in ("side", "other_side"):
+            if getattr(self, name) not in (None, *SIDES):
+                raise InvalidQuantity(f"faults.{name}", repr(getattr(self, name)), f"one of {', '.join(SIDES)}", ACTION)
         if self.ratio is not None:
             require("faults.ratio", self.ratio, Bound(0.0, 1.0, ""), ACTION)
         if self.step_s is not None:
@@ -130,6 +142,9 @@ class FaultTimeline:
     def led_output(self, ratio: LedRatio, t_s: float) -> LedRatio:
         """Return the light of the four sides when the chip's outputs ask for `ratio`: 0..1 of full light."""
         light = list(ratio)
+        for fault in self._active("led_swapped", t_s):
+            one, other = SIDES.index(str(fault.side)), SIDES.index(str(fault.other_side))
+            light[one], light[other] = light[other], light[one]
         for kind, act in LIGHT_FAULTS.items():
             for fault in self._active(kind, t_s):
                 for number in range(len(SIDES)):

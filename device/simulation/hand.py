@@ -19,6 +19,8 @@ BESIDE_MM = (40.0, 0.0)
 """Where the hand presses for the reference: far enough that the lump is not felt."""
 TOUCH_N, RAMP_AIM_N = 0.06, RAMP_TO_N + 0.06
 """What a hand takes a touch to be, and how far it means to go when it is to press slowly harder."""
+TAKEN_UP_FOR = ("hold_block", "put_weight")
+"""In a self-test the probe is taken up when it says so; tissue beside the lesion is the block, `aim_n` the weight."""
 REMEMBERED_MOVES = 8
 """The last motions: light, image and load cell ask about a time that is a little past."""
 ACTION = "describe a human hand"
@@ -93,11 +95,12 @@ class VirtualHand:
 
     def follow(self, guidance: str, now_s: float) -> None:
         """Read one line of guidance (its code) and act on it after the reaction time."""
+        self._following |= guidance in TAKEN_UP_FOR
         if not self._following:
             return
         act_s = now_s + self.settings.reaction_s
         match guidance:
-            case "press_beside":
+            case "press_beside" | "hold_block" | "put_weight":
                 self._hold(act_s, self.settings.aim_n, BESIDE_MM)
             case "press_lesion":
                 self._hold(act_s, self.settings.aim_n, self.settings.on_lesion_mm)
@@ -107,7 +110,7 @@ class VirtualHand:
                 self._ramp(act_s, TOUCH_N, self.settings.on_lesion_mm)
             case "press_slowly" | "press_lighter" | "slower" | "hold_still" if self._is_ramp:
                 self._go_on(act_s, guidance)
-            case "lift":
+            case "lift" | "take_weight_off":
                 self._hold(act_s, 0.0, None)
             case "done" | "rejected" | "fault":
                 self._hold(act_s, 0.0, None)

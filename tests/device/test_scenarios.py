@@ -1,4 +1,4 @@
-"""Every fault that a scenario injects is raised by its code, and where the fault ends, the device is ready again.
+"""Every fault that a scenario injects is raised by its code, or found by the self-test; after it the device is ready.
 
 The daemon's whole procedure on emulated chips, in two fifths of the time: hand, camera and time limits are as much
 faster as the faults are shorter.
@@ -17,14 +17,14 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
-from device import errors
-from device.assembly import open_simulated_probe
+from device.assembly import StartFailed, open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError
 from device.instrument import bench, force_recorder, procedure, watchdog
 from device.instrument.light_check import level_counts
 from device.instrument.procedure import Procedure
 from device.instrument.restart_note import RestartNote
+from device.instrument.self_test import run as self_test_run
 from device.instrument.watchdog import Watchdog
 from device.measurement.mode import Mode
 from device.measurement.recording import Recording, read_recording
@@ -35,9 +35,12 @@ from device.simulation.hand import HandSettings
 from device.simulation.scenario import Scenario, read_scenario
 
 FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).expects]
+SELF_TEST_FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).self_test_fails]
 TIME_RATIO = 0.4
 QUICK_HAND = HandSettings(rate_n_per_s=1.5, ramp_rate_n_per_s=0.4, reaction_s=0.05)
 QUICK_PRESS = PressSection(max_rate_n_per_s=0.6)
+SHORTER_LIMITS = {"E209": {"light": LightSection(max_on_s=3.0)}}
+"""For faults that take minutes: nobody waits 300 s for a light that is on for too long."""
 LONGEST_WAIT_S = 20.0
 
 
@@ -68,6 +71,13 @@ class Device:
         press = self.board.now.press
         return press is not None and press.id == press_id and press.state in ENDED
 
+    def failed_checks(self, weight_n: float | None = None) -> dict[str, str]:
+        """Run the self-test on the block; return the checks that failed, each with its part."""
+        self.procedure.request_self_test(on_block=True, weight_n=weight_n)
+        self.until(lambda: not self.procedure.self_test.is_under_way)
+        assert self.procedure.self_test.state == "done"
+        return {one.check: one.part for one in self.procedure.self_test.results if one.verdict == "failed"}
+
     def press(self, mode: Mode | None = None) -> None:
         self.until(self.is_ready)
         job = self.procedure.request(mode)
@@ -80,6 +90,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
     monkeypatch.setattr(force_recorder, "SILENCE_S", TIME_RATIO * force_recorder.SILENCE_S)
     monkeypatch.setattr(procedure, "AFTER_FAULT_S", 0.1)
     monkeypatch.setattr(watchdog, "WITHOUT_SYSTEMD_S", TIME_RATIO * watchdog.WITHOUT_SYSTEMD_S)
+    monkeypatch.setattr(self_test_run, "FREE_TIMEOUT_S", 2.0)
     camera = CameraSection(frame_rate_hz=60.0)
     config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
@@ -89,7 +100,8 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
             replace(fault, from_s=TIME_RATIO * fault.from_s, until_s=TIME_RATIO * fault.until_s)
             for fault in scenario.faults
         )
-        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=QUICK_HAND, faults=faults))
+        hand = replace(QUICK_HAND, tremor_n=scenario.hand.tremor_n)
+        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=hand, faults=faults))
         opened.start()
         watching = Watchdog(opened.progress, opened.board, RestartNote(tmp_path))
         watching.start()
@@ -104,14 +116,49 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(path, running):
+    scenario, refused = read_scenario(path), set()
+    try:
+        with running(scenario, **SHORTER_LIMITS.get(scenario.expects, {})) as device:
+            for _ in range(max((fault.from_press for fault in scenario.faults), default=1)):
+                device.press()
+            device.until(lambda: scenario.expects in device.codes())
+            if all(fault.until_s < float("inf") for fault in scenario.faults):
+                device.until(lambda: device.board.now.step == "ready")
+                device.procedure.require_ready()
+    except StartFailed as refusal:
+        refused = {fault.code for fault in refusal.faults}
+    assert refused <= {scenario.expects}
+
+
+@pytest.mark.parametrize("path", SELF_TEST_FILES, ids=lambda path: path.stem)
+def test_the_self_test_names_the_part_that_a_scenario_breaks_and_no_other(path, running):
     scenario = read_scenario(path)
     with running(scenario) as device:
-        for _ in range(max(fault.from_press for fault in scenario.faults)):
+        if any(fault.from_press for fault in scenario.faults):
             device.press()
-        device.until(lambda: scenario.expects in device.codes())
-        if all(fault.until_s < float("inf") for fault in scenario.faults):
-            device.until(device.is_ready)
-            device.procedure.require_ready()
+        failed = device.failed_checks()
+    assert scenario.self_test_fails in failed
+    assert len(set(failed.values())) == 1
+
+
+def test_a_model_that_is_tampered_with_while_the_probe_runs_is_named_by_the_self_test(running):
+    """What is in use was read before; the next start would be refused."""
+    with running(Scenario(faults=(Fault("bundle_tampered", from_press=1),))) as device:
+        device.press()
+        assert device.board.now.press.state == "done"
+        assert device.failed_checks() == {f"model {name}": "Model" for name in ("paper", "quick", "standard")}
+
+
+def test_the_self_test_of_a_sound_probe_passes_and_presses_go_on(running):
+    """The virtual hand holds tissue for the block and its aim, 0.5 N, for the weight."""
+    with running(Scenario()) as device:
+        assert device.failed_checks(weight_n=0.5) == {}
+        verdicts = {result.check: result.verdict for result in device.procedure.self_test.results}
+        del verdicts["time server"]  # of this machine
+        assert set(verdicts.values()) == {"passed"}
+        device.press()
+        assert device.board.now.press.state == "done"
+        assert device.codes() == set()
 
 
 def test_a_probe_without_a_fault_raises_none(running):
@@ -122,7 +169,9 @@ def test_a_probe_without_a_fault_raises_none(running):
 
 
 def test_every_kind_of_fault_has_a_scenario():
-    assert {fault.kind for path in FILES for fault in read_scenario(path).faults} == set(PARAMETERS)
+    assert {fault.kind for path in (ROOT / "scenarios").glob("*.toml") for fault in read_scenario(path).faults} == set(
+        PARAMETERS
+    )
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -130,19 +179,20 @@ def test_a_scenario_begins_with_a_sentence_and_expects_a_code_that_exists(path):
     text = path.read_text(encoding="utf-8")
     assert text.startswith("# ")
     assert text.splitlines()[0].endswith(".")
-    known = {kind.code for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, DeviceError)}
-    assert tomllib.loads(text)["expects"] in known
-
-
-def test_no_two_faults_share_a_code():
-    kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, DeviceError)]
-    assert len({kind.code for kind in kinds}) == len(kinds)
+    assert tomllib.loads(text)["expects"] in DeviceError.by_code
 
 
 def test_the_document_lists_every_scenario_with_its_code():
     page = (ROOT / "docs" / "simulated_probe.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^\| \[`(\w+)`\]\(\.\./scenarios/\w+\.toml\) \|.*?\| (E\d+)", page, re.MULTILINE)
+    listed = re.findall(r"^\| \[`(\w+)`\]\(\.\./scenarios/\w+\.toml\).*? \|.*?\| (E\d+)", page, re.MULTILINE)
     assert dict(listed) == {path.stem: read_scenario(path).expects for path in FILES}
+
+
+def test_the_page_of_the_self_test_lists_every_scenario_that_must_fail_it():
+    page = (ROOT / "docs" / "self_test.md").read_text(encoding="utf-8")
+    for path in SELF_TEST_FILES:
+        [row] = [line for line in page.splitlines() if line.startswith(f"| [`{path.stem}`]")]
+        assert read_scenario(path).self_test_fails.partition(" after ")[0] in row.split("|")[3]
 
 
 def test_the_fault_in_the_document_is_one():

@@ -190,3 +190,10 @@ def test_after_a_light_that_could_not_be_confirmed_it_is_set_again(hardware, mon
     bench.light(DARK)
     assert hardware.log[-1] == DARK
     assert hardware.log.count(DARK) == 2
+
+
+def test_an_exposure_needs_no_force(bench, hardware):
+    """The camera can be tested while the load cell is silent."""
+    bench.force.at = None
+    bench.light(DARK)
+    assert [bench.expose().exposure_start_s for _ in range(2)] == pytest.approx([10.0, 10.1])

@@ -9,7 +9,7 @@ from device.config import Config, LightSection, PressSection
 from device.errors import AmbientLightError, DarkSideError, NoContrastError, TornFrameError
 from device.instrument import capture as capture_module
 from device.instrument.bench import DARK
-from device.instrument.capture import UNLOADED_FRAMES, Capture, PressEnded
+from device.instrument.capture import UNLOADED_FRAMES, CalledAway, Capture, PressEnded
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
 from device.instrument.status import StatusBoard
@@ -358,3 +358,12 @@ def test_a_torn_frame_and_its_neighbour_are_taken_again(capture_of):
 def test_a_camera_whose_every_frame_is_torn_is_at_fault(capture_of):
     with pytest.raises(TornFrameError):
         capture_of(0.9, torn=range(2, 100)).side_levels(REFERENCE)
+
+
+def test_the_wait_for_an_untouched_probe_can_be_given_up(capture_of):
+    """A load cell whose zero has moved looks touched for ever: the self-test must still begin."""
+    capture = capture_of(0.1, 0.1, 0.1)
+    capture.called_away.set()
+    with pytest.raises(CalledAway):
+        capture.unloaded()
+    assert capture.bench.taken == 0

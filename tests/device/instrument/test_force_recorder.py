@@ -173,3 +173,21 @@ def test_closing_releases_the_cell(cell, monkeypatch):
     recorder = ForceRecorder(cell, SCALE, LIMIT)
     recorder.close()
     assert cell.is_closed
+
+
+def test_the_mean_is_that_of_the_last_seconds_or_the_newest_sample(recorder, monkeypatch):
+    """Samples at 1, 2 and 4 s are 0, 2 and 1 N."""
+    for now_s, window_s, mean_n in ((4.0, 2.5, 1.5), (4.0, 10.0, 1.0), (9.0, 1.0, 1.0)):
+        monkeypatch.setattr(force_recorder.time, "monotonic", lambda now_s=now_s: now_s)
+        assert recorder.mean_n(window_s=window_s) == pytest.approx(mean_n)
+
+
+def test_a_cell_at_fault_has_no_mean(recorder, cell):
+    cell.say(UNPLUGGED)
+    assert reached(lambda: recorder.fault)
+    with pytest.raises(LoadCellError):
+        recorder.mean_n(window_s=1.0)
+
+
+def test_the_zero_of_this_start_is_told_from_that_of_commissioning(recorder):
+    assert recorder.zero_shift_n == pytest.approx(0.5)

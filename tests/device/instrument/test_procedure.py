@@ -22,6 +22,7 @@ from device.instrument import procedure as procedure_module
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
+from device.instrument.self_test.result import Result
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Frame
@@ -467,3 +468,59 @@ def test_light_that_lost_a_tenth_between_two_presses_is_warned_of(rig):
     job = rig.press()
     assert job["state"] == "done"
     assert [warning["code"] for warning in job["warnings"]] == ["E206"]
+
+
+@pytest.fixture
+def held_self_test(rig, monkeypatch):
+    """A self-test of one check, which goes on until it is let go."""
+    go_on = threading.Event()
+
+    def results(job):
+        assert go_on.wait(10.0)
+        yield [Result("Light", "LED +x", "passed")]
+
+    monkeypatch.setattr(rig.procedure._self_tests._test, "results", results)
+    yield go_on
+    go_on.set()
+
+
+def test_a_self_test_runs_between_presses_which_are_refused_meanwhile(rig, held_self_test):
+    rig.procedure.request_self_test()
+    rig.until(lambda: rig.board.now.step == "self_test")
+    with pytest.raises(BusyError, match="self-test"):
+        rig.procedure.request()
+    held_self_test.set()
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert (rig.procedure.self_test.state, rig.procedure.self_test.verdict) == ("done", "passed")
+    assert rig.press()["state"] == "done"
+
+
+def test_a_self_test_is_refused_during_a_press_with_the_code_of_it(rig):
+    rig.is_away = True
+    job = rig.procedure.request()
+    with pytest.raises(BusyError) as refusal:
+        rig.procedure.request_self_test()
+    assert refusal.value.code == "E801"
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.store.press(job.id)["state"] in ENDED)
+    with pytest.raises(UnknownResource):
+        _ = rig.procedure.self_test
+
+
+def test_a_self_test_runs_while_the_probe_is_at_fault(rig, held_self_test):
+    rig.store.require_space = lambda free_mb: (_ for _ in ()).throw(StorageError("The disk is gone.", "Check it."))
+    rig.bench.breaks = [CameraError("No frame came.", "Check the ribbon cable.")]
+    rig.press()
+    rig.until(lambda: rig.board.now.fault is not None)
+    held_self_test.set()
+    rig.procedure.request_self_test()
+    rig.until(lambda: not rig.procedure.self_test.is_under_way)
+    assert rig.procedure.self_test.state == "done"
+    rig.until(lambda: rig.board.now.step == "fault")
+
+
+@pytest.mark.parametrize("weight_n", [0.09, 5.1, float("nan")])
+def test_a_weight_that_cannot_be_measured_is_refused(rig, weight_n):
+    """Contact is 0.05 N, and the cell bears 5 N."""
+    with pytest.raises(InvalidQuantity, match="weight_n"):
+        rig.procedure.request_self_test(weight_n=weight_n)

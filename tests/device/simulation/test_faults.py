@@ -53,6 +53,7 @@ def test_a_fault_of_a_press_waits_for_that_press(clock):
         (Fault("led_stuck_on", side="+y"), (0.6, 1.0, 0.4, 0.3)),
         (Fault("led_dimmed", side="-x", ratio=0.5), (0.6, 0.5, 0.2, 0.3)),
         (Fault("led_open", side="+x"), (0.0, 0.5, 0.4, 0.3)),
+        (Fault("led_swapped", side="+x", other_side="-y"), (0.3, 0.5, 0.4, 0.6)),
         (Fault("led_driver_hot"), (0.0, 0.0, 0.0, 0.0)),
         (Fault("led_dimmed"), (0.54, 0.45, 0.36, 0.27)),
     ],
@@ -64,6 +65,12 @@ def test_an_led_gives_another_light_than_its_register_asks_for(clock, fault, lig
 def test_a_dead_led_is_dark_even_when_it_is_dimmed_and_a_stuck_one_shines_while_all_are_off(clock):
     faults = [Fault("led_dimmed"), Fault("led_dead", side="+x"), Fault("led_stuck_on", side="-x")]
     assert FaultTimeline(faults, clock=clock).led_output((0.0,) * 4, 100.0) == (0.0, 0.0, 1.0, 0.0)
+
+
+def test_swapped_plugs_are_before_the_leds(clock):
+    """The output of +x feeds the LED at -x, which is dead."""
+    faults = [Fault("led_dead", side="-x"), Fault("led_swapped", side="+x", other_side="-x")]
+    assert FaultTimeline(faults, clock=clock).led_output((0.6, 0.0, 0.4, 0.0), 100.0) == (0.4, 0.0, 0.0, 0.0)
 
 
 def test_foreign_light_adds_up_and_the_wettest_counts(clock):
@@ -103,6 +110,8 @@ def test_without_faults_nothing_is_wrong():
         ({"kind": "camera_stall", "from_press": -1}, "faults.from_press", "at least 0"),
         ({"kind": "led_dead"}, "faults.side", "missing, but must be given for led_dead: add it"),
         ({"kind": "led_dead", "side": "left"}, "faults.side", r"one of \+x, \+y, -x, -y"),
+        ({"kind": "led_swapped", "side": "+x"}, "faults.other_side", "given for led_swapped"),
+        ({"kind": "led_swapped", "side": "+x", "other_side": "up"}, "faults.other_side", r"one of \+x, \+y, -x, -y"),
         ({"kind": "camera_stall", "side": "+x"}, "faults.side", "left out of camera_stall: remove it"),
         ({"kind": "led_dimmed", "ratio": 1.1}, "faults.ratio", "at most 1"),
         ({"kind": "clock_jump"}, "faults.step_s", "given for clock_jump"),

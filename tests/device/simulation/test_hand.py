@@ -182,3 +182,12 @@ def test_a_hand_that_misses_and_leans_presses_beside_the_middle_at_an_angle():
     hand.begin()
     hand.follow("press_lesion", 0.0)
     assert hand.place(1.0) == Placement(3.0, -1.0, 0.0, 2.0)
+
+
+@pytest.mark.parametrize(("taken_up", "put_down"), [("hold_block", "lift"), ("put_weight", "take_weight_off")])
+def test_in_a_self_test_it_takes_up_the_probe_by_itself(taken_up, put_down):
+    hand = VirtualHand(STEADY)
+    hand.follow(taken_up, 0.0)
+    assert hand.force_n(5.0) == pytest.approx(0.4)
+    hand.follow(put_down, 5.0)
+    assert hand.force_n(9.0) == 0.0

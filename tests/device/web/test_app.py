@@ -8,8 +8,11 @@ import pytest
 
 from device.config import Config
 from device.errors import ModeUnavailable
+from device.instrument.self_test.job import SelfTestJob
+from device.instrument.self_test.result import Result
 from device.instrument.status import PressJob
 from device.web.app import create_app
+from device.web.schema import SelfTest
 
 
 class Procedure:
@@ -23,6 +26,14 @@ class Procedure:
         if mode not in (None, *self.modes):
             raise ModeUnavailable(f"This probe has no model for the mode {mode}.", "Choose one of those it has.")
         return PressJob("p-1", mode or "paper")
+
+    def request_self_test(self, *, on_block, weight_n):
+        self.asked.append((on_block, weight_n))
+        return SelfTestJob("s-1", "2026-01-01T00:00:00Z", on_block, weight_n)
+
+    @property
+    def self_test(self):
+        return SelfTestJob("s-1", "2026-01-01T00:00:00Z", state="done", results=(Result("Light", "LED +x", "passed"),))
 
 
 @pytest.fixture
@@ -76,3 +87,27 @@ def test_the_device_says_how_long_its_leds_were_on_and_in_which_modes_it_measure
         {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5},
         {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0},
     ]
+
+
+@pytest.mark.parametrize(
+    ("content", "asked"),
+    [({}, (False, None)), ({"json": {"on_block": True, "weight_n": 0.5}}, (True, 0.5))],
+)
+def test_a_self_test_is_started_and_found_where_it_says(ask, procedure, content, asked):
+    answer = ask("POST", "/api/v1/self-test", **content)
+    assert (answer.status_code, answer.headers["location"]) == (202, "/api/v1/self-test")
+    assert SelfTest.model_validate(answer.json()).state == "waiting"
+    assert procedure.asked == [asked]
+
+
+def test_the_results_of_a_self_test_are_as_described_and_say_that_the_probe_is_simulated(ask):
+    answer = ask("GET", "/api/v1/self-test").json()
+    assert SelfTest.model_validate(answer).verdict == "passed"
+    assert answer["simulated"] is True
+    assert [result["check"] for result in answer["results"]] == ["LED +x"]
+
+
+def test_an_unknown_wish_for_a_self_test_is_refused(ask, procedure):
+    answer = ask("POST", "/api/v1/self-test", json={"weight_g": 50})
+    assert (answer.status_code, answer.json()["code"]) == (422, "E803")
+    assert procedure.asked == []

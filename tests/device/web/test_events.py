@@ -1,4 +1,4 @@
-"""The status as the screen gets it: faults and warnings with code, severity, cause and remedy."""
+"""The status as the screen gets it: faults and warnings with code, title, severity, cause and remedy."""
 
 import types
 
@@ -8,6 +8,7 @@ from device.config import PressSection
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
 from device.instrument.guidance import Guidance
 from device.instrument.status import PressJob, Status
+from device.web import schema
 from device.web.events import snapshot
 
 
@@ -44,9 +45,22 @@ def test_a_probe_without_a_fault_tells_its_force_and_no_fault(told):
 def test_a_fault_comes_before_the_warnings_and_each_says_what_it_is(told):
     fault, warning = LightBusError("The bus is stuck.", "Switch off."), ClockJumpError("It was set.", "Check it.")
     status = told(Status(fault=fault, warnings=(warning,)), Force())
+    assert schema.Status.model_validate(status).step == "starting"
     assert status["faults"] == [
-        {"code": "E202", "severity": "fault", "cause": "The bus is stuck.", "remedy": "Switch off."},
-        {"code": "E701", "severity": "warning", "cause": "It was set.", "remedy": "Check it."},
+        {
+            "code": "E202",
+            "title": "I2C bus stuck",
+            "severity": "fault",
+            "cause": "The bus is stuck.",
+            "remedy": "Switch off.",
+        },
+        {
+            "code": "E701",
+            "title": "Clock was set",
+            "severity": "warning",
+            "cause": "It was set.",
+            "remedy": "Check it.",
+        },
     ]
 
 
