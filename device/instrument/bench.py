@@ -89,11 +89,16 @@ class Bench:
             return self.lights.set_ratio(ratio)
 
     def _confirm_light(self) -> None:
-        """Write what the light is once more, and have it read back; frames that were begun under it remain good."""
-        if self._is_known:
-            self._is_known = False
-            self._acknowledged_s(self._light)
-            self._is_known = True
+        """Write what the light is once more, and have it read back; frames that were begun under it remain good.
+
+        A light that nobody knows is switched off.
+        """
+        if not self._is_known:
+            self.light(DARK)
+            return
+        self._is_known = False
+        self._acknowledged_s(self._light)
+        self._is_known = True
 
     def is_steady(self, t_s: float, steady_n: float) -> bool:
         """Return whether the force hardly varied just before a time: a ramp through the band is no hold."""

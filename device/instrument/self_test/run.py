@@ -53,7 +53,7 @@ class SelfTest:
         folder_of: Callable[[Path], Path] = Path,
     ) -> None:
         self._config, self._bench, self._store, self._clock = config, bench, store, clock
-        self._board, self._operator = board, Operator(board, bench.force, stopping)
+        self._board, self._operator = board, Operator(board, bench.force, bench.progress, stopping)
         self._folder_of = folder_of
         self._offset_s, self._zero_holds = 0.0, False
 
@@ -80,7 +80,8 @@ class SelfTest:
         return disk_results(self._store, self._config.store.min_free_mb)
 
     def _models(self, job: SelfTestJob) -> list[Result]:
-        return model_results(self._config, self._folder_of)
+        with self._bench.progress.inside("inference"):
+            return model_results(self._config, self._folder_of)
 
     def _camera(self, job: SelfTestJob) -> list[Result]:
         self._bench.light(DARK)

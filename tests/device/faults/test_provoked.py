@@ -17,14 +17,17 @@ PROVOKED_BY = {
     "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
+    "E210": "device/instrument/test_brightness_loop.py::"
+    "test_a_side_at_full_brightness_that_misses_its_share_is_warned_of_by_name",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E803": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E804": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E805": "device/web/test_app.py::test_a_mode_without_a_model_is_refused_with_its_own_code",
+    "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
-"""Codes that a request or a setting provokes, not a scene: file below tests/ and test, which names the code."""
+"""Codes that a request, a setting or a restart provokes, no scene: file below tests/ and test, which names the code."""
 
 
 @cache

@@ -28,7 +28,7 @@ def test_an_error_without_an_entry_of_its_own_cannot_be_written(missing):
     assert "E199" not in DeviceError.by_code
 
 
-@pytest.mark.parametrize("code", ["E19", "F101", "E1x1", "E999"])
+@pytest.mark.parametrize("code", ["E19", "F101", "E1x1", "EA01", "E 99"])
 def test_a_code_is_e_and_three_digits_of_a_part(code):
     with pytest.raises(TypeError, match="E and three digits"):
         type("New", (CameraError,), {"code": code, "title": "New", "__doc__": "A new one."})

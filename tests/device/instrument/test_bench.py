@@ -168,14 +168,14 @@ def test_a_beat_confirms_the_light_and_takes_a_frame_and_frames_of_that_light_re
     assert bench.take("press").t_s == pytest.approx(10.102)
 
 
-def test_a_light_that_nobody_knows_is_not_confirmed_by_a_beat(hardware):
+def test_a_light_that_nobody_knows_is_switched_off_by_a_beat(hardware):
     watch = Watch()
     bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
     bench.light(LIT)
     bench.check_lights()
     watch.now_s = 1.0
     bench.progress.beat()
-    assert hardware.log == [LIT, "check", ("frame", 10.0)]
+    assert hardware.log == [LIT, "check", ("frame", 10.0), DARK]
 
 
 def test_after_a_light_that_could_not_be_confirmed_it_is_set_again(hardware, monkeypatch):

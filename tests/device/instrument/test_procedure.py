@@ -22,6 +22,7 @@ from device.instrument import procedure as procedure_module
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
+from device.instrument.progress import ProgressBoard
 from device.instrument.self_test.result import Result
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
@@ -40,7 +41,7 @@ class ObedientBench:
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work = self.is_closed = False
-        self.budget = LightBudget()
+        self.budget, self.progress = LightBudget(), ProgressBoard()
 
     @property
     def latest_n(self):

@@ -1,11 +1,14 @@
 """The operator is told once and waited for, not longer than given, and not when the daemon stops."""
 
+import itertools
 import threading
 import types
 
 import pytest
 
+from device.errors import CameraError
 from device.instrument.guidance import Guidance
+from device.instrument.progress import ProgressBoard
 from device.instrument.self_test import operator as operator_module
 from device.instrument.self_test.operator import Operator
 from device.instrument.status import StatusBoard
@@ -49,8 +52,13 @@ def stopping():
 
 
 @pytest.fixture
-def operator(board, force, stopping):
-    return Operator(board, force, stopping)
+def progress(now_s):
+    return ProgressBoard(lambda: now_s[0])
+
+
+@pytest.fixture
+def operator(board, force, progress, stopping):
+    return Operator(board, force, progress, stopping)
 
 
 def test_who_does_as_told_is_waited_for(operator, force, board, now_s):
@@ -79,3 +87,22 @@ def test_a_force_that_settles_is_waited_for_and_one_that_never_does_is_not(opera
     force.range = lambda t_s: 0.1
     operator.settle(0.02, 30.0)
     assert now_s[0] == pytest.approx(132.0)
+
+
+def test_while_the_operator_is_waited_for_idle_parts_go_on_and_their_faults_are_left_to_their_checks(
+    operator, force, progress, now_s
+):
+    """The watchdog would end a self-test in which nothing is seen of camera and light for half of its 15 s."""
+    used_s = []
+
+    def look():
+        used_s.append(now_s[0])
+        with progress.inside("camera"):
+            raise CameraError("No frame.", "Check it.")
+
+    progress.exercise("camera", look)
+    operator.until(Guidance.HOLD_BLOCK, lambda force_n: False, 10.0)
+    force.range = lambda t_s: 0.1
+    operator.settle(0.02, 10.0)
+    assert len(used_s) >= 18
+    assert max(later - sooner for sooner, later in itertools.pairwise(used_s)) < 1.6

@@ -12,6 +12,7 @@ from device.errors import CameraError, LightError, LoadCellError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.bench import DARK
 from device.instrument.guidance import Guidance
+from device.instrument.progress import ProgressBoard
 from device.instrument.self_test import operator as operator_module
 from device.instrument.self_test import run as run_module
 from device.instrument.self_test.job import SelfTestJob
@@ -35,6 +36,7 @@ class PatientBench:
         self.board, self.force, self.zero_shift_n = board, self, 0.01
         self.forces_n = {Guidance.HOLD_BLOCK: 0.5, Guidance.HOLD_STILL: 0.5, Guidance.PUT_WEIGHT: 1.0}
         self.break_at, self.lights, self.now_s = {}, [], 0.0
+        self.progress = ProgressBoard(lambda: self.now_s)
 
     def _at(self, part):
         if part in self.break_at:
