@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse recordings, look at the settings, or darken the LEDs.
+"""`python -m device`: start the daemon, analyse recordings, see settings and calibrations, or darken the LEDs.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -19,15 +19,17 @@ import uvicorn
 
 from device.answers import Answers, answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
+from device.calibration_command import add_calibration_command, run_calibration_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.procedure import Procedure
 from device.led_off import led_off
-from device.measurement.calibration import read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
+from device.records.calibrations import Calibrations
 from device.settings.command import add_config_command, run_config_command
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, read_config, read_layers
@@ -55,11 +57,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    commands = parser.add_subparsers(dest="command", metavar="analyse | config | led-off")
+    commands = parser.add_subparsers(dest="command", metavar="analyse | config | calibration | led-off")
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
     add_config_command(commands)
+    add_calibration_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -78,6 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _analyse(options)
         if options.command == "config":
             return run_config_command(options)
+        if options.command == "calibration":
+            scenario = Scenario() if options.simulate else None
+            return run_calibration_command(options, _start_settings(options, scenario).config)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0
@@ -102,15 +108,21 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
 
 
 def _analyse(options: argparse.Namespace) -> int:
-    """Estimate recordings by the settings of a file, or those of the simulated probe that made them."""
+    """Estimate recordings by the settings of a file, or those of the simulated probe that made them.
+
+    The certificate has to have held when they were recorded.
+    """
     stated = read_config(options.config) if options.config else None
     of_probe: dict[str, Answers] = {}
+    calibrations: dict[str, CalibrationWatch] = {}
     for path in options.recordings:
         recording = read_recording(path)
         if recording.serial not in of_probe:
             config = stated or simulated_config(recording.serial)
-            bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
-            of_probe[recording.serial] = answers_for(config, bundle, calibration)
+            bundle = ModelBundle.load(config.model)
+            calibrations[recording.serial] = CalibrationWatch(Calibrations(config.calibration).active())
+            of_probe[recording.serial] = answers_for(config, bundle, calibrations[recording.serial].calibration)
+        calibrations[recording.serial].require_valid(recording.started_at)
         mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
         estimate = of_probe[recording.serial].estimator(recording, mode)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))

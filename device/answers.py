@@ -8,12 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from device.config import Config
-from device.errors import ConfigError
+from device.errors import ConfigError, MissingCalibration
 from device.instrument.procedure import Estimator
 from device.measurement.calibration import Calibration
+from device.measurement.estimate import Estimate
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.mode_models import with_models
+from device.measurement.recording import Recording
 
 
 class Answers(NamedTuple):
@@ -29,10 +31,16 @@ class Answers(NamedTuple):
             raise ConfigError(cause, "Choose one of those, or install the model.")
 
 
-def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
-    """Return what a probe can answer.
+def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+    """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
     models = with_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
-    return Answers(models.modes, lambda recording, mode: models.estimate(recording, mode, calibration))
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        if calibration is None:
+            raise MissingCalibration("The probe is not calibrated.", "Calibrate it and activate the certificate.")
+        return models.estimate(recording, mode, calibration)
+
+    return Answers(models.modes, estimate)

@@ -26,7 +26,14 @@ DeviceError
 │   ├── OverloadedCellError  E305  more load than the cell bears, from its zero at commissioning
 │   ├── ZeroShiftError       E306  the zero is far from that of commissioning
 │   └── DetachedCellError    E307  the amplifier answers, but no bridge is behind it
-├── ModelError               E401  a bundle or calibration is missing, tampered with, or not for this probe
+├── ModelError               E401  a model bundle is missing, tampered with, or not for this probe
+│   ├── MissingCalibration   E402  no calibration is active, or that which is named is not there or was changed
+│   ├── ForeignCalibration   E403  the calibration is for another probe, model, camera setting, force or load cell
+│   ├── ExpiredCalibration   E404  the calibration has expired
+│   ├── FaceDriftError       E405  the untouched face has drifted from the calibration's (a warning)
+│   ├── FaceDriftedError     E406  it has drifted so far that nothing is measured
+│   ├── CalibrationEndsSoon  E407  the calibration expires soon (a warning)
+│   └── ClockBeforeCalibration E408  the clock says that the calibration is still to come
 ├── NoContrastError          E501  pressing does not change the image: gel, or a wet face
 ├── StorageError             E601  a measurement could not be made durable
 │   └── DiskFullError        E602  there is no space left
@@ -192,10 +199,56 @@ class DetachedCellError(LoadCellError):
 
 
 class ModelError(DeviceError):
-    """A model bundle or calibration is missing, tampered with, or not made for this probe."""
+    """A model bundle is missing, tampered with, or not made for this probe."""
 
     code = "E401"
     status = 503
+
+
+class MissingCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """No calibration certificate is active, or the one that is named is not there or was changed."""
+
+    code = "E402"
+
+
+class ForeignCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration is for another probe, model, pixel size, exposure, force or load cell."""
+
+    code = "E403"
+
+
+class ExpiredCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration has expired; nothing is measured until another is activated."""
+
+    code = "E404"
+
+
+class FaceDriftError(ModelError):
+    """The untouched face looks otherwise than at the calibration; it is measured still."""
+
+    code = "E405"
+    severity = "warning"
+    is_lasting = True
+
+
+class FaceDriftedError(ModelError):
+    """The untouched face looks so different from the calibration's that nothing is measured."""
+
+    code = "E406"
+
+
+class CalibrationEndsSoon(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration expires within a month."""
+
+    code = "E407"
+    severity = "warning"
+    is_lasting = True
+
+
+class ClockBeforeCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The wall clock is before the calibration was made: whether that has expired cannot be told."""
+
+    code = "E408"
 
 
 class NoContrastError(DeviceError):

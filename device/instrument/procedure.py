@@ -17,6 +17,7 @@ from typing import Any
 from device.config import Config
 from device.errors import DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.capture import POLL_S, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
@@ -53,16 +54,16 @@ class Procedure:
         store: Store,
         *,
         modes: tuple[Mode, ...],
-        calibration_id: str,
+        calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
         simulated_truth: Inclusion | None = None,
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them."""
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
-        self.modes = modes
+        self.modes, self.calibration = modes, calibration
         self.board = StatusBoard()
-        self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
+        self._estimator, self._truth = estimator, simulated_truth
         self._capture = Capture(bench, config, self.board)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
@@ -126,7 +127,10 @@ class Procedure:
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
         self._warn(self._clock.warning())
+        self.calibration.require_valid(self._clock.now())
         unloaded = self._capture.unloaded()
+        self.calibration.require_no_drift(unloaded)
+        self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
             self.board.update(step="ready", guidance=guidance, fault=None)
@@ -199,7 +203,7 @@ class Procedure:
             frames,
             self.config,
             started_at=started_at,
-            calibration_id=self._calibration_id,
+            calibration_id=self.calibration.id,
             simulated_truth=self._truth,
         )
 
