@@ -183,7 +183,8 @@ def _procedure(
     force = parts.open(lambda: tared(config, cell)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
-    answers = parts.open(lambda: _answers(config, bundle, watch.calibration)) if bundle and watch else None
+    calibration = watch.calibration if watch else None
+    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None
     store = parts.open(lambda: Store(config.data, disk))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.

@@ -23,7 +23,10 @@ from device.measurement.untouched_face import Drift
 
 WARN_RATIO, BLOCK_RATIO = 0.10, 0.25
 """Change of the untouched face that is warned of, and that nothing is measured with."""
+UNTOUCHED_N = 0.01
+"""A touch by this force lets out a twentieth of the light of a press (the simulated probe's skin); 0.03 N, a tenth."""
 SOON_DAYS = 30.0
+OWN_WARNINGS = (CalibrationEndsSoon, FaceDriftError)
 CALIBRATE = "Calibrate the probe and activate the new certificate, then start the daemon again."
 WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
 
@@ -35,7 +38,7 @@ class CalibrationWatch:
         """Take the certificate, None for a probe that was never calibrated."""
         self.calibration = calibration
         self._ending: CalibrationEndsSoon | None = None
-        self._drift: FaceDriftError | None = None
+        self._drift: FaceDriftError | FaceDriftedError | None = None
 
     @property
     def id(self) -> str:
@@ -59,21 +62,28 @@ class CalibrationWatch:
             self._ending = CalibrationEndsSoon(cause, "Calibrate the probe before that day.")
 
     def require_no_drift(self, unloaded: Sequence[Frame]) -> None:
-        """Raise `FaceDriftedError` when unloaded frames, dark and lit, are too far from the certificate's."""
+        """Raise `FaceDriftedError` when unloaded frames, dark and lit, are too far from the certificate's.
+
+        Frames under a slight touch say nothing about it: then what the last untouched ones said holds.
+        """
         if self.calibration is None:
             return
-        drift = self.calibration.untouched.drift(unloaded)
-        size = abs(drift.change_ratio)
-        if size > BLOCK_RATIO:
-            raise FaceDriftedError(f"{_described(drift)}, above {BLOCK_RATIO:.0%}.", WIPE)
-        self._drift = (
-            FaceDriftError(f"{_described(drift)}, above {WARN_RATIO:.0%}.", WIPE) if size > WARN_RATIO else None
-        )
+        if max(abs(frame.force_n) for frame in unloaded) <= UNTOUCHED_N:
+            self._drift = _judged(self.calibration.untouched.drift(unloaded))
+        if isinstance(self._drift, FaceDriftedError):
+            raise self._drift
 
     def warned(self, others: Sequence[DeviceError]) -> tuple[DeviceError, ...]:
         """Return these warnings with those of the certificate brought up to date."""
-        own = [one for one in (self._ending, self._drift) if one]
-        return (*(one for one in others if one.code not in (CalibrationEndsSoon.code, FaceDriftError.code)), *own)
+        own = [one for one in (self._ending, self._drift) if isinstance(one, OWN_WARNINGS)]
+        return (*(one for one in others if not isinstance(one, OWN_WARNINGS)), *own)
+
+
+def _judged(drift: Drift) -> FaceDriftError | FaceDriftedError | None:
+    size = abs(drift.change_ratio)
+    if size > BLOCK_RATIO:
+        return FaceDriftedError(f"{_described(drift)}, above {BLOCK_RATIO:.0%}.", WIPE)
+    return FaceDriftError(f"{_described(drift)}, above {WARN_RATIO:.0%}.", WIPE) if size > WARN_RATIO else None
 
 
 def _described(drift: Drift) -> str:

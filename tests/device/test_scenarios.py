@@ -20,7 +20,7 @@ from daemon_process import ROOT
 from device import errors
 from device.assembly import open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
-from device.errors import DeviceError
+from device.errors import DeviceError, MissingCalibration
 from device.instrument import bench, force_recorder, procedure
 from device.instrument.procedure import Procedure
 from device.measurement.toml_record import from_table
@@ -83,7 +83,9 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
             replace(fault, from_s=TIME_RATIO * fault.from_s, until_s=TIME_RATIO * fault.until_s)
             for fault in scenario.faults
         )
-        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=QUICK_HAND, faults=faults))
+        own = {"serial": scenario.serial, "calibration": simulated_config(scenario.serial).calibration}
+        quick = replace(scenario, hand=QUICK_HAND, faults=faults)
+        opened = open_simulated_probe(replace(config, **(own | settings)), quick)
         opened.start()
         try:
             yield Device(opened)
@@ -110,6 +112,14 @@ def test_a_probe_without_a_fault_raises_none(running):
         device.press()
         assert device.board.now.press.state == "done"
         assert device.codes() == set()
+
+
+def test_a_probe_that_was_never_calibrated_runs_and_takes_no_press(running, tmp_path):
+    (tmp_path / "calibrations").mkdir()
+    with running(Scenario(), calibration=tmp_path / "calibrations") as device:
+        device.until(lambda: "E402" in device.codes())
+        with pytest.raises(MissingCalibration, match="no certificate is active"):
+            device.procedure.request()
 
 
 def test_every_kind_of_fault_has_a_scenario():

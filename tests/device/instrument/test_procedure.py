@@ -5,13 +5,16 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from small_certificate import small_certificate
 
 from device.config import CameraSection, Config, PressSection
 from device.errors import (
     BusyError,
+    CalibrationEndsSoon,
     CameraError,
     ClockJumpError,
     DiskFullError,
+    ExpiredCalibration,
     LastGoodConfigError,
     LightError,
     ModeUnavailable,
@@ -19,14 +22,19 @@ from device.errors import (
     UnknownResource,
 )
 from device.instrument import procedure as procedure_module
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Frame
+from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import Validity
 from device.records.store import ENDED, Store
 
+AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
+DARK_FACE = UntouchedFace(4.0, (0.0, 0.0, 0.0, 0.0), 0.0, 60.0, 0.6)
 CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(timeout_s=5.0))
 ANSWER = Estimate(
     *[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {"total": 1.0}
@@ -78,7 +86,7 @@ class Rig:
             self.estimate,
             self.store,
             modes=("paper", "quick", "standard"),
-            calibration_id="c",
+            calibration=CalibrationWatch(small_certificate(validity=AGELESS, untouched=DARK_FACE)),
             opened=opened,
             simulated_truth=Inclusion(10.0, 5.0, 80.0),
         )
@@ -209,7 +217,8 @@ def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig)
     rig.press()
     [recording] = seen
     assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 14, 10]
-    assert (recording.serial, recording.calibration_id, recording.simulated) == ("TSIS-0000", "c", True)
+    assert (recording.serial, recording.simulated) == ("TSIS-0000", True)
+    assert recording.calibration_id == rig.procedure.calibration.id
 
 
 def test_a_press_is_taken_and_estimated_in_the_mode_that_was_asked_for(rig):
@@ -467,3 +476,29 @@ def test_light_that_lost_a_tenth_between_two_presses_is_warned_of(rig):
     job = rig.press()
     assert job["state"] == "done"
     assert [warning["code"] for warning in job["warnings"]] == ["E206"]
+
+
+def test_a_probe_whose_certificate_has_expired_runs_and_says_so_and_takes_no_press(rig, monkeypatch):
+    expired = ExpiredCalibration("The calibration has expired.", "Calibrate the probe.")
+
+    def require_valid(now):
+        raise expired
+
+    with monkeypatch.context() as later:
+        later.setattr(rig.procedure.calibration, "require_valid", require_valid)
+        rig.press()
+        rig.until(lambda: rig.board.now.fault is expired)
+        with pytest.raises(ExpiredCalibration):
+            rig.procedure.request()
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.press()["state"] == "done"
+
+
+def test_warnings_of_the_certificate_are_told_with_every_press_until_they_are_over(rig):
+    warning = CalibrationEndsSoon("The calibration expires soon.", "Calibrate the probe.")
+    rig.procedure.calibration.warned = lambda others: (warning,)
+    rig.press()
+    assert [rig.press()["warnings"] for _ in range(2)] == [[warning.as_record()]] * 2
+    rig.procedure.calibration.warned = lambda others: ()
+    rig.press()
+    assert rig.press()["warnings"] == []
