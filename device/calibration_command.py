@@ -51,11 +51,15 @@ def run_calibration_command(options: argparse.Namespace, config: Config) -> int:
     if name is None:
         raise MissingCalibration("No certificate is active.", "Activate one, see `python -m device calibration list`.")
     record = calibrations.read(name).summary()
-    lines = [
-        f"{key:20} {json.dumps(value) if isinstance(value, dict | list) else value}" for key, value in record.items()
-    ]
-    print(json.dumps(record) if options.json else "\n".join(lines))
+    if options.json:
+        print(json.dumps(record))
+    else:
+        print("\n".join(f"{key:20} {_written(value)}" for key, value in record.items()))
     return 0
+
+
+def _written(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def _list(calibrations: Calibrations, *, as_json: bool) -> int:

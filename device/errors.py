@@ -30,10 +30,10 @@ DeviceError
 │   ├── MissingCalibration   E402  no calibration is active, or that which is named is not there or was changed
 │   ├── ForeignCalibration   E403  the calibration is for another probe, model, camera setting, force or load cell
 │   ├── ExpiredCalibration   E404  the calibration has expired
-│   ├── FaceDriftError       E405  the untouched face has drifted from the calibration's (a warning)
-│   ├── FaceDriftedError     E406  it has drifted so far that nothing is measured
+│   ├── SlightDriftError     E405  the untouched face has drifted from the calibration's (a warning)
+│   ├── LargeDriftError      E406  it has drifted so far that nothing is measured
 │   ├── CalibrationEndsSoon  E407  the calibration expires soon (a warning)
-│   └── ClockBeforeCalibration E408  the clock says that the calibration is still to come
+│   └── ClockBehindError     E408  the clock is before the calibration: its age cannot be told
 ├── NoContrastError          E501  pressing does not change the image: gel, or a wet face
 ├── StorageError             E601  a measurement could not be made durable
 │   └── DiskFullError        E602  there is no space left
@@ -223,7 +223,7 @@ class ExpiredCalibration(ModelError):  # noqa: N818 - the name is what the opera
     code = "E404"
 
 
-class FaceDriftError(ModelError):
+class SlightDriftError(ModelError):
     """The untouched face looks otherwise than at the calibration; it is measured still."""
 
     code = "E405"
@@ -231,7 +231,7 @@ class FaceDriftError(ModelError):
     is_lasting = True
 
 
-class FaceDriftedError(ModelError):
+class LargeDriftError(ModelError):
     """The untouched face looks so different from the calibration's that nothing is measured."""
 
     code = "E406"
@@ -245,7 +245,7 @@ class CalibrationEndsSoon(ModelError):  # noqa: N818 - the name is what the oper
     is_lasting = True
 
 
-class ClockBeforeCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+class ClockBehindError(ModelError):
     """The wall clock is before the calibration was made: whether that has expired cannot be told."""
 
     code = "E408"

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 from device.errors import (
     CalibrationEndsSoon,
-    ClockBeforeCalibration,
+    ClockBehindError,
     DeviceError,
     ExpiredCalibration,
-    FaceDriftedError,
-    FaceDriftError,
+    LargeDriftError,
     MissingCalibration,
+    SlightDriftError,
 )
 from device.measurement.calibration import Calibration
 from device.measurement.tactile_image import Frame
@@ -26,7 +26,7 @@ WARN_RATIO, BLOCK_RATIO = 0.10, 0.25
 UNTOUCHED_N = 0.01
 """A touch by this force lets out a twentieth of the light of a press (the simulated probe's skin); 0.03 N, a tenth."""
 SOON_DAYS = 30.0
-OWN_WARNINGS = (CalibrationEndsSoon, FaceDriftError)
+OWN_WARNINGS = (CalibrationEndsSoon, SlightDriftError)
 CALIBRATE = "Calibrate the probe and activate the new certificate, then start the daemon again."
 WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
 
@@ -38,7 +38,7 @@ class CalibrationWatch:
         """Take the certificate, None for a probe that was never calibrated."""
         self.calibration = calibration
         self._ending: CalibrationEndsSoon | None = None
-        self._drift: FaceDriftError | FaceDriftedError | None = None
+        self._drift: SlightDriftError | LargeDriftError | None = None
 
     @property
     def id(self) -> str:
@@ -52,7 +52,7 @@ class CalibrationWatch:
         validity = self.calibration.validity
         if validity.is_before(now):
             cause = f"The clock says {now[:10]}, before the calibration of {validity.measured_at[:10]}."
-            raise ClockBeforeCalibration(cause, "Set the board's clock, and check its time server.")
+            raise ClockBehindError(cause, "Set the board's clock, and check its time server.")
         days_left = validity.days_left(now)
         if days_left < 0:
             raise ExpiredCalibration(f"The calibration has expired on {validity.expires_at}.", CALIBRATE)
@@ -62,7 +62,7 @@ class CalibrationWatch:
             self._ending = CalibrationEndsSoon(cause, "Calibrate the probe before that day.")
 
     def require_no_drift(self, unloaded: Sequence[Frame]) -> None:
-        """Raise `FaceDriftedError` when unloaded frames, dark and lit, are too far from the certificate's.
+        """Raise `LargeDriftError` when unloaded frames, dark and lit, are too far from the certificate's.
 
         Frames under a slight touch say nothing about it: then what the last untouched ones said holds.
         """
@@ -70,7 +70,7 @@ class CalibrationWatch:
             return
         if max(abs(frame.force_n) for frame in unloaded) <= UNTOUCHED_N:
             self._drift = _judged(self.calibration.untouched.drift(unloaded))
-        if isinstance(self._drift, FaceDriftedError):
+        if isinstance(self._drift, LargeDriftError):
             raise self._drift
 
     def warned(self, others: Sequence[DeviceError]) -> tuple[DeviceError, ...]:
@@ -79,11 +79,11 @@ class CalibrationWatch:
         return (*(one for one in others if not isinstance(one, OWN_WARNINGS)), *own)
 
 
-def _judged(drift: Drift) -> FaceDriftError | FaceDriftedError | None:
+def _judged(drift: Drift) -> SlightDriftError | LargeDriftError | None:
     size = abs(drift.change_ratio)
     if size > BLOCK_RATIO:
-        return FaceDriftedError(f"{_described(drift)}, above {BLOCK_RATIO:.0%}.", WIPE)
-    return FaceDriftError(f"{_described(drift)}, above {WARN_RATIO:.0%}.", WIPE) if size > WARN_RATIO else None
+        return LargeDriftError(f"{_described(drift)}, above {BLOCK_RATIO:.0%}.", WIPE)
+    return SlightDriftError(f"{_described(drift)}, above {WARN_RATIO:.0%}.", WIPE) if size > WARN_RATIO else None
 
 
 def _described(drift: Drift) -> str:

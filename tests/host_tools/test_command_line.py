@@ -87,7 +87,8 @@ def test_train_from_a_sweep_gives_a_bundle_the_device_accepts(tmp_path):
     done = run_toolkit("train", "--data", tmp_path / "s.nc", "--out", tmp_path / "small", "--trials", 2)
     assert done.returncode == 0, done.stderr
     assert "size_mm" in done.stdout
-    phantoms = run_toolkit("phantom", "--model", tmp_path / "small", "--out", tmp_path / "phantoms")
+    # Not those of the small model: nine at random need not pass the gates of a calibration.
+    phantoms = run_toolkit("phantom", "--out", tmp_path / "phantoms")
     assert phantoms.returncode == 0, phantoms.stderr
     recordings = sorted((tmp_path / "phantoms").iterdir())
     assert len(recordings) == 9
