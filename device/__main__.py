@@ -113,20 +113,27 @@ def _analyse(options: argparse.Namespace) -> int:
     The certificate has to have held when they were recorded.
     """
     stated = read_config(options.config) if options.config else None
-    of_probe: dict[str, Answers] = {}
-    calibrations: dict[str, CalibrationWatch] = {}
+    of_probe: dict[str, tuple[CalibrationWatch, Answers]] = {}
     for path in options.recordings:
         recording = read_recording(path)
         if recording.serial not in of_probe:
-            config = stated or simulated_config(recording.serial)
-            bundle = ModelBundle.load(config.model)
-            calibrations[recording.serial] = CalibrationWatch(Calibrations(config.calibration).active())
-            of_probe[recording.serial] = answers_for(config, bundle, calibrations[recording.serial].calibration)
-        calibrations[recording.serial].require_valid(recording.started_at)
+            of_probe[recording.serial] = _answers_of(recording.serial, stated)
+        calibration, answers = of_probe[recording.serial]
+        calibration.require_valid(recording.started_at)
         mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
-        estimate = of_probe[recording.serial].estimator(recording, mode)
+        estimate = answers.estimator(recording, mode)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))
     return 0
+
+
+def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:
+    """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
+    config = stated or simulated_config(serial)
+    bundle = ModelBundle.load(config.model)
+    calibration = Calibrations(config.calibration).active()
+    if calibration:
+        calibration.require_for(serial, bundle)
+    return CalibrationWatch(calibration), answers_for(config, bundle, calibration)
 
 
 def _serve(options: argparse.Namespace) -> int:

@@ -264,3 +264,10 @@ def test_analyse_refuses_a_recording_from_after_the_certificate(run, recording, 
     code, out, errors = run("analyse", tmp_path / "late")
     assert (code, out) == (1, [])
     assert "has expired on 2069-12-07" in errors[0]
+
+
+def test_analyse_refuses_a_recording_of_another_probe_than_the_certificates(run, recording, tmp_path):
+    write_recording(dataclasses.replace(recording, serial="TSIS-0007"), tmp_path / "foreign")
+    code, out, errors = run("analyse", tmp_path / "foreign")
+    assert (code, out) == (1, [])
+    assert "for probe SIM-0001, but must be for probe TSIS-0007" in errors[0]

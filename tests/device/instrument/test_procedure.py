@@ -405,11 +405,13 @@ def test_closing_in_the_middle_of_a_press_says_how_it_ended(tmp_path):
     rig.store.close()
 
 
-def test_the_settings_of_the_camera_are_in_the_recording(rig):
+def test_the_settings_of_camera_and_load_cell_are_in_the_recording(rig):
     seen = []
-    rig.estimator = lambda recording: seen.append(recording.camera) or ANSWER
+    rig.estimator = lambda recording: seen.append(recording) or ANSWER
     rig.press()
-    assert (seen[0].width_px, seen[0].height_px, seen[0].exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+    camera, cell = seen[0].camera, seen[0].cell
+    assert (camera.width_px, camera.height_px, camera.exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+    assert (cell.counts_per_n, cell.tare_counts) == (CONFIG.cell.sensitivity_counts_per_n, None)
 
 
 def test_a_press_that_is_asked_for_while_the_probe_fails_ends_with_the_fault(rig, monkeypatch):
