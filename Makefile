@@ -59,11 +59,9 @@ train: sweep ## regenerate everything in models/ from nothing
 	$(HOST_TOOLS) train --profile quick --out models/quick
 	$(HOST_TOOLS) phantom --out build/phantoms/physical
 	rm -f models/simulated_probe/calibration.json models/simulated_probe/calibration_linear.json
-	$(HOST_TOOLS) calibrate build/phantoms/physical/* $(AGELESS) --out models/simulated_probe/calibration.json
+	$(HOST_TOOLS) calibrate build/phantoms/physical/* --operator "make train" --out models/simulated_probe/calibration.json
 	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
-	$(HOST_TOOLS) calibrate build/phantoms/linear/* $(AGELESS) --out models/simulated_probe/calibration_linear.json
-# A simulated probe does not age: from its phantoms, recorded in 1970, its certificates hold for a hundred years.
-AGELESS := --valid-days 36500 --operator "make train"
+	$(HOST_TOOLS) calibrate build/phantoms/linear/* --operator "make train" --out models/simulated_probe/calibration_linear.json
 
 modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
 	$(HOST_TOOLS) modes --out docs/modes.md

@@ -23,11 +23,12 @@ from device.measurement.intervals import HeldOut
 from device.measurement.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
-from device.measurement.validity import Validity, moment, written
+from device.measurement.validity import VALID_DAYS, Validity, moment, written
 from device.simulation.surface_table import SurfaceTable
 from host_tools.calibration_gates import (
     PHANTOMS_NEEDED,
     Gate,
+    age_gate,
     fit_gates,
     number_gate,
     recording_gates,
@@ -42,6 +43,7 @@ from host_tools.untouched_frames import untouched_face
 
 Array = NDArray[np.float64]
 
+A_YEAR_DAYS = 365.0
 HELD_OUT_SCENES = 1000
 WEAKEST_PEAK_MM = 5e-4
 """Lumps with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
@@ -49,11 +51,15 @@ WEAKEST_PEAK_MM = 5e-4
 
 @dataclass(frozen=True)
 class Provenance:
-    """What no recording knows: who calibrated, on which set of phantoms, and for how many days it is to hold."""
+    """What no recording knows: who calibrated, on which set of phantoms, when, and for how many days it is to hold.
+
+    Without `made_at` (RFC 3339) it is now; without `valid_days`, a year, or of a simulated probe a hundred.
+    """
 
     operator: str = ""
     phantom_serial: str = ""
-    valid_days: float = 365.0
+    made_at: str | None = None
+    valid_days: float | None = None
 
 
 class Calibrated(NamedTuple):
@@ -89,16 +95,22 @@ def calibrate(
     if problems or len(recordings) < PHANTOMS_NEEDED:
         require_all([number_gate(recordings)], problems)
     first, untouched = recordings[0], untouched_face(recordings)
+    made_at = stated.made_at or written(datetime.now(UTC))
+    validity = _validity(recordings, stated.valid_days)
     assert first.cell is not None  # `unusable` has refused it otherwise
     settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
     fit = _fit(recordings, settings, force_n)
-    gates = (*recording_gates(recordings, untouched), *fit_gates(fit.lines, fit.features))
+    gates = (
+        *recording_gates(recordings, untouched),
+        age_gate(validity, made_at),
+        *fit_gates(fit.lines, fit.features),
+    )
     require_all(gates)
     errors = scaled_errors(fit.residuals, fit.features[:, 0])
     certificate = Calibration(
         id="",
-        made_at=written(datetime.now(UTC)),
-        validity=_validity(recordings, stated.valid_days),
+        made_at=made_at,
+        validity=validity,
         operator=stated.operator,
         serial=first.serial,
         phantom_serial=stated.phantom_serial,
@@ -119,10 +131,12 @@ def calibrate(
     return Calibrated(replace(certificate, id=certificate_id(certificate)), gates)
 
 
-def _validity(recordings: Sequence[Recording], valid_days: float) -> Validity:
+def _validity(recordings: Sequence[Recording], valid_days: float | None) -> Validity:
     """Return the days from the first of the recordings: a calibration is as old as its oldest phantom."""
     started = (moment(recording.started_at, f"started_at of {recording.id}") for recording in recordings)
-    return Validity.of(written(min(started)), valid_days)
+    is_ageless = all(recording.simulated for recording in recordings)
+    usual_days = VALID_DAYS.high if is_ageless else A_YEAR_DAYS
+    return Validity.of(written(min(started)), usual_days if valid_days is None else valid_days)
 
 
 def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: float) -> Fit:

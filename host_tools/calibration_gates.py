@@ -18,6 +18,7 @@ from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQua
 from device.measurement.recording import Recording
 from device.measurement.tactile_image import saturated_ratio
 from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import Validity
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 PHANTOMS_NEEDED = 6
@@ -35,6 +36,8 @@ Which phantoms are taken counts, too: of nine at random, pressed well, O3 had 0.
 """
 LEAST_SPREAD_RATIO = 0.5
 """Part of the box of the network's training that the phantoms must span in each unknown."""
+CLOCKS_APART_DAYS = 1.0
+"""By so much the clock of the probe may be ahead of the workstation's."""
 MAX_DARK_COUNTS = 12.0
 """As the default of the daemon's `light.max_dark_counts`, above which it takes something to shine."""
 
@@ -136,6 +139,14 @@ def recording_gates(recordings: Sequence[Recording], untouched: UntouchedFace) -
         Gate("dark level", untouched.dark_counts, dark, "shade the probe, and record anew"),
         Gate("saturated pixels", saturated, full, "lower the light, and record anew"),
     ]
+
+
+def age_gate(validity: Validity, made_at: str) -> Gate:
+    """Return the gate of the oldest recording's age: no certificate is expired, or older than its phantoms."""
+    life_days = validity.days_left(validity.measured_at)
+    age_days = life_days - validity.days_left(made_at)
+    bound = Bound(-CLOCKS_APART_DAYS, life_days, "days", high_included=False)
+    return Gate("age of the oldest recording", age_days, bound, "check both clocks, or record the phantoms again")
 
 
 def _spread_gates(truths: Sequence[Inclusion]) -> list[Gate]:

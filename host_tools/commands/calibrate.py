@@ -31,8 +31,9 @@ def calibrate(
     operator: Annotated[str, typer.Option(help="Who calibrates.")] = "",
     phantom_serial: Annotated[str, typer.Option(help="Serial number of the set of phantoms.")] = "",
     valid_days: Annotated[
-        float, typer.Option(help="Days from the first recording, 1-36500; a simulated probe does not age.")
-    ] = 365.0,
+        float | None,
+        typer.Option(help="Days from the first recording, 1-36500; 365, or of a simulated probe all of them."),
+    ] = None,
     model: Annotated[Path, typer.Option(help="Bundle the certificate is for.")] = MODEL,
     table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = TABLE,
     force_n: Annotated[float, typer.Option(help="Force the probe is pressed with.")] = 0.5,
@@ -40,8 +41,8 @@ def calibrate(
 ) -> None:
     """Fit the three regressions from image to deformation features and write the certificate, once.
 
-    Gates of number and spread of the phantoms, R2, leave-one-out error, dark level and saturation must all be passed;
-    otherwise nothing is written and the exit code is 1. An existing file is never replaced.
+    Gates of number, spread and age of the phantoms, R2, leave-one-out error, dark level and saturation must all be
+    passed; otherwise nothing is written and the exit code is 1. An existing file is never replaced.
     """
     from host_tools.calibrate import Provenance
     from host_tools.calibrate import calibrate as run_calibration
@@ -53,7 +54,7 @@ def calibrate(
             ModelBundle.load(model),
             load_surface_table(table),
             force_n=force_n,
-            provenance=Provenance(operator, phantom_serial, valid_days),
+            provenance=Provenance(operator, phantom_serial, valid_days=valid_days),
         )
     except CalibrationRejected as rejection:
         if not as_json:

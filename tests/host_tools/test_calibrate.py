@@ -105,15 +105,41 @@ def test_all_that_is_wrong_with_the_recordings_is_told_at_once(recordings, bundl
     assert found == ["truth", "mean force", "mean force", "mean force", "serial", "phantom recordings"]
 
 
-def test_the_certificate_says_from_where_it_comes_and_how_long_it_holds(recordings, bundle, table):
-    stated = Provenance("N. N.", "PH-3", valid_days=100.0)
-    aged = [changed(recording, started_at=f"2027-03-0{i + 1}T12:00:00Z") for i, recording in enumerate(recordings)]
-    certificate, gates = calibrate(aged, bundle, table, force_n=0.5, provenance=stated)
-    assert (certificate.operator, certificate.phantom_serial) == ("N. N.", "PH-3")
+MADE_AT = "2027-05-01T12:00:00Z"
+
+
+@pytest.fixture
+def real(recordings):
+    """As if a real probe had recorded them, a day after the other."""
+    return [
+        changed(recording, started_at=f"2027-03-0{i + 1}T12:00:00Z", simulated=False)
+        for i, recording in enumerate(recordings)
+    ]
+
+
+def test_the_certificate_says_from_where_it_comes_and_how_long_it_holds(real, bundle, table):
+    stated = Provenance("N. N.", "PH-3", MADE_AT, valid_days=100.0)
+    certificate, gates = calibrate(real, bundle, table, force_n=0.5, provenance=stated)
+    assert (certificate.operator, certificate.phantom_serial, certificate.made_at) == ("N. N.", "PH-3", MADE_AT)
     assert certificate.validity == Validity("2027-03-01T12:00:00Z", "2027-06-09T12:00:00Z")
-    assert (certificate.camera, certificate.cell) == (aged[0].camera, aged[0].cell)
+    assert (certificate.camera, certificate.cell) == (real[0].camera, real[0].cell)
     assert certificate.software_sha256 == source_sha256()
     assert all(gate.problem is None for gate in gates)
+
+
+def test_a_real_probe_is_calibrated_for_a_year_and_a_simulated_one_for_a_hundred(recordings, real, bundle, table):
+    found = [
+        calibrate(all_of, bundle, table, force_n=0.5, provenance=Provenance(made_at=MADE_AT)).certificate.validity
+        for all_of in (real, recordings)
+    ]
+    assert [one.expires_at for one in found] == ["2028-02-29T12:00:00Z", "2069-12-07T00:00:00Z"]
+
+
+@pytest.mark.parametrize("made_at", ["2028-02-29T12:00:00Z", "2027-02-28T11:59:59Z"])
+def test_recordings_that_are_too_old_or_still_to_come_give_no_certificate(real, bundle, table, made_at):
+    with pytest.raises(CalibrationRejected) as rejection:
+        calibrate(real, bundle, table, force_n=0.5, provenance=Provenance(made_at=made_at))
+    assert [problem.quantity for problem in rejection.value.problems] == ["age of the oldest recording"]
 
 
 def test_exchanged_truths_are_rejected_by_name_of_the_feature(recordings, bundle, table):
