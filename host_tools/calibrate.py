@@ -23,6 +23,7 @@ from device.measurement.intervals import HeldOut
 from device.measurement.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
+from device.measurement.untouched_face import UntouchedFace
 from device.measurement.validity import VALID_DAYS, Validity, moment, written
 from device.simulation.surface_table import SurfaceTable
 from host_tools.calibration_gates import (
@@ -77,6 +78,16 @@ class Fit(NamedTuple):
     features: Array
 
 
+class Measured(NamedTuple):
+    """What phantom recordings measure, once it has passed its gates."""
+
+    made_at: str
+    validity: Validity
+    untouched: UntouchedFace
+    fit: Fit
+    gates: tuple[Gate, ...]
+
+
 def calibrate(
     recordings: Sequence[Recording],
     bundle: ModelBundle,
@@ -91,26 +102,15 @@ def calibrate(
     Raises `CalibrationRejected`, an `InvalidQuantity`, with everything that the recordings do not hold.
     """
     stated = provenance or Provenance()
-    problems = unusable(recordings, force_n)
-    if problems or len(recordings) < PHANTOMS_NEEDED:
-        require_all([number_gate(recordings)], problems)
-    first, untouched = recordings[0], untouched_face(recordings)
-    made_at = stated.made_at or written(datetime.now(UTC))
-    validity = _validity(recordings, stated.valid_days)
-    assert first.cell is not None  # `unusable` has refused it otherwise
     settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
-    fit = _fit(recordings, settings, force_n)
-    gates = (
-        *recording_gates(recordings, untouched),
-        age_gate(validity, made_at),
-        *fit_gates(fit.lines, fit.features),
-    )
-    require_all(gates)
-    errors = scaled_errors(fit.residuals, fit.features[:, 0])
+    measured = _measured(recordings, settings, force_n, stated)
+    errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
+    first = recordings[0]
+    assert first.cell is not None  # `unusable` has refused it otherwise
     certificate = Calibration(
         id="",
-        made_at=made_at,
-        validity=validity,
+        made_at=measured.made_at,
+        validity=measured.validity,
         operator=stated.operator,
         serial=first.serial,
         phantom_serial=stated.phantom_serial,
@@ -119,16 +119,33 @@ def calibrate(
         force_n=force_n,
         camera=first.camera,
         cell=first.cell,
-        untouched=untouched,
+        untouched=measured.untouched,
         settings=settings,
-        regressions=fit.lines,
+        regressions=measured.fit.lines,
         phantoms=len(recordings),
         held_out=held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed),
         software=__version__,
         software_sha256=source_sha256(),
         simulated=any(recording.simulated for recording in recordings),
     )
-    return Calibrated(replace(certificate, id=certificate_id(certificate)), gates)
+    return Calibrated(replace(certificate, id=certificate_id(certificate)), measured.gates)
+
+
+def _measured(
+    recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, stated: Provenance
+) -> Measured:
+    """Return what the recordings measure; raise `CalibrationRejected` when that is not good enough."""
+    problems = unusable(recordings, force_n)
+    if problems or len(recordings) < PHANTOMS_NEEDED:
+        require_all([number_gate(recordings)], problems)
+    made_at = stated.made_at or written(datetime.now(UTC))
+    validity = _validity(recordings, stated.valid_days)
+    untouched = untouched_face(recordings)
+    fit = _fit(recordings, settings, force_n)
+    of_recordings = recording_gates(recordings, untouched)
+    gates = (*of_recordings, age_gate(validity, made_at), *fit_gates(fit.lines, fit.features))
+    require_all(gates)
+    return Measured(made_at, validity, untouched, fit, gates)
 
 
 def _validity(recordings: Sequence[Recording], valid_days: float | None) -> Validity:

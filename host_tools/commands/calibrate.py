@@ -61,13 +61,19 @@ def calibrate(
             raise
         print(json.dumps({"accepted": False, "problems": [_problem(one) for one in rejection.problems]}))
         raise typer.Exit(1) from rejection
-    path = out if out.suffix == ".json" else out / f"{done.certificate.id}.json"
-    _require_new(path)
-    write_once(path, done.certificate.to_json().encode())
+    path = _issue(done, out)
     if as_json:
         print(json.dumps(_record(done, path)))
     else:
         _show(done, path)
+
+
+def _issue(done: Calibrated, out: Path) -> Path:
+    """Write the certificate under the name that is asked for, or its own, and return its path."""
+    path = out if out.suffix == ".json" else out / f"{done.certificate.id}.json"
+    _require_new(path)
+    write_once(path, done.certificate.to_json().encode())
+    return path
 
 
 def _require_new(path: Path) -> None:
