@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from device.config import Config
-from device.errors import ConfigError, ModelError
+from device.errors import ConfigError, MissingCalibration, ModelError
 from device.instrument.procedure import Estimator
 from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
@@ -54,17 +54,19 @@ class Answers(NamedTuple):
         return Answers(self.modes, estimator, prove)
 
 
-def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
-    """Return what a probe can answer.
+def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+    """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
     models = with_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
-    return Answers(
-        models.modes,
-        lambda recording, mode: models.estimate(recording, mode, calibration),
-        lambda: _prove(models),
-    )
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        if calibration is None:
+            raise MissingCalibration("The probe is not calibrated.", "Calibrate it and activate the certificate.")
+        return models.estimate(recording, mode, calibration)
+
+    return Answers(models.modes, estimate, lambda: _prove(models))
 
 
 def _prove(models: ModeModels) -> None:

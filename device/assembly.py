@@ -16,19 +16,21 @@ from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
-from device.config import Config
+from device.certificate import active_calibration
+from device.config import SIMULATED_PROBE, Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.instrument.bench import Bench
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
 from device.instrument.progress import ProgressBoard
-from device.measurement.calibration import Calibration, read_calibration
+from device.measurement.calibration import Calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
@@ -109,9 +111,8 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
     config = replace(commissioned(config), model=bundles.folder(config.model))
     parts.open(lambda: _require_own_serial(config, scenario))
-    table_folder = config.calibration.parent
     shape = config.camera.height_px, config.camera.width_px
-    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, config.camera.scale))
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, config.camera.scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
@@ -157,7 +158,7 @@ def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureReques
         gain=exposure.gain,
         frame_number=exposure.frame_number,
         wet_ratio=faults.wet_ratio(exposure.t_s),
-        ambient_ratio=faults.ambient_ratio(exposure.t_s),
+        ambient_ratio=faults.ambient_ratio(exposure.t_s) + faults.stray_ratio(exposure.led_ratio, exposure.t_s),
     )
 
 
@@ -193,8 +194,9 @@ def _procedure(
     progress = ProgressBoard()
     force = parts.open(lambda: tared(config, cell, progress)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
-    calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
-    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle and calibration else None
+    watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
+    calibration = watch.calibration if watch else None
+    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None
     store = parts.open(lambda: Store(config.data, disk))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.
@@ -202,7 +204,7 @@ def _procedure(
     assert camera is not None
     assert force is not None
     assert answers is not None
-    assert calibration is not None
+    assert watch is not None
     assert store is not None
     answers = answers.watched(progress, begin=partial(faults.hold_up, "inference_frozen"))
     progress.exercise("inference", answers.prove)
@@ -219,7 +221,7 @@ def _procedure(
         answers.estimator,
         store,
         modes=answers.modes,
-        calibration_id=calibration.id,
+        calibration=watch,
         opened=parts.opened,
         clock=clock,
         progress=progress,
@@ -228,20 +230,7 @@ def _procedure(
     )
 
 
-def _answers(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
+def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
     answers = answers_for(config, bundle, calibration)
     answers.require(config.press.mode)
     return answers
-
-
-def _calibration_for(config: Config, bundle: ModelBundle) -> Calibration:
-    """Return the certificate; raise `InvalidQuantity` when it is not for this probe, model, pixel size and force."""
-    calibration = read_calibration(config.calibration)
-    calibration.require_for(config.serial, bundle)
-    calibration.require_scale(config.camera.scale)
-    if not calibration.holds_at(config.press.target_n):
-        bound = f"{calibration.force_n:g} N as calibrated"
-        raise InvalidQuantity(
-            "press.target_n", config.press.target_n, bound, "set that force, or calibrate with this one"
-        )
-    return calibration

@@ -19,6 +19,7 @@ from device.settings.light_section import LightSection
 from device.settings.setting import Conflict, Section, conflict, setting
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
+SIMULATED_PROBE = MODELS / "simulated_probe"
 CellProtocol = Literal["openscale", "mantracourt"]
 
 
@@ -168,7 +169,10 @@ class Config(Section):
         MODELS / "standard",
         "Folder of the model of modes standard and precise, offered where it is installed and for this probe.",
     )
-    calibration: Path = setting(Path("/var/lib/tsis/calibration.json"), "Calibration certificate of this probe.")
+    calibration: Path = setting(
+        Path("/var/lib/tsis/calibrations"),
+        "Folder of this probe's certificates, of which one is active; or one certificate, NAME.json.",
+    )
     data: Path = setting(Path("/var/lib/tsis"), "Folder of measurements and recordings.")
     camera: CameraSection = field(default_factory=CameraSection)
     light: LightSection = field(default_factory=LightSection)
@@ -201,5 +205,5 @@ def simulated_config(serial: str = "SIM-0001") -> Config:
     Only the paper's regressions can be had for the paper's light.
     """
     certificate, mode = SIMULATED.get(serial, SIMULATED["SIM-0001"])
-    calibration = MODELS / "simulated_probe" / certificate
+    calibration = SIMULATED_PROBE / certificate
     return Config(serial=serial, calibration=calibration, data=Path("var"), press=PressSection(mode=mode))

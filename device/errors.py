@@ -238,11 +238,64 @@ class DetachedCellError(LoadCellError):
 
 
 class ModelError(DeviceError):
-    """A model bundle or calibration is missing, tampered with, or not made for this probe."""
+    """A model bundle is missing, tampered with, or not made for this probe."""
 
     code = "E401"
     title = "Model refused"
     status = 503
+
+
+class MissingCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """No calibration certificate is active, or the one that is named is not there or was changed."""
+
+    code = "E402"
+    title = "Not calibrated"
+
+
+class ForeignCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration is for another probe, model, pixel size, exposure, force or load cell."""
+
+    code = "E403"
+    title = "Calibration of another probe"
+
+
+class ExpiredCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration has expired; nothing is measured until another is activated."""
+
+    code = "E404"
+    title = "Calibration has expired"
+
+
+class SlightDriftError(ModelError):
+    """The untouched face looks otherwise than at the calibration; it is measured still."""
+
+    code = "E405"
+    title = "Face has changed slightly"
+    severity = "warning"
+    is_lasting = True
+
+
+class LargeDriftError(ModelError):
+    """The untouched face looks so different from the calibration's that nothing is measured."""
+
+    code = "E406"
+    title = "Face has changed too much"
+
+
+class CalibrationEndsSoon(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration expires within a month."""
+
+    code = "E407"
+    title = "Calibration expires soon"
+    severity = "warning"
+    is_lasting = True
+
+
+class ClockBehindError(ModelError):
+    """The wall clock is before the calibration was made: whether that has expired cannot be told."""
+
+    code = "E408"
+    title = "Clock before calibration"
 
 
 class NoContrastError(DeviceError):

@@ -19,6 +19,7 @@ from device.config import Config
 from device.errors import BusyError, DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
 from device.instrument.brightness_loop import BrightnessLoop
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.capture import POLL_S, CalledAway, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
@@ -59,7 +60,7 @@ class Procedure:
         store: Store,
         *,
         modes: tuple[Mode, ...],
-        calibration_id: str,
+        calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
         progress: ProgressBoard | None = None,
@@ -71,9 +72,9 @@ class Procedure:
         `folder_of` says where an installed model lies.
         """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
-        self.modes = modes
+        self.modes, self.calibration = modes, calibration
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
-        self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
+        self._estimator, self._truth = estimator, simulated_truth
         self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
@@ -163,8 +164,11 @@ class Procedure:
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
         self._warn(self._clock.warning())
+        self.calibration.require_valid(self._clock.now())
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
+        self.calibration.require_no_drift(unloaded)
+        self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
             self.board.update(step="ready", guidance=guidance, fault=None)
@@ -242,7 +246,7 @@ class Procedure:
             frames,
             self.config,
             started_at=started_at,
-            calibration_id=self._calibration_id,
+            calibration_id=self.calibration.id,
             simulated_truth=self._truth,
         )
 

@@ -31,6 +31,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "led_swapped": ("side", "other_side"),
     "ambient_light": ("ratio",),
     "wet_face": ("ratio",),
+    "dirty_face": ("ratio",),
     "cell_silent": (),
     "cell_garbage": (),
     "cell_saturated": (),
@@ -53,7 +54,7 @@ REQUIRED = {
     "led_swapped": ("side", "other_side"),
     "clock_jump": ("step_s",),
 }
-DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0}
+DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0, "dirty_face": 0.03}
 I2C_ERRNO = {"i2c_nack": 121, "i2c_stuck": errno.ETIMEDOUT}
 """What Linux answers: EREMOTEIO (121; macOS does not name it) for no acknowledgement, ETIMEDOUT for a line held low."""
 ACTION = "describe one fault"
@@ -66,8 +67,8 @@ class Fault:
 
     `from_s` and `until_s` count from the start of the simulation, or with `from_press` = n from the n-th press that
     was requested. `side`: of one LED, all four without; `other_side`: whose plug it has (led_swapped). `ratio`: light
-    that is left (led_dimmed), added light in units of full light (ambient_light), part of the face that is wet
-    (wet_face). `step_s`: by how much the wall clock is off.
+    that is left (led_dimmed), added light in units of full light (ambient_light, and dirty_face with all LEDs full),
+    part of the face that is wet (wet_face). `step_s`: by how much the wall clock is off.
     """
 
     kind: str
@@ -155,6 +156,10 @@ class FaultTimeline:
     def ambient_ratio(self, t_s: float) -> float:
         """Return the foreign light on every pixel, in units of full light, at a time."""
         return sum(fault.strength for fault in self._active("ambient_light", t_s))
+
+    def stray_ratio(self, led_ratio: LedRatio, t_s: float) -> float:
+        """Return the light on every pixel, in units of full light, that dirt on the face lets out of the waveguide."""
+        return sum(fault.strength for fault in self._active("dirty_face", t_s)) * sum(led_ratio) / len(led_ratio)
 
     def wet_ratio(self, t_s: float) -> float:
         """Return which part of the face is wet (0..1) at a time: there the image no longer depends on the press."""

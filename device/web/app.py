@@ -18,6 +18,7 @@ from device.instrument.press_cost import press_cost
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.job import SelfTestJob
 from device.measurement.mode import Mode
+from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
@@ -82,6 +83,13 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
             "default_mode": config.press.mode,
             "modes": [asdict(press_cost(mode, config)) for mode in procedure.modes],
         }
+
+    @app.get(f"{API}/calibrations")
+    def calibrations() -> dict[str, Any]:
+        """Return the certificates there are, which is active, and which the daemon started with."""
+        known = Calibrations(procedure.config.calibration)
+        entries = [{"id": one.name, **one.as_record()} for one in known.all()]
+        return {"active": known.active_name(), "in_use": procedure.calibration.id or None, "calibrations": entries}
 
     @app.get(f"{API}/health/live")
     def live() -> dict[str, str]:

@@ -19,7 +19,7 @@ from daemon_process import ROOT
 
 from device.assembly import StartFailed, open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
-from device.errors import DeviceError
+from device.errors import DeviceError, MissingCalibration
 from device.instrument import bench, force_recorder, procedure, watchdog
 from device.instrument.light_check import level_counts
 from device.instrument.procedure import Procedure
@@ -100,8 +100,10 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
             replace(fault, from_s=TIME_RATIO * fault.from_s, until_s=TIME_RATIO * fault.until_s)
             for fault in scenario.faults
         )
+        own = {"serial": scenario.serial, "calibration": simulated_config(scenario.serial).calibration}
         hand = replace(QUICK_HAND, tremor_n=scenario.hand.tremor_n)
-        opened = open_simulated_probe(replace(config, **settings), replace(scenario, hand=hand, faults=faults))
+        quick = replace(scenario, hand=hand, faults=faults)
+        opened = open_simulated_probe(replace(config, **(own | settings)), quick)
         opened.start()
         watching = Watchdog(opened.progress, opened.board, RestartNote(tmp_path))
         watching.start()
@@ -123,7 +125,7 @@ def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(p
                 device.press()
             device.until(lambda: scenario.expects in device.codes())
             if all(fault.until_s < float("inf") for fault in scenario.faults):
-                device.until(lambda: device.board.now.step == "ready")
+                device.until(device.is_ready)
                 device.procedure.require_ready()
     except StartFailed as refusal:
         refused = {fault.code for fault in refusal.faults}
@@ -166,6 +168,14 @@ def test_a_probe_without_a_fault_raises_none(running):
         device.press()
         assert device.board.now.press.state == "done"
         assert device.codes() == set()
+
+
+def test_a_probe_that_was_never_calibrated_runs_and_takes_no_press(running, tmp_path):
+    (tmp_path / "calibrations").mkdir()
+    with running(Scenario(), calibration=tmp_path / "calibrations") as device:
+        device.until(lambda: "E402" in device.codes())
+        with pytest.raises(MissingCalibration, match="no certificate is active"):
+            device.procedure.request()
 
 
 def test_every_kind_of_fault_has_a_scenario():

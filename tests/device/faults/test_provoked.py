@@ -19,6 +19,10 @@ PROVOKED_BY = {
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
     "E210": "device/instrument/test_brightness_loop.py::"
     "test_a_side_at_full_brightness_that_misses_its_share_is_warned_of_by_name",
+    "E402": "device/test_scenarios.py::test_a_probe_that_was_never_calibrated_runs_and_takes_no_press",
+    "E403": "device/test_device_command_line.py::test_a_certificate_of_another_probe_keeps_the_probe_from_starting",
+    "E407": "device/instrument/test_calibration_watch.py::"
+    "test_the_last_month_is_warned_of_and_the_warning_ends_with_it",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",

@@ -5,13 +5,16 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from small_certificate import small_certificate
 
 from device.config import CameraSection, Config, PressSection
 from device.errors import (
     BusyError,
+    CalibrationEndsSoon,
     CameraError,
     ClockJumpError,
     DiskFullError,
+    ExpiredCalibration,
     LastGoodConfigError,
     LightError,
     ModeUnavailable,
@@ -19,6 +22,7 @@ from device.errors import (
     UnknownResource,
 )
 from device.instrument import procedure as procedure_module
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
@@ -27,8 +31,12 @@ from device.instrument.self_test.result import Result
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Frame
+from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import Validity
 from device.records.store import ENDED, Store
 
+AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
+DARK_FACE = UntouchedFace(4.0, (0.0, 0.0, 0.0, 0.0), 0.0, 60.0, 0.6)
 CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(timeout_s=5.0))
 ANSWER = Estimate(
     *[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {"total": 1.0}
@@ -80,7 +88,7 @@ class Rig:
             self.estimate,
             self.store,
             modes=("paper", "quick", "standard"),
-            calibration_id="c",
+            calibration=CalibrationWatch(small_certificate(validity=AGELESS, untouched=DARK_FACE)),
             opened=opened,
             simulated_truth=Inclusion(10.0, 5.0, 80.0),
         )
@@ -211,7 +219,8 @@ def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig)
     rig.press()
     [recording] = seen
     assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 14, 10]
-    assert (recording.serial, recording.calibration_id, recording.simulated) == ("TSIS-0000", "c", True)
+    assert (recording.serial, recording.simulated) == ("TSIS-0000", True)
+    assert recording.calibration_id == rig.procedure.calibration.id
 
 
 def test_a_press_is_taken_and_estimated_in_the_mode_that_was_asked_for(rig):
@@ -398,11 +407,13 @@ def test_closing_in_the_middle_of_a_press_says_how_it_ended(tmp_path):
     rig.store.close()
 
 
-def test_the_settings_of_the_camera_are_in_the_recording(rig):
+def test_the_settings_of_camera_and_load_cell_are_in_the_recording(rig):
     seen = []
-    rig.estimator = lambda recording: seen.append(recording.camera) or ANSWER
+    rig.estimator = lambda recording: seen.append(recording) or ANSWER
     rig.press()
-    assert (seen[0].width_px, seen[0].height_px, seen[0].exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+    camera, cell = seen[0].camera, seen[0].cell
+    assert (camera.width_px, camera.height_px, camera.exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+    assert (cell.counts_per_n, cell.tare_counts) == (CONFIG.cell.sensitivity_counts_per_n, None)
 
 
 def test_a_press_that_is_asked_for_while_the_probe_fails_ends_with_the_fault(rig, monkeypatch):
@@ -525,3 +536,29 @@ def test_a_weight_that_cannot_be_measured_is_refused(rig, weight_n):
     """Contact is 0.05 N, and the cell bears 5 N."""
     with pytest.raises(InvalidQuantity, match="weight_n"):
         rig.procedure.request_self_test(weight_n=weight_n)
+
+
+def test_a_probe_whose_certificate_has_expired_runs_and_says_so_and_takes_no_press(rig, monkeypatch):
+    expired = ExpiredCalibration("The calibration has expired.", "Calibrate the probe.")
+
+    def require_valid(now):
+        raise expired
+
+    with monkeypatch.context() as later:
+        later.setattr(rig.procedure.calibration, "require_valid", require_valid)
+        rig.press()
+        rig.until(lambda: rig.board.now.fault is expired)
+        with pytest.raises(ExpiredCalibration):
+            rig.procedure.request()
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.press()["state"] == "done"
+
+
+def test_warnings_of_the_certificate_are_told_with_every_press_until_they_are_over(rig):
+    warning = CalibrationEndsSoon("The calibration expires soon.", "Calibrate the probe.")
+    rig.procedure.calibration.warned = lambda others: (warning,)
+    rig.press()
+    assert [rig.press()["warnings"] for _ in range(2)] == [[warning.as_record()]] * 2
+    rig.procedure.calibration.warned = lambda others: ()
+    rig.press()
+    assert rig.press()["warnings"] == []

@@ -81,6 +81,13 @@ def test_foreign_light_adds_up_and_the_wettest_counts(clock):
     assert (timeline.ambient_ratio(101.0), timeline.wet_ratio(101.0)) == pytest.approx((0.3, 0.7))
 
 
+def test_dirt_lets_out_light_only_of_leds_that_are_on(clock):
+    timeline = FaultTimeline([Fault("dirty_face", ratio=0.2)], clock=clock)
+    assert timeline.stray_ratio((0.5, 0.5, 0.0, 0.0), 100.5) == pytest.approx(0.05)
+    assert timeline.stray_ratio((0.0,) * 4, 100.5) == 0.0
+    assert NO_FAULTS.stray_ratio((1.0,) * 4, 100.5) == 0.0
+
+
 def test_a_clock_that_jumped_shows_another_time_and_the_monotonic_clock_does_not(clock):
     faults = [Fault("clock_jump", step_s=-3600.0, from_s=2.0, until_s=4.0)]
     timeline = FaultTimeline(faults, clock=clock, wall_clock=lambda: 5000.0)
