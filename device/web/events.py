@@ -36,6 +36,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "serial": procedure.config.serial,
         "software": __version__,
         "step": status.step,
+        "press_state": status.state.code,
         "guidance": {"code": status.guidance.code, "text": status.guidance.text},
         "force_n": force_n,
         "mode": mode,

@@ -58,8 +58,14 @@ class ObedientBench:
         light = sum(self.ratio) * self.brightness if self.latest_n else 0.0
         return Frame(np.full((64, 64), 4 + round(100 * light), np.uint8), role, 0.0, self.latest_n, self.ratio)
 
-    def is_steady(self, t_s, steady_n):
-        return True
+    def range_n(self, t_s, *, around_line):
+        return 0.0
+
+    def rate_n_per_s(self, t_s):
+        return 0.0
+
+    def peak_n(self, since_s, t_s):
+        return self.latest_n
 
     def close(self):
         self.is_closed = True
