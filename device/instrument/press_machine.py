@@ -171,8 +171,8 @@ class Press:
         if self.replaced < MAX_REPLACED:
             return self._to(PressState.HOLDING, replaced=self.replaced + 1)
         return self.reject(
-            f"More than {MAX_REPLACED} frames were unlike the others, the last by {deviation_ratio:.0%} of the light: "
-            "shade the probe, hold it still, and press again."
+            f"More than {MAX_REPLACED} frames were unlike the others, the last by {deviation_ratio:.0%}: "
+            "shade the probe and hold still."
         )
 
     def hold(self, spot_mm: tuple[float, float] | None, rules: PressRules) -> Press:
@@ -252,6 +252,6 @@ def off_centre(spot_mm: tuple[float, float], max_offset_mm: float) -> str:
         if abs(part) >= max(abs(x_mm), abs(y_mm)) / 2
     ]
     return (
-        f"The lump lies {hypot(x_mm, y_mm):.1f} mm off the middle of the face, above {max_offset_mm:g} mm: "
-        f"move the probe towards {' and '.join(towards)}, and press again."
+        f"The lump lies {hypot(x_mm, y_mm):.1f} mm off the middle, above {max_offset_mm:g} mm: "
+        f"move the probe towards {' and '.join(towards)}."
     )

@@ -386,7 +386,7 @@ def test_a_hold_in_which_frames_are_unlike_the_others_again_and_again_is_rejecte
     """Every second frame; the five that may be taken again are not enough."""
     capture = capture_of(0.1, 0.5, brighter=dict.fromkeys(range(4, 99, 2), 1.3))
     monkeypatch.setitem(FRAMES, "paper", Frames(10, is_ramp=False))
-    with pytest.raises(PressEnded, match="More than 5 frames were unlike the others, the last by 30% of the light"):
+    with pytest.raises(PressEnded, match="More than 5 frames were unlike the others, the last by 30%: shade"):
         capture.loaded("press", "paper")
 
 

@@ -194,17 +194,17 @@ def test_frames_that_are_unlike_the_others_are_taken_again_a_few_times():
         assert press.state is PressState.HOLDING
     rejected = press.replace_frame(0.3)
     assert rejected.state is PressState.REJECTED
-    assert "More than 5 frames were unlike the others, the last by 30% of the light" in rejected.reason
+    assert "More than 5 frames were unlike the others, the last by 30%: shade" in rejected.reason
 
 
 @pytest.mark.parametrize(
     ("spot_mm", "towards"),
-    [((3.0, 0.5), "+x,"), ((-3.0, 1.0), "-x,"), ((0.0, 2.6), "+y,"), ((1.0, -4.0), "-y,"), ((2.0, -2.0), "+x and -y,")],
+    [((3.0, 0.5), "+x."), ((-3.0, 1.0), "-x."), ((0.0, 2.6), "+y."), ((1.0, -4.0), "-y."), ((2.0, -2.0), "+x and -y.")],
 )
 def test_a_lump_off_the_middle_ends_the_press_and_says_where_to_go(spot_mm, towards):
     rejected = after(0.5).hold(spot_mm, RULES)
     assert rejected.state is PressState.REJECTED
-    assert f"above 2.5 mm: move the probe towards {towards} and press again" in rejected.reason
+    assert f"above 2.5 mm: move the probe towards {towards}" in rejected.reason
 
 
 def test_a_lump_near_enough_to_the_middle_and_one_that_is_not_seen_are_measured():

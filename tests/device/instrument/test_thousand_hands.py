@@ -74,7 +74,7 @@ def test_no_bad_press_is_accepted_and_each_says_why(presses):
     [
         ("too hard", "above 1.00 N: lift and press more gently"),
         ("never reaching", "stayed below 0.47 N|force came to 0"),
-        ("off-centre", "off the middle of the face"),
+        ("off-centre", "off the middle"),
         ("lifts early", "lifted|force came to 0|stayed below|not steady"),
         ("double", "lifted|force came to 0|stayed below|not steady"),
     ],
