@@ -17,7 +17,7 @@ from device.errors import DeviceError
 from device.hardware.interfaces import CameraFrame
 from device.instrument import bench as bench_module
 from device.instrument import capture as capture_module
-from device.instrument.bench import Bench
+from device.instrument.bench import DARK, Bench
 from device.instrument.capture import Capture, PressEnded
 from device.instrument.force_recorder import force_range_n
 from device.instrument.light_budget import LightBudget
@@ -153,5 +153,6 @@ def _measure(capture: Capture, budget: LightBudget, probe: SimulatedTimeProbe, m
     capture.lifted()
     press = capture.loaded("press", mode)
     capture.release()
+    capture.bench.light(DARK)
     capture.done()
     return [*reference, *press]

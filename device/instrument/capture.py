@@ -156,12 +156,12 @@ class Capture:
         return tuple(levels)
 
     def release(self) -> None:
-        """Let the hand lift: every frame is there. The light goes off."""
+        """Let the hand lift: every frame is there."""
         self._become(self.machine.release(time.monotonic()))
-        self.bench.light(DARK)
 
     def lifted(self) -> None:
         """Return once the probe touches nothing between the two presses; raises `PressEnded` as `loaded` does."""
+        self.bench.light(DARK)
         while (force_n := self.bench.force.latest_n) >= self.press.contact_n:
             self._require_going_on()
             self._become(self.machine.wait(time.monotonic(), force_n, self.press))

@@ -11,6 +11,7 @@ from math import hypot
 from typing import Any, Literal
 
 from device.config import PressSection
+from device.instrument.press_reasons import off_centre, too_hard
 from device.instrument.press_state import ACTIVE, SEEING, TOUCHING, TRANSITIONS, IllegalTransition, PressState
 from device.measurement.estimate import SATURATED_RATIO
 from device.measurement.tactile_image import Role
@@ -119,12 +120,12 @@ class Press:
 
     def begin(self, role: Role, t_s: float) -> Press:
         """Return the press as it begins, beside the lesion or, once the probe is lifted, on it."""
-        self._require((PressState.IDLE, PressState.RELEASING))
+        self._require((PressState.IDLE, PressState.RELEASING), "begin")
         return replace(Press(self.state), role=role, contact_s=t_s)._to(PressState.APPROACH)
 
     def see(self, seen: Observation, rules: PressRules) -> Press:
         """Return the press after a frame of the capture."""
-        self._require(SEEING)
+        self._require(SEEING, "take a frame")
         if seen.peak_n > rules.overload_n:
             return self.reject(too_hard(seen.peak_n, rules.overload_n))
         if self.touched_s is not None and seen.t_s - self.touched_s > rules.timeout_s:
@@ -167,7 +168,7 @@ class Press:
 
     def replace_frame(self, deviation_ratio: float) -> Press:
         """Return the press after a frame of it was dropped that was unlike the others by that part of the light."""
-        self._require(TOUCHING)
+        self._require(TOUCHING, "replace a frame")
         if self.replaced < MAX_REPLACED:
             return self._to(PressState.HOLDING, replaced=self.replaced + 1)
         return self.reject(
@@ -180,14 +181,14 @@ class Press:
 
         None without a lump that stands out, and beside the lesion.
         """
-        self._require(TOUCHING)
+        self._require(TOUCHING, "have its frames")
         if spot_mm is not None and hypot(*spot_mm) > rules.max_offset_mm:
             return self.reject(off_centre(spot_mm, rules.max_offset_mm))
         return self._to(PressState.HOLDING)
 
     def check(self, seen: Observation, press: PressSection) -> Press:
         """Return the press after a frame by which each side's light is looked at while the hand holds."""
-        self._require((PressState.HOLDING,))
+        self._require((PressState.HOLDING,), "look at its light")
         if seen.peak_n > press.overload_n:
             return self.reject(too_hard(seen.peak_n, press.overload_n))
         if seen.force_n < CHECKED_RATIO * press.target_n:
@@ -200,7 +201,7 @@ class Press:
 
     def wait(self, t_s: float, force_n: float, press: PressSection) -> Press:
         """Return the press while the hand is to lift; it has lifted when the force is below `contact_n`."""
-        self._require((PressState.RELEASING,))
+        self._require((PressState.RELEASING,), "wait")
         if force_n >= press.contact_n and t_s - self.contact_s > press.timeout_s:
             return self.reject(f"The probe was not lifted for {press.timeout_s:.0f} s: begin again.")
         return self
@@ -211,7 +212,7 @@ class Press:
 
     def reject(self, reason: str, ending: Ending = "rejected") -> Press:
         """Return the press ended without a measurement, from any state in which one is under way."""
-        self._require(ACTIVE)
+        self._require(ACTIVE, "be ended")
         return self._to(PressState.REJECTED, ending=ending, reason=reason)
 
     def _why_so_long(self, seen: Observation, rules: PressRules) -> str:
@@ -228,30 +229,11 @@ class Press:
             f"and the force came to {self.peak_n:.2f} N."
         )
 
-    def _require(self, states: tuple[PressState, ...]) -> None:
+    def _require(self, states: tuple[PressState, ...], step: str) -> None:
         if self.state not in states:
-            raise IllegalTransition(self.state, states[0])
+            raise IllegalTransition(self.state, step)
 
     def _to(self, state: PressState, **changes: Any) -> Press:
         if state not in TRANSITIONS[self.state]:
-            raise IllegalTransition(self.state, state)
+            raise IllegalTransition(self.state, f"become {state.code}")
         return replace(self, state=state, **changes)
-
-
-def too_hard(force_n: float, overload_n: float) -> str:
-    """Return why a force is too much."""
-    return f"The force rose to {force_n:.2f} N, above {overload_n:.2f} N: lift and press more gently."
-
-
-def off_centre(spot_mm: tuple[float, float], max_offset_mm: float) -> str:
-    """Return how far off the middle a lump is, and where the probe has to go: +x is right, +y is down in the image."""
-    x_mm, y_mm = spot_mm
-    towards = [
-        f"{'+' if part > 0 else '-'}{axis}"
-        for axis, part in (("x", x_mm), ("y", y_mm))
-        if abs(part) >= max(abs(x_mm), abs(y_mm)) / 2
-    ]
-    return (
-        f"The lump lies {hypot(x_mm, y_mm):.1f} mm off the middle, above {max_offset_mm:g} mm: "
-        f"move the probe towards {' and '.join(towards)}."
-    )

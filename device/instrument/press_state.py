@@ -58,7 +58,5 @@ TRANSITIONS = _transitions()
 class IllegalTransition(RuntimeError):  # noqa: N818 - reads as what it says
     """The driver asked for a step that the table does not have: a mistake in the program, never in a press."""
 
-    def __init__(self, before: PressState, after: PressState) -> None:
-        super().__init__(
-            f"A press that is {before.code} cannot become {after.code}; see device/instrument/press_state.py."
-        )
+    def __init__(self, state: PressState, step: str) -> None:
+        super().__init__(f"A press that is {state.code} cannot {step}; see device/instrument/press_state.py.")

@@ -158,7 +158,8 @@ class Procedure:
             self._set_job(job, state="capturing", progress=0.5)
             self.board.update(step="lesion")
             press = self._capture.loaded("press", job.mode)
-            self._release()
+            self._capture.release()
+            self._darken()
             self.board.update(step="computing", guidance=Guidance.LIFT)
             self._warn(self._clock.warning())
             self._set_job(job, state="computing", progress=0.9)
@@ -179,13 +180,6 @@ class Procedure:
         seconds = self.bench.budget.unsaved_s
         self.store.add_light_on_s(seconds)
         self.bench.budget.note_saved(seconds)
-
-    def _release(self) -> None:
-        """Let the hand lift after the last frame: a light that then fails costs no measurement."""
-        try:
-            self._capture.release()
-        except LightError as error:
-            log.error("%s %s", error.code, error)
 
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self._capture.end(reason)

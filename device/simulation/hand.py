@@ -103,10 +103,8 @@ class Move:
     def steady_n(self, t_s: float) -> float:
         """Return the force on the way from one to the other, at a limited rate, and after that."""
         gap_n = self.aim_n - self.from_n
-        step_n, held_s = (
-            self.rate_n_per_s * max(t_s - self.since_s, 0.0),
-            t_s - self.since_s - abs(gap_n) / self.rate_n_per_s,
-        )
+        step_n = self.rate_n_per_s * max(t_s - self.since_s, 0.0)
+        held_s = t_s - self.since_s - abs(gap_n) / self.rate_n_per_s
         if held_s <= 0.0:
             return self.from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
         beyond_n = self.overshoot_n * held_s / OVERSHOOT_S * math.exp(1 - held_s / OVERSHOOT_S)
