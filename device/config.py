@@ -111,6 +111,11 @@ class PressSection(Section):
         "A ramp's force may not change faster, or it would not be known at the exposure.",
         Bound(0.05, 5.0, "N/s"),
     )
+    max_offset_mm: float = setting(
+        2.5,
+        "A lump whose bright spot lies further off the middle of the face is off-centre: the press is rejected.",
+        Bound(0.5, 30.0, "mm"),
+    )
     timeout_s: float = setting(60.0, "A press that takes longer is given up.", Bound(1.0, 3600.0, "s"))
 
     def conflicts(self) -> Iterator[Conflict]:

@@ -9,6 +9,7 @@ from device.hardware.interfaces import Camera, CameraFrame, Lights
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
 from device.instrument.light_budget import LightBudget
+from device.instrument.press_machine import STEADY_WINDOW_S
 from device.instrument.progress import ProgressBoard
 from device.measurement.tactile_image import Frame, LedRatio, Role
 
@@ -16,7 +17,6 @@ DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
 FRAME_TIMEOUT_S = 1.0
 LATE_S = 0.1
 """Three frames of 30 Hz."""
-STEADY_WINDOW_S = 0.15
 
 
 @dataclass
@@ -100,9 +100,13 @@ class Bench:
         self._acknowledged_s(self._light)
         self._is_known = True
 
-    def is_steady(self, t_s: float, steady_n: float) -> bool:
-        """Return whether the force hardly varied just before a time: a ramp through the band is no hold."""
-        return self.force.range_n(t_s, window_s=STEADY_WINDOW_S) <= steady_n
+    def range_n(self, t_s: float, *, around_line: bool) -> float:
+        """Return by how much the force varied just before a time, or on a ramp around it: a ramp is no hold."""
+        return self.force.range_n(t_s, window_s=STEADY_WINDOW_S, around_line=around_line)
+
+    def peak_n(self, since_s: float, t_s: float) -> float:
+        """Return the largest force of the samples after one time and until another, and of the latter itself."""
+        return self.force.peak_n(since_s, t_s)
 
     def rate_n_per_s(self, t_s: float) -> float:
         """Return how fast the force grew just before a time, tremor averaged out; negative while the hand eases."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,6 +21,16 @@ from device.instrument.progress import ProgressBoard
 KEPT_SAMPLES = 1000
 SILENCE_S = 1.0
 RETRY_S = 0.2
+
+
+def force_range_n(samples: Sequence[tuple[float, float]], *, around_line: bool) -> Newtons:
+    """Return by how much the forces of one or more samples (s, N) vary, or what their straight line leaves of it."""
+    if not around_line:
+        return Newtons(max(force for _, force in samples) - min(force for _, force in samples))
+    times, forces = np.array(samples).T
+    centred = times - times.mean()
+    slope = float(centred @ forces) / max(float(centred @ centred), 1e-12)
+    return Newtons(float(np.ptp(forces - slope * centred)))
 
 
 class ForceRecorder:
@@ -102,11 +113,20 @@ class ForceRecorder:
         """Return how far the tare of this start is from that of commissioning."""
         return self._limit.commissioned.newtons(self._scale.tare_counts)
 
-    def range_n(self, t_s: float, *, window_s: float) -> Newtons:
-        """Return by how much the force varied in a window that ends at a time."""
+    def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
+        """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""
         with self._news:
-            inside = [force for t, force in self._samples if t_s - window_s <= t <= t_s]
-        return Newtons(max(inside) - min(inside) if inside else float("inf"))
+            inside = [(t - t_s, force) for t, force in self._samples if t_s - window_s <= t <= t_s]
+        return force_range_n(inside, around_line=around_line) if inside else Newtons(float("inf"))
+
+    def peak_n(self, since_s: float, t_s: float) -> Newtons:
+        """Return the largest force of the samples after one time and until another, and of that time itself.
+
+        Waits for a later sample and raises `LoadCellError` as `at` does.
+        """
+        at_the_end = self.at(t_s)
+        with self._news:
+            return max([at_the_end, *(force for t, force in self._samples if since_s < t <= t_s)])
 
     def close(self) -> None:
         """Stop the thread and release the cell."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from device.instrument.press_state import PressState
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.tactile_image import Role
 
@@ -42,10 +43,11 @@ def before_contact(role: Role, mode: Mode) -> Guidance:
     return Guidance.TOUCH_LESION if is_ramp else Guidance.PRESS_LESION
 
 
-def advise(force_n: float, band_n: tuple[float, float]) -> Guidance:
-    """Return what to do at a force of the touching probe: press harder, lighter, or hold still inside the band."""
-    if force_n < band_n[0]:
-        return Guidance.PRESS_HARDER
-    if force_n > band_n[1]:
-        return Guidance.PRESS_LIGHTER
-    return Guidance.HOLD_STILL
+HELD_GUIDANCE = {
+    PressState.TOO_LIGHT: Guidance.PRESS_HARDER,
+    PressState.TOO_HARD: Guidance.PRESS_LIGHTER,
+    PressState.UNSTEADY: Guidance.HOLD_STILL,
+    PressState.HOLDING: Guidance.HOLD_STILL,
+    PressState.CAPTURING: Guidance.HOLD_STILL,
+}
+"""What to do in each state of a hold; a ramp's guidance depends on the forces that are still wanted, too."""

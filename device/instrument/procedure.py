@@ -26,6 +26,7 @@ from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
 from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
+from device.instrument.press_state import PressState
 from device.instrument.progress import ProgressBoard
 from device.instrument.self_test.job import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
@@ -171,7 +172,7 @@ class Procedure:
         self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
-            self.board.update(step="ready", guidance=guidance, fault=None)
+            self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
         job = self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S)
         if job:
             self._measure(job, unloaded)
@@ -190,6 +191,7 @@ class Procedure:
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
         started_at = self._clock.now()
         self.bench.budget.begin_press()
+        self._capture.clear()
         try:
             self._set_job(job, state="capturing", progress=0.1)
             self.board.update(step="reference", measurement_id=None)
@@ -197,11 +199,13 @@ class Procedure:
             levels = self._capture.side_levels(reference)
             self._warn(self._dimming.warning(levels))
             self._warn(self._brightness.saw(levels))
+            self._capture.release()
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)
             self.board.update(step="lesion")
             press = self._capture.loaded("press", job.mode)
+            self._capture.release()
             self._darken()
             self.board.update(step="computing", guidance=Guidance.LIFT)
             self._warn(self._clock.warning())
@@ -214,6 +218,7 @@ class Procedure:
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
         else:
+            self._capture.done()
             # The screen first: whoever is told that the press has ended finds its result there.
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
             self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
@@ -224,6 +229,7 @@ class Procedure:
         self.bench.budget.note_saved(seconds)
 
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
+        self._capture.end(reason)
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
         self._set_job(job, state=state, reason=reason, code=code)
 
@@ -258,6 +264,7 @@ class Procedure:
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:
             log.error("%s %s", error.code, error)
+        self._capture.end(str(error), "failed")
         # The fault first: whoever is told that the press has ended finds out why.
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
         self._fail_press(error)

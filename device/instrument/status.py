@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from device.errors import DeviceError
 from device.instrument.guidance import Guidance
+from device.instrument.press_state import PressState
 from device.instrument.self_test.job import SelfTestJob
 from device.measurement.mode import Mode
 
@@ -43,11 +44,13 @@ class PressJob:
 class Status:
     """One moment of the procedure.
 
-    `wanted_n`: forces at which the press under way still wants frames. `warnings`: those of the last press, or of the
-    time since, and the lasting ones. `stall`: a part that makes no progress, by the watchdog's thread.
+    `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
+    frames. `warnings`: those of the last press, or of the time since, and the lasting ones. `stall`: a part that makes
+    no progress, by the watchdog's thread.
     """
 
     step: Step = "starting"
+    state: PressState = PressState.IDLE
     guidance: Guidance = Guidance.WAIT
     frames_taken: int = 0
     wanted_n: tuple[float, ...] = ()

@@ -38,6 +38,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "serial": procedure.config.serial,
         "software": __version__,
         "step": step,
+        "press_state": status.state.code,
         "guidance": {"code": guidance.code, "text": guidance.text},
         "force_n": force_n,
         "mode": mode,

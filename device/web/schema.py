@@ -5,15 +5,20 @@ Answers are described, not filtered: fields are only ever added within v1, so a 
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
 from device.faults.table import FaultCode
+from device.instrument.press_state import PressState
 from device.instrument.self_test.job import SelfTestState
 from device.instrument.self_test.result import Verdict
 from device.instrument.status import JobState, Step
 from device.measurement.mode import Mode
+
+PressStateCode = StrEnum("PressStateCode", [(state.name, state.code) for state in PressState])  # type: ignore[misc]
+"""Every state of a press. (The type check cannot see members that a table makes.)"""
 
 
 class _Body(BaseModel):
@@ -105,6 +110,7 @@ class Status(_Body):
     serial: str
     software: str
     step: Step
+    press_state: PressStateCode
     guidance: GuidanceLine
     force_n: float | None
     mode: Mode

@@ -134,6 +134,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe_with_
     expect(page.locator("#instruction")).to_have_text("Press slowly harder")
     wanted = page.locator("#force-wanted span")
     expect(page.locator("#frames")).to_have_text(re.compile("[3-7] of 10 frames"))
+    expect(page.locator("#press-state")).to_have_text("capturing")
     assert 0 < wanted.count() < 10
     _shoot(page, "ramp")
     _require_fits(page)

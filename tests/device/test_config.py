@@ -60,6 +60,7 @@ BOUNDS = [
     ("press.steady_n", 0.001, 1.0),
     ("press.overload_n", 0.72, 50.0),  # 1.2 times the largest force of a ramp
     ("press.max_rate_n_per_s", 0.05, 5.0),
+    ("press.max_offset_mm", 0.5, 30.0),
     ("press.timeout_s", 1.0, 3600.0),
     ("store.min_free_mb", 1.0, 1e6),
     ("clock.max_jump_s", 0.1, 3600.0),

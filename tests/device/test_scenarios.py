@@ -39,8 +39,6 @@ SELF_TEST_FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) 
 TIME_RATIO = 0.4
 QUICK_HAND = HandSettings(rate_n_per_s=1.5, ramp_rate_n_per_s=0.4, reaction_s=0.05)
 QUICK_PRESS = PressSection(max_rate_n_per_s=0.6)
-SHORTER_LIMITS = {"E209": {"light": LightSection(max_on_s=3.0)}}
-"""For faults that take minutes: nobody waits 300 s for a light that is on for too long."""
 LONGEST_WAIT_S = 20.0
 
 
@@ -120,7 +118,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
 def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(path, running):
     scenario, refused = read_scenario(path), set()
     try:
-        with running(scenario, **SHORTER_LIMITS.get(scenario.expects, {})) as device:
+        with running(scenario) as device:
             for _ in range(max((fault.from_press for fault in scenario.faults), default=1)):
                 device.press()
             device.until(lambda: scenario.expects in device.codes())
@@ -217,6 +215,16 @@ def test_a_probe_with_the_other_led_chip_measures_without_a_fault(running):
     with running(Scenario(), **pca9685) as device:
         device.press()
         assert device.board.now.press.state == "done"
+        assert device.codes() == set()
+
+
+def test_a_hand_that_trembles_is_rejected_with_the_reason_and_no_fault(running):
+    trembling = read_scenario(ROOT / "scenarios" / "hand_trembling.toml")
+    with running(trembling, press=replace(QUICK_PRESS, timeout_s=3.0)) as device:
+        device.press()
+        press = device.board.now.press
+        assert (press.state, press.code) == ("rejected", None)
+        assert "was not steady" in press.reason
         assert device.codes() == set()
 
 

@@ -97,6 +97,7 @@ function showProgress() {
   const cells = byId("frame-cells");
   panel.style.setProperty("--progress", pressUnderWay() ? status.press.progress : 0);
   setText(byId("frames"), `${taken} of ${needed} frames`);
+  setText(byId("press-state"), pressUnderWay() ? status.press_state.replaceAll("_", " ") : "");
   if (cells.childElementCount !== needed) {
     cells.replaceChildren(...Array.from({ length: needed }, () => element("span", "")));
   }

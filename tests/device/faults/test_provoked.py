@@ -17,6 +17,8 @@ PROVOKED_BY = {
     "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
+    "E209": "device/test_scenarios.py::"
+    "test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_recovers",
     "E210": "device/instrument/test_brightness_loop.py::"
     "test_a_side_at_full_brightness_that_misses_its_share_is_warned_of_by_name",
     "E402": "device/test_scenarios.py::test_a_probe_that_was_never_calibrated_runs_and_takes_no_press",

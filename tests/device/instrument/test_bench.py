@@ -20,7 +20,7 @@ class FakeHardware:
     """Lights, camera and force in one: acknowledges light at 10.0 s, exposes 4 ms frames every 0.1 s."""
 
     def __init__(self):
-        self.log, self.range = [], 0.01
+        self.log = []
 
     def set_ratio(self, ratio):
         self.log.append(ratio)
@@ -37,8 +37,11 @@ class FakeHardware:
     def at(self, t_s):
         return t_s / 100
 
-    def range_n(self, t_s, *, window_s):
-        return self.range
+    def range_n(self, t_s, *, window_s, around_line):
+        return {(0.15, False): 0.01, (0.15, True): 0.003}[window_s, around_line]
+
+    def peak_n(self, since_s, t_s):
+        return (since_s + t_s) / 2
 
 
 @pytest.fixture
@@ -78,10 +81,11 @@ def test_light_that_is_on_already_is_not_set_again(bench, hardware):
     assert hardware.log == [DARK, LIT, DARK]
 
 
-@pytest.mark.parametrize(("range_n", "is_steady"), [(0.02, True), (0.0201, False), (float("inf"), False)])
-def test_a_force_that_varied_more_than_allowed_is_not_steady(bench, hardware, range_n, is_steady):
-    hardware.range = range_n
-    assert bench.is_steady(10.0, 0.02) is is_steady
+def test_range_and_peak_are_those_of_the_recorded_force(bench):
+    """The range is that of the window just before; the peak is asked for from frame to frame."""
+    assert bench.range_n(10.0, around_line=False) == 0.01
+    assert bench.range_n(10.0, around_line=True) == 0.003
+    assert bench.peak_n(9.0, 10.0) == 9.5
 
 
 def test_the_rate_is_that_of_the_force_just_before(bench):

@@ -25,6 +25,7 @@ from device.instrument import procedure as procedure_module
 from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
+from device.instrument.press_state import PressState
 from device.instrument.procedure import Procedure
 from device.instrument.progress import ProgressBoard
 from device.instrument.self_test.result import Result
@@ -68,8 +69,14 @@ class ObedientBench:
         light = sum(self.ratio) * self.brightness if self.latest_n else 0.0
         return Frame(np.full((64, 64), 4 + round(100 * light), np.uint8), role, 0.0, self.latest_n, self.ratio)
 
-    def is_steady(self, t_s, steady_n):
-        return True
+    def range_n(self, t_s, *, around_line):
+        return 0.0
+
+    def rate_n_per_s(self, t_s):
+        return 0.0
+
+    def peak_n(self, since_s, t_s):
+        return self.latest_n
 
     def close(self):
         self.is_closed = True
@@ -145,6 +152,30 @@ def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
     assert rig.store.recording_folder(kept["recording_id"]).is_dir()
     steps = [Guidance.HOLD_STILL, Guidance.LIFT, Guidance.PRESS_LESION, Guidance.HOLD_STILL, Guidance.LIFT]
     assert [guidance for guidance in told if guidance is not Guidance.PRESS_BESIDE][:6] == [*steps, Guidance.DONE]
+
+
+def test_the_board_tells_the_state_of_the_press_until_the_next_one(rig):
+    states = []
+    rig.estimator = lambda recording: states.append(rig.board.now.state) or ANSWER
+    assert rig.board.now.state is PressState.IDLE
+    rig.press()
+    assert (states, rig.board.now.state) == ([PressState.RELEASING], PressState.DONE)
+    rig.is_away = True
+    job = rig.procedure.request()
+    rig.until(lambda: rig.board.now.state is PressState.APPROACH)
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.board.now.state is PressState.REJECTED)
+    assert rig.board.now.frames_taken == 0
+
+
+def test_a_fault_ends_the_press_in_whatever_state_it_is_and_the_next_finds_an_idle_probe(rig):
+    seen = []
+    rig.board.on_guidance(lambda guidance: guidance is Guidance.FAULT and seen.append(rig.board.now.state))
+    rig.bench.breaks = [CameraError("No frame came.", "Check the ribbon cable.")]
+    rig.press()
+    assert seen == [PressState.REJECTED]
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.board.now.state is PressState.IDLE
 
 
 def test_the_light_is_off_while_the_result_is_computed(rig):

@@ -7,6 +7,7 @@ import pytest
 from device.config import PressSection
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
 from device.instrument.guidance import Guidance
+from device.instrument.press_state import PressState
 from device.instrument.status import PressJob, Status
 from device.web import schema
 from device.web.events import snapshot
@@ -85,6 +86,11 @@ def test_a_ramp_has_the_forces_at_which_frames_are_still_wanted(told):
     assert status["wanted_n"] == (0.6,)
     reference = told(Status(step="reference", press=job, wanted_n=(0.62,)), Force())
     assert reference["band_n"] == pytest.approx((0.06, 0.62))
+
+
+def test_the_state_of_the_press_is_told_by_its_code(told):
+    assert told(Status(), Force())["press_state"] == "idle"
+    assert told(Status(state=PressState.TOO_HARD), Force())["press_state"] == "too_hard"
 
 
 def test_before_a_press_the_mode_is_that_of_the_settings(told):

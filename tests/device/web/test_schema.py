@@ -6,6 +6,7 @@ import pytest
 
 from device.errors import LightError
 from device.faults.table import FAULTS
+from device.instrument.press_state import PressState
 from device.instrument.status import PressJob
 from device.web.app import create_app
 from device.web.schema import Press
@@ -27,6 +28,12 @@ def test_the_codes_of_faults_and_presses_are_of_the_enumeration(schema):
     assert models["Fault"]["properties"]["code"]["$ref"] == CODES
     assert models["Press"]["properties"]["code"]["anyOf"] == [{"$ref": CODES}, {"type": "null"}]
     assert models["Status"]["properties"]["faults"]["items"]["$ref"] == "#/components/schemas/Fault"
+
+
+def test_the_states_of_a_press_are_an_enumeration(schema):
+    models = schema["components"]["schemas"]
+    assert models["PressStateCode"]["enum"] == [state.code for state in PressState]
+    assert models["Status"]["properties"]["press_state"]["$ref"] == "#/components/schemas/PressStateCode"
 
 
 def test_every_route_may_answer_with_a_problem_of_the_enumeration(schema):
