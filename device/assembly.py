@@ -12,10 +12,10 @@ from functools import partial
 from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
+from device.camera_assembly import emulated_camera, real_camera
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
-from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.instrument.bench import Bench
@@ -30,6 +30,7 @@ from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
+from device.simulation.camera_server import CameraServer
 from device.simulation.faults import FaultTimeline
 from device.simulation.full_disk import EmulatedDisk
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
@@ -77,22 +78,11 @@ class _Parts:
             raise StartFailed(self.faults)
 
 
-def _camera_settings(config: Config) -> dict[str, Any]:
-    camera = config.camera
-    return {
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "exposure_us": camera.exposure_us,
-        "gain": camera.gain,
-        "frame_rate_hz": camera.frame_rate_hz,
-    }
-
-
 def open_probe(config: Config) -> Procedure:
     """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
     parts = _Parts()
     lights = parts.open(lambda: open_led_driver(config.light))
-    camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
+    camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
     return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
 
@@ -108,18 +98,21 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
-    picam2 = VirtualPicamera2(
+    open_picam2 = partial(
+        VirtualPicamera2,
         partial(_render, probe, faults),
         width_px=config.camera.width_px,
         height_px=config.camera.height_px,
         led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
         faults=faults,
     )
+    server = CameraServer(open_picam2)
+    parts.opened.callback(server.close)
     line = emulated_amplifier(config, probe, faults)
     parts.opened.callback(line.close)
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
     lights = parts.open(lambda: led_driver(config.light, bus))
-    camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
+    camera = parts.open(lambda: emulated_camera(config.camera, server.address))
     cell = parts.open(lambda: open_cell(config, line.device_path))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
     procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)

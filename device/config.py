@@ -36,6 +36,9 @@ class CameraSection(Section):
     gain: float = setting(1.0, "Analogue gain of every frame.", Bound(1.0, 16.0, ""))
     frame_rate_hz: float = setting(30.0, "Frames a second.", Bound(1.0, 240.0, "Hz"))
     index: int = setting(0, "Number of the camera on this board.", Bound(0, 99, ""))
+    max_restarts: int = setting(
+        5, "How often in a minute the camera's process, when it hung or died, is started again.", Bound(0, 100, "")
+    )
     late_frames: float = setting(
         3.0, "A frame begun this long after it was asked for is late.", Bound(1.5, 100.0, "frame times")
     )

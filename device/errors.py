@@ -9,7 +9,8 @@ DeviceError
 │   └── LastGoodConfigError  E002  the settings files are bad, the last good ones are used (a warning)
 ├── CameraError              E101  no frame, or a frame of the wrong shape
 │   ├── LateFrameError       E102  the camera leaves out most of its frames
-│   └── TornFrameError       E103  frames are put together from two exposures
+│   ├── TornFrameError       E103  frames are put together from two exposures
+│   └── CameraProcessError   E104  the camera's process hung or died; it is restarted, but not for ever
 ├── LightError               E201  the LED chip does not answer or does not hold what was written
 │   ├── LightBusError        E202  the I2C bus is stuck
 │   ├── DarkSideError        E203  a side gives no light although its register is set
@@ -54,6 +55,10 @@ class DeviceError(Exception):
         self.cause, self.remedy = cause, remedy
         super().__init__(f"{cause} {remedy}")
 
+    def __reduce__(self) -> tuple[type[DeviceError], tuple[str, str]]:
+        """Carry the error to another process: an exception alone forgets what it was made of."""
+        return type(self), (self.cause, self.remedy)
+
     def as_record(self) -> dict[str, str]:
         """Return the error as the JSON object of the status and of a press."""
         return {"code": self.code, "severity": self.severity, "cause": self.cause, "remedy": self.remedy}
@@ -90,6 +95,12 @@ class TornFrameError(CameraError):
     """Frames are put together from two exposures, again and again."""
 
     code = "E103"
+
+
+class CameraProcessError(CameraError):
+    """The camera's process hung or died; it is started again a few times."""
+
+    code = "E104"
 
 
 class LightError(DeviceError):

@@ -20,6 +20,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_stall": (),
     "camera_late": (),
     "camera_torn": (),
+    "camera_hung": (),
+    "camera_crashed": (),
     "i2c_nack": (),
     "i2c_stuck": (),
     "led_dead": ("side",),

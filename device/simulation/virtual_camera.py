@@ -33,6 +33,12 @@ GAIN_STEP = 1 / 16
 LONGEST_FRAME_US = 1_000_000
 LATE_CAMERA_KEEPS_EVERY = 10
 """A camera that leaves out frames delivers those whose number is a multiple of this."""
+LOOK_EVERY_S = 0.01
+"""How soon a call that hangs notices that the fault is over."""
+
+
+class CameraCrash(Exception):  # noqa: N818 - the camera's library ends its process without a word
+    """Here the process that called the camera's library dies."""
 
 
 class VirtualPicamera2:
@@ -141,6 +147,10 @@ class VirtualPicamera2:
         Blocks while the camera is stopped or all buffers are out; after `wait` seconds raises a bare `TimeoutError`
         and leaves its job behind, which keeps a buffer until `cancel_all_and_flush`.
         """
+        if self._faults.is_active("camera_crashed"):
+            raise CameraCrash
+        while self._faults.is_active("camera_hung"):  # whatever `wait` says
+            time.sleep(LOOK_EVERY_S)
         deadline_ns = math.inf if wait is None else time.monotonic_ns() + 1e9 * wait
         with self._changed:
             self._changed.wait_for(self._is_flowing, wait)
