@@ -18,6 +18,7 @@ from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
+from device.hardware.raw_mode import RAW_BITS
 from device.instrument.bench import Bench
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.frame_check import FramePace
@@ -93,16 +94,18 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
     parts.open(lambda: _require_own_serial(config, scenario))
     table_folder = config.calibration.parent
-    shape = config.camera.height_px, config.camera.width_px
-    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, config.camera.scale))
+    width_px, height_px = config.camera.raw_mode.sensor_px
+    shape, scale = (height_px, width_px), config.camera.sensor_scale
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
     open_picam2 = partial(
         VirtualPicamera2,
         partial(_render, probe, faults),
-        width_px=config.camera.width_px,
-        height_px=config.camera.height_px,
+        width_px=width_px,
+        height_px=height_px,
+        raw_formats=(config.camera.raw_format,),
         led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
         faults=faults,
     )
@@ -128,8 +131,10 @@ def _require_own_serial(config: Config, scenario: Scenario) -> None:
             f"serial is {config.serial}, but the simulated probe with {scenario.light} light is {scenario.serial}.",
             "Correct the setting, and its calibration with it.",
         )
-    if scenario.sensor.bits != 8:
-        raise ConfigError(f"sensor.bits is {scenario.sensor.bits}, but the daemon's camera takes 8.", "Set it to 8.")
+    bits, raw_format = scenario.sensor.bits, config.camera.raw_format
+    if bits != RAW_BITS[raw_format]:
+        cause = f"The scene's sensor.bits is {bits}, but camera.raw_format is {raw_format}."
+        raise ConfigError(cause, "Correct one of them.")
 
 
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:

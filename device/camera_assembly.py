@@ -45,8 +45,7 @@ def _in_its_process(opener: CameraOpener, settings: CameraSection) -> CameraProc
 
 def _driver_settings(settings: CameraSection) -> dict[str, Any]:
     return {
-        "width_px": settings.width_px,
-        "height_px": settings.height_px,
+        "mode": settings.raw_mode,
         "exposure_us": settings.exposure_us,
         "gain": settings.gain,
         "frame_rate_hz": settings.frame_rate_hz,
