@@ -10,7 +10,8 @@ DeviceError
 ├── CameraError              E101  no frame, or a frame of the wrong shape
 │   ├── LateFrameError       E102  the camera leaves out most of its frames
 │   ├── TornFrameError       E103  frames are put together from two exposures
-│   └── CameraProcessError   E104  the camera's process hung or died; it is restarted, but not for ever
+│   ├── CameraProcessError   E104  the camera's process hung or died; it is restarted, but not for ever
+│   └── StaleFrameError      E105  a frame shows the light from before it was changed
 ├── LightError               E201  the LED chip does not answer or does not hold what was written
 │   ├── LightBusError        E202  the I2C bus is stuck
 │   ├── DarkSideError        E203  a side gives no light although its register is set
@@ -101,6 +102,12 @@ class CameraProcessError(CameraError):
     """The camera's process hung or died; it is started again a few times."""
 
     code = "E104"
+
+
+class StaleFrameError(CameraError):
+    """A frame shows the light from before it was changed, although it is said to have begun after that."""
+
+    code = "E105"
 
 
 class LightError(DeviceError):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from device.hardware.interfaces import Camera, Lights
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
+from device.instrument.frame_level import LevelWatch
 from device.instrument.light_budget import LightBudget
 from device.measurement.tactile_image import Frame, LedRatio, Role
 
@@ -27,6 +28,7 @@ class Bench:
     force: ForceRecorder
     pace: FramePace = field(default_factory=lambda: FramePace(LATE_S))
     budget: LightBudget = field(default_factory=LightBudget)
+    levels: LevelWatch = field(default_factory=LevelWatch)
     _light: LedRatio = DARK
     _not_before_s: float = 0.0
 
@@ -53,14 +55,17 @@ class Bench:
     def take(self, role: Role) -> Frame:
         """Return the next frame under the present light, with the force in the middle of its exposure.
 
-        Raises `CameraError` when none comes or most are left out, `LoadCellError` when its force is not known.
+        Raises `CameraError` when none comes, most are left out or one shows another light, `LoadCellError` when its
+        force is not known.
         """
         asked_s = max(time.monotonic(), self._not_before_s)
         taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
         self.pace.saw(asked_s, taken.exposure_start_s)
         self._not_before_s = taken.exposure_start_s + 1e-6
         middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
-        return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        frame = Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        self.levels.saw(frame)
+        return frame
 
     def is_steady(self, t_s: float, steady_n: float) -> bool:
         """Return whether the force hardly varied just before a time: a ramp through the band is no hold."""

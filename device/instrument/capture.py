@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from device.config import Config
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import TearWatch
+from device.instrument.frame_level import require_lit
 from device.instrument.guidance import before_contact
 from device.instrument.hold_frames import TOUCH_RATIO, HoldFrames
 from device.instrument.light_check import (
@@ -61,7 +62,8 @@ class Capture:
             time.sleep(POLL_S)
         self.bench.check_lights()
         dark = self._agreeing("dark", DARK)
-        require_dark(dark[-1], self.light.max_dark_counts)
+        for frame in dark:
+            require_dark(frame, self.light.max_dark_counts)
         self._dark_counts = level_counts(dark[-1])
         lit = self._agreeing("reference", self.lit)
         self.bench.light(DARK)
@@ -71,8 +73,8 @@ class Capture:
         """Return the frames of one press, as many as the mode needs.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
-        depend on it, `OpenLedError` or `HotLedDriverError` when the light fails before it,
-        `LightBudgetError` when it was on for too long.
+        depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
+        light fails before it, `LightBudgetError` when it was on for too long.
         """
         wanted, begin = self._wanted(role, mode), before_contact(role, mode)
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
@@ -92,6 +94,7 @@ class Capture:
                 guidance = begin
                 wanted.begin_again()
             self.board.update(guidance=guidance, frames_taken=len(wanted.frames), wanted_n=wanted.wanted_n)
+        require_lit(wanted.frames, self._dark_counts)
         if seen := wanted.light_and_hard():
             require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
         return wanted.frames

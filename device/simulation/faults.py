@@ -20,6 +20,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_stall": (),
     "camera_late": (),
     "camera_torn": (),
+    "camera_stale": (),
     "camera_hung": (),
     "camera_crashed": (),
     "i2c_nack": (),

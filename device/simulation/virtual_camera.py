@@ -171,7 +171,7 @@ class VirtualPicamera2:
             with self._changed:
                 self._abandoned_jobs += 1
             raise TimeoutError
-        return VirtualRequest(self, self._exposure(frame), frame, self._torn_into(frame))
+        return VirtualRequest(self, self._exposure(self._shown_in(frame)), frame, self._torn_into(frame))
 
     def cancel_all_and_flush(self) -> None:
         """Drop the jobs that timed-out captures left behind."""
@@ -214,6 +214,11 @@ class VirtualPicamera2:
         if self._faults.is_active("camera_late", start_s) and frame.number % LATE_CAMERA_KEEPS_EVERY:
             return False
         return not self._faults.is_active("camera_stall", start_s)
+
+    def _shown_in(self, frame: ClockedFrame) -> ClockedFrame:
+        """Return the frame whose exposure is delivered as that of `frame`: the one before when the camera is stale."""
+        is_stale = frame.number > 0 and self._faults.is_active("camera_stale", 1e-9 * frame.exposure_start_ns)
+        return frame.clock.frame(frame.number - 1) if is_stale else frame
 
     def _torn_into(self, frame: ClockedFrame) -> ExposureRequest | None:
         """Return the exposure that the lower rows of a torn frame show, or None when it is whole."""

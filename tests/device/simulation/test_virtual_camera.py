@@ -220,6 +220,21 @@ def test_the_time_stamps_of_a_late_camera_skip_frames():
     assert (skipped > 0).all()
 
 
+def test_a_stale_frame_is_the_exposure_before_under_its_own_time_stamp():
+    """The light is the time: what it was at the start of the exposure that is shown, one frame too early."""
+    exposures: list[ExposureRequest] = []
+
+    def remember(exposure: ExposureRequest) -> np.ndarray:
+        exposures.append(exposure)
+        return np.zeros((32, 64), np.uint8)
+
+    camera = camera_with(Fault("camera_stale"), remember)
+    request = camera.capture_request(flush=time.monotonic_ns() + 3000 * FRAME_US, wait=1.0)
+    request.make_array("raw")
+    begun_s = 1e-9 * request.get_metadata()["SensorTimestamp"] - 1e-6 * EXPOSURE_US
+    assert exposures[0].led_ratio[0] == pytest.approx(begun_s - 1e-6 * FRAME_US)
+
+
 def test_the_lower_half_of_a_torn_frame_is_the_exposure_before():
     def frame_number(exposure: ExposureRequest) -> np.ndarray:
         return np.full((32, 64), exposure.frame_number, np.uint8)
