@@ -1,6 +1,6 @@
 """Cameras for a process of their own, which misbehave on command; as a program, a daemon that has one open.
 
-`python scripted_camera.py` opens a camera that hangs, prints the number of its process, and waits for a frame.
+`python scripted_camera.py` opens a camera that hangs, prints its process's number and memory, and waits for a frame.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import signal
 import sys
 import threading
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -66,7 +67,13 @@ def scripted_process(max_restarts: int = 3, **script: int) -> CameraProcess:
     return CameraProcess(partial(ScriptedCamera, **script), shape=SHAPE, limit=RestartLimit(max_restarts, 60.0))
 
 
+def memory_of(camera: CameraProcess) -> Path:
+    """Where the shared memory would be seen if it still had its name."""
+    assert camera._child
+    return Path("/dev/shm") / camera._child._ring.name.lstrip("/")
+
+
 if __name__ == "__main__":
     camera = scripted_process(hangs_at=1)
-    print(camera.pid, flush=True)
+    print(camera.pid, memory_of(camera), flush=True)
     camera.capture(begun_after_s=0.0, timeout_s=600.0)

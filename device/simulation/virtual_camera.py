@@ -132,9 +132,9 @@ class VirtualPicamera2:
                 self._clock.change(max(0, under_way) + CONTROL_DELAY_FRAMES, self._timing())
 
     def start(self) -> None:
-        """Start the frame clock."""
+        """Start the frame clock; a camera that was not configured takes a configuration of its own."""
         if self._configuration is None:
-            raise RuntimeError("Camera has not been configured")
+            self.configure(self.create_video_configuration())
         with self._changed:
             if self._clock is None:
                 self._clock = FrameClock(time.monotonic_ns(), self._timing())

@@ -13,15 +13,13 @@ import numpy as np
 import pytest
 import scripted_camera
 from daemon_process import ROOT
-from scripted_camera import SHAPE, scripted_process
+from scripted_camera import SHAPE, memory_of, scripted_process
 
 from device.errors import CameraError, CameraProcessError, LateFrameError
 from device.hardware import camera_child
 from device.hardware.camera_process import CameraProcess
 from device.hardware.restart_limit import RestartLimit
 from device.measurement.quantities import InvalidQuantity
-
-SHARED_MEMORY = Path("/dev/shm")
 
 
 @pytest.fixture
@@ -139,12 +137,11 @@ def test_a_process_that_does_not_end_by_itself_is_killed_at_the_end(monkeypatch,
 
 
 def test_a_closed_camera_has_no_process_no_memory_and_gives_no_frame(opened):
-    before = set(SHARED_MEMORY.iterdir())
     camera = opened()
-    pid = camera.pid
+    pid, memory = camera.pid, memory_of(camera)
     level(camera)
-    assert set(SHARED_MEMORY.iterdir()) <= before
     camera.close()
+    assert not memory.exists()
     assert not is_running(pid)
     with pytest.raises(CameraError, match="is closed"):
         level(camera)
@@ -166,12 +163,12 @@ def program(*arguments: str) -> subprocess.Popen[str]:
 
 def test_a_daemon_that_is_killed_leaves_no_camera_process_and_no_memory_behind():
     """The pipes of its output end only with the last process that has them, here one that hangs in the camera."""
-    before = set(SHARED_MEMORY.iterdir())
     with program(str(ROOT / "tests" / "scripted_camera.py")) as daemon:
-        assert int(daemon.stdout.readline()) != daemon.pid
+        pid, memory = daemon.stdout.readline().split()
+        assert int(pid) != daemon.pid
         daemon.kill()
         assert daemon.communicate(timeout=60) == ("", "")
-    assert set(SHARED_MEMORY.iterdir()) <= before
+    assert not Path(memory).exists()
 
 
 def test_a_daemon_that_ends_well_leaves_no_warning_of_leaked_memory():
