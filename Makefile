@@ -5,10 +5,10 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test check bench verify sweep train evaluate modes lock clean
+.PHONY: help setup run test test-camera-virtual check bench verify sweep train evaluate modes lock clean
 
 help: ## list the verbs
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
 
 .venv/bin/python:
 	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: install python3."; exit 1; }
@@ -31,6 +31,9 @@ run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCEN
 
 test: .venv/all.stamp ## run all tests
 	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile
+
+test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian chroot under build (root, 1.7 GB)
+	tests/libcamera/run.sh build/trixie
 
 check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 	.venv/bin/ruff check .

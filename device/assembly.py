@@ -15,13 +15,14 @@ from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
+from device.camera_assembly import emulated_camera, real_camera
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
 from device.certificate import active_calibration
 from device.config import SIMULATED_PROBE, Config
 from device.errors import ConfigError, DeviceError, ModelError
-from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
+from device.hardware.raw_mode import RAW_BITS
 from device.instrument.bench import Bench
 from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.clock_watch import ClockWatch
@@ -36,6 +37,7 @@ from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
+from device.simulation.camera_server import CameraServer
 from device.simulation.emulated_bundles import EmulatedBundles
 from device.simulation.emulated_disk import EmulatedDisk
 from device.simulation.faults import NO_FAULTS, FaultTimeline
@@ -85,22 +87,11 @@ class _Parts:
             raise StartFailed(self.faults)
 
 
-def _camera_settings(config: Config) -> dict[str, Any]:
-    camera = config.camera
-    return {
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "exposure_us": camera.exposure_us,
-        "gain": camera.gain,
-        "frame_rate_hz": camera.frame_rate_hz,
-    }
-
-
 def open_probe(config: Config) -> Procedure:
     """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
     parts = _Parts()
     lights = parts.open(lambda: open_led_driver(config.light))
-    camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
+    camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
     return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
 
@@ -111,23 +102,28 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
     config = replace(commissioned(config), model=bundles.folder(config.model))
     parts.open(lambda: _require_own_serial(config, scenario))
-    shape = config.camera.height_px, config.camera.width_px
-    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, config.camera.scale))
+    width_px, height_px = config.camera.raw_mode.sensor_px
+    shape, scale = (height_px, width_px), config.camera.sensor_scale
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
-    picam2 = VirtualPicamera2(
+    open_picam2 = partial(
+        VirtualPicamera2,
         partial(_render, probe, faults),
-        width_px=config.camera.width_px,
-        height_px=config.camera.height_px,
+        width_px=width_px,
+        height_px=height_px,
+        raw_formats=(config.camera.raw_format,),
         led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
         faults=faults,
     )
+    server = CameraServer(open_picam2)
+    parts.opened.callback(server.close)
     line = emulated_amplifier(config, probe, faults)
     parts.opened.callback(line.close)
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
     lights = parts.open(lambda: led_driver(config.light, bus))
-    camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
+    camera = parts.open(lambda: emulated_camera(config.camera, server.address))
     cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
     procedure = _procedure(
@@ -145,8 +141,10 @@ def _require_own_serial(config: Config, scenario: Scenario) -> None:
             f"serial is {config.serial}, but the simulated probe with {scenario.light} light is {scenario.serial}.",
             "Correct the setting, and its calibration with it.",
         )
-    if scenario.sensor.bits != 8:
-        raise ConfigError(f"sensor.bits is {scenario.sensor.bits}, but the daemon's camera takes 8.", "Set it to 8.")
+    bits, raw_format = scenario.sensor.bits, config.camera.raw_format
+    if bits != RAW_BITS[raw_format]:
+        cause = f"The scene's sensor.bits is {bits}, but camera.raw_format is {raw_format}."
+        raise ConfigError(cause, "Correct one of them.")
 
 
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:

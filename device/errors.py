@@ -47,6 +47,10 @@ class DeviceError(Exception):
         self.cause, self.remedy = cause, remedy
         super().__init__(f"{cause} {remedy}")
 
+    def __reduce__(self) -> tuple[type[DeviceError], tuple[str, str]]:
+        """Carry the error to another process: an exception alone forgets what it was made of."""
+        return type(self), (self.cause, self.remedy)
+
     def as_record(self) -> dict[str, str]:
         """Return the error as the JSON object of the status and of a press."""
         told = {"cause": self.cause, "remedy": self.remedy}
@@ -112,6 +116,20 @@ class TornFrameError(CameraError):
 
     code = "E103"
     title = "Torn frames"
+
+
+class CameraProcessError(CameraError):
+    """The camera's process hung or died; it is started again a few times."""
+
+    code = "E104"
+    title = "Camera process ended"
+
+
+class StaleFrameError(CameraError):
+    """A frame shows the light from before it was changed, although it is said to have begun after that."""
+
+    code = "E105"
+    title = "Image of the light before"
 
 
 class LightError(DeviceError):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from device.hardware.interfaces import Camera, CameraFrame, Lights
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
+from device.instrument.frame_level import LevelWatch
 from device.instrument.light_budget import LightBudget
 from device.instrument.press_machine import STEADY_WINDOW_S
 from device.instrument.progress import ProgressBoard
@@ -29,6 +30,7 @@ class Bench:
     pace: FramePace = field(default_factory=lambda: FramePace(LATE_S))
     budget: LightBudget = field(default_factory=LightBudget)
     progress: ProgressBoard = field(default_factory=ProgressBoard)
+    levels: LevelWatch = field(default_factory=LevelWatch)
     _light: LedRatio = DARK
     _is_known: bool = False
     _not_before_s: float = 0.0
@@ -61,11 +63,14 @@ class Bench:
     def take(self, role: Role) -> Frame:
         """Return the next frame under the present light, with the force in the middle of its exposure.
 
-        Raises `CameraError` when none comes or most are left out, `LoadCellError` when its force is not known.
+        Raises `CameraError` when none comes, most are left out or one shows another light, `LoadCellError` when its
+        force is not known.
         """
         taken = self.expose()
         middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
-        return Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        frame = Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        self.levels.saw(frame)
+        return frame
 
     def expose(self) -> CameraFrame:
         """Return the next frame under the present light, whatever the force; raises `CameraError` as `take` does."""

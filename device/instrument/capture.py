@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from device.config import Config
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import TearWatch
+from device.instrument.frame_level import require_lit
 from device.instrument.guidance import before_contact
 from device.instrument.light_check import (
     Levels,
@@ -77,7 +78,8 @@ class Capture:
             time.sleep(POLL_S)
         self.bench.check_lights()
         dark = self._agreeing("dark", DARK)
-        require_dark(dark[-1], self.light.max_dark_counts)
+        for frame in dark:
+            require_dark(frame, self.light.max_dark_counts)
         self._dark, self._dark_counts = dark, level_counts(dark[-1])
         lit = self._agreeing("reference", self.lit)
         self.bench.light(DARK)
@@ -87,8 +89,8 @@ class Capture:
         """Return the frames of one press, as many as the mode needs.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
-        depend on it, `OpenLedError` or `HotLedDriverError` when the light fails before it,
-        `LightBudgetError` when it was on for too long.
+        depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
+        light fails before it, `LightBudgetError` when it was on for too long.
         """
         wanted = wanted_frames(mode, role, self.press, self._tears)
         rules = PressRules.of(self.press, wanted.window_n, is_ramp=wanted.is_ramp)
@@ -109,6 +111,7 @@ class Capture:
                 guidance = begin
                 wanted.begin_again()
             self.board.update(guidance=guidance, frames_taken=len(wanted.frames), wanted_n=wanted.wanted_n)
+        require_lit(wanted.frames, self._dark_counts)
         if seen := wanted.light_and_hard():
             require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
         self._become(self.machine.hold(self._spot_mm(role, wanted.frames), rules))

@@ -20,6 +20,10 @@ class InvalidQuantity(ValueError):  # noqa: N818 - reads as what it says: this q
         self.quantity, self.value, self.bound, self.action = quantity, value, bound, action
         super().__init__(f"{quantity} is {value}, but must be {bound}: {action}.")
 
+    def __reduce__(self) -> tuple[type[InvalidQuantity], tuple[str, object, str, str]]:
+        """Carry the error to another process: an exception alone forgets what it was made of."""
+        return type(self), (self.quantity, self.value, self.bound, self.action)
+
 
 @dataclass(frozen=True)
 class Bound:

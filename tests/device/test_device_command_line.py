@@ -209,11 +209,11 @@ def test_a_target_force_that_the_certificate_is_not_for_keeps_the_probe_from_sta
     assert line.startswith("E403 press.target_n is 0.7, but must be 0.5 N as calibrated")
 
 
-def test_a_camera_of_ten_bits_is_refused_for_the_daemon(run, models, tmp_path):
+def test_a_camera_of_other_bits_than_the_settings_say_is_refused(run, models, tmp_path):
     (tmp_path / "scene.toml").write_text("[sensor]\nbits = 10\n")
     code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")
     assert code == 1
-    assert errors == ["E001 sensor.bits is 10, but the daemon's camera takes 8. Set it to 8."]
+    assert errors == ["E001 The scene's sensor.bits is 10, but camera.raw_format is R8. Correct one of them."]
 
 
 def test_with_bad_settings_the_probe_starts_on_its_last_good_ones_and_warns(run, models, started, tmp_path):

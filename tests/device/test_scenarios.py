@@ -33,6 +33,7 @@ from device.records.store import ENDED
 from device.simulation.faults import PARAMETERS, Fault
 from device.simulation.hand import HandSettings
 from device.simulation.scenario import Scenario, read_scenario
+from device.simulation.sensor import Sensor
 
 FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).expects]
 SELF_TEST_FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).self_test_fails]
@@ -225,6 +226,15 @@ def test_a_hand_that_trembles_is_rejected_with_the_reason_and_no_fault(running):
         press = device.board.now.press
         assert (press.state, press.code) == ("rejected", None)
         assert "was not steady" in press.reason
+        assert device.codes() == set()
+
+
+def test_a_probe_with_a_larger_sensor_of_ten_bits_measures_without_a_fault(running):
+    """An OV9281: the middle of its 1280 x 800, scaled down to a frame."""
+    camera = CameraSection(raw_format="R10", sensor_width_px=1280, sensor_height_px=800, crop_width_px=1070)
+    with running(Scenario(sensor=Sensor(bits=10)), camera=camera) as device:
+        device.press()
+        assert device.board.now.press.state == "done"
         assert device.codes() == set()
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from device.errors import LateFrameError, LightError
+from device.errors import LateFrameError, LightError, StaleFrameError
 from device.hardware.interfaces import CameraFrame
 from device.instrument import bench as bench_module
 from device.instrument.bench import DARK, Bench
@@ -124,6 +124,24 @@ def test_a_camera_that_leaves_out_frames_is_at_fault(hardware, monkeypatch):
         slow.take("press")
     with pytest.raises(LateFrameError):
         slow.take("press")
+
+
+def test_a_frame_that_shows_the_light_before_is_not_taken_for_one_under_the_new_light(bench, hardware, monkeypatch):
+    """Lit at 70 counts, then dark: the first dark frame still has 70."""
+    levels = iter([70, 70, 4])
+    monkeypatch.setattr(
+        hardware,
+        "capture",
+        lambda *, begun_after_s, timeout_s: CameraFrame(
+            np.full((16, 16), next(levels), np.uint8), begun_after_s, 4000.0, 1.0
+        ),
+    )
+    bench.light(LIT)
+    bench.take("reference")
+    bench.light(DARK)
+    bench.take("reference")
+    with pytest.raises(StaleFrameError):
+        bench.take("reference")
 
 
 def late_frame(start_s):

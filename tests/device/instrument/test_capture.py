@@ -340,6 +340,13 @@ def test_a_dead_side_is_named(capture_of):
         holding(capture_of(*HELD, dead=(2,))).side_levels(REFERENCE)
 
 
+def test_a_press_that_shows_no_light_at_all_ends_before_it_is_measured(capture_of):
+    capture = capture_of(*[0.0] * (1 + 2 * UNLOADED_FRAMES), 0.5, dead=(0, 1, 2, 3))
+    capture.unloaded()
+    with pytest.raises(DarkSideError, match="No light from any side although all are switched on: 0.0 counts"):
+        capture.loaded("press", "paper")
+
+
 def test_light_that_is_there_while_all_sides_are_off_is_seen_untouched_and_under_load(capture_of):
     with pytest.raises(AmbientLightError):
         capture_of(0.0, 0.0, glow=20).unloaded()
