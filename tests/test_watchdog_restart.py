@@ -1,6 +1,7 @@
 """Each loop frozen in turn, in the middle of a press: a fault on the screen, a restart, and darkness.
 
 The daemon is its own process under a stand-in for systemd; the four stories run at once, each in a folder of its own.
+A camera's process that hangs is not one of them: it is ended and started again by the daemon itself.
 """
 
 from __future__ import annotations
@@ -99,3 +100,18 @@ def test_the_log_names_the_fault_and_where_every_thread_was(stories, part):
     assert "E901" in log
     assert "Fatal Python error: Aborted" in log
     assert "Thread 0x" in log
+
+
+def test_a_camera_whose_process_hangs_is_started_again_without_a_restart_of_the_daemon(tmp_path):
+    """It hangs for longer than the watchdog would bear of a camera without frames: twice 6 s."""
+    scene = f'{QUICK_HAND}[[faults]]\nkind = "camera_hung"\nfrom_press = 1\nfrom_s = 1.0\nuntil_s = 14.0\n'
+    supervisor = Supervisor(tmp_path, scene, WATCHDOG_S)
+    try:
+        daemon = supervisor.start()
+        assert supervisor.is_fed_until(lambda daemon: daemon.ask("/api/v1/health/ready").status == 200)
+        daemon.ask("/api/v1/presses", "POST", {})
+        assert supervisor.is_fed_until(lambda daemon: "E104" in codes(daemon))
+        assert supervisor.is_fed_until(lambda daemon: daemon.ask("/api/v1/health/ready").status == 200)
+        assert codes(daemon) == set()
+    finally:
+        supervisor.close()
