@@ -5,10 +5,10 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test check bench verify sweep train evaluate modes lock clean
+.PHONY: help setup run test test-camera-virtual check bench verify sweep train evaluate modes lock clean
 
 help: ## list the verbs
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
 
 .venv/bin/python:
 	@python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: install python3."; exit 1; }
@@ -32,6 +32,9 @@ run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCEN
 test: .venv/all.stamp ## run all tests
 	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadgroup
 
+test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian chroot under build (root, 1.7 GB)
+	tests/libcamera/run.sh build/trixie
+
 check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
@@ -39,9 +42,10 @@ check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 	.venv/bin/lint-imports
 	$(PY) tests/dead_links.py
 
-bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute
+bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second
 	$(PY) tests/bench.py
 	$(PY) tests/bench_forward.py
+	$(PY) tests/bench_acquisition.py
 
 verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md
 	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md
@@ -58,9 +62,10 @@ train: sweep ## regenerate everything in models/ from nothing
 	$(HOST_TOOLS) train --profile standard --out models/standard
 	$(HOST_TOOLS) train --profile quick --out models/quick
 	$(HOST_TOOLS) phantom --out build/phantoms/physical
-	$(HOST_TOOLS) calibrate build/phantoms/physical/* --out models/simulated_probe/calibration.json
+	rm -f models/simulated_probe/calibration.json models/simulated_probe/calibration_linear.json
+	$(HOST_TOOLS) calibrate build/phantoms/physical/* --operator "make train" --out models/simulated_probe/calibration.json
 	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
-	$(HOST_TOOLS) calibrate build/phantoms/linear/* --out models/simulated_probe/calibration_linear.json
+	$(HOST_TOOLS) calibrate build/phantoms/linear/* --operator "make train" --out models/simulated_probe/calibration_linear.json
 
 modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
 	$(HOST_TOOLS) modes --out docs/modes.md

@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse recordings, look at the settings, or darken the LEDs.
+"""`python -m device`: start the daemon, analyse recordings, see settings, calibrations and faults, test itself, darken.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -6,6 +6,7 @@ Exit codes: 0 ok, 1 failed, 2 usage.
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import json
 import logging
 import signal
@@ -19,15 +20,21 @@ import uvicorn
 
 from device.answers import Answers, answers_for
 from device.assembly import StartFailed, open_probe, open_simulated_probe
+from device.calibration_command import add_calibration_command, run_calibration_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.faults.listing import add_faults_command, run_faults_command
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.procedure import Procedure
+from device.instrument.restart_note import RestartNote
+from device.instrument.watchdog import Watchdog
 from device.led_off import led_off
-from device.measurement.calibration import read_calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import read_recording
+from device.records.calibrations import Calibrations
+from device.self_test_command import add_self_test_command, run_self_test_command
 from device.settings.command import add_config_command, run_config_command
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, read_config, read_layers
@@ -39,6 +46,7 @@ EXAMPLES = """examples:
   python -m device --simulate --scene scene.toml   the same on another inclusion
   python -m device analyse recording/ press.zip    JSON estimates, one a line
   python -m device config check                    every problem of the settings files
+  python -m device self-test --simulate            every part with measured value and verdict
   python -m device led-off                         darken the LEDs of a daemon that was killed
 """
 
@@ -55,11 +63,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    commands = parser.add_subparsers(dest="command", metavar="analyse | config | led-off")
+    verbs = "analyse | config | calibration | faults | self-test | led-off"
+    commands = parser.add_subparsers(dest="command", metavar=verbs)
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
     add_config_command(commands)
+    add_calibration_command(commands)
+    add_faults_command(commands)
+    add_self_test_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -78,6 +90,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _analyse(options)
         if options.command == "config":
             return run_config_command(options)
+        if options.command == "calibration":
+            scenario = _scenario(options)
+            return run_calibration_command(options, _start_settings(options, scenario).config)
+        if options.command == "faults":
+            return run_faults_command(options)
+        if options.command == "self-test":
+            return _self_test(options)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0
@@ -102,37 +121,68 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
 
 
 def _analyse(options: argparse.Namespace) -> int:
-    """Estimate recordings by the settings of a file, or those of the simulated probe that made them."""
+    """Estimate recordings by the settings of a file, or those of the simulated probe that made them.
+
+    The certificate has to have held when they were recorded.
+    """
     stated = read_config(options.config) if options.config else None
-    of_probe: dict[str, Answers] = {}
+    of_probe: dict[str, tuple[CalibrationWatch, Answers]] = {}
     for path in options.recordings:
         recording = read_recording(path)
         if recording.serial not in of_probe:
-            config = stated or simulated_config(recording.serial)
-            bundle, calibration = ModelBundle.load(config.model), read_calibration(config.calibration)
-            of_probe[recording.serial] = answers_for(config, bundle, calibration)
+            of_probe[recording.serial] = _answers_of(recording.serial, stated)
+        calibration, answers = of_probe[recording.serial]
+        calibration.require_valid(recording.started_at)
         mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
-        estimate = of_probe[recording.serial].estimator(recording, mode)
+        estimate = answers.estimator(recording, mode)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))
     return 0
 
 
+def _scenario(options: argparse.Namespace) -> Scenario | None:
+    if not options.simulate:
+        return None
+    return read_scenario(options.scene) if options.scene else Scenario()
+
+
+def _opened(config: Config, scenario: Scenario | None) -> Procedure:
+    return open_simulated_probe(config, scenario) if scenario else open_probe(config)
+
+
+def _self_test(options: argparse.Namespace) -> int:
+    scenario = _scenario(options)
+    config = _start_settings(options, scenario).config
+    return run_self_test_command(options, lambda: _opened(config, scenario))
+
+
+def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:
+    """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
+    config = stated or simulated_config(serial)
+    bundle = ModelBundle.load(config.model)
+    calibration = Calibrations(config.calibration).active()
+    if calibration:
+        calibration.require_for(serial, bundle)
+    return CalibrationWatch(calibration), answers_for(config, bundle, calibration)
+
+
 def _serve(options: argparse.Namespace) -> int:
-    scenario = None
-    if options.simulate:
-        scenario = read_scenario(options.scene) if options.scene else Scenario()
+    scenario = _scenario(options)
     settings = _start_settings(options, scenario)
     config = settings.config
     listening = _listen(config)
     with listening:
-        procedure = open_simulated_probe(config, scenario) if scenario else open_probe(config)
-        if settings.warning:
-            procedure.board.update(warnings=(settings.warning,))
+        procedure = _opened(config, scenario)
+        note = RestartNote(config.data)
+        warnings = tuple(warning for warning in (settings.warning, note.warning()) if warning)
+        procedure.board.update(warnings=warnings)
+        watchdog = Watchdog(procedure.progress, procedure.board, note)
         procedure.start()
+        watchdog.start()
         try:
             settings.keep()
             _run_server(procedure, listening)
         finally:
+            watchdog.close()
             procedure.close()
     return 0
 
@@ -166,4 +216,5 @@ def _run_server(procedure: Procedure, listening: socket.socket) -> None:
 
 
 if __name__ == "__main__":
+    faulthandler.enable()  # the watchdog's SIGABRT then writes where every thread was
     sys.exit(main())

@@ -1,26 +1,36 @@
 """The models of a probe to its answers: the modes in which it can be pressed, and what estimates a recording of each.
 
-A mode is offered only when its model is there; the mode of the settings must be one of those.
+A mode is offered only when its model is there; the mode of the settings must be one of those. Between presses the
+models prove themselves on their golden vectors: an inference that hangs or errs is known before a press needs it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from device.config import Config
-from device.errors import ConfigError
+from device.errors import ConfigError, MissingCalibration, ModelError
 from device.instrument.procedure import Estimator
+from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
-from device.measurement.inversion import ModelBundle
+from device.measurement.estimate import Estimate
+from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import Mode
-from device.measurement.mode_models import with_models
+from device.measurement.mode_models import ModeModels, with_models
+from device.measurement.recording import Recording
+
+
+def _nothing_to_prove() -> None:
+    """Stand for models without golden vectors."""
 
 
 class Answers(NamedTuple):
-    """The modes in which this probe has a model, and what answers in them."""
+    """The modes in which this probe has a model, what answers in them, and what proves that it still does."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
+    prove: Callable[[], None] = _nothing_to_prove
 
     def require(self, mode: Mode) -> None:
         """Raise `ConfigError` when the settings ask for a mode that is not among them."""
@@ -28,11 +38,40 @@ class Answers(NamedTuple):
             cause = f"press.mode is {mode}, but this probe has models for {', '.join(self.modes)} only."
             raise ConfigError(cause, "Choose one of those, or install the model.")
 
+    def watched(self, progress: ProgressBoard, begin: Callable[[], None]) -> Answers:
+        """Return the same, each run of it noted as progress of the inference; `begin` is called before each."""
 
-def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
-    """Return what a probe can answer.
+        def estimator(recording: Recording, mode: Mode) -> Estimate:
+            with progress.inside("inference"):
+                begin()
+                return self.estimator(recording, mode)
+
+        def prove() -> None:
+            with progress.inside("inference"):
+                begin()
+                self.prove()
+
+        return Answers(self.modes, estimator, prove)
+
+
+def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+    """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
     models = with_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
-    return Answers(models.modes, lambda recording, mode: models.estimate(recording, mode, calibration))
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        if calibration is None:
+            raise MissingCalibration("The probe is not calibrated.", "Calibrate it and activate the certificate.")
+        return models.estimate(recording, mode, calibration)
+
+    return Answers(models.modes, estimate, lambda: _prove(models))
+
+
+def _prove(models: ModeModels) -> None:
+    """Raise `ModelError` when a model does not answer its golden vectors any more."""
+    try:
+        models.prove()
+    except BundleRefused as error:
+        raise ModelError(str(error), "Then start the daemon again.") from error

@@ -8,30 +8,40 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
+from device.camera_assembly import emulated_camera, real_camera
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
-from device.config import Config
+from device.certificate import active_calibration
+from device.config import SIMULATED_PROBE, Config
 from device.errors import ConfigError, DeviceError, ModelError
-from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
+from device.hardware.raw_mode import RAW_BITS
 from device.instrument.bench import Bench
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.frame_check import FramePace
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
-from device.measurement.calibration import Calibration, read_calibration
+from device.instrument.progress import ProgressBoard
+from device.measurement.calibration import Calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
-from device.simulation.faults import FaultTimeline
-from device.simulation.full_disk import EmulatedDisk
+from device.simulation.camera_server import CameraServer
+from device.simulation.emulated_bundles import EmulatedBundles
+from device.simulation.emulated_disk import EmulatedDisk
+from device.simulation.faults import NO_FAULTS, FaultTimeline
+from device.simulation.frozen_cell import FreezingCell
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
 from device.simulation.scenario import Scenario
@@ -77,52 +87,48 @@ class _Parts:
             raise StartFailed(self.faults)
 
 
-def _camera_settings(config: Config) -> dict[str, Any]:
-    camera = config.camera
-    return {
-        "width_px": camera.width_px,
-        "height_px": camera.height_px,
-        "exposure_us": camera.exposure_us,
-        "gain": camera.gain,
-        "frame_rate_hz": camera.frame_rate_hz,
-    }
-
-
 def open_probe(config: Config) -> Procedure:
     """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
     parts = _Parts()
     lights = parts.open(lambda: open_led_driver(config.light))
-    camera = parts.open(lambda: open_camera(config.camera.index, **_camera_settings(config)))
+    camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
     return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
 
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
-    config = commissioned(config)
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
+    bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
+    config = replace(commissioned(config), model=bundles.folder(config.model))
     parts.open(lambda: _require_own_serial(config, scenario))
-    table_folder = config.calibration.parent
-    shape = config.camera.height_px, config.camera.width_px
-    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(table_folder), shape, config.camera.scale))
+    width_px, height_px = config.camera.raw_mode.sensor_px
+    shape, scale = (height_px, width_px), config.camera.sensor_scale
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale))
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
-    picam2 = VirtualPicamera2(
+    open_picam2 = partial(
+        VirtualPicamera2,
         partial(_render, probe, faults),
-        width_px=config.camera.width_px,
-        height_px=config.camera.height_px,
+        width_px=width_px,
+        height_px=height_px,
+        raw_formats=(config.camera.raw_format,),
         led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
         faults=faults,
     )
+    server = CameraServer(open_picam2)
+    parts.opened.callback(server.close)
     line = emulated_amplifier(config, probe, faults)
     parts.opened.callback(line.close)
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
     lights = parts.open(lambda: led_driver(config.light, bus))
-    camera = parts.open(lambda: RawMonoCamera(picam2, **_camera_settings(config)))
-    cell = parts.open(lambda: open_cell(config, line.device_path))
+    camera = parts.open(lambda: emulated_camera(config.camera, server.address))
+    cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
-    procedure = _procedure(config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario)
+    procedure = _procedure(
+        config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario, faults, bundles.folder
+    )
     procedure.on_request(lambda mode: faults.begin_press())
     _lead_by_hand(procedure, probe)
     return procedure
@@ -135,8 +141,10 @@ def _require_own_serial(config: Config, scenario: Scenario) -> None:
             f"serial is {config.serial}, but the simulated probe with {scenario.light} light is {scenario.serial}.",
             "Correct the setting, and its calibration with it.",
         )
-    if scenario.sensor.bits != 8:
-        raise ConfigError(f"sensor.bits is {scenario.sensor.bits}, but the daemon's camera takes 8.", "Set it to 8.")
+    bits, raw_format = scenario.sensor.bits, config.camera.raw_format
+    if bits != RAW_BITS[raw_format]:
+        cause = f"The scene's sensor.bits is {bits}, but camera.raw_format is {raw_format}."
+        raise ConfigError(cause, "Correct one of them.")
 
 
 def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:
@@ -148,7 +156,7 @@ def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureReques
         gain=exposure.gain,
         frame_number=exposure.frame_number,
         wet_ratio=faults.wet_ratio(exposure.t_s),
-        ambient_ratio=faults.ambient_ratio(exposure.t_s),
+        ambient_ratio=faults.ambient_ratio(exposure.t_s) + faults.stray_ratio(exposure.led_ratio, exposure.t_s),
     )
 
 
@@ -177,12 +185,16 @@ def _procedure(
     clock: ClockWatch,
     disk: Disk | None = None,
     scenario: Scenario | None = None,
+    faults: FaultTimeline = NO_FAULTS,
+    folder_of: Callable[[Path], Path] = Path,
 ) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
-    force = parts.open(lambda: tared(config, cell)) if cell else None
+    progress = ProgressBoard()
+    force = parts.open(lambda: tared(config, cell, progress)) if cell else None
     bundle = parts.open(lambda: ModelBundle.load(config.model))
-    calibration = parts.open(lambda: _calibration_for(config, bundle)) if bundle else None
-    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle and calibration else None
+    watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
+    calibration = watch.calibration if watch else None
+    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None
     store = parts.open(lambda: Store(config.data, disk))
     parts.require_all()
     # require_all has raised if any of these is missing; the type checker cannot know.
@@ -190,8 +202,10 @@ def _procedure(
     assert camera is not None
     assert force is not None
     assert answers is not None
-    assert calibration is not None
+    assert watch is not None
     assert store is not None
+    answers = answers.watched(progress, begin=partial(faults.hold_up, "inference_frozen"))
+    progress.exercise("inference", answers.prove)
     return Procedure(
         config,
         Bench(
@@ -200,31 +214,21 @@ def _procedure(
             force,
             FramePace(config.camera.late_frames / config.camera.frame_rate_hz),
             LightBudget(config.light.max_on_s),
+            progress,
         ),
         answers.estimator,
         store,
         modes=answers.modes,
-        calibration_id=calibration.id,
+        calibration=watch,
         opened=parts.opened,
         clock=clock,
+        progress=progress,
         simulated_truth=scenario.inclusion if scenario else None,
+        folder_of=folder_of,
     )
 
 
-def _answers(config: Config, bundle: ModelBundle, calibration: Calibration) -> Answers:
+def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
     answers = answers_for(config, bundle, calibration)
     answers.require(config.press.mode)
     return answers
-
-
-def _calibration_for(config: Config, bundle: ModelBundle) -> Calibration:
-    """Return the certificate; raise `InvalidQuantity` when it is not for this probe, model, pixel size and force."""
-    calibration = read_calibration(config.calibration)
-    calibration.require_for(config.serial, bundle)
-    calibration.require_scale(config.camera.scale)
-    if not calibration.holds_at(config.press.target_n):
-        bound = f"{calibration.force_n:g} N as calibrated"
-        raise InvalidQuantity(
-            "press.target_n", config.press.target_n, bound, "set that force, or calibrate with this one"
-        )
-    return calibration

@@ -10,6 +10,7 @@ from device.hardware.interfaces import CellCounts, ForceScale, LoadCell
 from device.hardware.load_cell import measure_tare, open_load_cell
 from device.instrument.force_recorder import ForceRecorder
 from device.instrument.load_limit import LoadLimit
+from device.instrument.progress import ProgressBoard
 from device.simulation.emulated_amplifier import EmulatedAmplifier, EmulatedBridge
 from device.simulation.faults import FaultTimeline
 from device.simulation.mantracourt_line import EmulatedMantracourt
@@ -52,7 +53,7 @@ def commissioned(config: Config) -> Config:
     return replace(config, cell=replace(config.cell, commissioned_tare_counts=CellSettings().zero_counts))
 
 
-def tared(config: Config, cell: LoadCell) -> ForceRecorder:
+def tared(config: Config, cell: LoadCell, progress: ProgressBoard | None = None) -> ForceRecorder:
     """Take the tare of this start and begin to record; raise the `LoadCellError` that forbids it.
 
     Newtons count from this tare, overload from that of commissioning.
@@ -69,4 +70,4 @@ def tared(config: Config, cell: LoadCell) -> ForceRecorder:
     zero_counts = tare_counts if at_commissioning is None else CellCounts(at_commissioning)
     limit = LoadLimit(ForceScale(sensitivity, zero_counts), settings.max_load_n, settings.tare_drift_n)
     limit.require_tare(tare_counts)
-    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts), limit)
+    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts), limit, progress)

@@ -12,6 +12,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Literal, get_args
 
+from device.hardware.raw_mode import RAW_BITS, RawFormat, RawMode
 from device.measurement.mode import MODES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.quantities import Bound
 from device.measurement.tactile_image import PixelScale
@@ -19,23 +20,45 @@ from device.settings.light_section import LightSection
 from device.settings.setting import Conflict, Section, conflict, setting
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
+SIMULATED_PROBE = MODELS / "simulated_probe"
 CellProtocol = Literal["openscale", "mantracourt"]
 
 
 @dataclass(frozen=True)
 class CameraSection(Section):
-    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate."""
+    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate.
+
+    A frame may be made of a larger mode of the sensor: of its middle, each pixel the mean over an area.
+    """
 
     prefix = "camera."
 
     width_px: int = setting(768, "Columns of a frame.", Bound(64, 4096, "px"))
     height_px: int = setting(492, "Rows of a frame.", Bound(64, 4096, "px"))
-    mm_per_px_x: float = setting(0.03125, "Width of a pixel on the sensing face.", Bound(1e-4, 1.0, "mm"))
-    mm_per_px_y: float = setting(0.03646, "Height of a pixel on the sensing face.", Bound(1e-4, 1.0, "mm"))
+    mm_per_px_x: float = setting(0.03125, "Width of a frame's pixel on the sensing face.", Bound(1e-4, 1.0, "mm"))
+    mm_per_px_y: float = setting(0.03646, "Height of a frame's pixel on the sensing face.", Bound(1e-4, 1.0, "mm"))
+    raw_format: RawFormat = setting(
+        "R8", "Unpacked raw format of the sensor; frames have 8 bits all the same.", choices=tuple(RAW_BITS)
+    )
+    sensor_width_px: int | None = setting(
+        None, "Columns of the sensor's mode; those of a frame unless given.", Bound(64, 8192, "px")
+    )
+    sensor_height_px: int | None = setting(
+        None, "Rows of the sensor's mode; those of a frame unless given.", Bound(64, 8192, "px")
+    )
+    crop_width_px: int | None = setting(
+        None, "Columns in the sensor's middle that a frame is made of; all unless given.", Bound(64, 8192, "px")
+    )
+    crop_height_px: int | None = setting(
+        None, "Rows in the sensor's middle that a frame is made of; all unless given.", Bound(64, 8192, "px")
+    )
     exposure_us: int = setting(4000, "Exposure time of every frame, at most one frame long.", Bound(10, 1e6, "us"))
     gain: float = setting(1.0, "Analogue gain of every frame.", Bound(1.0, 16.0, ""))
     frame_rate_hz: float = setting(30.0, "Frames a second.", Bound(1.0, 240.0, "Hz"))
     index: int = setting(0, "Number of the camera on this board.", Bound(0, 99, ""))
+    max_restarts: int = setting(
+        5, "How often in a minute the camera's process, when it hung or died, is started again.", Bound(0, 100, "")
+    )
     late_frames: float = setting(
         3.0, "A frame begun this long after it was asked for is late.", Bound(1.5, 100.0, "frame times")
     )
@@ -46,14 +69,35 @@ class CameraSection(Section):
     )
 
     def conflicts(self) -> Iterator[Conflict]:
-        """Yield an exposure that is longer than a frame."""
+        """Yield an exposure longer than a frame, and a part of the sensor that is not on it or less than a frame."""
         bound = Bound(10, 1e6 / self.frame_rate_hz, "us, one frame")
         yield from conflict("camera.exposure_us", self.exposure_us, bound, "camera.frame_rate_hz")
+        mode = self.raw_mode
+        for number, side in enumerate(("width_px", "height_px")):
+            sensor_px, crop_px, frame_px = mode.sensor_px[number], mode.crop_px[number], mode.frame_px[number]
+            sensor, crop, frame = f"camera.sensor_{side}", f"camera.crop_{side}", f"camera.{side}"
+            too_small = [*conflict(sensor, sensor_px, Bound(frame_px, 8192, "px, a frame's or more"), frame)]
+            within = Bound(frame_px, sensor_px, "px, from a frame's to the sensor's")
+            yield from too_small or conflict(crop, crop_px, within, frame, sensor)
 
     @property
     def scale(self) -> PixelScale:
-        """Size of a pixel on the face."""
+        """Size of a frame's pixel on the face."""
         return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
+
+    @property
+    def sensor_scale(self) -> PixelScale:
+        """Size of a sensor's pixel on the face."""
+        (crop_x, crop_y), (width, height) = self.raw_mode.crop_px, self.raw_mode.frame_px
+        return PixelScale(self.mm_per_px_x * width / crop_x, self.mm_per_px_y * height / crop_y)
+
+    @property
+    def raw_mode(self) -> RawMode:
+        """The sensor's mode and what a frame is made of."""
+        frame_px = (self.width_px, self.height_px)
+        sensor_px = (self.sensor_width_px or self.width_px, self.sensor_height_px or self.height_px)
+        crop_px = (self.crop_width_px or sensor_px[0], self.crop_height_px or sensor_px[1])
+        return RawMode(sensor_px, crop_px, frame_px, self.raw_format)
 
 
 @dataclass(frozen=True)
@@ -109,6 +153,11 @@ class PressSection(Section):
         0.35,
         "A ramp's force may not change faster, or it would not be known at the exposure.",
         Bound(0.05, 5.0, "N/s"),
+    )
+    max_offset_mm: float = setting(
+        2.5,
+        "A lump whose bright spot lies further off the middle of the face is off-centre: the press is rejected.",
+        Bound(0.5, 30.0, "mm"),
     )
     timeout_s: float = setting(60.0, "A press that takes longer is given up.", Bound(1.0, 3600.0, "s"))
 
@@ -168,7 +217,10 @@ class Config(Section):
         MODELS / "standard",
         "Folder of the model of modes standard and precise, offered where it is installed and for this probe.",
     )
-    calibration: Path = setting(Path("/var/lib/tsis/calibration.json"), "Calibration certificate of this probe.")
+    calibration: Path = setting(
+        Path("/var/lib/tsis/calibrations"),
+        "Folder of this probe's certificates, of which one is active; or one certificate, NAME.json.",
+    )
     data: Path = setting(Path("/var/lib/tsis"), "Folder of measurements and recordings.")
     camera: CameraSection = field(default_factory=CameraSection)
     light: LightSection = field(default_factory=LightSection)
@@ -201,5 +253,5 @@ def simulated_config(serial: str = "SIM-0001") -> Config:
     Only the paper's regressions can be had for the paper's light.
     """
     certificate, mode = SIMULATED.get(serial, SIMULATED["SIM-0001"])
-    calibration = MODELS / "simulated_probe" / certificate
+    calibration = SIMULATED_PROBE / certificate
     return Config(serial=serial, calibration=calibration, data=Path("var"), press=PressSection(mode=mode))

@@ -1,74 +1,97 @@
-"""The daemon's errors: each class one fault, each with the code that the screen and the API show.
+"""The daemon's errors: each class one fault, and the only place where its code, title, meaning and status are written.
 
-The hundreds are the part: 0 settings, 1 camera, 2 light, 3 load cell, 4 model, 5 press, 6 storage, 7 clock, 8 request
-(E803 and E804, a malformed one and an unknown path, are device/web/problems.py's own).
-docs/simulated_probe.md lists how each fault is provoked and seen.
-
-DeviceError
-├── ConfigError              E001  a setting is missing, unknown or out of its bound
-│   └── LastGoodConfigError  E002  the settings files are bad, the last good ones are used (a warning)
-├── CameraError              E101  no frame, or a frame of the wrong shape
-│   ├── LateFrameError       E102  the camera leaves out most of its frames
-│   └── TornFrameError       E103  frames are put together from two exposures
-├── LightError               E201  the LED chip does not answer or does not hold what was written
-│   ├── LightBusError        E202  the I2C bus is stuck
-│   ├── DarkSideError        E203  a side gives no light although its register is set
-│   ├── StuckLightError      E204  a side cannot be switched off
-│   ├── AmbientLightError    E205  foreign light reaches the camera
-│   ├── DimLightError        E206  a side is dimmer than it was (a warning)
-│   ├── OpenLedError         E207  no current flows through the LED of a side
-│   ├── HotLedDriverError    E208  the LED chip is too hot, or no side is connected
-│   └── LightBudgetError     E209  the light was on for too long in one press
-├── LoadCellError            E301  no force
-│   ├── UnreadableCellError  E302  lines come, but none that can be read
-│   ├── SaturatedCellError   E303  the amplifier is at the end of its range
-│   ├── UnpluggedCellError   E304  the serial line is gone
-│   ├── OverloadedCellError  E305  more load than the cell bears, from its zero at commissioning
-│   ├── ZeroShiftError       E306  the zero is far from that of commissioning
-│   └── DetachedCellError    E307  the amplifier answers, but no bridge is behind it
-├── ModelError               E401  a bundle or calibration is missing, tampered with, or not for this probe
-├── NoContrastError          E501  pressing does not change the image: gel, or a wet face
-├── StorageError             E601  a measurement could not be made durable
-│   └── DiskFullError        E602  there is no space left
-├── ClockJumpError           E701  the wall clock was set (a warning)
-├── BusyError                E801  a press is already under way
-├── UnknownResource          E802  no such press or measurement
-└── ModeUnavailable          E805  this probe cannot answer in that mode
+The first sentence of a class's docstring is the fault's meaning. docs/faults.md, the screen's headings and the codes in
+the API's schema are made from these classes (device/faults/); docs/simulated_probe.md says how a fault is provoked.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, ClassVar, Literal
+
+PARTS = {
+    "0": "Settings and daemon",
+    "1": "Camera",
+    "2": "Light",
+    "3": "Load cell",
+    "4": "Model",
+    "5": "Press",
+    "6": "Storage",
+    "7": "Clock",
+    "8": "Request",
+    "9": "Watchdog",
+}
+"""The part that a fault names: its code's hundred."""
 
 
 class DeviceError(Exception):
-    """Something the operator or maintainer can act on: what happened, and the remedy."""
+    """The daemon itself failed: its port is in use, or something that nobody foresaw."""
 
     code = "E000"
+    title = "The daemon failed"
     status = 500
     severity: Literal["fault", "warning"] = "fault"
     is_lasting = False
     """Whether a warning is true as long as the daemon runs, not of one press only."""
 
+    by_code: ClassVar[dict[str, type[DeviceError]]] = {}
+    """Every fault there is."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        """Take a fault into the table; raise `TypeError` for one without a code and a title of its own."""
+        super().__init_subclass__(**keywords)
+        cls._require_entry()
+        cls.by_code[cls.code] = cls
+
     def __init__(self, cause: str, remedy: str) -> None:
+        """Take what happened, and what the operator or maintainer can do about it, each a sentence."""
         self.cause, self.remedy = cause, remedy
         super().__init__(f"{cause} {remedy}")
 
+    def __reduce__(self) -> tuple[type[DeviceError], tuple[str, str]]:
+        """Carry the error to another process: an exception alone forgets what it was made of."""
+        return type(self), (self.cause, self.remedy)
+
     def as_record(self) -> dict[str, str]:
         """Return the error as the JSON object of the status and of a press."""
-        return {"code": self.code, "severity": self.severity, "cause": self.cause, "remedy": self.remedy}
+        told = {"cause": self.cause, "remedy": self.remedy}
+        return {"code": self.code, "title": self.title, "severity": self.severity, **told}
+
+    @classmethod
+    def part(cls) -> str:
+        """Return the part that the fault names."""
+        return PARTS[cls.code[1]]
+
+    @classmethod
+    def meaning(cls) -> str:
+        """Return the fault in one sentence."""
+        return (cls.__doc__ or "").split("\n\n")[0].replace("\n    ", " ")
+
+    @classmethod
+    def _require_entry(cls) -> None:
+        for name in ("code", "title", "__doc__"):
+            if not vars(cls).get(name):
+                raise TypeError(f"{cls.__name__} has no {name} of its own: every fault has code, title and docstring.")
+        if other := cls.by_code.get(cls.code):
+            raise TypeError(f"{cls.__name__} has the code {cls.code} of {other.__name__}: choose one that is free.")
+        if not (len(cls.code) == 4 and cls.code[0] == "E" and cls.code[1:].isdigit() and cls.code[1] in PARTS):
+            raise TypeError(f"{cls.__name__} has the code {cls.code!r}: E and three digits, the first one of PARTS.")
+
+
+DeviceError.by_code[DeviceError.code] = DeviceError
 
 
 class ConfigError(DeviceError):
     """A setting is missing, unknown or out of its bound."""
 
     code = "E001"
+    title = "Settings refused"
 
 
 class LastGoodConfigError(ConfigError):
     """The settings files are bad; the probe runs on those with which it last started well."""
 
     code = "E002"
+    title = "Old settings in use"
     severity = "warning"
     is_lasting = True
 
@@ -77,6 +100,7 @@ class CameraError(DeviceError):
     """The camera gives no frame, or one of the wrong shape."""
 
     code = "E101"
+    title = "No camera image"
     status = 503
 
 
@@ -84,18 +108,35 @@ class LateFrameError(CameraError):
     """The camera leaves out most of its frames."""
 
     code = "E102"
+    title = "Camera leaves out frames"
 
 
 class TornFrameError(CameraError):
     """Frames are put together from two exposures, again and again."""
 
     code = "E103"
+    title = "Torn frames"
+
+
+class CameraProcessError(CameraError):
+    """The camera's process hung or died; it is started again a few times."""
+
+    code = "E104"
+    title = "Camera process ended"
+
+
+class StaleFrameError(CameraError):
+    """A frame shows the light from before it was changed, although it is said to have begun after that."""
+
+    code = "E105"
+    title = "Image of the light before"
 
 
 class LightError(DeviceError):
     """The LED chip does not answer, or does not hold what was written."""
 
     code = "E201"
+    title = "LED chip does not answer"
     status = 503
 
 
@@ -103,30 +144,35 @@ class LightBusError(LightError):
     """The I2C bus is stuck: a line is held low."""
 
     code = "E202"
+    title = "I2C bus stuck"
 
 
 class DarkSideError(LightError):
     """A side gives no light although its register is set."""
 
     code = "E203"
+    title = "A side is dark"
 
 
 class StuckLightError(LightError):
     """A side shines although its register is off."""
 
     code = "E204"
+    title = "A side does not go off"
 
 
 class AmbientLightError(LightError):
     """Foreign light reaches the camera."""
 
     code = "E205"
+    title = "Foreign light"
 
 
 class DimLightError(LightError):
     """A side is dimmer than it was; the measurement stands, since its reference is dimmer by the same ratio."""
 
     code = "E206"
+    title = "Light is dimmer"
     severity = "warning"
 
 
@@ -134,24 +180,36 @@ class OpenLedError(LightError):
     """No current flows through the LED of a side although its output is on."""
 
     code = "E207"
+    title = "LED without current"
 
 
 class HotLedDriverError(LightError):
     """The LED chip has switched off because it is too hot, or none of the sides is connected."""
 
     code = "E208"
+    title = "LED chip hot or unplugged"
 
 
 class LightBudgetError(LightError):
     """The light was on for too long in one press; it goes off, and the next press may begin."""
 
     code = "E209"
+    title = "Light on for too long"
+
+
+class LightLimitError(LightError):
+    """A side is at an end of its brightness and does not give its share of the light; the measurement stands."""
+
+    code = "E210"
+    title = "Light at its limit"
+    severity = "warning"
 
 
 class LoadCellError(DeviceError):
     """The load cell is silent."""
 
     code = "E301"
+    title = "Load cell silent"
     status = 503
 
 
@@ -159,49 +217,110 @@ class UnreadableCellError(LoadCellError):
     """The load cell's lines cannot be read."""
 
     code = "E302"
+    title = "Load cell unreadable"
 
 
 class SaturatedCellError(LoadCellError):
     """The load cell's amplifier is at the end of its range: too much force, or a wire is off."""
 
     code = "E303"
+    title = "Load cell saturated"
 
 
 class UnpluggedCellError(LoadCellError):
     """The load cell's serial line is gone, or was never there."""
 
     code = "E304"
+    title = "Load cell unplugged"
 
 
 class OverloadedCellError(LoadCellError):
     """The load cell carries more than it bears, from its zero at commissioning."""
 
     code = "E305"
+    title = "Load cell overloaded"
 
 
 class ZeroShiftError(LoadCellError):
     """The load cell's zero is far from that of commissioning: under load at the start, or bent."""
 
     code = "E306"
+    title = "Load cell's zero has moved"
 
 
 class DetachedCellError(LoadCellError):
     """The load cell's amplifier answers, but no bridge is behind it: a plug is off or a gauge is broken."""
 
     code = "E307"
+    title = "Load cell detached"
 
 
 class ModelError(DeviceError):
-    """A model bundle or calibration is missing, tampered with, or not made for this probe."""
+    """A model bundle is missing, tampered with, or not made for this probe."""
 
     code = "E401"
+    title = "Model refused"
     status = 503
+
+
+class MissingCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """No calibration certificate is active, or the one that is named is not there or was changed."""
+
+    code = "E402"
+    title = "Not calibrated"
+
+
+class ForeignCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration is for another probe, model, pixel size, exposure, force or load cell."""
+
+    code = "E403"
+    title = "Calibration of another probe"
+
+
+class ExpiredCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration has expired; nothing is measured until another is activated."""
+
+    code = "E404"
+    title = "Calibration has expired"
+
+
+class SlightDriftError(ModelError):
+    """The untouched face looks otherwise than at the calibration; it is measured still."""
+
+    code = "E405"
+    title = "Face has changed slightly"
+    severity = "warning"
+    is_lasting = True
+
+
+class LargeDriftError(ModelError):
+    """The untouched face looks so different from the calibration's that nothing is measured."""
+
+    code = "E406"
+    title = "Face has changed too much"
+
+
+class CalibrationEndsSoon(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The calibration expires within a month."""
+
+    code = "E407"
+    title = "Calibration expires soon"
+    severity = "warning"
+    is_lasting = True
+
+
+class ClockBehindError(ModelError):
+    """The wall clock is before the calibration was made: whether that has expired cannot be told."""
+
+    code = "E408"
+    title = "Clock before calibration"
 
 
 class NoContrastError(DeviceError):
     """Pressing does not change the image; it ends this press, not the probe's readiness."""
 
     code = "E501"
+    title = "Image does not follow the press"
     status = 422
 
 
@@ -209,6 +328,7 @@ class StorageError(DeviceError):
     """A measurement could not be made durable."""
 
     code = "E601"
+    title = "Not stored"
     status = 507
 
 
@@ -216,26 +336,46 @@ class DiskFullError(StorageError):
     """There is no space left for a measurement."""
 
     code = "E602"
+    title = "Disk full"
 
 
 class ClockJumpError(DeviceError):
     """The wall clock was set; what is measured runs on the monotonic clock, but `taken_at` may be wrong."""
 
     code = "E701"
+    title = "Clock was set"
     severity = "warning"
 
 
 class BusyError(DeviceError):
-    """A press is already under way."""
+    """A press or a self-test is already under way."""
 
     code = "E801"
+    title = "Busy"
     status = 409
 
 
 class UnknownResource(DeviceError):  # noqa: N818 - the name is what the caller reads
-    """No press or measurement of that id."""
+    """No press or measurement of that id, or no self-test yet."""
 
     code = "E802"
+    title = "Not found"
+    status = 404
+
+
+class InvalidRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The request is malformed: a field is unknown, missing or out of its bound."""
+
+    code = "E803"
+    title = "Request refused"
+    status = 422
+
+
+class UnknownPath(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The API has no such path, or not with that method."""
+
+    code = "E804"
+    title = "No such path"
     status = 404
 
 
@@ -243,4 +383,21 @@ class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller 
     """A press was asked for in a mode for which this probe has no model."""
 
     code = "E805"
+    title = "Mode not available"
     status = 422
+
+
+class StalledError(DeviceError):
+    """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
+
+    code = "E901"
+    title = "A part has stopped"
+    status = 503
+
+
+class RestartedError(DeviceError):
+    """The watchdog has restarted the daemon; shown until a press has told of it."""
+
+    code = "E902"
+    title = "Restarted by itself"
+    severity = "warning"

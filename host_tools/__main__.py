@@ -8,10 +8,11 @@ import typer
 
 from device.measurement.inversion import BundleRefused
 from device.measurement.quantities import InvalidQuantity
+from host_tools.commands.calibrate import calibrate
 from host_tools.commands.evaluate import evaluate
 from host_tools.commands.features import features
 from host_tools.commands.limits import limits
-from host_tools.commands.model import calibrate, phantom, table
+from host_tools.commands.model import phantom, table
 from host_tools.commands.modes import modes
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note

@@ -7,83 +7,161 @@ Source: Lee & Won 2013, section III (regressions on nine phantoms).
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from device import __version__
-from device.measurement.calibration import FORCE_TOLERANCE, Calibration, Regression
+from device.measurement.calibration import Calibration, Regression, certificate_id
 from device.measurement.estimate import image_features
 from device.measurement.features import FeatureSettings
 from device.measurement.intervals import HeldOut
 from device.measurement.inversion import FEATURE_UNITS, ModelBundle
-from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
+from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import VALID_DAYS, Validity, moment, written
 from device.simulation.surface_table import SurfaceTable
+from host_tools.calibration_gates import (
+    PHANTOMS_NEEDED,
+    Gate,
+    age_gate,
+    fit_gates,
+    number_gate,
+    recording_gates,
+    require_all,
+    unusable,
+)
 from host_tools.forward.deformation import Deformation, deformation
 from host_tools.forward.solve import solve
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
+from host_tools.software import source_sha256
+from host_tools.untouched_frames import untouched_face
 
 Array = NDArray[np.float64]
 
-PHANTOMS_NEEDED = 4
-"""A line with a leave-one-out error needs at least this many."""
+A_YEAR_DAYS = 365.0
 HELD_OUT_SCENES = 1000
 WEAKEST_PEAK_MM = 5e-4
 """Lumps with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
 
 
+@dataclass(frozen=True)
+class Provenance:
+    """What no recording knows: who calibrated, on which set of phantoms, when, and for how many days it is to hold.
+
+    Without `made_at` (RFC 3339) it is now; without `valid_days`, a year, or of a simulated probe a hundred.
+    """
+
+    operator: str = ""
+    phantom_serial: str = ""
+    made_at: str | None = None
+    valid_days: float | None = None
+
+
+class Calibrated(NamedTuple):
+    """A certificate and the gates that it has passed."""
+
+    certificate: Calibration
+    gates: tuple[Gate, ...]
+
+
+class Fit(NamedTuple):
+    """Three lines, their leave-one-out residuals [phantoms, 3], and the deformation features [phantoms, 3]."""
+
+    lines: tuple[Regression, ...]
+    residuals: Array
+    features: Array
+
+
+class Measured(NamedTuple):
+    """What phantom recordings measure, once it has passed its gates."""
+
+    made_at: str
+    validity: Validity
+    untouched: UntouchedFace
+    fit: Fit
+    gates: tuple[Gate, ...]
+
+
 def calibrate(
-    recordings: Sequence[Recording], bundle: ModelBundle, table: SurfaceTable, *, force_n: float, seed: int = 1
-) -> Calibration:
-    """Return the certificate of the probe that made the recordings; raises `InvalidQuantity` on what cannot be used."""
-    serial = _require_usable(recordings, force_n)
+    recordings: Sequence[Recording],
+    bundle: ModelBundle,
+    table: SurfaceTable,
+    *,
+    force_n: float,
+    provenance: Provenance | None = None,
+    seed: int = 1,
+) -> Calibrated:
+    """Return the certificate of the probe that made the recordings.
+
+    Raises `CalibrationRejected`, an `InvalidQuantity`, with everything that the recordings do not hold.
+    """
+    stated = provenance or Provenance()
     settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
+    measured = _measured(recordings, settings, force_n, stated)
+    errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
+    first = recordings[0]
+    assert first.cell is not None  # `unusable` has refused it otherwise
+    certificate = Calibration(
+        id="",
+        made_at=measured.made_at,
+        validity=measured.validity,
+        operator=stated.operator,
+        serial=first.serial,
+        phantom_serial=stated.phantom_serial,
+        model_sha256=bundle.sha256,
+        model_card_sha256=bundle.card_sha256,
+        force_n=force_n,
+        camera=first.camera,
+        cell=first.cell,
+        untouched=measured.untouched,
+        settings=settings,
+        regressions=measured.fit.lines,
+        phantoms=len(recordings),
+        held_out=held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed),
+        software=__version__,
+        software_sha256=source_sha256(),
+        simulated=any(recording.simulated for recording in recordings),
+    )
+    return Calibrated(replace(certificate, id=certificate_id(certificate)), measured.gates)
+
+
+def _measured(
+    recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, stated: Provenance
+) -> Measured:
+    """Return what the recordings measure; raise `CalibrationRejected` when that is not good enough."""
+    problems = unusable(recordings, force_n)
+    if problems or len(recordings) < PHANTOMS_NEEDED:
+        require_all([number_gate(recordings)], problems)
+    made_at = stated.made_at or written(datetime.now(UTC))
+    validity = _validity(recordings, stated.valid_days)
+    untouched = untouched_face(recordings)
+    fit = _fit(recordings, settings, force_n)
+    of_recordings = recording_gates(recordings, untouched)
+    gates = (*of_recordings, age_gate(validity, made_at), *fit_gates(fit.lines, fit.features))
+    require_all(gates)
+    return Measured(made_at, validity, untouched, fit, gates)
+
+
+def _validity(recordings: Sequence[Recording], valid_days: float | None) -> Validity:
+    """Return the days from the first of the recordings: a calibration is as old as its oldest phantom."""
+    started = (moment(recording.started_at, f"started_at of {recording.id}") for recording in recordings)
+    is_ageless = all(recording.simulated for recording in recordings)
+    usual_days = VALID_DAYS.high if is_ageless else A_YEAR_DAYS
+    return Validity.of(written(min(started)), usual_days if valid_days is None else valid_days)
+
+
+def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: float) -> Fit:
     image = np.array([image_features(recording, settings).mean(axis=0) for recording in recordings])
     truths = [recording.truth for recording in recordings if recording.truth]
     features = np.array([as_row(solve(Scene(truth, Press(force_n=force_n))).lump) for truth in truths])
     lines, residuals = zip(*(fit_line(image[:, i], features[:, i]) for i in range(features.shape[1])), strict=True)
-    errors = scaled_errors(np.column_stack(residuals), features[:, 0])
-    held_out = held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed)
-    return Calibration(
-        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"{serial} {bundle.sha256} {image.tobytes().hex()}")),
-        made_at=datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
-        serial=serial,
-        model_sha256=bundle.sha256,
-        model_card_sha256=bundle.card_sha256,
-        force_n=force_n,
-        scale=recordings[0].camera.scale,
-        settings=settings,
-        regressions=lines,
-        phantoms=len(recordings),
-        held_out=held_out,
-        software=__version__,
-        simulated=any(recording.simulated for recording in recordings),
-    )
-
-
-def _require_usable(recordings: Sequence[Recording], force_n: float) -> str:
-    action = "record more phantoms"
-    require("phantom recordings", len(recordings), Bound(PHANTOMS_NEEDED, 10_000, "recordings"), action)
-    for recording in recordings:
-        presses = len(recording.with_role("press"))
-        require(f"press frames of {recording.id}", presses, Bound(1, 1e6, "frames"), "record the phantom again")
-        mean_n = float(np.mean([frame.force_n for frame in recording.with_role("press")]))
-        bound = Bound(force_n * (1 - FORCE_TOLERANCE), force_n * (1 + FORCE_TOLERANCE), "N")
-        require(f"mean force of {recording.id}", mean_n, bound, "press the phantom with the force of --force-n")
-        if recording.camera.scale != recordings[0].camera.scale:
-            raise InvalidQuantity("pixel size", recording.camera.scale, "the same in all recordings", "record anew")
-        if recording.truth is None:
-            raise InvalidQuantity(
-                "truth", f"missing in {recording.id}", "the phantom's inclusion", "add it or leave it out"
-            )
-    serials = sorted({recording.serial for recording in recordings})
-    if len(serials) > 1:
-        raise InvalidQuantity("serial", " and ".join(serials), "one probe", "calibrate each probe on its own")
-    return serials[0]
+    return Fit(lines, np.column_stack(residuals), features)
 
 
 def as_row(lump: Deformation) -> Array:

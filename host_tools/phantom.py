@@ -14,7 +14,7 @@ import numpy as np
 
 from device import __version__
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording import CameraSettings, Recording
+from device.measurement.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.tactile_image import Frame, Role
 from device.simulation.hand import BESIDE_MM
 from device.simulation.pressed_face import Placement
@@ -116,4 +116,5 @@ def phantom_recording(
         position_mm=(asked.place.x_mm, asked.place.y_mm),
         truth=inclusion,
         simulated=True,
+        cell=RecordedCell(made_of.cell.counts_per_n, made_of.cell.zero_counts),
     )

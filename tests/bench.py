@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads make small products slower on a busy machine
 
 import numpy as np
+from camera_works import Handover, sustained_hz
 
 from device.measurement.calibration import read_calibration
 from device.measurement.estimate import estimate_recording
@@ -74,8 +75,11 @@ def main() -> None:
     image = tactile_image(press, base, recording.camera.scale)
     row = np.array([[0.05, 1.7, 57.0]])
     picture = np.random.default_rng(1).random((492, 768), dtype=np.float32)
+    handover = Handover()
     works: dict[str, Callable[[], object]] = {
         "yardstick: exp and sum of one image": lambda: np.exp(picture).sum(),
+        "camera: hand over a frame, one process": handover.here,
+        "camera: hand over a frame, two processes": handover.through_its_process,
         "frame: correction": lambda: tactile_image(press, base, recording.camera.scale),
         "frame: features": lambda: extract_features(image, calibration.settings),
         "frame: 100 networks (ONNX)": lambda: bundle.estimate(row),
@@ -88,6 +92,8 @@ def main() -> None:
     yardstick = next(iter(seconds.values()))
     for name, value in seconds.items():
         print(f"{name:40} {value / yardstick:10.2f} x   ({1e3 * value:8.2f} ms here)")
+    handover.close()
+    print(f"virtual camera through its own process: {sustained_hz(60.0):.1f} frames/s of 60")
     print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
 
 

@@ -9,6 +9,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,17 +31,29 @@ class Answer:
 
 
 class Daemon:
-    """`python -m device --simulate` as its own process on a free port unless told otherwise."""
+    """`python -m device --simulate` as its own process on a free port unless told otherwise.
 
-    def __init__(self, folder: Path, scene: str = "", port: int = 0) -> None:
-        arguments = [sys.executable, "-m", "device", "--simulate", "--port", str(port)]
+    `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        scene: str = "",
+        port: int = 0,
+        *,
+        program: Sequence[str] = ("-m", "device"),
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        arguments = [sys.executable, *program, "--simulate", "--port", str(port)]
         if scene:
             (folder / "scene.toml").write_text(scene)
             arguments += ["--scene", "scene.toml"]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
-        self.log = (folder / "log.txt").open("w")
+        path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+        whole = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", **(environment or {})}
+        self.log = (folder / "log.txt").open("a")
         self.process = subprocess.Popen(
-            arguments, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=self.log, text=True
+            arguments, cwd=folder, env=whole, stdout=subprocess.PIPE, stderr=self.log, text=True
         )
         assert self.process.stdout is not None
         greeting = self.process.stdout.readline()
@@ -74,6 +87,10 @@ class Daemon:
 
     def stop(self) -> int:
         self.process.terminate()
+        return self.ended_code()
+
+    def ended_code(self) -> int:
+        """Return how the process ended, once it has."""
         code = self.process.wait(timeout=20)
         assert self.process.stdout is not None
         self.process.stdout.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sqlite3
+import time
 import urllib.request
 import zipfile
 from dataclasses import replace
@@ -168,6 +169,21 @@ def test_a_lump_that_cannot_be_seen_gets_no_number(tmp_path):
     # No contrast, or, when the two presses differ by a hundredth of the force, a contrast that no lump has.
     assert estimate["status"] in ("not_identifiable", "outside_range")
     assert estimate["size_mm"]["value"] is None
+
+
+def test_a_daemon_whose_certificate_has_expired_serves_and_refuses_presses_with_its_code(tmp_path):
+    daemon = Daemon(tmp_path, '[[faults]]\nkind = "clock_jump"\nstep_s = 2e9\n')
+    for _ in range(600):
+        status = daemon.ask("/api/v1/status").json
+        if status["faults"]:
+            break
+        time.sleep(0.05)
+    press, ready = daemon.ask("/api/v1/presses", "POST", {}), daemon.ask("/api/v1/health/ready")
+    known = daemon.ask("/api/v1/calibrations").json
+    daemon.stop()
+    assert ([fault["code"] for fault in status["faults"]], status["guidance"]["code"]) == (["E404"], "fault")
+    assert [(one.status, one.json["code"]) for one in (press, ready)] == [(503, "E404")] * 2
+    assert known["active"] == known["in_use"] == known["calibrations"][0]["id"]
 
 
 def test_a_second_daemon_on_the_same_data_is_refused_and_ends_no_press(tmp_path):

@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 
 from device.errors import CameraError
 from device.hardware.interfaces import CameraFrame
+from device.hardware.raw_mode import RawMode
 from device.measurement.quantities import Bound, InvalidQuantity, require
 
 if TYPE_CHECKING:
     from picamera2 import CompletedRequest, Picamera2
 
-RAW_FORMAT = "R8"
-"""libcamera's name of 8-bit monochrome raw."""
 BUFFER_COUNT = 4
+EXPOSURE_STEP_US = 50
+"""A sensor exposes for a whole number of its rows, none of which takes longer."""
+GAIN_STEP_RATIO = 0.05
+"""Steps of the gain are sixteenths or finer."""
 REMEDY = "Check the camera's ribbon cable, then restart the probe."
 
 
@@ -33,8 +36,7 @@ class RawMonoCamera:
         self,
         picam2: Picamera2,
         *,
-        width_px: int,
-        height_px: int,
+        mode: RawMode,
         exposure_us: int,
         gain: float,
         frame_rate_hz: float,
@@ -47,23 +49,25 @@ class RawMonoCamera:
         longest = Bound(0.0, frame_us, "us", low_included=False)
         require("exposure_us", exposure_us, longest, "shorten the exposure or lower the frame rate")
         self._picam2 = picam2
-        self._shape = (height_px, width_px)
+        self._mode, self._exposure_us, self._gain = mode, exposure_us, gain
         controls: dict[str, Any] = {"ExposureTime": exposure_us, "AnalogueGain": gain}
         controls["FrameDurationLimits"] = (frame_us, frame_us)
         if "AeEnable" in picam2.camera_controls:
             controls["AeEnable"] = False
         try:
-            self._stride_px = self._configure(controls)
+            self._stride_bytes = self._configure(controls)
             self._picam2.start()
         except RuntimeError as error:
             raise CameraError(f"Camera cannot be started: {error}.", REMEDY) from error
+        # Once for nothing: loading what scales a frame may take longer than the first frame may.
+        mode.frame(np.zeros((mode.sensor_px[1], self._stride_bytes), np.uint8))
 
     def _configure(self, controls: dict[str, Any]) -> int:
-        """Configure the raw stream and return its row length (px); raise `CameraError` when anything was adjusted."""
-        size = self._shape[::-1]
+        """Configure the raw stream; return its rows' bytes, or raise `CameraError` when anything was adjusted."""
+        size, raw_format = self._mode.sensor_px, self._mode.raw_format
         configuration = self._picam2.create_video_configuration(
             main={"size": size, "format": "YUV420"},  # libcamera insists on a processed stream beside the raw one
-            raw={"size": size, "format": RAW_FORMAT},
+            raw={"size": size, "format": raw_format},
             controls=controls,
             buffer_count=BUFFER_COUNT,
             display=None,
@@ -71,7 +75,7 @@ class RawMonoCamera:
         )
         self._picam2.configure(configuration)
         raw = self._picam2.camera_configuration()["raw"] or {}
-        self._refuse_adjustment("format", RAW_FORMAT, raw.get("format"))
+        self._refuse_adjustment("format", raw_format, raw.get("format"))
         self._refuse_adjustment("size", size, raw.get("size"))
         self._refuse_out_of_range(controls)
         return int(raw["stride"])
@@ -114,19 +118,28 @@ class RawMonoCamera:
         # SensorTimestamp is the end of the exposure on CLOCK_BOOTTIME. It equals CLOCK_MONOTONIC, the clock of the
         # lights and the load cell, as long as the board was never suspended; the probe never is.
         exposure_start_s = metadata["SensorTimestamp"] * 1e-9 - exposure_us * 1e-6
-        counts = self._counts(request.make_array("raw"))
-        return CameraFrame(counts, exposure_start_s, exposure_us, float(metadata["AnalogueGain"]))
+        gain = float(metadata["AnalogueGain"])
+        self._require_as_set(exposure_us, gain)
+        rows = request.make_array("raw")
+        self._require_rows(rows)
+        # The buffer is reused: the counts are a copy.
+        return CameraFrame(self._mode.frame(rows), exposure_start_s, exposure_us, gain)
 
-    def _counts(self, rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the image [height_px, width_px] without the padding of its rows, as a copy: buffers are reused."""
-        height_px, width_px = self._shape
-        if rows.shape != (height_px, self._stride_px) or rows.dtype != np.uint8:
+    def _require_as_set(self, exposure_us: float, gain: float) -> None:
+        """Refuse a frame that was not taken as it was asked for; the sensor's own steps are granted."""
+        missed_us, missed_ratio = abs(exposure_us - self._exposure_us), abs(gain / self._gain - 1)
+        if missed_us > EXPOSURE_STEP_US or missed_ratio > GAIN_STEP_RATIO:
             cause = (
-                f"Camera gave a frame of shape {rows.shape} and type {rows.dtype} "
-                f"instead of {(height_px, self._stride_px)} and uint8."
+                f"Camera exposed a frame for {exposure_us:g} us at gain {gain:g} "
+                f"instead of {self._exposure_us} us at {self._gain:g}."
             )
+            raise CameraError(cause, "Set an exposure and a gain that this camera has in the configuration.")
+
+    def _require_rows(self, rows: NDArray[np.uint8]) -> None:
+        expected = (self._mode.sensor_px[1], self._stride_bytes)
+        if rows.shape != expected or rows.dtype != np.uint8:
+            cause = f"Camera gave a frame of shape {rows.shape} and type {rows.dtype} instead of {expected} and uint8."
             raise CameraError(cause, REMEDY)
-        return rows[:, :width_px].copy()
 
     def close(self) -> None:
         """Stop the stream and give the camera back."""
@@ -134,9 +147,7 @@ class RawMonoCamera:
         self._picam2.close()
 
 
-def open_camera(
-    index: int, *, width_px: int, height_px: int, exposure_us: int, gain: float, frame_rate_hz: float
-) -> RawMonoCamera:
+def open_camera(index: int, *, mode: RawMode, exposure_us: int, gain: float, frame_rate_hz: float) -> RawMonoCamera:
     """Open the board's camera `index` and start it; raise `CameraError` when there is no camera or no picamera2."""
     try:
         from picamera2 import Picamera2
@@ -148,14 +159,7 @@ def open_camera(
     except RuntimeError as error:
         raise CameraError(f"Camera {index} cannot be opened: {error}.", REMEDY) from error
     try:
-        return RawMonoCamera(
-            picam2,
-            width_px=width_px,
-            height_px=height_px,
-            exposure_us=exposure_us,
-            gain=gain,
-            frame_rate_hz=frame_rate_hz,
-        )
+        return RawMonoCamera(picam2, mode=mode, exposure_us=exposure_us, gain=gain, frame_rate_hz=frame_rate_hz)
     except (CameraError, InvalidQuantity):
         picam2.close()
         raise

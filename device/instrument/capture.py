@@ -1,7 +1,8 @@
 """Takes the frames a measurement is made of: unloaded ones, and those of a press in the mode that was asked for.
 
-Which frames of a press count is for `HoldFrames` or `RampFrames` to say; a hand that lifts early begins again.
-The light of each side is looked at while the reference press is still held.
+It drives the press machine: each frame becomes an observation, and what the machine makes of it goes to the board. A
+press that the machine rejects ends with `PressEnded`. The light of each side is looked at while the reference press is
+still held.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from collections.abc import Sequence
 from device.config import Config
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import TearWatch
+from device.instrument.frame_level import require_lit
 from device.instrument.guidance import before_contact
-from device.instrument.hold_frames import TOUCH_RATIO, HoldFrames
 from device.instrument.light_check import (
     Levels,
     growth_ratio,
@@ -23,10 +24,14 @@ from device.instrument.light_check import (
     require_dark,
     require_every_side,
 )
-from device.instrument.ramp_frames import RampFrames, ramp_targets_n
+from device.instrument.lump_spot import lump_spot_mm
+from device.instrument.press_machine import Ending, Observation, Press, PressRules
+from device.instrument.press_state import ACTIVE
+from device.instrument.progress import ProgressBoard
 from device.instrument.status import StatusBoard
-from device.measurement.mode import FRAMES, Mode
-from device.measurement.tactile_image import SIDES, Frame, LedRatio, Role
+from device.instrument.wanted_frames import WantedFrames, wanted_frames
+from device.measurement.mode import Mode
+from device.measurement.tactile_image import SIDES, Frame, LedRatio, Role, saturated_ratio
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02
@@ -35,34 +40,47 @@ POLL_S = 0.02
 class PressEnded(Exception):  # noqa: N818 - not every end is an error
     """The press ended without a measurement: rejected with a reason, or cancelled."""
 
-    def __init__(self, state: str, reason: str) -> None:
+    def __init__(self, state: Ending, reason: str) -> None:
         self.state, self.reason = state, reason
         super().__init__(reason)
+
+
+class CalledAway(Exception):  # noqa: N818 - not an error: something else is to be done first
+    """The wait for an untouched probe was given up."""
 
 
 class Capture:
     """The part of the procedure that moves the light and takes frames."""
 
-    def __init__(self, bench: Bench, config: Config, board: StatusBoard) -> None:
-        self.bench, self.press, self.light, self.board = bench, config.press, config.light, board
+    def __init__(self, bench: Bench, config: Config, board: StatusBoard, progress: ProgressBoard | None = None) -> None:
+        self._progress = progress or ProgressBoard()
+        self.bench, self.config, self.press, self.light, self.board = bench, config, config.press, config.light, board
         self.lit = (self.light.ratio[0], self.light.ratio[1], self.light.ratio[2], self.light.ratio[3])
-        self.cancelled, self.stopping = threading.Event(), threading.Event()
+        self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
+        self.machine = Press()
         self._tears = TearWatch(config.camera.tear_counts)
-        self._dark_counts = 0.0
+        self._dark: list[Frame] = []
+        self._reference: list[Frame] = []
+        self._dark_counts = self._before_s = 0.0
 
     def unloaded(self) -> list[Frame]:
         """Return dark and lit frames of the untouched probe; waits until it is untouched.
 
-        Raises `StuckLightError` or `AmbientLightError` when the dark ones are not dark, `OpenLedError` or
-        `HotLedDriverError` when the LED chip says that current does not flow.
+        Raises `CalledAway` when something else is to be done meanwhile, `StuckLightError` or `AmbientLightError` when
+        the dark ones are not dark, `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not
+        flow.
         """
         self.bench.light(DARK)
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
+            self._progress.beat()
+            if self.called_away.is_set():
+                raise CalledAway
             time.sleep(POLL_S)
         self.bench.check_lights()
         dark = self._agreeing("dark", DARK)
-        require_dark(dark[-1], self.light.max_dark_counts)
-        self._dark_counts = level_counts(dark[-1])
+        for frame in dark:
+            require_dark(frame, self.light.max_dark_counts)
+        self._dark, self._dark_counts = dark, level_counts(dark[-1])
         lit = self._agreeing("reference", self.lit)
         self.bench.light(DARK)
         return dark + lit
@@ -71,36 +89,65 @@ class Capture:
         """Return the frames of one press, as many as the mode needs.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
-        depend on it, `OpenLedError` or `HotLedDriverError` when the light fails before it,
-        `LightBudgetError` when it was on for too long.
+        depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
+        light fails before it, `LightBudgetError` when it was on for too long.
         """
-        wanted, begin = self._wanted(role, mode), before_contact(role, mode)
+        wanted = wanted_frames(mode, role, self.press, self._tears)
+        rules = PressRules.of(self.press, wanted.window_n, is_ramp=wanted.is_ramp)
+        begin = before_contact(role, mode)
+        self._before_s = time.monotonic()
+        self._become(self.machine.begin(role, self._before_s))
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
         self.bench.check_lights()
         self.bench.light(self.lit)
-        last_contact_s = time.monotonic()
         while not wanted.is_complete:
             self._require_going_on()
             frame = self.bench.take(role)
-            is_touching = frame.force_n >= self.press.contact_n
-            if is_touching:
-                last_contact_s = time.monotonic()
-            self._require_bearable(frame, last_contact_s)
-            if is_touching:
-                guidance = wanted.see(frame)
+            self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
+            if self.machine.is_touching:
+                guidance = wanted.see(frame, self.machine.state)
+                self._drop_outliers(wanted)
             else:
                 guidance = begin
                 wanted.begin_again()
             self.board.update(guidance=guidance, frames_taken=len(wanted.frames), wanted_n=wanted.wanted_n)
+        require_lit(wanted.frames, self._dark_counts)
         if seen := wanted.light_and_hard():
             require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
+        self._become(self.machine.hold(self._spot_mm(role, wanted.frames), rules))
         return wanted.frames
 
-    def _wanted(self, role: Role, mode: Mode) -> HoldFrames | RampFrames:
-        count = FRAMES[mode].count
-        if FRAMES[mode].is_ramp:
-            return RampFrames(ramp_targets_n(count, role), self.press, self.bench, self._tears)
-        return HoldFrames(count, self.press, self.bench, self._tears)
+    def _drop_outliers(self, wanted: WantedFrames) -> None:
+        """Take the frames again that are unlike the others, once all are there."""
+        while wanted.is_complete and (dropped := wanted.drop_outlier(self._dark_counts)):
+            self._become(self.machine.replace_frame(dropped.deviation_ratio))
+
+    def _spot_mm(self, role: Role, frames: list[Frame]) -> tuple[float, float] | None:
+        """Return where the lump lies from the middle of the face; None beside it, or when it does not stand out."""
+        if role == "reference":
+            self._reference = frames
+            return None
+        if not (self._dark and self._reference):
+            return None
+        return lump_spot_mm(self._dark, self._reference, frames, self.config.camera.scale)
+
+    def _observation(self, frame: Frame, *, is_ramp: bool) -> Observation:
+        since_s, self._before_s = self._before_s, frame.t_s
+        return Observation(
+            t_s=frame.t_s,
+            force_n=frame.force_n,
+            peak_n=self.bench.peak_n(since_s, frame.t_s),
+            range_n=self.bench.range_n(frame.t_s, around_line=is_ramp),
+            rate_n_per_s=self.bench.rate_n_per_s(frame.t_s),
+            saturated_ratio=saturated_ratio(frame.counts),
+        )
+
+    def _become(self, press: Press) -> None:
+        """Take over what the machine says, and tell the board; raise `PressEnded` when it is the end."""
+        self.machine = press
+        self.board.update(state=press.state)
+        if press.ending:
+            raise PressEnded(press.ending, press.reason)
 
     def side_levels(self, reference: Sequence[Frame]) -> Levels:
         """Return the light of each side alone, under the load of the reference press that is being held.
@@ -121,15 +168,31 @@ class Capture:
         require_every_side(tuple(levels), self.light.min_side_ratio)
         return tuple(levels)
 
+    def release(self) -> None:
+        """Let the hand lift: every frame is there."""
+        self._become(self.machine.release(time.monotonic()))
+
     def lifted(self) -> None:
         """Return once the probe touches nothing between the two presses; raises `PressEnded` as `loaded` does."""
         self.bench.light(DARK)
-        deadline_s = time.monotonic() + self.press.timeout_s
-        while self.bench.force.latest_n >= self.press.contact_n:
+        while (force_n := self.bench.force.latest_n) >= self.press.contact_n:
             self._require_going_on()
-            if time.monotonic() > deadline_s:
-                raise PressEnded("rejected", f"The probe was not lifted for {self.press.timeout_s:.0f} s: begin again.")
+            self._become(self.machine.wait(time.monotonic(), force_n, self.press))
             time.sleep(POLL_S)
+
+    def done(self) -> None:
+        """Say that the measurement is kept."""
+        self._become(self.machine.done())
+
+    def end(self, reason: str, ending: Ending = "rejected") -> None:
+        """End the press under way, if there is one, for a reason that the machine does not know."""
+        if self.machine.state in ACTIVE:
+            self.machine = self.machine.reject(reason, ending)
+            self.board.update(state=self.machine.state)
+
+    def clear(self) -> None:
+        """Forget the last press: the next may begin."""
+        self.machine = Press()
 
     def _agreeing(self, role: Role, ratio: LedRatio) -> list[Frame]:
         self.bench.light(ratio)
@@ -145,21 +208,13 @@ class Capture:
         while len(frames) < 2:
             self._require_going_on()
             self._tears.append(frames, self.bench.take("reference"))
-        if frames[-1].force_n < TOUCH_RATIO * self.press.target_n:
-            raise PressEnded("rejected", "The probe was lifted too early: hold it until the screen says so.")
+        self._become(self.machine.check(self._observation(frames[-1], is_ramp=False), self.press))
         return frames[-1]
 
     def _require_going_on(self) -> None:
+        self._progress.beat()
         self.bench.budget.require_left()
         if self.cancelled.is_set():
-            raise PressEnded("cancelled", "Cancelled by the operator.")
+            self._become(self.machine.reject("Cancelled by the operator.", "cancelled"))
         if self.stopping.is_set():
-            raise PressEnded("failed", "The daemon was stopped during the press.")
-
-    def _require_bearable(self, frame: Frame, last_contact_s: float) -> None:
-        limit_n, timeout_s = self.press.overload_n, self.press.timeout_s
-        if frame.force_n > limit_n:
-            reason = f"The force rose to {frame.force_n:.2f} N, above {limit_n:.2f} N: lift and press more gently."
-            raise PressEnded("rejected", reason)
-        if time.monotonic() - last_contact_s > timeout_s:
-            raise PressEnded("rejected", f"No press came for {timeout_s:.0f} s: begin again.")
+            self._become(self.machine.reject("The daemon was stopped during the press.", "failed"))

@@ -22,7 +22,12 @@ class ClockWatch:
         monotonic_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._max_jump_s, self._wall_time_s, self._monotonic_s = max_jump_s, wall_time_s, monotonic_s
-        self._offset_s = wall_time_s() - monotonic_s()
+        self._offset_s = self.offset_s
+
+    @property
+    def offset_s(self) -> float:
+        """Return wall minus monotonic time, which stays while nobody sets the clock."""
+        return self._wall_time_s() - self._monotonic_s()
 
     def now(self) -> str:
         """Return the time as RFC 3339 in UTC."""
@@ -31,7 +36,7 @@ class ClockWatch:
 
     def warning(self) -> ClockJumpError | None:
         """Return the warning that the clock deserves for having been set since the last look, or None."""
-        offset_s = self._wall_time_s() - self._monotonic_s()
+        offset_s = self.offset_s
         jump_s, self._offset_s = offset_s - self._offset_s, offset_s
         if abs(jump_s) <= self._max_jump_s:
             return None

@@ -9,27 +9,42 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
 from device.errors import LoadCellError, OverloadedCellError
 from device.hardware.interfaces import ForceScale, LoadCell, Newtons
 from device.instrument.load_limit import LoadLimit
+from device.instrument.progress import ProgressBoard
 
 KEPT_SAMPLES = 1000
 SILENCE_S = 1.0
 RETRY_S = 0.2
 
 
+def force_range_n(samples: Sequence[tuple[float, float]], *, around_line: bool) -> Newtons:
+    """Return by how much the forces of one or more samples (s, N) vary, or what their straight line leaves of it."""
+    if not around_line:
+        return Newtons(max(force for _, force in samples) - min(force for _, force in samples))
+    times, forces = np.array(samples).T
+    centred = times - times.mean()
+    slope = float(centred @ forces) / max(float(centred @ centred), 1e-12)
+    return Newtons(float(np.ptp(forces - slope * centred)))
+
+
 class ForceRecorder:
     """Force history of the last seconds."""
 
-    def __init__(self, cell: LoadCell, scale: ForceScale, limit: LoadLimit) -> None:
+    def __init__(
+        self, cell: LoadCell, scale: ForceScale, limit: LoadLimit, progress: ProgressBoard | None = None
+    ) -> None:
         """Start recording; there is a sample when this returns. Raises `LoadCellError` when none comes."""
         self._cell, self._scale, self._limit = cell, scale, limit
         self._samples: deque[tuple[float, Newtons]] = deque(maxlen=KEPT_SAMPLES)
         self._news, self._stopping = threading.Condition(), threading.Event()
         self.fault: LoadCellError | None = None
+        self._progress = progress or ProgressBoard()
         self._thread = threading.Thread(target=self._run, name="force", daemon=True)
         self._thread.start()
         try:
@@ -46,7 +61,8 @@ class ForceRecorder:
     def _run(self) -> None:
         while not self._stopping.is_set():
             try:
-                sample = self._cell.read(timeout_s=SILENCE_S)
+                with self._progress.inside("force"):
+                    sample = self._cell.read(timeout_s=SILENCE_S)
                 self._limit.require_bearable(sample.counts)
             except OverloadedCellError as error:
                 self.fault = error  # and the next sample at once: those behind it must not grow old
@@ -85,11 +101,32 @@ class ForceRecorder:
             raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
         return Newtons(float(np.interp(t_s, times, forces)))
 
-    def range_n(self, t_s: float, *, window_s: float) -> Newtons:
-        """Return by how much the force varied in a window that ends at a time."""
+    def mean_n(self, *, window_s: float) -> Newtons:
+        """Return the mean force of the last seconds, as far as they are known; raises as `latest_n` does."""
+        newest_n, now_s = self.latest_n, time.monotonic()
         with self._news:
-            inside = [force for t, force in self._samples if t_s - window_s <= t <= t_s]
-        return Newtons(max(inside) - min(inside) if inside else float("inf"))
+            inside = [force for t, force in self._samples if now_s - window_s <= t]
+        return Newtons(sum(inside) / len(inside)) if inside else newest_n
+
+    @property
+    def zero_shift_n(self) -> Newtons:
+        """Return how far the tare of this start is from that of commissioning."""
+        return self._limit.commissioned.newtons(self._scale.tare_counts)
+
+    def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
+        """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""
+        with self._news:
+            inside = [(t - t_s, force) for t, force in self._samples if t_s - window_s <= t <= t_s]
+        return force_range_n(inside, around_line=around_line) if inside else Newtons(float("inf"))
+
+    def peak_n(self, since_s: float, t_s: float) -> Newtons:
+        """Return the largest force of the samples after one time and until another, and of that time itself.
+
+        Waits for a later sample and raises `LoadCellError` as `at` does.
+        """
+        at_the_end = self.at(t_s)
+        with self._news:
+            return max([at_the_end, *(force for t, force in self._samples if since_s < t <= t_s)])
 
     def close(self) -> None:
         """Stop the thread and release the cell."""

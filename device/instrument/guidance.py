@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from device.instrument.press_state import PressState
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.tactile_image import Role
 
@@ -22,6 +23,10 @@ class Guidance(Enum):
     SLOWER = "slower", "Slower"
     HOLD_STILL = "hold_still", "Hold still"
     LIFT = "lift", "Lift the probe"
+    KEEP_FREE = "keep_free", "Keep the probe free"
+    HOLD_BLOCK = "hold_block", "Hold the probe on the reference block"
+    PUT_WEIGHT = "put_weight", "Put the weight on the probe"
+    TAKE_WEIGHT_OFF = "take_weight_off", "Take the weight off"
     DONE = "done", "Done"
     REJECTED = "rejected", "Press rejected"
     FAULT = "fault", "The probe has a fault"
@@ -38,10 +43,11 @@ def before_contact(role: Role, mode: Mode) -> Guidance:
     return Guidance.TOUCH_LESION if is_ramp else Guidance.PRESS_LESION
 
 
-def advise(force_n: float, band_n: tuple[float, float]) -> Guidance:
-    """Return what to do at a force of the touching probe: press harder, lighter, or hold still inside the band."""
-    if force_n < band_n[0]:
-        return Guidance.PRESS_HARDER
-    if force_n > band_n[1]:
-        return Guidance.PRESS_LIGHTER
-    return Guidance.HOLD_STILL
+HELD_GUIDANCE = {
+    PressState.TOO_LIGHT: Guidance.PRESS_HARDER,
+    PressState.TOO_HARD: Guidance.PRESS_LIGHTER,
+    PressState.UNSTEADY: Guidance.HOLD_STILL,
+    PressState.HOLDING: Guidance.HOLD_STILL,
+    PressState.CAPTURING: Guidance.HOLD_STILL,
+}
+"""What to do in each state of a hold; a ramp's guidance depends on the forces that are still wanted, too."""

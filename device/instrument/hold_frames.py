@@ -1,15 +1,15 @@
-"""The frames of a press that holds one force: those in the force band, taken while the hand holds still.
+"""The frames of a press that holds one force: those that count, until enough of them are alike.
 
-A force that only passes through the band does not count. Source: Lee & Won 2013, section IV: ten frames a lesion,
-averaged.
+Which frame counts is for the press machine to say. Source: Lee & Won 2013, section IV: ten frames a lesion, averaged.
 """
 
 from __future__ import annotations
 
 from device.config import PressSection
-from device.instrument.bench import Bench
 from device.instrument.frame_check import TearWatch
-from device.instrument.guidance import Guidance, advise
+from device.instrument.guidance import HELD_GUIDANCE, Guidance
+from device.instrument.outlier_frames import Outlier, worst_outlier
+from device.instrument.press_state import PressState
 from device.measurement.tactile_image import Frame
 
 TOUCH_RATIO = 0.7
@@ -21,8 +21,10 @@ FEWEST_COMPARED = 2
 class HoldFrames:
     """`count` frames at the target force."""
 
-    def __init__(self, count: int, press: PressSection, bench: Bench, tears: TearWatch) -> None:
-        self._count, self._press, self._bench, self._tears = count, press, bench, tears
+    is_ramp = False
+
+    def __init__(self, count: int, press: PressSection, tears: TearWatch) -> None:
+        self._count, self._press, self._tears = count, press, tears
         self._frames: list[Frame] = []
         self._touch: Frame | None = None
 
@@ -30,6 +32,11 @@ class HoldFrames:
     def frames(self) -> list[Frame]:
         """The frames so far, at most as many as are needed."""
         return self._frames[-self._count :]
+
+    @property
+    def window_n(self) -> tuple[float, float]:
+        """Forces (N) between which frames are wanted: the band around the target."""
+        return self._press.band_n
 
     @property
     def wanted_n(self) -> tuple[float, ...]:
@@ -41,13 +48,19 @@ class HoldFrames:
         """Whether all frames are there."""
         return len(self._frames) >= max(self._count, FEWEST_COMPARED)
 
-    def see(self, frame: Frame) -> Guidance:
+    def see(self, frame: Frame, state: PressState) -> Guidance:
         """Keep a frame of the touching probe if it counts; return what to do next."""
         self._touch = self._touch or frame
-        guidance = advise(frame.force_n, self._press.band_n)
-        if guidance is Guidance.HOLD_STILL and self._bench.is_steady(frame.t_s, self._press.steady_n):
+        if state is PressState.CAPTURING:
             self._tears.append(self._frames, frame)
-        return guidance
+        return HELD_GUIDANCE[state]
+
+    def drop_outlier(self, dark_counts: float) -> Outlier | None:
+        """Drop the frame that is most unlike the others and return it, or None when they are alike."""
+        worst = worst_outlier(self._frames, dark_counts)
+        if worst:
+            self._frames = [frame for frame in self._frames if frame is not worst.frame]
+        return worst
 
     def begin_again(self) -> None:
         """Forget all frames: the probe was lifted."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from device.config import Config
-from device.instrument.bench import STEADY_WINDOW_S
+from device.instrument.press_machine import STEADY_WINDOW_S
 from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N, Mode
 
 EASY_RATIO = 0.5

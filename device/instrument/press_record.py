@@ -16,7 +16,7 @@ from device.errors import DeviceError
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion
-from device.measurement.recording import CameraSettings, Recording
+from device.measurement.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.tactile_image import Frame
 
 
@@ -49,6 +49,7 @@ def recording_of(
         calibration_id=calibration_id,
         truth=simulated_truth,
         simulated=simulated_truth is not None,
+        cell=RecordedCell(config.cell.sensitivity_counts_per_n, config.cell.commissioned_tare_counts),
     )
 
 

@@ -35,7 +35,8 @@ class PressRequests:
     def ask(self, mode: Mode | None) -> PressJob:
         """Ask for a press in a mode, that of the settings unless given.
 
-        Raises `ModeUnavailable`, `BusyError` when one is under way, or the `DeviceError` that the probe is at fault by.
+        Raises `ModeUnavailable`, `BusyError` when a press or the self-test is under way, or the `DeviceError` that
+        the probe is at fault by.
         """
         mode = mode or self._mode
         if mode not in self._modes:
@@ -43,10 +44,12 @@ class PressRequests:
             raise ModeUnavailable(f"This probe has no model for the mode {mode}.", remedy)
         with self._lock:
             status = self._board.now
-            if status.fault:
-                raise status.fault
+            if status.hindrance:
+                raise status.hindrance
             if self._waiting or (status.press and status.press.state not in ENDED):
                 raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
+            if status.self_test and status.self_test.is_under_way:
+                raise BusyError("The self-test is under way.", "Wait until it has ended.")
             job = self._new_job(mode)
             self._store.save_press(job.as_record())
             self._waiting = job

@@ -12,21 +12,29 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from device.config import Config
-from device.errors import DeviceError, LightError, NoContrastError
+from device.errors import BusyError, DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
-from device.instrument.capture import POLL_S, Capture, PressEnded
+from device.instrument.brightness_loop import BrightnessLoop
+from device.instrument.calibration_watch import CalibrationWatch
+from device.instrument.capture import POLL_S, CalledAway, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
 from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
+from device.instrument.press_state import PressState
+from device.instrument.progress import ProgressBoard
+from device.instrument.self_test.job import SelfTestJob
+from device.instrument.self_test.requests import SelfTestRequests
+from device.instrument.self_test.run import SelfTest
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
-from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording import Recording
 from device.measurement.tactile_image import Frame
 from device.records.store import ENDED, Store
@@ -53,22 +61,30 @@ class Procedure:
         store: Store,
         *,
         modes: tuple[Mode, ...],
-        calibration_id: str,
+        calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
+        progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
+        folder_of: Callable[[Path], Path] = Path,
     ) -> None:
-        """Take `modes`, those in which the estimator answers; the settings' own mode is one of them."""
+        """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
+
+        `folder_of` says where an installed model lies.
+        """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
-        self.modes = modes
-        self.board = StatusBoard()
-        self._estimator, self._calibration_id, self._truth = estimator, calibration_id, simulated_truth
-        self._capture = Capture(bench, config, self.board)
+        self.modes, self.calibration = modes, calibration
+        self.board, self.progress = StatusBoard(), progress or ProgressBoard()
+        self._estimator, self._truth = estimator, simulated_truth
+        self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
+        self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
             self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
         )
+        test = SelfTest(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
+        self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
 
     @property
@@ -78,8 +94,8 @@ class Procedure:
 
     def require_ready(self) -> None:
         """Raise the fault that keeps a press from being measured, if there is one."""
-        if self.board.now.fault:
-            raise self.board.now.fault
+        if self.board.now.hindrance:
+            raise self.board.now.hindrance
         _ = self.bench.force.latest_n
 
     def start(self) -> None:
@@ -104,6 +120,25 @@ class Procedure:
         """Cancel the press under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
 
+    def request_self_test(self, *, on_block: bool = False, weight_n: float | None = None) -> SelfTestJob:
+        """Ask for a self-test, with the probe held on the reference block and with a known weight (N) if given.
+
+        Raises `BusyError` while a press or a self-test is under way, `InvalidQuantity` for a weight that is too light
+        to be told from none, or more than the load cell bears.
+        """
+        if weight_n is not None:
+            bound = Bound(2 * self.config.press.contact_n, self.config.cell.max_load_n, "N")
+            require("weight_n", weight_n, bound, "take another weight")
+        press = self.board.now.press
+        if self._requests.is_waiting or (press and press.state not in ENDED):
+            raise BusyError("A press is under way.", "Wait until it has ended, or cancel it.")
+        return self._self_tests.ask(on_block=on_block, weight_n=weight_n)
+
+    @property
+    def self_test(self) -> SelfTestJob:
+        """The self-test under way or the last one; raises `UnknownResource` when there was none."""
+        return self._self_tests.last
+
     def _run(self) -> None:
         self._run_presses()
         try:
@@ -114,7 +149,10 @@ class Procedure:
     def _run_presses(self) -> None:
         while not self._capture.stopping.is_set():
             try:
+                self._self_tests.run_if_asked()
                 self._one_press()
+            except CalledAway:
+                continue
             except DeviceError as error:
                 self._at_fault(error)
             except Exception as error:
@@ -122,39 +160,52 @@ class Procedure:
                 self._at_fault(DeviceError(f"The daemon failed: {error!r}.", "Restart it and report the log."))
 
     def _one_press(self) -> None:
+        self.progress.beat()
         self.store.require_space(self.config.store.min_free_mb)
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
         self._warn(self._clock.warning())
+        self.calibration.require_valid(self._clock.now())
+        self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
+        self.calibration.require_no_drift(unloaded)
+        self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
-            self.board.update(step="ready", guidance=guidance, fault=None)
+            self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
         job = self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S)
         if job:
             self._measure(job, unloaded)
 
     def _next_job(self, until_s: float) -> PressJob | None:
-        while time.monotonic() < until_s and not self._capture.stopping.is_set():
+        while time.monotonic() < until_s and not (
+            self._capture.stopping.is_set() or self._capture.called_away.is_set()
+        ):
             is_touched = self.bench.force.latest_n >= self.config.press.contact_n
             if job := self._requests.begin(is_touched=is_touched):
                 return job
+            self.progress.beat()
             time.sleep(POLL_S)
         return None
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
         started_at = self._clock.now()
         self.bench.budget.begin_press()
+        self._capture.clear()
         try:
             self._set_job(job, state="capturing", progress=0.1)
             self.board.update(step="reference", measurement_id=None)
             reference = self._capture.loaded("reference", job.mode)
-            self._warn(self._dimming.warning(self._capture.side_levels(reference)))
+            levels = self._capture.side_levels(reference)
+            self._warn(self._dimming.warning(levels))
+            self._warn(self._brightness.saw(levels))
+            self._capture.release()
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
             self._set_job(job, state="capturing", progress=0.5)
             self.board.update(step="lesion")
             press = self._capture.loaded("press", job.mode)
+            self._capture.release()
             self._darken()
             self.board.update(step="computing", guidance=Guidance.LIFT)
             self._warn(self._clock.warning())
@@ -167,6 +218,7 @@ class Procedure:
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
         else:
+            self._capture.done()
             # The screen first: whoever is told that the press has ended finds its result there.
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
             self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
@@ -177,6 +229,7 @@ class Procedure:
         self.bench.budget.note_saved(seconds)
 
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
+        self._capture.end(reason)
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
         self._set_job(job, state=state, reason=reason, code=code)
 
@@ -199,7 +252,7 @@ class Procedure:
             frames,
             self.config,
             started_at=started_at,
-            calibration_id=self._calibration_id,
+            calibration_id=self.calibration.id,
             simulated_truth=self._truth,
         )
 
@@ -211,6 +264,7 @@ class Procedure:
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:
             log.error("%s %s", error.code, error)
+        self._capture.end(str(error), "failed")
         # The fault first: whoever is told that the press has ended finds out why.
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
         self._fail_press(error)

@@ -1,18 +1,18 @@
 """The frames of a press that grows slowly: for each of evenly spaced forces the frame that comes nearest to it.
 
-A frame counts when its force is within half a spacing of a target and changes so slowly that it is known at the
-exposure, on the way up or down. A ramp is complete when every target has its frame and the hand is at the top, where
-it then holds. Which forces an estimate needs: device/measurement/mode.py.
+A frame that counts (the press machine says so: its force is known at the exposure) is kept for a target within half a
+spacing, on the way up or down. A ramp is complete when every target has its frame and the hand is at the top, where it
+then holds. Which forces an estimate needs: device/measurement/mode.py.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from device.config import PressSection
-from device.instrument.bench import Bench
 from device.instrument.frame_check import TearWatch
 from device.instrument.guidance import Guidance
+from device.instrument.outlier_frames import Outlier
+from device.instrument.press_state import PressState
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.measurement.tactile_image import Frame, Role
 
@@ -29,9 +29,11 @@ def ramp_targets_n(count: int, role: Role) -> tuple[float, ...]:
 class RampFrames:
     """One frame for each of two or more target forces, evenly spaced and growing."""
 
-    def __init__(self, targets_n: tuple[float, ...], press: PressSection, bench: Bench, tears: TearWatch) -> None:
+    is_ramp = True
+
+    def __init__(self, targets_n: tuple[float, ...], tears: TearWatch) -> None:
         self._targets_n, self._reach_n = targets_n, (targets_n[1] - targets_n[0]) / 2
-        self._press, self._bench, self._tears = press, bench, tears
+        self._tears = tears
         self._kept: dict[float, Frame] = {}
         self._before: Frame | None = None
         self._is_rising = True
@@ -40,6 +42,11 @@ class RampFrames:
     def frames(self) -> list[Frame]:
         """The frames so far, by growing target."""
         return [self._kept[target] for target in self._targets_n if target in self._kept]
+
+    @property
+    def window_n(self) -> tuple[float, float]:
+        """Forces (N) between which frames are wanted: half a spacing beyond both ends of the ramp."""
+        return self._targets_n[0] - self._reach_n, self._targets_n[-1] + self._reach_n
 
     @property
     def wanted_n(self) -> tuple[float, ...]:
@@ -51,13 +58,16 @@ class RampFrames:
         """Whether all frames are there and the hand has come to the top."""
         return not self.wanted_n and self._before is not None and self._before.force_n >= self._targets_n[-1]
 
-    def see(self, frame: Frame) -> Guidance:
+    def see(self, frame: Frame, state: PressState) -> Guidance:
         """Keep a frame of the touching probe if it counts; return what to do next."""
         is_whole = self._agrees_with_the_one_before(frame)
-        is_slow = abs(self._bench.rate_n_per_s(frame.t_s)) <= self._press.max_rate_n_per_s
-        if is_whole and is_slow:
+        if is_whole and state is PressState.CAPTURING:
             self._keep(frame)
-        return self._advise(frame.force_n) if is_slow else Guidance.SLOWER
+        return Guidance.SLOWER if state is PressState.UNSTEADY else self._advise(frame.force_n)
+
+    def drop_outlier(self, dark_counts: float) -> Outlier | None:
+        """Return None: no two frames of a ramp ought to be alike, and torn ones are not kept."""
+        return None
 
     def begin_again(self) -> None:
         """Forget all frames: the probe was lifted."""

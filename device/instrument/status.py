@@ -9,9 +9,11 @@ from typing import Any, Literal
 
 from device.errors import DeviceError
 from device.instrument.guidance import Guidance
+from device.instrument.press_state import PressState
+from device.instrument.self_test.job import SelfTestJob
 from device.measurement.mode import Mode
 
-Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "fault"]
+Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "self_test", "fault"]
 JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "cancelled", "failed"]
 
 
@@ -42,18 +44,27 @@ class PressJob:
 class Status:
     """One moment of the procedure.
 
-    `wanted_n`: forces at which the press under way still wants frames. `warnings`: those of the last press, or of the
-    time since, and the lasting ones.
+    `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
+    frames. `warnings`: those of the last press, or of the time since, and the lasting ones. `stall`: a part that makes
+    no progress, by the watchdog's thread.
     """
 
     step: Step = "starting"
+    state: PressState = PressState.IDLE
     guidance: Guidance = Guidance.WAIT
     frames_taken: int = 0
     wanted_n: tuple[float, ...] = ()
     press: PressJob | None = None
     measurement_id: str | None = None
+    self_test: SelfTestJob | None = None
     fault: DeviceError | None = None
     warnings: tuple[DeviceError, ...] = ()
+    stall: DeviceError | None = None
+
+    @property
+    def hindrance(self) -> DeviceError | None:
+        """What keeps a press from being measured, if anything does."""
+        return self.fault or self.stall
 
 
 class StatusBoard:

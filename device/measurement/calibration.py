@@ -1,14 +1,17 @@
 """A calibration certificate: three straight lines from image to deformation features, and how far to trust them.
 
 The lines are fitted on phantoms with known inclusions (`host_tools calibrate`). The certificate is for one probe and
-one model, quotes its own residuals, and carries the held-out scenes that give every estimate its interval.
+one model, until a day, quotes its own residuals, and carries the held-out scenes that give every estimate its interval.
 Source: Lee & Won 2013, section III: three separate linear regressions O1':O1, O2':O2, O3':O3.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
+import uuid
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
@@ -20,14 +23,25 @@ from device.measurement.features import FEATURE_NAMES, FeatureSettings
 from device.measurement.intervals import HeldOut
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording import CameraSettings, RecordedCell
 from device.measurement.tactile_image import PixelScale
+from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import Validity
 
-SCHEMA = "tsis.calibration/1"
+SCHEMA = "tsis.calibration/2"
 RENEW = "calibrate the probe again"
 
 FORCE_TOLERANCE = 0.06
 """Relative. Features grow with the force: a press a fifth harder leaves the intervals beside the truth."""
 SCALE_TOLERANCE = 1e-3
+EXPOSURE_TOLERANCE = 0.02
+"""Relative, of exposure times gain: dividing by the reference takes it out of the image, not out of the drift."""
+
+
+TEXTS = (
+    *("id", "made_at", "operator", "serial", "phantom_serial"),
+    *("model_sha256", "model_card_sha256", "software", "software_sha256"),
+)
 
 
 @dataclass(frozen=True)
@@ -42,27 +56,36 @@ class Regression:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What turns this probe's images into the model's features."""
+    """What turns this probe's images into the model's features.
+
+    `id` follows from all else but `made_at`; `software_sha256` is over the sources that computed it.
+    """
 
     id: str
     made_at: str
+    validity: Validity
+    operator: str
     serial: str
+    phantom_serial: str
     model_sha256: str
     model_card_sha256: str
     force_n: float
-    scale: PixelScale
+    camera: CameraSettings
+    cell: RecordedCell
+    untouched: UntouchedFace
     settings: FeatureSettings
     regressions: tuple[Regression, ...]
     phantoms: int
     held_out: HeldOut
     software: str
+    software_sha256: str
     simulated: bool
 
     def __post_init__(self) -> None:
         if len(self.regressions) != len(FEATURE_NAMES):
             found = f"{len(self.regressions)} lines"
             raise InvalidQuantity("regressions", found, f"one for each of {', '.join(FEATURE_NAMES)}", RENEW)
-        for name in ("id", "serial", "model_sha256", "model_card_sha256"):
+        for name in TEXTS:
             value = getattr(self, name)
             if not isinstance(value, str):
                 raise InvalidQuantity(name, repr(value), "text", RENEW)
@@ -77,46 +100,98 @@ class Calibration:
         intercept = np.array([line.intercept for line in self.regressions])
         return np.asarray(image_features * slope + intercept)
 
+    @property
+    def scale(self) -> PixelScale:
+        """Size of a pixel on the face."""
+        return self.camera.scale
+
     def require_for(self, serial: str, bundle: ModelBundle) -> None:
         """Raise `InvalidQuantity` when the certificate is for another probe or another model."""
+        for problem in self.foreign(serial, bundle):
+            raise problem
+
+    def foreign(self, serial: str, bundle: ModelBundle) -> Iterator[InvalidQuantity]:
+        """Yield what says that the certificate is for another probe, or for another model."""
         pairs = ((self.model_sha256, bundle.sha256), (self.model_card_sha256, bundle.card_sha256))
         for ours, theirs in pairs:
             if ours != theirs:
                 found, expected = f"for model {ours[:12]}", f"for model {theirs[:12]}"
-                raise InvalidQuantity("calibration", found, expected, "calibrate with this model")
+                yield InvalidQuantity("calibration", found, expected, "calibrate with this model")
+                break
         if self.serial != serial:
             found, expected = f"for probe {self.serial}", f"for probe {serial}"
-            raise InvalidQuantity("calibration", found, expected, "use the probe's own certificate")
+            yield InvalidQuantity("calibration", found, expected, "use the probe's own certificate")
 
     def require_scale(self, scale: PixelScale) -> None:
         """Raise `InvalidQuantity` when frames are of another pixel size than the certificate's."""
+        for problem in self._other_scale(scale):
+            raise problem
+
+    def other_settings(
+        self, scale: PixelScale, *, exposure_us: float, gain: float, cell_counts_per_n: float
+    ) -> Iterator[InvalidQuantity]:
+        """Yield the settings of a probe that are not those of its calibration, each with the value it had there."""
+        yield from self._other_scale(scale)
+        gathered, ours = exposure_us * gain, self.camera.exposure_us * self.camera.gain
+        if abs(gathered - ours) > EXPOSURE_TOLERANCE * ours:
+            bound = f"{ours:g} us as calibrated, within {EXPOSURE_TOLERANCE:.0%}"
+            yield InvalidQuantity(
+                "camera.exposure_us times camera.gain", f"{gathered:g} us", bound, f"set it, or {RENEW}"
+            )
+        if abs(cell_counts_per_n - self.cell.counts_per_n) > SCALE_TOLERANCE * self.cell.counts_per_n:
+            found, bound = f"{cell_counts_per_n:g}", f"{self.cell.counts_per_n:g} counts/N as calibrated"
+            yield InvalidQuantity("cell.sensitivity_counts_per_n", found, bound, f"set it, or {RENEW}")
+
+    def _other_scale(self, scale: PixelScale) -> Iterator[InvalidQuantity]:
         ours, theirs = astuple(self.scale), astuple(scale)
         if not np.allclose(ours, theirs, rtol=SCALE_TOLERANCE):
-            raise InvalidQuantity("mm_per_px_x, mm_per_px_y", theirs, f"{ours} as calibrated", RENEW)
+            yield InvalidQuantity("mm_per_px_x, mm_per_px_y", theirs, f"{ours} as calibrated", RENEW)
 
     def holds_at(self, force_n: float) -> bool:
         """Return whether a press is as hard as those the regressions and the model were made with."""
         return abs(force_n - self.force_n) <= FORCE_TOLERANCE * self.force_n
 
+    def summary(self) -> dict[str, Any]:
+        """Return the certificate as JSON object without the held-out scenes."""
+        record = {name: value for name, value in _content(self).items() if name != "held_out"}
+        return {"schema": SCHEMA, **record, "is_drift_resolved": self.untouched.is_resolved}
+
     def to_json(self) -> str:
-        """Return the certificate as JSON text."""
-        record = {"schema": SCHEMA, **asdict(self)}
-        record["held_out"] = {k: np.round(v, 3).tolist() for k, v in record["held_out"].items()}
+        """Return the certificate as JSON text, with a hash of its content."""
+        record = _content(self)
         rows_on_one_line = re.compile(r"\[\s+([-\d.e,\s]+?)\s+\]")
-        text = json.dumps(record, indent=1)
+        text = json.dumps({"schema": SCHEMA, "sha256": _sha256(record), **record}, indent=1)
         return rows_on_one_line.sub(lambda row: f"[{' '.join(row[1].split())}]", text) + "\n"
 
 
+def certificate_id(calibration: Calibration) -> str:
+    """Return the id of a certificate's content: the same for the same recordings, operator, validity and software."""
+    content = {name: value for name, value in _content(calibration).items() if name not in ("id", "made_at")}
+    return str(uuid.uuid5(uuid.NAMESPACE_OID, _sha256(content)))
+
+
+def _content(calibration: Calibration) -> dict[str, Any]:
+    record = asdict(calibration)
+    record["held_out"] = {k: np.round(v, 3).tolist() for k, v in record["held_out"].items()}
+    return record
+
+
+def _sha256(record: Mapping[str, Any]) -> str:
+    """Return the hash of what a JSON object says, however it is written."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
 def read_calibration(path: Path) -> Calibration:
-    """Read a certificate; raise `InvalidQuantity` naming the first thing that is wrong with it."""
+    """Read a certificate; raise `InvalidQuantity` naming the first thing that is wrong with it.
+
+    The hash tells a file that was damaged or edited; it is no signature.
+    """
+    record = _record(path)
     try:
-        record: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InvalidQuantity("calibration", path, "a readable certificate", f"{RENEW} ({error})") from error
-    if not isinstance(record, dict) or record.pop("schema", None) != SCHEMA:
-        raise InvalidQuantity("calibration schema", path, SCHEMA, RENEW)
-    try:
-        record["scale"] = PixelScale(**record["scale"])
+        for name, kind in (("validity", Validity), ("camera", CameraSettings), ("cell", RecordedCell)):
+            record[name] = kind(**record[name])
+        side_counts = tuple(record["untouched"].pop("side_counts"))
+        record["untouched"] = UntouchedFace(side_counts=side_counts, **record["untouched"])
         record["settings"] = FeatureSettings(**record["settings"])
         record["regressions"] = tuple(Regression(**line) for line in record["regressions"])
         held_out = {name: np.array(rows, dtype=float) for name, rows in record["held_out"].items()}
@@ -126,3 +201,19 @@ def read_calibration(path: Path) -> Calibration:
         raise
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InvalidQuantity("calibration", path, "a complete certificate", f"{RENEW} ({error})") from error
+
+
+def _record(path: Path) -> dict[str, Any]:
+    """Return what the file says, without schema and hash, once both hold."""
+    try:
+        record: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidQuantity("calibration", path, "a readable certificate", f"{RENEW} ({error})") from error
+    schema = record.pop("schema", None) if isinstance(record, dict) else None
+    if schema != SCHEMA:
+        raise InvalidQuantity("calibration schema", f"{schema} in {path}", SCHEMA, RENEW)
+    stated = record.pop("sha256", None)
+    if stated != (found := _sha256(record)):
+        action = f"restore the file as it was written, or {RENEW}"
+        raise InvalidQuantity("calibration sha256", f"{found[:12]} in {path}", f"{str(stated)[:12]} as stated", action)
+    return dict(record)

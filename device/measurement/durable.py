@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+READ_ONLY = 0o444
+
 
 def write_and_sync(path: Path, content: bytes) -> None:
     """Write a file; when this returns its content is on the disk."""
@@ -23,6 +25,22 @@ def write_durably(path: Path, content: bytes) -> None:
     temporary = path.with_name(path.name + ".tmp")
     write_and_sync(temporary, content)
     temporary.replace(path)
+    sync_directory(path.parent)
+
+
+def write_once(path: Path, content: bytes) -> None:
+    """Write a file that nobody may write again: whole or not at all, read-only; makes its folder.
+
+    Raises `FileExistsError` when there is one already, which is left as it is.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        write_and_sync(temporary, content)
+        temporary.chmod(READ_ONLY)
+        os.link(temporary, path)  # unlike a rename it replaces nothing
+    finally:
+        temporary.unlink(missing_ok=True)
     sync_directory(path.parent)
 
 

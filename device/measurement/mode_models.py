@@ -39,6 +39,13 @@ class ModeModels(NamedTuple):
         """Return the models that are for one probe."""
         return ModeModels(self.paper, _if_for(serial, self.held), _if_for(serial, self.profile))
 
+    def prove(self) -> None:
+        """Run the golden vectors of every model; raise `BundleRefused` when one of them does not hold any more."""
+        for model in (self.held, self.profile):
+            if model:
+                model.bundle.prove()
+        self.paper.prove()
+
     def estimate(self, recording: Recording, mode: Mode, calibration: Calibration) -> Estimate:
         """Return the estimate of a recording in a mode.
 

@@ -20,6 +20,10 @@ class InvalidQuantity(ValueError):  # noqa: N818 - reads as what it says: this q
         self.quantity, self.value, self.bound, self.action = quantity, value, bound, action
         super().__init__(f"{quantity} is {value}, but must be {bound}: {action}.")
 
+    def __reduce__(self) -> tuple[type[InvalidQuantity], tuple[str, object, str, str]]:
+        """Carry the error to another process: an exception alone forgets what it was made of."""
+        return type(self), (self.quantity, self.value, self.bound, self.action)
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -36,6 +40,8 @@ class Bound:
         if math.isinf(self.high):
             return f"{low} {self.low:g} {self.unit}".strip()
         high = "at most" if self.high_included else "below"
+        if math.isinf(self.low):
+            return f"{high} {self.high:g} {self.unit}".strip()
         return f"{low} {self.low:g} and {high} {self.high:g} {self.unit}".strip()
 
     def holds(self, value: float) -> bool:

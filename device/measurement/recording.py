@@ -65,6 +65,20 @@ class CameraSettings:
 
 
 @dataclass(frozen=True)
+class RecordedCell:
+    """How the load cell's counts became the forces: slope, and reading of the free probe at commissioning if known."""
+
+    counts_per_n: float
+    tare_counts: float | None = None
+
+    def __post_init__(self) -> None:
+        bound = Bound(0.0, 1e9, "counts/N", low_included=False)
+        require("cell.counts_per_n", self.counts_per_n, bound, REPAIR)
+        if self.tare_counts is not None:
+            require("cell.tare_counts", self.tare_counts, Bound(-1e12, 1e12, "counts"), REPAIR)
+
+
+@dataclass(frozen=True)
 class Recording:
     """One press: frames of every role with their force, and where it came from. `truth` only for phantoms."""
 
@@ -78,6 +92,7 @@ class Recording:
     position_mm: tuple[float, float] = (0.0, 0.0)
     truth: Inclusion | None = None
     simulated: bool = False
+    cell: RecordedCell | None = None
 
     def __post_init__(self) -> None:
         require_one_shape(self.frames)
@@ -149,6 +164,7 @@ def _as_json(recording: Recording) -> dict[str, Any]:
         "started_at": recording.started_at,
         "simulated": recording.simulated,
         "camera": asdict(recording.camera),
+        "cell": asdict(recording.cell) if recording.cell else None,
         "frames": [
             {
                 "file": _frame_name(i),
@@ -211,7 +227,15 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         position_mm=_position_mm(_optional(record, "position_mm", list, [0.0, 0.0])),
         truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth is not None else None,
         simulated=_optional(record, "simulated", bool, False),
+        cell=_cell(_optional(record, "cell", dict, None)),
     )
+
+
+def _cell(record: dict[str, Any] | None) -> RecordedCell | None:
+    if record is None:
+        return None
+    tare = _field(record, "tare_counts", NUMBER, "cell.") if record.get("tare_counts") is not None else None
+    return RecordedCell(_field(record, "counts_per_n", NUMBER, "cell."), tare)
 
 
 def _time(record: dict[str, Any]) -> str:

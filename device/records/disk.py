@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 from typing import Protocol
@@ -29,3 +30,14 @@ class LocalDisk:
     def write(self, path: Path, content: bytes) -> None:
         """Write and synchronise a file; raise `OSError` when that fails."""
         write_and_sync(path, content)
+
+
+def read_uncached(path: Path) -> bytes:
+    """Return a synchronised file's content from the disk itself where the kernel lets go of its copy.
+
+    Source: posix_fadvise(2), POSIX_FADV_DONTNEED; a system without it reads what it has in memory.
+    """
+    with path.open("rb") as file:
+        if hasattr(os, "posix_fadvise"):
+            os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+        return file.read()

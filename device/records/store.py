@@ -19,7 +19,7 @@ from typing import Any
 
 from device.errors import DiskFullError, StorageError, UnknownResource
 from device.measurement.recording import Recording, write_recording
-from device.records.disk import Disk, LocalDisk
+from device.records.disk import Disk, LocalDisk, read_uncached
 
 Record = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
@@ -93,13 +93,30 @@ class Store:
 
     def require_space(self, free_mb: float) -> None:
         """Raise `DiskFullError` when less than `free_mb` (1e6 bytes) is left, `StorageError` when nobody can say."""
-        try:
-            left_mb = self._disk.free_bytes(self.folder) / 1e6
-        except OSError as error:
-            raise StorageError(f"The disk of {self.folder} is gone: {error}.", "Check the disk.") from error
+        left_mb = self.free_mb
         if left_mb < free_mb:
             cause = f"The disk of {self.folder} has {left_mb:.0f} MB left, below {free_mb:g} MB."
             raise DiskFullError(cause, "Copy recordings away and delete them there.")
+
+    @property
+    def free_mb(self) -> float:
+        """Return the space that is left, in 1e6 bytes; raise `StorageError` when nobody can say."""
+        try:
+            return self._disk.free_bytes(self.folder) / 1e6
+        except OSError as error:
+            raise StorageError(f"The disk of {self.folder} is gone: {error}.", "Check the disk.") from error
+
+    def read_back(self, content: bytes) -> bytes:
+        """Write a file as a recording's is written, read it and remove it; raise `StorageError` or `DiskFullError`."""
+        path = self.folder / "self-test.tmp"
+        try:
+            self._disk.write(path, content)
+            return read_uncached(path)
+        except OSError as error:
+            kind = DiskFullError if _is_full(error) else StorageError
+            raise kind(f"A file could not be written and read: {error}.", "Free space, or check the disk.") from error
+        finally:
+            path.unlink(missing_ok=True)
 
     def save_press(self, job: Record) -> None:
         """Keep the state of a press job."""

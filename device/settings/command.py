@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from device.settings.catalogue import SETTINGS, Known
 from device.settings.layers import Layers, layer_files, read_layers
 from device.settings.page import markdown
+from device.text_table import aligned
 
 EXAMPLES = """examples:
   python -m device config check                    all files of this machine
@@ -72,7 +72,7 @@ def _show(layers: Layers, *, only_changed: bool, as_json: bool) -> None:
     if as_json:
         print(json.dumps([_record(known, values[known.name], layers) for known in shown], default=str))
     else:
-        print("\n".join(_aligned([COLUMNS, *(_row(known, values[known.name], layers) for known in shown)])))
+        print("\n".join(aligned([COLUMNS, *(_row(known, values[known.name], layers) for known in shown)])))
 
 
 def _record(known: Known, value: Any, layers: Layers) -> dict[str, Any]:
@@ -84,11 +84,3 @@ def _record(known: Known, value: Any, layers: Layers) -> dict[str, Any]:
 def _row(known: Known, value: Any, layers: Layers) -> tuple[str, ...]:
     file = str(layers.origins.get(known.name, "default"))
     return known.name, known.written(value), known.setting.unit, known.written(known.default), file
-
-
-def _aligned(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Yield rows as lines of columns, each as wide as its widest entry."""
-    rows = list(rows)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

@@ -59,9 +59,15 @@ class LightSection(Section):
     oscillator_hz: float = setting(INTERNAL_HZ, "Oscillator of a pca9685, as measured.", Bound(20e6, 30e6, "Hz"))
     ratio: tuple[float, ...] = setting(
         (0.6, 0.6, 0.6, 0.6),
-        "Brightness of each side while measuring.",
+        "Brightness of each side while measuring, of the first press if it is held at light.target_counts.",
         Bound(0.0, 1.0, "", low_included=False),
         count=4,
+    )
+    target_counts: float | None = setting(
+        None,
+        "Mean counts above dark at the target force that the light is held at from press to press; "
+        "unless given the brightness stays.",
+        Bound(1.0, 150.0, "counts"),
     )
     max_dark_counts: float = setting(
         12.0,

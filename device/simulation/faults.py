@@ -20,31 +20,48 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_stall": (),
     "camera_late": (),
     "camera_torn": (),
+    "camera_stale": (),
+    "camera_hung": (),
+    "camera_crashed": (),
     "i2c_nack": (),
     "i2c_stuck": (),
+    "i2c_frozen": (),
     "led_dead": ("side",),
     "led_stuck_on": ("side",),
     "led_dimmed": ("side", "ratio"),
     "led_open": ("side",),
     "led_driver_hot": (),
+    "led_swapped": ("side", "other_side"),
     "ambient_light": ("ratio",),
     "wet_face": ("ratio",),
+    "dirty_face": ("ratio",),
     "cell_silent": (),
     "cell_garbage": (),
     "cell_saturated": (),
     "cell_overloaded": (),
     "cell_disconnected": (),
     "cell_unplugged": (),
+    "cell_frozen": (),
+    "inference_frozen": (),
     "clock_jump": ("step_s",),
     "disk_full": (),
+    "disk_read_only": (),
+    "bundle_tampered": (),
 }
 """Every kind of fault, and what it takes besides its times."""
 
-REQUIRED = {"led_dead": ("side",), "led_stuck_on": ("side",), "led_open": ("side",), "clock_jump": ("step_s",)}
-DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0}
+REQUIRED = {
+    "led_dead": ("side",),
+    "led_stuck_on": ("side",),
+    "led_open": ("side",),
+    "led_swapped": ("side", "other_side"),
+    "clock_jump": ("step_s",),
+}
+DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0, "dirty_face": 0.03}
 I2C_ERRNO = {"i2c_nack": 121, "i2c_stuck": errno.ETIMEDOUT}
 """What Linux answers: EREMOTEIO (121; macOS does not name it) for no acknowledgement, ETIMEDOUT for a line held low."""
 ACTION = "describe one fault"
+FROZEN_POLL_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -52,8 +69,9 @@ class Fault:
     """One fault: its kind, from when until when, and what it takes.
 
     `from_s` and `until_s` count from the start of the simulation, or with `from_press` = n from the n-th press that
-    was requested. `side`: of one LED, all four without. `ratio`: light that is left (led_dimmed), added light in units
-    of full light (ambient_light), part of the face that is wet (wet_face). `step_s`: by how much the wall clock is off.
+    was requested. `side`: of one LED, all four without; `other_side`: whose plug it has (led_swapped). `ratio`: light
+    that is left (led_dimmed), added light in units of full light (ambient_light, and dirty_face with all LEDs full),
+    part of the face that is wet (wet_face). `step_s`: by how much the wall clock is off.
     """
 
     kind: str
@@ -61,6 +79,7 @@ class Fault:
     until_s: float = math.inf
     from_press: int = 0
     side: str | None = None
+    other_side: str | None = None
     ratio: float | None = None
     step_s: float | None = None
 
@@ -71,10 +90,11 @@ class Fault:
         if not self.until_s > self.from_s:
             raise InvalidQuantity("faults.until_s", self.until_s, f"above from_s, {self.from_s:g} s", ACTION)
         require("faults.from_press", self.from_press, Bound(0, 1000, "(0: the start)"), ACTION)
-        for name in ("side", "ratio", "step_s"):
+        for name in ("side", "other_side", "ratio", "step_s"):
             self._require_parameter(name)
-        if self.side is not None and self.side not in SIDES:
-            raise InvalidQuantity("faults.side", repr(self.side), f"one of {', '.join(SIDES)}", ACTION)
+        for name in ("side", "other_side"):
+            if getattr(self, name) not in (None, *SIDES):
+                raise InvalidQuantity(f"faults.{name}", repr(getattr(self, name)), f"one of {', '.join(SIDES)}", ACTION)
         if self.ratio is not None:
             require("faults.ratio", self.ratio, Bound(0.0, 1.0, ""), ACTION)
         if self.step_s is not None:
@@ -114,6 +134,11 @@ class FaultTimeline:
         """Return whether a fault of that kind is there at a time (s, monotonic), now unless given."""
         return next(self._active(kind, self._clock() if t_s is None else t_s), None) is not None
 
+    def hold_up(self, kind: str) -> None:
+        """Return when there is no fault of that kind: stands for a call that does not return while there is one."""
+        while self.is_active(kind):
+            time.sleep(FROZEN_POLL_S)
+
     def is_open(self, side: str) -> bool:
         """Return whether the circuit of a side's LED is open now."""
         return any(fault.side == side for fault in self._active("led_open", self._clock()))
@@ -121,6 +146,9 @@ class FaultTimeline:
     def led_output(self, ratio: LedRatio, t_s: float) -> LedRatio:
         """Return the light of the four sides when the chip's outputs ask for `ratio`: 0..1 of full light."""
         light = list(ratio)
+        for fault in self._active("led_swapped", t_s):
+            one, other = SIDES.index(str(fault.side)), SIDES.index(str(fault.other_side))
+            light[one], light[other] = light[other], light[one]
         for kind, act in LIGHT_FAULTS.items():
             for fault in self._active(kind, t_s):
                 for number in range(len(SIDES)):
@@ -131,6 +159,10 @@ class FaultTimeline:
     def ambient_ratio(self, t_s: float) -> float:
         """Return the foreign light on every pixel, in units of full light, at a time."""
         return sum(fault.strength for fault in self._active("ambient_light", t_s))
+
+    def stray_ratio(self, led_ratio: LedRatio, t_s: float) -> float:
+        """Return the light on every pixel, in units of full light, that dirt on the face lets out of the waveguide."""
+        return sum(fault.strength for fault in self._active("dirty_face", t_s)) * sum(led_ratio) / len(led_ratio)
 
     def wet_ratio(self, t_s: float) -> float:
         """Return which part of the face is wet (0..1) at a time: there the image no longer depends on the press."""

@@ -1,7 +1,9 @@
 """The virtual operator's hand: it reads the screen's guidance and follows it, late and with a tremor.
 
 A hand moves its force at a limited rate towards what it wants, so the force is a function of time that light, image
-and load cell can all ask for. Physiological tremor: 8-12 Hz (Elble & Randall, 1978), plus a slow drift.
+and load cell can all ask for. Physiological tremor: 8-12 Hz (Elble & Randall, 1978; Elble & Koller, Tremor, 1990), plus
+a slow drift; that a force which is held is never still: Slifkin & Newell, J. Exp. Psychol. HPP 25 (1999). Amplitudes
+are assumed.
 """
 
 from __future__ import annotations
@@ -19,6 +21,13 @@ BESIDE_MM = (40.0, 0.0)
 """Where the hand presses for the reference: far enough that the lump is not felt."""
 TOUCH_N, RAMP_AIM_N = 0.06, RAMP_TO_N + 0.06
 """What a hand takes a touch to be, and how far it means to go when it is to press slowly harder."""
+TAKEN_UP_FOR = ("hold_block", "put_weight")
+"""In a self-test the probe is taken up when it says so; tissue beside the lesion is the block, `aim_n` the weight."""
+TREMOR_HZ = 9.3
+TREMOR_BEAT = 11.1 / 9.3
+"""A second sine makes tremor swell and fade: its frequency over that of the first, and half its size."""
+OVERSHOOT_S = 0.15
+"""How long after the hand has arrived an overshoot is largest."""
 REMEMBERED_MOVES = 8
 """The last motions: light, image and load cell ask about a time that is a little past."""
 ACTION = "describe a human hand"
@@ -28,13 +37,23 @@ ACTION = "describe a human hand"
 class HandSettings:
     """How this operator presses; `miss` is where the lesion is pressed beside its middle, `tilt` how it leans.
 
-    `rate_n_per_s` is how fast it goes to a force that it then holds, `ramp_rate_n_per_s` what it takes for slowly.
+    `rate_n_per_s` is how fast it goes to a force that it then holds, `ramp_rate_n_per_s` what it takes for slowly,
+    `ramp_aim_n` how far that goes. `corrects_to_n`: where it takes a held force when the screen says harder or lighter,
+    not at all without. `overshoot_ratio`: how far it first goes beyond its aim. `fade_n_per_s`: how fast a force that
+    it means to hold changes. `early_lifts`: so often it lifts a press `lifts_after_s` after it has begun it.
     """
 
     rate_n_per_s: float = 0.45
     ramp_rate_n_per_s: float = 0.15
     reaction_s: float = 0.25
     aim_n: float = 0.5
+    ramp_aim_n: float = RAMP_AIM_N
+    corrects_to_n: float | None = None
+    overshoot_ratio: float = 0.0
+    fade_n_per_s: float = 0.0
+    early_lifts: int = 0
+    lifts_after_s: float = 1.0
+    tremor_hz: float = TREMOR_HZ
     tremor_n: float = 0.002
     drift_n: float = 0.006
     miss_x_mm: float = 0.0
@@ -46,7 +65,15 @@ class HandSettings:
         require("hand.rate_n_per_s", self.rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
         require("hand.ramp_rate_n_per_s", self.ramp_rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
         require("hand.reaction_s", self.reaction_s, Bound(0.0, 5.0, "s"), ACTION)
-        require("hand.aim_n", self.aim_n, Bound(0.0, 5.0, "N"), ACTION)
+        for name in ("aim_n", "ramp_aim_n"):
+            require(f"hand.{name}", getattr(self, name), Bound(0.0, 5.0, "N"), ACTION)
+        if self.corrects_to_n is not None:
+            require("hand.corrects_to_n", self.corrects_to_n, Bound(0.0, 5.0, "N"), ACTION)
+        require("hand.overshoot_ratio", self.overshoot_ratio, Bound(0.0, 5.0, ""), ACTION)
+        require("hand.fade_n_per_s", self.fade_n_per_s, Bound(-5.0, 5.0, "N/s"), ACTION)
+        require("hand.early_lifts", self.early_lifts, Bound(0, 1000, ""), ACTION)
+        require("hand.lifts_after_s", self.lifts_after_s, Bound(0.01, 60.0, "s"), ACTION)
+        require("hand.tremor_hz", self.tremor_hz, Bound(1.0, 30.0, "Hz"), ACTION)
         require("hand.tremor_n", self.tremor_n, Bound(0.0, 1.0, "N"), ACTION)
         require("hand.drift_n", self.drift_n, Bound(0.0, 1.0, "N"), ACTION)
         for name in ("miss_x_mm", "miss_y_mm"):
@@ -62,18 +89,28 @@ class HandSettings:
 
 @dataclass(frozen=True)
 class Move:
-    """One motion of the hand: from when, from which force to which, how fast, and where."""
+    """One motion of the hand: from when, from which force to which, how fast, and where.
+
+    `overshoot_n` is how far it first goes beyond, `fade_n_per_s` how the force changes once it is there.
+    """
 
     since_s: float
     from_n: float
     aim_n: float
     rate_n_per_s: float
     position_mm: tuple[float, float]
+    overshoot_n: float = 0.0
+    fade_n_per_s: float = 0.0
 
     def steady_n(self, t_s: float) -> float:
-        """Return the force on the way from one to the other, at a limited rate."""
-        step_n, gap_n = self.rate_n_per_s * max(t_s - self.since_s, 0.0), self.aim_n - self.from_n
-        return self.from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
+        """Return the force on the way from one to the other, at a limited rate, and after that."""
+        gap_n = self.aim_n - self.from_n
+        step_n = self.rate_n_per_s * max(t_s - self.since_s, 0.0)
+        held_s = t_s - self.since_s - abs(gap_n) / self.rate_n_per_s
+        if held_s <= 0.0:
+            return self.from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
+        beyond_n = self.overshoot_n * held_s / OVERSHOOT_S * math.exp(1 - held_s / OVERSHOOT_S)
+        return self.aim_n + math.copysign(beyond_n, gap_n) + self.fade_n_per_s * held_s
 
 
 class VirtualHand:
@@ -84,6 +121,7 @@ class VirtualHand:
         self._lock = Lock()
         self._moves = deque([Move(0.0, 0.0, 0.0, settings.rate_n_per_s, BESIDE_MM)], maxlen=REMEMBERED_MOVES)
         self._following = self._is_ramp = False
+        self._lifts_left = settings.early_lifts
         self._ramp_rate_n_per_s = settings.ramp_rate_n_per_s
 
     def begin(self) -> None:
@@ -93,11 +131,12 @@ class VirtualHand:
 
     def follow(self, guidance: str, now_s: float) -> None:
         """Read one line of guidance (its code) and act on it after the reaction time."""
+        self._following |= guidance in TAKEN_UP_FOR
         if not self._following:
             return
         act_s = now_s + self.settings.reaction_s
         match guidance:
-            case "press_beside":
+            case "press_beside" | "hold_block" | "put_weight":
                 self._hold(act_s, self.settings.aim_n, BESIDE_MM)
             case "press_lesion":
                 self._hold(act_s, self.settings.aim_n, self.settings.on_lesion_mm)
@@ -105,10 +144,13 @@ class VirtualHand:
                 self._ramp(act_s, TOUCH_N, BESIDE_MM)
             case "touch_lesion":
                 self._ramp(act_s, TOUCH_N, self.settings.on_lesion_mm)
+            case "press_harder" | "press_lighter" if not self._is_ramp and self.settings.corrects_to_n is not None:
+                self._hold(act_s, self.settings.corrects_to_n, None)
             case "press_slowly" | "press_lighter" | "slower" | "hold_still" if self._is_ramp:
                 self._go_on(act_s, guidance)
-            case "lift":
+            case "lift" | "take_weight_off":
                 self._hold(act_s, 0.0, None)
+                self._lifts_left = self.settings.early_lifts
             case "done" | "rejected" | "fault":
                 self._hold(act_s, 0.0, None)
                 self._following = False
@@ -118,7 +160,7 @@ class VirtualHand:
         before = self._move_at(act_s)
         if guidance == "slower":
             self._ramp_rate_n_per_s /= 2
-        aim_n = {"press_slowly": RAMP_AIM_N, "press_lighter": TOUCH_N, "slower": before.aim_n}
+        aim_n = {"press_slowly": self.settings.ramp_aim_n, "press_lighter": TOUCH_N, "slower": before.aim_n}
         self._ramp(act_s, aim_n.get(guidance, before.steady_n(act_s)), None)
 
     def _hold(self, act_s: float, aim_n: float, position_mm: tuple[float, float] | None) -> None:
@@ -132,8 +174,20 @@ class VirtualHand:
     def _aim(self, act_s: float, aim_n: float, rate_n_per_s: float, position_mm: tuple[float, float] | None) -> None:
         before = self._move_at(act_s)
         force_n = before.steady_n(act_s)
+        place = position_mm or before.position_mm
+        holds = aim_n > 0.0 and not self._is_ramp
+        overshoot_n = self.settings.overshoot_ratio * abs(aim_n - force_n) if holds else 0.0
+        fade_n_per_s = self.settings.fade_n_per_s if holds else 0.0
         with self._lock:
-            self._moves.append(Move(act_s, force_n, aim_n, rate_n_per_s, position_mm or before.position_mm))
+            self._moves.append(Move(act_s, force_n, aim_n, rate_n_per_s, place, overshoot_n, fade_n_per_s))
+            if self._lifts_left and aim_n > TOUCH_N:
+                self._lift_early(self._moves[-1])
+
+    def _lift_early(self, move: Move) -> None:
+        """Append that this hand lifts by itself in the middle of a move; needs the lock."""
+        self._lifts_left -= 1
+        at_s = move.since_s + self.settings.lifts_after_s
+        self._moves.append(Move(at_s, move.steady_n(at_s), 0.0, self.settings.rate_n_per_s, move.position_mm))
 
     def _move_at(self, t_s: float) -> Move:
         """Return the motion under way at a time: until the reaction time is over, that is still the one before."""
@@ -146,7 +200,8 @@ class VirtualHand:
         if steady_n <= 0.0:
             return 0.0
         held = min(steady_n / 0.1, 1.0)
-        tremor = math.sin(2 * math.pi * 9.3 * t_s) + 0.5 * math.sin(2 * math.pi * 11.1 * t_s + 1.0)
+        hz = self.settings.tremor_hz
+        tremor = math.sin(2 * math.pi * hz * t_s) + 0.5 * math.sin(2 * math.pi * TREMOR_BEAT * hz * t_s + 1.0)
         drift = math.sin(2 * math.pi * 0.4 * t_s) + 0.4 * math.sin(2 * math.pi * 1.1 * t_s + 2.0)
         return max(0.0, steady_n + held * (self.settings.tremor_n * tremor + self.settings.drift_n * drift))
 

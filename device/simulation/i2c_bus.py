@@ -65,6 +65,7 @@ class EmulatedI2cBus:
 
     def i2c_rdwr(self, *i2c_msgs: I2cMessage) -> None:
         """Carry out one transaction; raise `OSError` as the kernel does: 121 not acknowledged, 110 stuck bus."""
+        self._faults.hold_up("i2c_frozen")
         error = errno.EBADF if self.is_closed else self._faults.i2c_errno()
         if error is not None:
             raise OSError(error, os.strerror(error))

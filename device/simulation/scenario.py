@@ -42,9 +42,10 @@ class CellSettings:
 
 @dataclass(frozen=True)
 class Scenario:
-    """What the virtual probe is made of and pressed on, what goes wrong, and the fault code the device must raise.
+    """What the virtual probe is made of and pressed on, what goes wrong, and how the device must tell.
 
     An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 4-6.25 kPa, 27-36 mm.
+    `expects` is the fault code it must raise, `self_test_fails` the check of its self-test that must fail.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
     """
 
@@ -62,6 +63,7 @@ class Scenario:
     neighbour: Neighbour | None = None
     faults: tuple[Fault, ...] = ()
     expects: str = ""
+    self_test_fails: str = ""
 
     def __post_init__(self) -> None:
         if self.light not in SERIALS:

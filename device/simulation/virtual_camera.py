@@ -16,31 +16,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.tactile_image import LedRatio
+from device.measurement.tactile_image import Counts, LedRatio
 from device.simulation.faults import NO_FAULTS, FaultTimeline
-from device.simulation.frame_clock import ClockedFrame, FrameClock
+from device.simulation.frame_clock import ClockedFrame, FrameClock, Timing
 from device.simulation.virtual_request import ExposureRequest, VirtualRequest
 
-Render = Callable[[ExposureRequest], NDArray[np.uint8]]
+Render = Callable[[ExposureRequest], Counts]
 
 Stream = dict[str, Any]
 """Format, size, stride ... of one stream, or a whole camera configuration, as picamera2 passes them about."""
 
 RAW_FORMATS = {"R8", "R10", "R12", "R16", "R8_CSI2P", "R10_CSI2P", "R12_CSI2P", "MONO_PISP_COMP1"}
+UNPACKED_BITS = {"R8": 8, "R10": 10, "R12": 12, "R16": 16}
 BUFFER_COUNT = 4
+CONTROL_DELAY_FRAMES = 2
+"""The frame that is being exposed, and the next, are as they were (libcamera: delays of the OV9281's controls)."""
 STRIDE_ALIGNMENT = 64
 GAIN_STEP = 1 / 16
 LONGEST_FRAME_US = 1_000_000
 LATE_CAMERA_KEEPS_EVERY = 10
 """A camera that leaves out frames delivers those whose number is a multiple of this."""
+LOOK_EVERY_S = 0.01
+"""How soon a call that hangs notices that the fault is over."""
+
+
+class CameraCrash(Exception):  # noqa: N818 - the camera's library ends its process without a word
+    """Here the process that called the camera's library dies."""
 
 
 class VirtualPicamera2:
     """The part of `picamera2.Picamera2` that a monochrome raw stream needs, with its wording of errors.
 
-    `render` makes the image of one exposure; `led_ratio_at` is the light at a time (s, monotonic). The sensor has one
-    mode, R8 of width_px x height_px: anything else that is asked for is silently adjusted to it.
-    Controls act from the next start. `faults` says which frames do not come, and which come torn.
+    `render` makes the image of one exposure, of 8 bits, or with its bits at the top of 16; `led_ratio_at` is the light
+    at a time (s, monotonic). The sensor has one size, width_px x height_px, in each of `raw_formats`: anything else is
+    silently adjusted, the format to the first of them. Controls act from the next start, or while the sensor runs two
+    frames later. `faults` says which frames do not come, and which come torn.
     """
 
     def __init__(
@@ -50,12 +60,13 @@ class VirtualPicamera2:
         width_px: int,
         height_px: int,
         led_ratio_at: Callable[[float], LedRatio],
+        raw_formats: tuple[str, ...] = ("R8",),
         max_frame_rate_hz: float = 120.0,
         faults: FaultTimeline = NO_FAULTS,
     ) -> None:
         self._render = render
         self._size = (width_px, height_px)
-        self._stride = -(-width_px // STRIDE_ALIGNMENT) * STRIDE_ALIGNMENT
+        self._raw_formats, self._raw_format, self._stride = raw_formats, raw_formats[0], 0
         self._led_ratio_at, self._faults = led_ratio_at, faults
         shortest_us = round(1e6 / max_frame_rate_hz)
         # A monochrome sensor advertises no white balance and no colour controls.
@@ -97,7 +108,10 @@ class VirtualPicamera2:
             raise RuntimeError("Unrecognised raw format " + raw["format"])
         if any(side % 2 for side in raw["size"]):
             raise RuntimeError("width and height should be even")
-        adjusted = {"format": "R8", "size": self._size, "stride": self._stride}
+        self._raw_format = raw["format"] if raw["format"] in self._raw_formats else self._raw_formats[0]
+        row_bytes = self._size[0] * (1 if self._raw_format == "R8" else 2)
+        self._stride = -(-row_bytes // STRIDE_ALIGNMENT) * STRIDE_ALIGNMENT
+        adjusted = {"format": self._raw_format, "size": self._size, "stride": self._stride}
         self._configuration = camera_config | {"raw": raw | adjusted}
         self._controls = {}
         self.set_controls(camera_config["controls"])
@@ -111,17 +125,19 @@ class VirtualPicamera2:
         for name in controls:
             if name not in self.camera_controls:
                 raise RuntimeError(f"Control {name} is not advertised by libcamera")
-        self._controls |= controls
+        with self._changed:
+            self._controls |= controls
+            if self._clock is not None:
+                under_way = self._clock.first_begun_after(time.monotonic_ns()) - 1
+                self._clock.change(max(0, under_way) + CONTROL_DELAY_FRAMES, self._timing())
 
     def start(self) -> None:
-        """Start the frame clock."""
+        """Start the frame clock; a camera that was not configured takes a configuration of its own."""
         if self._configuration is None:
-            raise RuntimeError("Camera has not been configured")
+            self.configure(self.create_video_configuration())
         with self._changed:
             if self._clock is None:
-                frame_us = int(self._clamped("FrameDurationLimits"))
-                exposure_us = min(int(self._clamped("ExposureTime")), frame_us)
-                self._clock = FrameClock(time.monotonic_ns(), 1000 * frame_us, 1000 * exposure_us)
+                self._clock = FrameClock(time.monotonic_ns(), self._timing())
                 self._next_number = self._buffers_held = self._abandoned_jobs = 0
                 self._changed.notify_all()
 
@@ -141,6 +157,10 @@ class VirtualPicamera2:
         Blocks while the camera is stopped or all buffers are out; after `wait` seconds raises a bare `TimeoutError`
         and leaves its job behind, which keeps a buffer until `cancel_all_and_flush`.
         """
+        if self._faults.is_active("camera_crashed"):
+            raise CameraCrash
+        while self._faults.is_active("camera_hung"):  # whatever `wait` says
+            time.sleep(LOOK_EVERY_S)
         deadline_ns = math.inf if wait is None else time.monotonic_ns() + 1e9 * wait
         with self._changed:
             self._changed.wait_for(self._is_flowing, wait)
@@ -151,7 +171,7 @@ class VirtualPicamera2:
             with self._changed:
                 self._abandoned_jobs += 1
             raise TimeoutError
-        return VirtualRequest(self, self._exposure(frame), frame, self._torn_into(frame))
+        return VirtualRequest(self, self._exposure(self._shown_in(frame)), frame, self._torn_into(frame))
 
     def cancel_all_and_flush(self) -> None:
         """Drop the jobs that timed-out captures left behind."""
@@ -168,9 +188,11 @@ class VirtualPicamera2:
                 self._changed.notify_all()
 
     def render_rows(self, exposure: ExposureRequest) -> NDArray[np.uint8]:
-        """Return the rendered exposure with its rows padded to the stride."""
+        """Return the rendered exposure as bytes, low ones first, with its rows padded to the stride."""
         image = self._render(exposure)
-        return np.pad(image, ((0, 0), (0, self._stride - self._size[0])))
+        if self._raw_format != "R8":
+            image = (image >> (16 - UNPACKED_BITS[self._raw_format])).astype("<u2").view(np.uint8)
+        return np.pad(image, ((0, 0), (0, self._stride - image.shape[1])))
 
     def _is_flowing(self) -> bool:
         return self._clock is not None and self._buffers_held < BUFFER_COUNT
@@ -193,6 +215,11 @@ class VirtualPicamera2:
             return False
         return not self._faults.is_active("camera_stall", start_s)
 
+    def _shown_in(self, frame: ClockedFrame) -> ClockedFrame:
+        """Return the frame whose exposure is delivered as that of `frame`: the one before when the camera is stale."""
+        is_stale = frame.number > 0 and self._faults.is_active("camera_stale", 1e-9 * frame.exposure_start_ns)
+        return frame.clock.frame(frame.number - 1) if is_stale else frame
+
     def _torn_into(self, frame: ClockedFrame) -> ExposureRequest | None:
         """Return the exposure that the lower rows of a torn frame show, or None when it is whole."""
         if frame.number == 0 or not self._faults.is_active("camera_torn", 1e-9 * frame.exposure_start_ns):
@@ -200,14 +227,19 @@ class VirtualPicamera2:
         return self._exposure(frame.clock.frame(frame.number - 1))
 
     def _exposure(self, frame: ClockedFrame) -> ExposureRequest:
-        start_s, exposure_s = 1e-9 * frame.exposure_start_ns, 1e-9 * frame.clock.exposure_ns
+        start_s, exposure_s = 1e-9 * frame.exposure_start_ns, 1e-9 * frame.timing.exposure_ns
         return ExposureRequest(
             t_s=start_s + exposure_s / 2,
-            exposure_us=frame.clock.exposure_ns // 1000,
-            gain=round(self._clamped("AnalogueGain") / GAIN_STEP) * GAIN_STEP,
+            exposure_us=frame.timing.exposure_ns // 1000,
+            gain=frame.timing.gain,
             led_ratio=self._led_ratio_at(start_s),
             frame_number=frame.number,
         )
+
+    def _timing(self) -> Timing:
+        frame_us = int(self._clamped("FrameDurationLimits"))
+        exposure_us = min(int(self._clamped("ExposureTime")), frame_us)
+        return Timing(1000 * frame_us, 1000 * exposure_us, round(self._clamped("AnalogueGain") / GAIN_STEP) * GAIN_STEP)
 
     def _clamped(self, name: str) -> float:
         low, high, default = self.camera_controls[name]

@@ -48,7 +48,7 @@ class VirtualRequest:
         self._is_released = False
 
     def make_array(self, name: str) -> NDArray[np.uint8]:
-        """Render and return the rows of the raw stream, padded to its stride: counts [height_px, stride]."""
+        """Render and return the rows of the raw stream, padded to its stride: bytes [height_px, stride]."""
         if name != "raw":
             raise RuntimeError(f"Stream {name!r} is not defined")
         if self._is_released:
@@ -65,7 +65,7 @@ class VirtualRequest:
             "SensorTimestamp": self._frame.exposure_end_ns,
             "ExposureTime": self._exposure.exposure_us,
             "AnalogueGain": self._exposure.gain,
-            "FrameDuration": self._frame.clock.frame_ns // 1000,
+            "FrameDuration": self._frame.timing.frame_ns // 1000,
         }
 
     def release(self) -> None:

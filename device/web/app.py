@@ -16,11 +16,14 @@ from pydantic import BaseModel, ConfigDict
 from device import __version__
 from device.instrument.press_cost import press_cost
 from device.instrument.procedure import Procedure
+from device.instrument.self_test.job import SelfTestJob
 from device.measurement.mode import Mode
+from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
+from device.web.schema import PROBLEM, Press, SelfTest, Status, answers
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -35,15 +38,29 @@ class PressRequest(BaseModel):
     mode: Mode | None = None
 
 
+class SelfTestRequest(BaseModel):
+    """What a client may say when it starts a self-test: what the operator will hold the probe on, and put on it (N)."""
+
+    model_config = ConfigDict(extra="forbid")
+    on_block: bool = False
+    weight_n: float | None = None
+
+
 def create_app(procedure: Procedure, store: Store) -> FastAPI:
     """Return the web application of a running procedure."""
     app = FastAPI(
-        title="TSIS probe", version=__version__, openapi_url=f"{API}/openapi.json", docs_url=None, redoc_url=None
+        title="TSIS probe",
+        version=__version__,
+        openapi_url=f"{API}/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        responses=PROBLEM,
     )
     install_problems(app)
     _add_state(app, procedure, store)
     _add_presses(app, procedure, store)
     _add_measurements(app, store)
+    _add_self_test(app, procedure)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)
@@ -67,6 +84,13 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
             "modes": [asdict(press_cost(mode, config)) for mode in procedure.modes],
         }
 
+    @app.get(f"{API}/calibrations")
+    def calibrations() -> dict[str, Any]:
+        """Return the certificates there are, which is active, and which the daemon started with."""
+        known = Calibrations(procedure.config.calibration)
+        entries = [{"id": one.name, **one.as_record()} for one in known.all()]
+        return {"active": known.active_name(), "in_use": procedure.calibration.id or None, "calibrations": entries}
+
     @app.get(f"{API}/health/live")
     def live() -> dict[str, str]:
         """Answer as long as the daemon runs."""
@@ -78,7 +102,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
         procedure.require_ready()
         return {"status": "ready"}
 
-    @app.get(f"{API}/status")
+    @app.get(f"{API}/status", responses=answers(200, Status))
     def status() -> dict[str, Any]:
         """Return what the event stream sends."""
         return snapshot(procedure)
@@ -90,18 +114,18 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
 
 
 def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
-    @app.post(f"{API}/presses", status_code=202)
+    @app.post(f"{API}/presses", status_code=202, responses=answers(202, Press))
     def start_press(request: PressRequest | None = None) -> JSONResponse:
         """Start a measurement; on the simulated probe the virtual hand takes up the probe."""
         job = procedure.request(request.mode if request else None)
         return JSONResponse(job.as_record(), status_code=202, headers={"Location": f"{API}/presses/{job.id}"})
 
-    @app.get(f"{API}/presses/{{press_id}}")
+    @app.get(f"{API}/presses/{{press_id}}", responses=answers(200, Press))
     def press(press_id: str) -> dict[str, Any]:
         """Return the state of a press."""
         return store.press(press_id)
 
-    @app.delete(f"{API}/presses/{{press_id}}", status_code=202)
+    @app.delete(f"{API}/presses/{{press_id}}", status_code=202, responses=answers(202, Press))
     def cancel_press(press_id: str) -> dict[str, Any]:
         """Cancel the press under way."""
         procedure.cancel(press_id)
@@ -137,6 +161,23 @@ def _add_measurements(app: FastAPI, store: Store) -> None:
         """Return the recording that the measurement was computed from."""
         folder = store.recording_folder(store.measurement(measurement_id)["recording_id"])
         return Response(_zipped(folder), media_type="application/zip")
+
+
+def _add_self_test(app: FastAPI, procedure: Procedure) -> None:
+    def record(job: SelfTestJob) -> dict[str, Any]:
+        return {"simulated": procedure.is_simulated, **job.as_record()}
+
+    @app.post(f"{API}/self-test", status_code=202, responses=answers(202, SelfTest))
+    def start_self_test(request: SelfTestRequest | None = None) -> JSONResponse:
+        """Start a self-test; what the operator has to do for it is in the status' guidance."""
+        request = request or SelfTestRequest()
+        job = procedure.request_self_test(on_block=request.on_block, weight_n=request.weight_n)
+        return JSONResponse(record(job), status_code=202, headers={"Location": f"{API}/self-test"})
+
+    @app.get(f"{API}/self-test", responses=answers(200, SelfTest))
+    def self_test() -> dict[str, Any]:
+        """Return the self-test under way, or the last one."""
+        return record(procedure.self_test)
 
 
 def _zipped(folder: Path) -> bytes:

@@ -9,6 +9,7 @@ from typing import Any
 
 from device import __version__
 from device.errors import DeviceError, LoadCellError
+from device.instrument.guidance import Guidance
 from device.instrument.procedure import Procedure
 from device.instrument.ramp_frames import ramp_targets_n
 from device.instrument.status import Status
@@ -24,7 +25,8 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     job = status.press if status.press and status.press.state not in ENDED else None
     mode = job.mode if job else press.mode
     ramp_n = _ramp_n(mode, status) if FRAMES[mode].is_ramp else None
-    faults: list[DeviceError] = [status.fault] if status.fault else []
+    faults: list[DeviceError] = [fault for fault in (status.fault, status.stall) if fault]
+    step, guidance = ("fault", Guidance.FAULT) if status.stall else (status.step, status.guidance)
     try:
         force_n: float | None = round(procedure.bench.force.latest_n, 4)
     except LoadCellError as error:
@@ -35,8 +37,9 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "simulated": procedure.is_simulated,
         "serial": procedure.config.serial,
         "software": __version__,
-        "step": status.step,
-        "guidance": {"code": status.guidance.code, "text": status.guidance.text},
+        "step": step,
+        "press_state": status.state.code,
+        "guidance": {"code": guidance.code, "text": guidance.text},
         "force_n": force_n,
         "mode": mode,
         "kind": "ramp" if ramp_n else "hold",
@@ -48,6 +51,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "frames_needed": FRAMES[mode].count,
         "press": status.press.as_record() if status.press else None,
         "measurement_id": status.measurement_id,
+        "self_test": status.self_test.summary() if status.self_test else None,
         "faults": [fault.as_record() for fault in faults],
     }
 

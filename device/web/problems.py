@@ -11,52 +11,51 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from device.errors import DeviceError
+from device.errors import DeviceError, InvalidRequest, UnknownPath
 from device.measurement.quantities import InvalidQuantity
 
 log = logging.getLogger(__name__)
 
 
-def problem(status: int, detail: str, *, code: str, remedy: str) -> JSONResponse:
-    """Return a problem document."""
+REMEDY = "The API is described at /api/v1/openapi.json."
+
+
+def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
+    """Return the problem document of an error; with its own status unless another is given."""
+    status = status or error.status
     body: dict[str, Any] = {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
         "status": status,
-        "detail": detail,
-        "code": code,
-        "remedy": remedy,
+        "detail": error.cause,
+        "code": error.code,
+        "remedy": error.remedy,
     }
     return JSONResponse(body, status_code=status, media_type="application/problem+json")
 
 
 def _device_error(request: Request, error: DeviceError) -> JSONResponse:
-    return problem(error.status, error.cause, code=error.code, remedy=error.remedy)
+    return problem(error)
 
 
 def _invalid_quantity(request: Request, error: InvalidQuantity) -> JSONResponse:
-    return problem(
-        422, f"{error.quantity} is {error.value}, but must be {error.bound}.", code="E803", remedy=error.action
-    )
+    return problem(InvalidRequest(f"{error.quantity} is {error.value}, but must be {error.bound}.", error.action))
 
 
 def _invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"])
-    remedy = "Correct the field; the API is described at /api/v1/openapi.json."
-    return problem(422, f"{where}: {first['msg']}.", code="E803", remedy=remedy)
+    return problem(InvalidRequest(f"{where}: {first['msg']}.", f"Correct the field. {REMEDY}"))
 
 
 def _http_error(request: Request, error: HTTPException) -> JSONResponse:
-    remedy = "The API is described at /api/v1/openapi.json."
-    return problem(
-        error.status_code, f"{request.method} {request.url.path}: {error.detail}.", code="E804", remedy=remedy
-    )
+    unknown = UnknownPath(f"{request.method} {request.url.path}: {error.detail}.", REMEDY)
+    return problem(unknown, error.status_code)
 
 
 def _unexpected(request: Request, error: Exception) -> JSONResponse:
     log.exception("request failed", exc_info=error)
-    return problem(500, "The daemon failed to answer.", code="E000", remedy="Report the daemon's log.")
+    return problem(DeviceError("The daemon failed to answer.", "Report the daemon's log."))
 
 
 def install_problems(app: FastAPI) -> None:

@@ -1,4 +1,4 @@
-"""`host_tools table`, `phantom`, `calibrate`: the simulated probe's tables, recordings and certificates."""
+"""`host_tools table` and `phantom`: the simulated probe's tables and its recordings of phantoms."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from device.measurement.durable import write_durably
-from device.measurement.features import FEATURE_NAMES
-from device.measurement.inversion import FEATURE_UNITS, ModelBundle
+from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording import read_recording, write_recording
+from device.measurement.recording import write_recording
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario, read_scenario
-from device.simulation.surface_table import load_surface_table
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.output import note, progress
 
@@ -98,25 +95,3 @@ def phantoms_of(bundle: ModelBundle) -> list[Inclusion]:
     if not rows:
         raise InvalidQuantity("phantoms", "missing in model.json", "the scored scenes", "train the model anew")
     return [Inclusion(*row) for row in rows]
-
-
-def calibrate(
-    recordings: Annotated[list[Path], typer.Argument(help="Phantom recordings with truth.")],
-    out: Annotated[Path, typer.Option(help="Certificate to write.")],
-    model: Annotated[Path, typer.Option(help="Bundle the certificate is for.")] = MODELS / "paper",
-    table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = MODELS / "simulated_probe",
-    force_n: Annotated[float, typer.Option(help="Force the probe is pressed with.")] = 0.5,
-) -> None:
-    """Fit the three regressions from image to deformation features and write the certificate."""
-    from host_tools.calibrate import calibrate as run_calibration
-
-    certificate = run_calibration(
-        [read_recording(path) for path in recordings],
-        ModelBundle.load(model),
-        load_surface_table(table),
-        force_n=force_n,
-    )
-    write_durably(out, certificate.to_json().encode())
-    for image, line, name in zip(FEATURE_NAMES, certificate.regressions, FEATURE_UNITS, strict=True):
-        law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"
-        print(f"{law:76} R2 {line.r_squared:.5f}  leave-one-out {line.leave_one_out_std:.3g}")

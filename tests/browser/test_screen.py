@@ -134,6 +134,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe_with_
     expect(page.locator("#instruction")).to_have_text("Press slowly harder")
     wanted = page.locator("#force-wanted span")
     expect(page.locator("#frames")).to_have_text(re.compile("[3-7] of 10 frames"))
+    expect(page.locator("#press-state")).to_have_text("capturing")
     assert 0 < wanted.count() < 10
     _shoot(page, "ramp")
     _require_fits(page)
@@ -153,6 +154,7 @@ def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: P
     page.locator("#press-button").click()
     warning = page.locator('.fault[data-severity="warning"]')
     expect(warning.locator(".fault-code")).to_have_text("E701", timeout=60_000)
+    expect(warning.locator(".fault-title")).to_have_text("Clock was set")
     expect(warning.locator(".fault-code")).to_have_css("background-color", "rgb(255, 190, 61)")
     expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
     expect(page.locator("#size-value")).to_have_text(re.compile(r"\d+\.\d mm"))
@@ -173,3 +175,43 @@ def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_pa
     expect(page.locator("#connection-lost")).to_be_hidden(timeout=30_000)
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
     again.stop()
+
+
+def test_a_fault_takes_the_view_with_its_code_and_title(page: Page, tmp_path: Path):
+    daemon = Daemon(tmp_path, '[[faults]]\nkind = "i2c_stuck"\nfrom_press = 1\n')
+    page.goto(daemon.url)
+    page.locator("#press-button").click()
+    fault = page.locator('.fault[data-severity="fault"]')
+    expect(fault.locator(".fault-code")).to_have_text("E202", timeout=60_000)
+    expect(fault.locator(".fault-title")).to_have_text("I2C bus stuck")
+    _shoot(page, "fault")
+    _require_fits(page)
+    daemon.stop()
+
+
+def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page, tmp_path: Path):
+    """Two swapped plugs: the page says what to do, then names both, before all that is well."""
+    scene = '[[faults]]\nkind = "led_swapped"\nside = "+x"\nother_side = "-x"\n[hand]\nreaction_s = 1.0\n'
+    daemon = Daemon(tmp_path, scene)
+    page.goto(daemon.url)
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    page.locator("#self-test-open").click()
+    line = page.locator("#self-test-line")
+    expect(line).to_have_text("Not run since the probe was started.")
+    page.locator("#self-test-block").check()
+    page.locator("#self-test-run").click()
+    expect(line).to_have_text("Hold the probe on the reference block")
+    expect(page.locator("#self-test-run")).to_be_disabled()
+    expect(line).to_have_text("The probe has failed.")
+    failed = page.locator('.check[data-verdict="failed"]')
+    expect(failed).to_have_count(2)
+    expect(failed.nth(0)).to_contain_text("It lights -x: put the plugs of +x and -x where they belong.")
+    assert page.locator(".check").first.get_attribute("data-verdict") == "failed"
+    _shoot(page, "self-test")
+    _require_fits(page)
+    page.locator("#self-test-weight").fill("99")
+    page.locator("#self-test-run").click()
+    expect(line).to_contain_text("E803 weight_n is 99")
+    page.locator("#self-test-close").click()
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    daemon.stop()

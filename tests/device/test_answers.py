@@ -2,13 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from device.answers import Answers, answers_for
 from device.assembly import StartFailed, open_simulated_probe
 from device.config import PressSection, simulated_config
-from device.errors import ConfigError
+from device.errors import ConfigError, ModelError
+from device.instrument.progress import ProgressBoard
 from device.measurement.estimate import estimate_recording
+from device.measurement.inversion import Raw
 from device.measurement.mode import MODES
 from device.simulation.scenario import Scenario
 
@@ -43,3 +46,26 @@ def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tm
     config = replace(simulated_config(), data=tmp_path, profile_model=tmp_path / "none")
     with pytest.raises(StartFailed, match=r"press\.mode is standard, but this probe has models for quick, paper only"):
         open_simulated_probe(config, Scenario())
+
+
+def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle, calibration, monkeypatch):
+    answers = answers_for(simulated_config(), bundle, calibration)
+    answers.prove()
+    wrong = Raw(np.zeros((9, 3)), np.zeros((9, 3)))
+    monkeypatch.setattr(bundle, "_run", lambda rows: wrong)
+    with pytest.raises(ModelError, match=r"golden\.estimate") as refusal:
+        answers.prove()
+    assert refusal.value.code == "E401"
+
+
+def test_every_run_of_a_watched_answer_is_progress_of_the_inference():
+    now_s, begun = [0.0], []
+    progress = ProgressBoard(lambda: now_s[0])
+    answers = Answers(("paper",), lambda recording, mode: mode).watched(progress, lambda: begun.append(now_s[0]))
+    now_s[0] = 40.0
+    assert answers.estimator(None, "paper") == "paper"
+    assert "inference" not in progress.stall(15.0).parts
+    now_s[0] = 80.0
+    answers.prove()
+    assert "inference" not in progress.stall(15.0).parts
+    assert begun == [40.0, 80.0]

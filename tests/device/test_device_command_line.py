@@ -1,5 +1,6 @@
 """`python -m device` as typed: exit codes, one line a fault on stderr, and JSON on stdout."""
 
+import dataclasses
 import json
 import shutil
 import socket
@@ -117,7 +118,7 @@ def test_a_certificate_of_another_probe_keeps_the_probe_from_starting(run, model
     code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
     assert code == 1
     [line] = errors
-    assert line.startswith("E401 ")
+    assert line.startswith("E403 ")
     assert "for probe SIM-LINEAR, but must be for probe SIM-0001" in line
 
 
@@ -205,14 +206,14 @@ def test_a_target_force_that_the_certificate_is_not_for_keeps_the_probe_from_sta
     code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
     assert code == 1
     [line] = errors
-    assert line.startswith("E401 press.target_n is 0.7, but must be 0.5 N as calibrated")
+    assert line.startswith("E403 press.target_n is 0.7, but must be 0.5 N as calibrated")
 
 
-def test_a_camera_of_ten_bits_is_refused_for_the_daemon(run, models, tmp_path):
+def test_a_camera_of_other_bits_than_the_settings_say_is_refused(run, models, tmp_path):
     (tmp_path / "scene.toml").write_text("[sensor]\nbits = 10\n")
     code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")
     assert code == 1
-    assert errors == ["E001 sensor.bits is 10, but the daemon's camera takes 8. Set it to 8."]
+    assert errors == ["E001 The scene's sensor.bits is 10, but camera.raw_format is R8. Correct one of them."]
 
 
 def test_with_bad_settings_the_probe_starts_on_its_last_good_ones_and_warns(run, models, started, tmp_path):
@@ -235,3 +236,38 @@ def test_settings_with_which_the_probe_did_not_start_are_not_kept_as_good(run, m
 def test_without_a_settings_file_the_simulated_probe_keeps_none(run, started, tmp_path):
     assert run("--simulate", "--port", 0)[0] == 0
     assert not (tmp_path / "var" / NAME).exists()
+
+
+def test_a_probe_that_was_never_calibrated_starts(run, models, started, tmp_path):
+    (tmp_path / "calibrations").mkdir()
+    settings = (tmp_path / "probe.toml").read_text().replace(
+        "models/simulated_probe/calibration.json", "calibrations"
+    )  # fmt: skip
+    (tmp_path / "probe.toml").write_text(settings)
+    assert run("--simulate", "--port", 0, "--config", "probe.toml")[0] == 0
+    assert len(started) == 1
+
+
+def test_an_unknown_certificate_is_refused_at_the_start_beside_all_else(run, models, tmp_path):
+    (models / "quick" / "model.json").write_text("{")
+    settings = (tmp_path / "probe.toml").read_text().replace("calibration.json", "none.json")
+    settings += 'quick_model = "models/quick"\n'
+    (tmp_path / "probe.toml").write_text(settings + "[cell]\ncommissioned_tare_counts = 0\ntare_drift_n = 0.01\n")
+    code, _, errors = run("--simulate", "--port", 0, "--config", "probe.toml")
+    assert code == 1
+    assert sorted(line.split()[0] for line in errors) == ["E306", "E401", "E402"]
+    assert any("none.json" in line for line in errors)
+
+
+def test_analyse_refuses_a_recording_from_after_the_certificate(run, recording, tmp_path):
+    write_recording(dataclasses.replace(recording, started_at="2070-01-01T00:00:00Z"), tmp_path / "late")
+    code, out, errors = run("analyse", tmp_path / "late")
+    assert (code, out) == (1, [])
+    assert "has expired on 2069-12-07" in errors[0]
+
+
+def test_analyse_refuses_a_recording_of_another_probe_than_the_certificates(run, recording, tmp_path):
+    write_recording(dataclasses.replace(recording, serial="TSIS-0007"), tmp_path / "foreign")
+    code, out, errors = run("analyse", tmp_path / "foreign")
+    assert (code, out) == (1, [])
+    assert "for probe SIM-0001, but must be for probe TSIS-0007" in errors[0]

@@ -6,6 +6,7 @@ largest rate of a ramp is raised.
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from device import assembly
 from device.answers import Answers
 from device.assembly import open_simulated_probe
 from device.config import CameraSection, PressSection, simulated_config
+from device.instrument.press_state import PressState
 from device.instrument.procedure import Procedure
 from device.instrument.ramp_frames import ramp_targets_n
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
@@ -175,6 +177,17 @@ def test_a_ramp_that_goes_too_far_is_rejected_with_both_numbers(running, monkeyp
         job = device.press("standard")
     assert job["state"] == "rejected"
     assert "above 1.00 N" in job["reason"]
+    assert device.witness.recordings == []
+
+
+@pytest.mark.parametrize("mode", ["paper", "standard"])
+def test_a_press_far_beside_the_lump_is_rejected_and_says_where_to_go(running, mode):
+    """The probe stands 5 mm to the right of the lump: the lump shines on the left, -x, and there it has to go."""
+    with running(Scenario(hand=replace(HAND, miss_x_mm=5.0))) as device:
+        job = device.press(mode)
+    assert job["state"] == "rejected"
+    assert re.search(r"lies [34]\.\d mm off the middle, above 2\.5 mm: move the probe towards -x\.$", job["reason"])
+    assert device.board.now.state is PressState.REJECTED
     assert device.witness.recordings == []
 
 

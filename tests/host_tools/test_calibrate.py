@@ -1,18 +1,30 @@
 """Regressions with known answers, and a certificate from simulated phantoms."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from device.measurement.estimate import image_features
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.validity import Validity
 from device.simulation.scenario import Scenario
-from host_tools.calibrate import calibrate, fit_line, scaled_errors, table_features
+from host_tools.calibrate import Provenance, calibrate, fit_line, scaled_errors, table_features
+from host_tools.calibration_gates import CalibrationRejected
 from host_tools.forward.solve import solve
 from host_tools.phantom import Protocol, phantom_recording
 from host_tools.scene import Press, Scene
+from host_tools.software import source_sha256
 
 LINEAR = Scenario(light="linear")
-DESIGNS = [(14.0, 4.5, 110.0), (12.0, 7.0, 60.0), (9.0, 5.0, 80.0), (11.0, 9.0, 100.0), (7.0, 6.0, 50.0)]
+DESIGNS = [
+    (14.0, 4.5, 110.0),
+    (12.0, 7.0, 60.0),
+    (9.0, 5.0, 80.0),
+    (11.0, 9.0, 100.0),
+    (6.0, 6.0, 50.0),
+    (8.0, 4.5, 90.0),
+]
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +54,7 @@ def test_leave_one_out_residuals_are_those_of_lines_fitted_without_the_point():
 
 
 def test_the_lines_hold_for_a_phantom_that_was_not_used(recordings, bundle, tables, table):
-    certificate = calibrate(recordings, bundle, table, force_n=0.5)
+    certificate = calibrate(recordings, bundle, table, force_n=0.5).certificate
     fresh = Inclusion(10.0, 5.5, 70.0)
     image = image_features(phantom_recording(fresh, tables, seed=77, scenario=LINEAR), certificate.settings)
     found = certificate.deformation_features(image).mean(axis=0)
@@ -62,16 +74,78 @@ def test_the_areas_error_is_scaled_by_the_peak():
     np.testing.assert_allclose(scaled_errors(np.ones((2, 3)), np.array([0.1, 0.2])), [[1, 1, 0.1], [1, 1, 0.2]])
 
 
-def test_too_few_phantoms_or_missing_truth_are_refused(recordings, bundle, table):
-    with pytest.raises(InvalidQuantity, match="phantom recordings is 3"):
-        calibrate(recordings[:3], bundle, table, force_n=0.5)
-    nameless = [*recordings[:4], type(recordings[4])(**{**vars(recordings[4]), "truth": None})]
-    with pytest.raises(InvalidQuantity, match="truth"):
-        calibrate(nameless, bundle, table, force_n=0.5)
-    with pytest.raises(InvalidQuantity, match="mean force of"):
-        calibrate(recordings, bundle, table, force_n=0.6)
-    with pytest.raises(InvalidQuantity, match="all equal"):
-        calibrate([recordings[0]] * 4, bundle, table, force_n=0.5)
-    foreign = [*recordings[:4], type(recordings[4])(**{**vars(recordings[4]), "serial": "OTHER"})]
-    with pytest.raises(InvalidQuantity, match="serial"):
-        calibrate(foreign, bundle, table, force_n=0.5)
+def changed(recording, **changes):
+    return dataclasses.replace(recording, **changes)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda all_of: all_of[:3], "phantom recordings is 3, but must be at least 6"),
+        (lambda all_of: [*all_of[:5], changed(all_of[5], truth=None)], "truth is missing in"),
+        (lambda all_of: [*all_of[:5], changed(all_of[5], cell=None)], "cell is missing in"),
+        (lambda all_of: [*all_of[:5], changed(all_of[5], serial="OTHER")], "serial is OTHER and SIM-LINEAR"),
+        (
+            lambda all_of: [*all_of[:5], changed(all_of[5], camera=dataclasses.replace(all_of[5].camera, gain=2.0))],
+            "camera is .* the same in all recordings",
+        ),
+        (lambda all_of: [all_of[0]] * 6, "all equal"),
+    ],
+)
+def test_recordings_that_are_no_calibration_are_refused(recordings, bundle, table, spoil, words):
+    with pytest.raises(InvalidQuantity, match=words):
+        calibrate(spoil(recordings), bundle, table, force_n=0.5)
+
+
+def test_all_that_is_wrong_with_the_recordings_is_told_at_once(recordings, bundle, table):
+    bad = [changed(recordings[0], truth=None), changed(recordings[1], serial="OTHER"), recordings[2]]
+    with pytest.raises(CalibrationRejected) as rejection:
+        calibrate(bad, bundle, table, force_n=0.6)
+    found = [problem.quantity.split(" of ")[0] for problem in rejection.value.problems]
+    assert found == ["truth", "mean force", "mean force", "mean force", "serial", "phantom recordings"]
+
+
+MADE_AT = "2027-05-01T12:00:00Z"
+
+
+@pytest.fixture
+def real(recordings):
+    """As if a real probe had recorded them, a day after the other."""
+    return [
+        changed(recording, started_at=f"2027-03-0{i + 1}T12:00:00Z", simulated=False)
+        for i, recording in enumerate(recordings)
+    ]
+
+
+def test_the_certificate_says_from_where_it_comes_and_how_long_it_holds(real, bundle, table):
+    stated = Provenance("N. N.", "PH-3", MADE_AT, valid_days=100.0)
+    certificate, gates = calibrate(real, bundle, table, force_n=0.5, provenance=stated)
+    assert (certificate.operator, certificate.phantom_serial, certificate.made_at) == ("N. N.", "PH-3", MADE_AT)
+    assert certificate.validity == Validity("2027-03-01T12:00:00Z", "2027-06-09T12:00:00Z")
+    assert (certificate.camera, certificate.cell) == (real[0].camera, real[0].cell)
+    assert certificate.software_sha256 == source_sha256()
+    assert all(gate.problem is None for gate in gates)
+
+
+def test_a_real_probe_is_calibrated_for_a_year_and_a_simulated_one_for_a_hundred(recordings, real, bundle, table):
+    found = [
+        calibrate(all_of, bundle, table, force_n=0.5, provenance=Provenance(made_at=MADE_AT)).certificate.validity
+        for all_of in (real, recordings)
+    ]
+    assert [one.expires_at for one in found] == ["2028-02-29T12:00:00Z", "2069-12-07T00:00:00Z"]
+
+
+@pytest.mark.parametrize("made_at", ["2028-02-29T12:00:00Z", "2027-02-28T11:59:59Z"])
+def test_recordings_that_are_too_old_or_still_to_come_give_no_certificate(real, bundle, table, made_at):
+    with pytest.raises(CalibrationRejected) as rejection:
+        calibrate(real, bundle, table, force_n=0.5, provenance=Provenance(made_at=made_at))
+    assert [problem.quantity for problem in rejection.value.problems] == ["age of the oldest recording"]
+
+
+def test_exchanged_truths_are_rejected_by_name_of_the_feature(recordings, bundle, table):
+    truths = [recording.truth for recording in recordings]
+    mixed = [changed(one, truth=truth) for one, truth in zip(recordings, truths[1:] + truths[:1], strict=True)]
+    with pytest.raises(CalibrationRejected) as rejection:
+        calibrate(mixed, bundle, table, force_n=0.5)
+    found = {problem.quantity for problem in rejection.value.problems}
+    assert {"R2 of max_deformation_mm", "leave-one-out error of max_deformation_mm"} <= found

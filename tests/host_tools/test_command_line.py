@@ -7,6 +7,12 @@ import numpy as np
 import pytest
 from toolkit_process import run_toolkit
 
+from device.measurement.calibration import read_calibration
+from device.measurement.quantities import Inclusion
+from device.measurement.recording import write_recording
+from device.simulation.scenario import Scenario
+from host_tools.phantom import Protocol, phantom_recording
+
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
 
 
@@ -81,7 +87,8 @@ def test_train_from_a_sweep_gives_a_bundle_the_device_accepts(tmp_path):
     done = run_toolkit("train", "--data", tmp_path / "s.nc", "--out", tmp_path / "small", "--trials", 2)
     assert done.returncode == 0, done.stderr
     assert "size_mm" in done.stdout
-    phantoms = run_toolkit("phantom", "--model", tmp_path / "small", "--out", tmp_path / "phantoms")
+    # Not those of the small model: nine at random need not pass the gates of a calibration.
+    phantoms = run_toolkit("phantom", "--out", tmp_path / "phantoms")
     assert phantoms.returncode == 0, phantoms.stderr
     recordings = sorted((tmp_path / "phantoms").iterdir())
     assert len(recordings) == 9
@@ -89,3 +96,36 @@ def test_train_from_a_sweep_gives_a_bundle_the_device_accepts(tmp_path):
     calibrated = run_toolkit("calibrate", *recordings, "--model", tmp_path / "small", "--out", out)
     assert calibrated.returncode == 0, calibrated.stderr
     assert "R2" in calibrated.stdout
+    assert read_calibration(out).validity.expires_at == "2069-12-07T00:00:00Z"
+    written = out.read_bytes()
+    again = run_toolkit("calibrate", *recordings, "--model", tmp_path / "small", "--out", out)
+    assert (again.returncode, out.read_bytes()) == (1, written)
+    assert "a certificate is written once" in again.stderr
+
+
+def test_calibrate_names_a_certificate_by_its_id_or_prints_all_that_speaks_against_it(tables, tmp_path):
+    recordings = []
+    for i, (d, h, E) in enumerate([(14, 4.5, 110), (12, 7, 60), (9, 5, 80), (11, 9, 100), (6, 6, 50), (8, 4.5, 90)]):
+        one = phantom_recording(
+            Inclusion(d, h, E), tables, seed=i, protocol=Protocol(frames=1), scenario=Scenario(light="linear")
+        )
+        recordings.append(tmp_path / f"phantom{i}")
+        write_recording(one, recordings[-1])
+    out = tmp_path / "calibrations"
+    done = run_toolkit("calibrate", *recordings, "--out", out, "--operator", "N. N.", "--valid-days", 36000, "--json")
+    assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)
+    [path] = out.iterdir()
+    assert (record["accepted"], path.name) == (True, f"{record['id']}.json")
+    assert all(gate["passes"] for gate in record["gates"])
+    assert (read_calibration(path).id, read_calibration(path).operator) == (record["id"], "N. N.")
+
+    rejected = run_toolkit("calibrate", *recordings[:3], "--force-n", 0.6, "--out", tmp_path / "no", "--json")
+    assert rejected.returncode == 1
+    record = json.loads(rejected.stdout)
+    assert [one["quantity"].split(" of ")[0] for one in record["problems"]] == [
+        *["mean force"] * 3,
+        "phantom recordings",
+    ]
+    assert record["problems"][-1]["action"] == "record more phantoms"
+    assert not (tmp_path / "no").exists()

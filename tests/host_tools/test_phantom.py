@@ -10,6 +10,7 @@ from device.instrument import capture
 from device.measurement.estimate import image_features
 from device.measurement.mode import FRAMES
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording import RecordedCell
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario
 from device.simulation.sensor import Sensor
@@ -26,6 +27,7 @@ def test_phantoms_are_recorded_with_the_simulated_probes_settings():
     assert camera.scale == phantom.CAMERA.scale
     assert (camera.exposure_us, camera.gain) == (phantom.CAMERA.exposure_us, phantom.CAMERA.gain)
     assert config.light.ratio == phantom.LIT
+    assert config.cell.sensitivity_counts_per_n == Scenario().cell.counts_per_n
     assert (config.press.target_n, FRAMES["paper"].count) == (phantom.TARGET_N, phantom.PRESS_FRAMES)
     assert capture.UNLOADED_FRAMES == phantom.UNLOADED_FRAMES
 
@@ -37,6 +39,7 @@ def test_a_ramp_has_frames_at_each_force_on_the_lesion_and_beside_it(tables):
     assert forces == pytest.approx([0.2, 0.2, 0.4, 0.4], abs=0.03)
     assert len(recording.with_role("reference")) == phantom.UNLOADED_FRAMES + 4
     assert recording.position_mm == (6.0, 0.0)
+    assert recording.cell == RecordedCell(100_000.0, 8200.0)
 
 
 def test_frames_of_ten_bits_are_recorded_in_sixteen(tables):

@@ -56,6 +56,12 @@ export const startPress = (mode) => ask("POST", "/presses", JSON.stringify(mode 
 export const cancelPress = (id) => ask("DELETE", `/presses/${encodeURIComponent(id)}`);
 export const imageUrl = (id) => `${API}/measurements/${encodeURIComponent(id)}/image.png`;
 
+export const startSelfTest = (wanted) => ask("POST", "/self-test", JSON.stringify(wanted));
+
+export async function fetchSelfTest() {
+  return (await ask("GET", "/self-test")).json();
+}
+
 export async function fetchDevice() {
   return (await ask("GET", "/device")).json();
 }

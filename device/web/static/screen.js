@@ -6,12 +6,14 @@ import { showGauge } from "./gauge.js";
 import { chosenMode, offerModes, showModes } from "./modes.js";
 import { cancelPress, fetchDevice, fetchMeasurement, followStatus, startPress } from "./probe.js";
 import { describeEstimate, showMeasurement } from "./result.js";
+import { showSelfTest } from "./self_test.js";
 
 const UNDER_WAY = new Set(["waiting", "capturing", "computing"]);
 const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
 const ICONS = {
   press_beside: "press", press_lesion: "press", press_harder: "harder", press_lighter: "lighter",
   touch_beside: "press", touch_lesion: "press", press_slowly: "harder", slower: "wait",
+  keep_free: "lift", hold_block: "press", put_weight: "press", take_weight_off: "lift",
   hold_still: "hold", lift: "lift", done: "done", rejected: "rejected", fault: "fault",
 };
 const WAIT_ICONS = { ready: "press" };
@@ -22,6 +24,7 @@ const STEP_HINTS = {
   reference: "Reference press: on plain tissue beside the lesion.",
   lesion: "Lesion press: on the lesion, with the same force.",
   computing: "Computing size, depth and Young's modulus.",
+  self_test: "The probe tests its parts.",
 };
 const RAMP_HINTS = {
   reference: "Reference press: slowly harder, on plain tissue beside the lesion.",
@@ -94,18 +97,21 @@ function showProgress() {
   const cells = byId("frame-cells");
   panel.style.setProperty("--progress", pressUnderWay() ? status.press.progress : 0);
   setText(byId("frames"), `${taken} of ${needed} frames`);
+  setText(byId("press-state"), pressUnderWay() ? status.press_state.replaceAll("_", " ") : "");
   if (cells.childElementCount !== needed) {
     cells.replaceChildren(...Array.from({ length: needed }, () => element("span", "")));
   }
   [...cells.children].forEach((cell, index) => cell.classList.toggle("taken", index < taken));
 }
 
-function faultItem({ code, severity, cause, remedy }) {
+function faultItem({ code, title, severity, cause, remedy }) {
   const item = element("div", "fault");
   item.dataset.severity = severity;
   const words = element("p", "fault-words");
   words.append(element("strong", "fault-cause", cause), " ", element("span", "fault-remedy", remedy));
-  item.append(element("span", "fault-code", code), words);
+  const name = element("p", "fault-name");
+  name.append(element("span", "fault-code", code), element("span", "fault-title", title));
+  item.append(name, words);
   return item;
 }
 
@@ -122,7 +128,7 @@ function showButton() {
   const start = status.simulated ? "Press the simulated probe" : "New measurement";
   setText(button, pressUnderWay() ? "Cancel" : start);
   button.classList.toggle("button-cancel", pressUnderWay());
-  button.disabled = sending || status.step === "starting";
+  button.disabled = sending || status.step === "starting" || status.step === "self_test";
 }
 
 function show() {
@@ -137,6 +143,7 @@ function show() {
   showButton();
   showModes(!pressUnderWay());
   showGauge(status);
+  showSelfTest(status);
 }
 
 /** Ask the probe for what the page needs, one thing at a time; what failed is asked for again. */
@@ -172,6 +179,7 @@ function loadWhatIsMissing() {
 function showConnection(lost) {
   byId("connection-lost").hidden = !lost;
   byId("main").inert = lost;
+  if (lost) byId("self-test").close(); // it lies above everything
   if (lost) offersAreKnown = false; // whoever comes back may be another probe
 }
 

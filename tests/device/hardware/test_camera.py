@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera, open_camera
+from device.hardware.raw_mode import RawMode
 from device.hardware.tlc59116 import Tlc59116
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.tactile_image import LedRatio
@@ -21,7 +22,7 @@ from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_request import ExposureRequest
 
 WIDTH_PX, HEIGHT_PX = 96, 64
-SETTINGS = {"width_px": WIDTH_PX, "height_px": HEIGHT_PX, "exposure_us": 2000, "gain": 2.0, "frame_rate_hz": 100.0}
+SETTINGS = {"mode": RawMode.whole(WIDTH_PX, HEIGHT_PX), "exposure_us": 2000, "gain": 2.0, "frame_rate_hz": 100.0}
 
 
 def brightness(exposure: ExposureRequest) -> NDArray[np.uint8]:
@@ -38,8 +39,11 @@ def virtual(
     *,
     width_px: int = WIDTH_PX,
     led_ratio_at: Callable[[float], LedRatio] = dark,
+    raw_formats: tuple[str, ...] = ("R8",),
 ) -> VirtualPicamera2:
-    return VirtualPicamera2(render, width_px=width_px, height_px=HEIGHT_PX, led_ratio_at=led_ratio_at)
+    return VirtualPicamera2(
+        render, width_px=width_px, height_px=HEIGHT_PX, led_ratio_at=led_ratio_at, raw_formats=raw_formats
+    )
 
 
 def test_a_frame_begun_after_the_light_was_set_shows_that_light_and_no_other():
@@ -150,6 +154,38 @@ def test_a_frame_of_the_wrong_type_is_refused():
     camera = RawMonoCamera(virtual(lambda _: np.zeros((HEIGHT_PX, WIDTH_PX), np.uint16)), **SETTINGS)
     with pytest.raises(CameraError, match="type uint16"):
         camera.capture(begun_after_s=0.0, timeout_s=1.0)
+
+
+def test_ten_bits_become_eight_of_the_same_light():
+    """1000 of 1024 at the top of 16 bits: 250 of 256."""
+    picam2 = virtual(lambda _: np.full((HEIGHT_PX, WIDTH_PX), 1000 << 6, np.uint16), raw_formats=("R8", "R10"))
+    camera = RawMonoCamera(picam2, **SETTINGS | {"mode": RawMode.whole(WIDTH_PX, HEIGHT_PX, "R10")})
+    counts = camera.capture(begun_after_s=0.0, timeout_s=1.0).counts
+    assert (counts.dtype, counts.shape, np.unique(counts).tolist()) == (np.uint8, (HEIGHT_PX, WIDTH_PX), [250])
+
+
+def test_a_frame_of_a_larger_sensor_is_its_middle_scaled_down():
+    """96 x 64 to the 48 x 32 in the middle to 24 x 16: a ramp along x rises twice as fast, from 24.5."""
+
+    def ramp(_: ExposureRequest) -> NDArray[np.uint8]:
+        return np.tile(np.arange(WIDTH_PX, dtype=np.uint8), (HEIGHT_PX, 1)) * np.uint8(2)
+
+    camera = RawMonoCamera(virtual(ramp), **SETTINGS | {"mode": RawMode((WIDTH_PX, HEIGHT_PX), (48, 32), (24, 16))})
+    counts = camera.capture(begun_after_s=0.0, timeout_s=1.0).counts
+    np.testing.assert_array_equal(counts, np.tile(np.arange(49, 49 + 4 * 24, 4, dtype=np.uint8), (16, 1)))
+
+
+@pytest.mark.parametrize(
+    ("controls", "seen"),
+    [({"ExposureTime": 1900}, "1900 us at gain 2 "), ({"AnalogueGain": 2.25}, "2000 us at gain 2.25")],
+)
+def test_a_frame_that_was_not_taken_as_asked_for_is_refused(controls, seen):
+    picam2 = virtual()
+    camera = RawMonoCamera(picam2, **SETTINGS)
+    picam2.set_controls(controls)
+    later_s = time.monotonic() + 0.05
+    with pytest.raises(CameraError, match=f"exposed a frame for {seen}.*instead of 2000 us at 2"):
+        camera.capture(begun_after_s=later_s, timeout_s=1.0)
 
 
 def test_a_camera_that_cannot_start_is_a_camera_error():

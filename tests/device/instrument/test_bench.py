@@ -5,12 +5,13 @@ import itertools
 import numpy as np
 import pytest
 
-from device.errors import LateFrameError, LightError
+from device.errors import LateFrameError, LightError, StaleFrameError
 from device.hardware.interfaces import CameraFrame
 from device.instrument import bench as bench_module
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import LATE_FRAMES, FramePace
 from device.instrument.light_budget import LightBudget
+from device.instrument.progress import ProgressBoard
 
 LIT = (0.6, 0.6, 0.6, 0.6)
 
@@ -19,7 +20,7 @@ class FakeHardware:
     """Lights, camera and force in one: acknowledges light at 10.0 s, exposes 4 ms frames every 0.1 s."""
 
     def __init__(self):
-        self.log, self.range = [], 0.01
+        self.log = []
 
     def set_ratio(self, ratio):
         self.log.append(ratio)
@@ -36,8 +37,11 @@ class FakeHardware:
     def at(self, t_s):
         return t_s / 100
 
-    def range_n(self, t_s, *, window_s):
-        return self.range
+    def range_n(self, t_s, *, window_s, around_line):
+        return {(0.15, False): 0.01, (0.15, True): 0.003}[window_s, around_line]
+
+    def peak_n(self, since_s, t_s):
+        return (since_s + t_s) / 2
 
 
 @pytest.fixture
@@ -77,10 +81,11 @@ def test_light_that_is_on_already_is_not_set_again(bench, hardware):
     assert hardware.log == [DARK, LIT, DARK]
 
 
-@pytest.mark.parametrize(("range_n", "is_steady"), [(0.02, True), (0.0201, False), (float("inf"), False)])
-def test_a_force_that_varied_more_than_allowed_is_not_steady(bench, hardware, range_n, is_steady):
-    hardware.range = range_n
-    assert bench.is_steady(10.0, 0.02) is is_steady
+def test_range_and_peak_are_those_of_the_recorded_force(bench):
+    """The range is that of the window just before; the peak is asked for from frame to frame."""
+    assert bench.range_n(10.0, around_line=False) == 0.01
+    assert bench.range_n(10.0, around_line=True) == 0.003
+    assert bench.peak_n(9.0, 10.0) == 9.5
 
 
 def test_the_rate_is_that_of_the_force_just_before(bench):
@@ -121,6 +126,24 @@ def test_a_camera_that_leaves_out_frames_is_at_fault(hardware, monkeypatch):
         slow.take("press")
 
 
+def test_a_frame_that_shows_the_light_before_is_not_taken_for_one_under_the_new_light(bench, hardware, monkeypatch):
+    """Lit at 70 counts, then dark: the first dark frame still has 70."""
+    levels = iter([70, 70, 4])
+    monkeypatch.setattr(
+        hardware,
+        "capture",
+        lambda *, begun_after_s, timeout_s: CameraFrame(
+            np.full((16, 16), next(levels), np.uint8), begun_after_s, 4000.0, 1.0
+        ),
+    )
+    bench.light(LIT)
+    bench.take("reference")
+    bench.light(DARK)
+    bench.take("reference")
+    with pytest.raises(StaleFrameError):
+        bench.take("reference")
+
+
 def late_frame(start_s):
     return CameraFrame(np.zeros((16, 16), np.uint8), start_s, 4000.0, 1.0)
 
@@ -145,3 +168,54 @@ def test_light_counts_from_when_it_is_asked_for_until_darkness_is_acknowledged(h
     bench.check_lights()
     now_s[0] = 9.0
     assert bench.budget.press_s == 6.0
+
+
+class Watch:
+    """Shows what a test sets."""
+
+    def __init__(self):
+        self.now_s = 0.0
+
+    def __call__(self):
+        return self.now_s
+
+
+def test_a_beat_confirms_the_light_and_takes_a_frame_and_frames_of_that_light_remain_good(hardware):
+    watch = Watch()
+    bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
+    bench.light(LIT)
+    watch.now_s = 1.0
+    bench.progress.beat()
+    assert hardware.log == [LIT, ("frame", 10.0), LIT]
+    assert bench.take("press").t_s == pytest.approx(10.102)
+
+
+def test_a_light_that_nobody_knows_is_switched_off_by_a_beat(hardware):
+    watch = Watch()
+    bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
+    bench.light(LIT)
+    bench.check_lights()
+    watch.now_s = 1.0
+    bench.progress.beat()
+    assert hardware.log == [LIT, "check", ("frame", 10.0), DARK]
+
+
+def test_after_a_light_that_could_not_be_confirmed_it_is_set_again(hardware, monkeypatch):
+    watch = Watch()
+    bench = Bench(hardware, hardware, hardware, progress=ProgressBoard(watch))
+    bench.light(DARK)
+    watch.now_s = 1.0
+    with monkeypatch.context() as broken:
+        broken.setattr(hardware, "set_ratio", lambda ratio: (_ for _ in ()).throw(LightError("No answer.", "Mend it.")))
+        with pytest.raises(LightError):
+            bench.progress.beat()
+    bench.light(DARK)
+    assert hardware.log[-1] == DARK
+    assert hardware.log.count(DARK) == 2
+
+
+def test_an_exposure_needs_no_force(bench, hardware):
+    """The camera can be tested while the load cell is silent."""
+    bench.force.at = None
+    bench.light(DARK)
+    assert [bench.expose().exposure_start_s for _ in range(2)] == pytest.approx([10.0, 10.1])

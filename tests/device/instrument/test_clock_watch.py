@@ -43,3 +43,13 @@ def test_slewing_is_no_jump_however_long_it_goes_on(clocks, watch):
 def test_now_is_the_wall_clock_in_utc(clocks, watch):
     clocks.wall_s = 1_700_000_000.25
     assert watch.now() == "2023-11-14T22:13:20.250Z"
+
+
+def test_the_offset_of_the_clocks_changes_only_when_one_is_set(clocks, watch):
+    before_s = watch.offset_s
+    clocks.wall_s += 60.0
+    clocks.monotonic_s += 60.0
+    assert watch.offset_s == before_s
+    clocks.wall_s += 5.0
+    assert watch.offset_s - before_s == pytest.approx(5.0)
+    assert watch.warning() is not None

@@ -173,3 +173,46 @@ def test_closing_releases_the_cell(cell, monkeypatch):
     recorder = ForceRecorder(cell, SCALE, LIMIT)
     recorder.close()
     assert cell.is_closed
+
+
+def test_the_mean_is_that_of_the_last_seconds_or_the_newest_sample(recorder, monkeypatch):
+    """Samples at 1, 2 and 4 s are 0, 2 and 1 N."""
+    for now_s, window_s, mean_n in ((4.0, 2.5, 1.5), (4.0, 10.0, 1.0), (9.0, 1.0, 1.0)):
+        monkeypatch.setattr(force_recorder.time, "monotonic", lambda now_s=now_s: now_s)
+        assert recorder.mean_n(window_s=window_s) == pytest.approx(mean_n)
+
+
+def test_a_cell_at_fault_has_no_mean(recorder, cell):
+    cell.say(UNPLUGGED)
+    assert reached(lambda: recorder.fault)
+    with pytest.raises(LoadCellError):
+        recorder.mean_n(window_s=1.0)
+
+
+def test_the_zero_of_this_start_is_told_from_that_of_commissioning(recorder):
+    assert recorder.zero_shift_n == pytest.approx(0.5)
+
+
+def test_the_largest_force_is_that_of_the_samples_since_and_of_the_time_itself(recorder):
+    """Samples of 0, 2 and 1 N at 1, 2 and 4 s."""
+    assert recorder.peak_n(1.0, 3.0) == pytest.approx(2.0)
+    assert recorder.peak_n(2.0, 3.0) == pytest.approx(1.5)
+    assert recorder.peak_n(0.0, 1.5) == pytest.approx(1.0)
+
+
+def test_around_a_line_a_ramp_does_not_vary_and_tremor_does(cell, recorder):
+    """A ramp of 0.5 N/s from 5 to 6 s; then a tooth of 0.1 N on the same ramp, of which the line takes a part."""
+    cell.say(*[(5.0 + k / 10, 500.0 + 50.0 * k) for k in range(11)])
+    recorder.at(6.0)
+    assert recorder.range_n(6.0, window_s=1.0) == pytest.approx(0.5)
+    assert recorder.range_n(6.0, window_s=1.0, around_line=True) == pytest.approx(0.0, abs=1e-9)
+    cell.say(*[(6.0 + k / 10, 1000.0 + 50.0 * k + 100.0 * (k % 2)) for k in range(1, 11)])
+    recorder.at(7.0)
+    assert recorder.range_n(7.0, window_s=1.0, around_line=True) == pytest.approx(0.1, abs=0.02)
+    assert recorder.range_n(3.0, window_s=0.5, around_line=True) == float("inf")
+
+
+def test_the_history_does_not_grow_beyond_its_bound(cell, recorder):
+    cell.say(*[(5.0 + k / 100, 500.0) for k in range(2 * force_recorder.KEPT_SAMPLES)])
+    recorder.at(5.0 + (2 * force_recorder.KEPT_SAMPLES - 1) / 100)
+    assert len(recorder._samples) == force_recorder.KEPT_SAMPLES

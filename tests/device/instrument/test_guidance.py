@@ -1,25 +1,17 @@
-"""What the operator is told at each force."""
+"""What the operator is told in each state of a press."""
 
 import pytest
 
-from device.instrument.guidance import Guidance, advise, before_contact
+from device.instrument.guidance import HELD_GUIDANCE, Guidance, before_contact
+from device.instrument.press_state import TOUCHING, PressState
 
-BAND_N = (0.475, 0.525)
 
-
-@pytest.mark.parametrize(
-    ("force_n", "guidance"),
-    [
-        (0.05, Guidance.PRESS_HARDER),
-        (0.474, Guidance.PRESS_HARDER),
-        (0.475, Guidance.HOLD_STILL),
-        (0.525, Guidance.HOLD_STILL),
-        (0.526, Guidance.PRESS_LIGHTER),
-        (5.0, Guidance.PRESS_LIGHTER),
-    ],
-)
-def test_the_band_includes_both_its_ends(force_n, guidance):
-    assert advise(force_n, BAND_N) is guidance
+def test_every_state_of_a_touching_probe_has_its_guidance_in_a_hold():
+    assert set(HELD_GUIDANCE) == set(TOUCHING)
+    assert {state for state, guidance in HELD_GUIDANCE.items() if guidance is not Guidance.HOLD_STILL} == {
+        PressState.TOO_LIGHT,
+        PressState.TOO_HARD,
+    }
 
 
 @pytest.mark.parametrize("mode", ["quick", "paper"])

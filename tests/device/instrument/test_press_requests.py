@@ -7,6 +7,7 @@ import pytest
 
 from device.errors import BusyError, CameraError, ClockJumpError, LastGoodConfigError, ModeUnavailable, UnknownResource
 from device.instrument.press_requests import PressRequests
+from device.instrument.self_test.job import SelfTestJob
 from device.instrument.status import StatusBoard
 from device.records.store import Store
 
@@ -98,3 +99,12 @@ def test_what_the_last_press_was_told_is_not_told_to_the_next_unless_it_lasts(re
     board.update(press=replace(told, state="done", warnings=(once.as_record(), lasting.as_record())))
     requests.begin(is_touched=True)
     assert board.now.warnings == (lasting,)
+
+
+def test_a_press_is_refused_while_a_self_test_waits_or_runs_and_taken_after_it(requests, board):
+    for state in ("waiting", "running"):
+        board.update(self_test=SelfTestJob("s", "2026-01-01T00:00:00Z", state=state))
+        with pytest.raises(BusyError, match="self-test"):
+            requests.ask(None)
+    board.update(self_test=SelfTestJob("s", "2026-01-01T00:00:00Z", state="done"))
+    assert requests.ask(None).state == "waiting"

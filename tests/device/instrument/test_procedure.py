@@ -5,13 +5,16 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from small_certificate import small_certificate
 
 from device.config import CameraSection, Config, PressSection
 from device.errors import (
     BusyError,
+    CalibrationEndsSoon,
     CameraError,
     ClockJumpError,
     DiskFullError,
+    ExpiredCalibration,
     LastGoodConfigError,
     LightError,
     ModeUnavailable,
@@ -19,14 +22,22 @@ from device.errors import (
     UnknownResource,
 )
 from device.instrument import procedure as procedure_module
+from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.guidance import Guidance
 from device.instrument.light_budget import LightBudget
+from device.instrument.press_state import PressState
 from device.instrument.procedure import Procedure
+from device.instrument.progress import ProgressBoard
+from device.instrument.self_test.result import Result
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.tactile_image import Frame
+from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import Validity
 from device.records.store import ENDED, Store
 
+AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
+DARK_FACE = UntouchedFace(4.0, (0.0, 0.0, 0.0, 0.0), 0.0, 60.0, 0.6)
 CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(timeout_s=5.0))
 ANSWER = Estimate(
     *[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {"total": 1.0}
@@ -39,7 +50,7 @@ class ObedientBench:
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work = self.is_closed = False
-        self.budget = LightBudget()
+        self.budget, self.progress = LightBudget(), ProgressBoard()
 
     @property
     def latest_n(self):
@@ -58,8 +69,14 @@ class ObedientBench:
         light = sum(self.ratio) * self.brightness if self.latest_n else 0.0
         return Frame(np.full((64, 64), 4 + round(100 * light), np.uint8), role, 0.0, self.latest_n, self.ratio)
 
-    def is_steady(self, t_s, steady_n):
-        return True
+    def range_n(self, t_s, *, around_line):
+        return 0.0
+
+    def rate_n_per_s(self, t_s):
+        return 0.0
+
+    def peak_n(self, since_s, t_s):
+        return self.latest_n
 
     def close(self):
         self.is_closed = True
@@ -78,7 +95,7 @@ class Rig:
             self.estimate,
             self.store,
             modes=("paper", "quick", "standard"),
-            calibration_id="c",
+            calibration=CalibrationWatch(small_certificate(validity=AGELESS, untouched=DARK_FACE)),
             opened=opened,
             simulated_truth=Inclusion(10.0, 5.0, 80.0),
         )
@@ -135,6 +152,30 @@ def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
     assert rig.store.recording_folder(kept["recording_id"]).is_dir()
     steps = [Guidance.HOLD_STILL, Guidance.LIFT, Guidance.PRESS_LESION, Guidance.HOLD_STILL, Guidance.LIFT]
     assert [guidance for guidance in told if guidance is not Guidance.PRESS_BESIDE][:6] == [*steps, Guidance.DONE]
+
+
+def test_the_board_tells_the_state_of_the_press_until_the_next_one(rig):
+    states = []
+    rig.estimator = lambda recording: states.append(rig.board.now.state) or ANSWER
+    assert rig.board.now.state is PressState.IDLE
+    rig.press()
+    assert (states, rig.board.now.state) == ([PressState.RELEASING], PressState.DONE)
+    rig.is_away = True
+    job = rig.procedure.request()
+    rig.until(lambda: rig.board.now.state is PressState.APPROACH)
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.board.now.state is PressState.REJECTED)
+    assert rig.board.now.frames_taken == 0
+
+
+def test_a_fault_ends_the_press_in_whatever_state_it_is_and_the_next_finds_an_idle_probe(rig):
+    seen = []
+    rig.board.on_guidance(lambda guidance: guidance is Guidance.FAULT and seen.append(rig.board.now.state))
+    rig.bench.breaks = [CameraError("No frame came.", "Check the ribbon cable.")]
+    rig.press()
+    assert seen == [PressState.REJECTED]
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.board.now.state is PressState.IDLE
 
 
 def test_the_light_is_off_while_the_result_is_computed(rig):
@@ -209,7 +250,8 @@ def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig)
     rig.press()
     [recording] = seen
     assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 14, 10]
-    assert (recording.serial, recording.calibration_id, recording.simulated) == ("TSIS-0000", "c", True)
+    assert (recording.serial, recording.simulated) == ("TSIS-0000", True)
+    assert recording.calibration_id == rig.procedure.calibration.id
 
 
 def test_a_press_is_taken_and_estimated_in_the_mode_that_was_asked_for(rig):
@@ -396,11 +438,13 @@ def test_closing_in_the_middle_of_a_press_says_how_it_ended(tmp_path):
     rig.store.close()
 
 
-def test_the_settings_of_the_camera_are_in_the_recording(rig):
+def test_the_settings_of_camera_and_load_cell_are_in_the_recording(rig):
     seen = []
-    rig.estimator = lambda recording: seen.append(recording.camera) or ANSWER
+    rig.estimator = lambda recording: seen.append(recording) or ANSWER
     rig.press()
-    assert (seen[0].width_px, seen[0].height_px, seen[0].exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+    camera, cell = seen[0].camera, seen[0].cell
+    assert (camera.width_px, camera.height_px, camera.exposure_us) == (64, 64, CONFIG.camera.exposure_us)
+    assert (cell.counts_per_n, cell.tare_counts) == (CONFIG.cell.sensitivity_counts_per_n, None)
 
 
 def test_a_press_that_is_asked_for_while_the_probe_fails_ends_with_the_fault(rig, monkeypatch):
@@ -467,3 +511,85 @@ def test_light_that_lost_a_tenth_between_two_presses_is_warned_of(rig):
     job = rig.press()
     assert job["state"] == "done"
     assert [warning["code"] for warning in job["warnings"]] == ["E206"]
+
+
+@pytest.fixture
+def held_self_test(rig, monkeypatch):
+    """A self-test of one check, which goes on until it is let go."""
+    go_on = threading.Event()
+
+    def results(job):
+        assert go_on.wait(10.0)
+        yield [Result("Light", "LED +x", "passed")]
+
+    monkeypatch.setattr(rig.procedure._self_tests._test, "results", results)
+    yield go_on
+    go_on.set()
+
+
+def test_a_self_test_runs_between_presses_which_are_refused_meanwhile(rig, held_self_test):
+    rig.procedure.request_self_test()
+    rig.until(lambda: rig.board.now.step == "self_test")
+    with pytest.raises(BusyError, match="self-test"):
+        rig.procedure.request()
+    held_self_test.set()
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert (rig.procedure.self_test.state, rig.procedure.self_test.verdict) == ("done", "passed")
+    assert rig.press()["state"] == "done"
+
+
+def test_a_self_test_is_refused_during_a_press_with_the_code_of_it(rig):
+    rig.is_away = True
+    job = rig.procedure.request()
+    with pytest.raises(BusyError) as refusal:
+        rig.procedure.request_self_test()
+    assert refusal.value.code == "E801"
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.store.press(job.id)["state"] in ENDED)
+    with pytest.raises(UnknownResource):
+        _ = rig.procedure.self_test
+
+
+def test_a_self_test_runs_while_the_probe_is_at_fault(rig, held_self_test):
+    rig.store.require_space = lambda free_mb: (_ for _ in ()).throw(StorageError("The disk is gone.", "Check it."))
+    rig.bench.breaks = [CameraError("No frame came.", "Check the ribbon cable.")]
+    rig.press()
+    rig.until(lambda: rig.board.now.fault is not None)
+    held_self_test.set()
+    rig.procedure.request_self_test()
+    rig.until(lambda: not rig.procedure.self_test.is_under_way)
+    assert rig.procedure.self_test.state == "done"
+    rig.until(lambda: rig.board.now.step == "fault")
+
+
+@pytest.mark.parametrize("weight_n", [0.09, 5.1, float("nan")])
+def test_a_weight_that_cannot_be_measured_is_refused(rig, weight_n):
+    """Contact is 0.05 N, and the cell bears 5 N."""
+    with pytest.raises(InvalidQuantity, match="weight_n"):
+        rig.procedure.request_self_test(weight_n=weight_n)
+
+
+def test_a_probe_whose_certificate_has_expired_runs_and_says_so_and_takes_no_press(rig, monkeypatch):
+    expired = ExpiredCalibration("The calibration has expired.", "Calibrate the probe.")
+
+    def require_valid(now):
+        raise expired
+
+    with monkeypatch.context() as later:
+        later.setattr(rig.procedure.calibration, "require_valid", require_valid)
+        rig.press()
+        rig.until(lambda: rig.board.now.fault is expired)
+        with pytest.raises(ExpiredCalibration):
+            rig.procedure.request()
+    rig.until(lambda: rig.board.now.step == "ready")
+    assert rig.press()["state"] == "done"
+
+
+def test_warnings_of_the_certificate_are_told_with_every_press_until_they_are_over(rig):
+    warning = CalibrationEndsSoon("The calibration expires soon.", "Calibrate the probe.")
+    rig.procedure.calibration.warned = lambda others: (warning,)
+    rig.press()
+    assert [rig.press()["warnings"] for _ in range(2)] == [[warning.as_record()]] * 2
+    rig.procedure.calibration.warned = lambda others: ()
+    rig.press()
+    assert rig.press()["warnings"] == []

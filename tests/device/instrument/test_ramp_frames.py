@@ -1,42 +1,35 @@
-"""Which frames of a slow press count: one for each of five forces, 0.1 to 0.5 N, told as a list of (force, rate)."""
+"""Which frames of a slow press count: one for each of five forces, 0.1 to 0.5 N, told as a list of forces."""
 
 import numpy as np
 import pytest
 
-from device.config import PressSection
 from device.errors import TornFrameError
 from device.instrument.frame_check import TORN_PAIRS, TearWatch
 from device.instrument.guidance import Guidance
+from device.instrument.press_state import TOUCHING, PressState
 from device.instrument.ramp_frames import RampFrames, ramp_targets_n
 from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N
 from device.measurement.tactile_image import Frame
 
 TARGETS_N = (0.1, 0.2, 0.3, 0.4, 0.5)
-PRESS = PressSection(max_rate_n_per_s=0.3)
+CAPTURING = PressState.CAPTURING
 UP, DOWN, HOLD = Guidance.PRESS_SLOWLY, Guidance.PRESS_LIGHTER, Guidance.HOLD_STILL
-
-
-class RatedBench:
-    """The force changes as fast as a frame's time says: this bench's clock tells rates."""
-
-    def rate_n_per_s(self, t_s):
-        return t_s
 
 
 @pytest.fixture
 def ramp():
-    return RampFrames(TARGETS_N, PRESS, RatedBench(), TearWatch(10.0))
+    return RampFrames(TARGETS_N, TearWatch(10.0))
 
 
-def frame(force_n, rate_n_per_s=0.1, torn=False):
+def frame(force_n, torn=False):
     counts = np.full((32, 32), round(200 * force_n), np.uint8)
     if torn:
         counts[16:] = 0
-    return Frame(counts, "press", rate_n_per_s, force_n, (0.6,) * 4)
+    return Frame(counts, "press", 0.0, force_n, (0.6,) * 4)
 
 
 def see(ramp, *forces_n):
-    return [ramp.see(frame(force_n)) for force_n in forces_n]
+    return [ramp.see(frame(force_n), CAPTURING) for force_n in forces_n]
 
 
 def forces_of(ramp):
@@ -72,11 +65,11 @@ def test_frames_are_given_in_order_of_their_force_in_whatever_order_they_came(ra
     assert ramp.wanted_n == (0.1, 0.4)
 
 
-@pytest.mark.parametrize(("rate_n_per_s", "counts"), [(0.3, 1), (0.301, 0), (-0.3, 1), (-0.301, 0)])
-def test_a_frame_whose_force_changes_too_fast_does_not_count_and_the_hand_is_slowed(ramp, rate_n_per_s, counts):
-    guidance = ramp.see(frame(0.2, rate_n_per_s))
-    assert len(ramp.frames) == counts
-    assert (guidance is Guidance.SLOWER) is (counts == 0)
+@pytest.mark.parametrize("state", [state for state in TOUCHING if state is not CAPTURING])
+def test_a_frame_does_not_count_unless_the_machine_says_so_and_an_unsteady_hand_is_slowed(ramp, state):
+    guidance = ramp.see(frame(0.2), state)
+    assert ramp.frames == []
+    assert (guidance is Guidance.SLOWER) is (state is PressState.UNSTEADY)
 
 
 def test_the_hand_is_led_up_past_every_target_and_holds_at_the_top(ramp):
@@ -110,7 +103,7 @@ def test_a_hand_that_lifts_begins_again(ramp):
 
 def test_a_torn_frame_and_the_one_before_it_are_taken_again(ramp):
     see(ramp, 0.1, 0.3)
-    ramp.see(frame(0.4, torn=True))
+    ramp.see(frame(0.4, torn=True), CAPTURING)
     assert forces_of(ramp) == [0.1]
     see(ramp, 0.3, 0.4, 0.2, 0.5)
     assert forces_of(ramp) == list(TARGETS_N)
@@ -118,7 +111,7 @@ def test_a_torn_frame_and_the_one_before_it_are_taken_again(ramp):
 
 def test_a_ramp_is_not_complete_on_a_torn_frame(ramp):
     see(ramp, 0.1, 0.2, 0.3, 0.4, 0.46)
-    ramp.see(frame(0.5, torn=True))
+    ramp.see(frame(0.5, torn=True), CAPTURING)
     assert not ramp.is_complete
     see(ramp, 0.5)
     assert ramp.is_complete
@@ -127,9 +120,9 @@ def test_a_ramp_is_not_complete_on_a_torn_frame(ramp):
 def test_a_camera_whose_frames_are_torn_again_and_again_is_at_fault(ramp):
     frames = [frame(0.3, torn=number % 2 == 1) for number in range(2 * TORN_PAIRS)]
     for one in frames[:-1]:
-        ramp.see(one)
+        ramp.see(one, CAPTURING)
     with pytest.raises(TornFrameError):
-        ramp.see(frames[-1])
+        ramp.see(frames[-1], CAPTURING)
 
 
 def test_neighbours_in_time_are_compared_however_far_apart_the_kept_frames_are(ramp):

@@ -1,14 +1,14 @@
 """A calibration certificate: its lines, its way through JSON, and everything that makes it unusable."""
 
+import hashlib
 import json
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from small_certificate import small_certificate
 
-from device.measurement.calibration import Calibration, Regression, read_calibration
-from device.measurement.features import FeatureSettings
-from device.measurement.intervals import HeldOut
+from device.measurement.calibration import Regression, certificate_id, read_calibration
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.tactile_image import PixelScale
 
@@ -23,24 +23,7 @@ class Model:
 
 @pytest.fixture
 def certificate():
-    rng = np.random.default_rng(1)
-    truth = rng.uniform((1, 4, 40), (15, 12, 120), (100, 3)).round(3)
-    lines = (Regression(2.0, 0.5, 0.99, 0.01), Regression(-1.0, 0.0, 0.98, 0.02), Regression(0.1, -3.0, 0.97, 0.03))
-    return Calibration(
-        id="c-1",
-        made_at="2026-01-02T03:04:05Z",
-        serial="TSIS-0007",
-        model_sha256="ab" * 32,
-        model_card_sha256="ef" * 32,
-        force_n=0.5,
-        scale=PixelScale(0.03, 0.04),
-        settings=FeatureSettings(smoothing_mm=0.4),
-        regressions=lines,
-        phantoms=9,
-        held_out=HeldOut(truth.round(1), truth, np.array([1.0, 4.0, 40.0]), np.array([15.0, 12.0, 120.0])),
-        software="1.0",
-        simulated=False,
-    )
+    return small_certificate()
 
 
 @pytest.fixture
@@ -50,13 +33,32 @@ def path(certificate, tmp_path):
     return path
 
 
+CAMERA = {
+    "width_px": 64,
+    "height_px": 48,
+    "bits": 8,
+    "mm_per_px_x": 0.03,
+    "mm_per_px_y": 0.04,
+    "exposure_us": 4000.0,
+    "gain": 1.0,
+}
+UNTOUCHED = {
+    "dark_counts": 4.0,
+    "side_counts": [1.0] * 4,
+    "spread_counts": 0.0,
+    "pressed_counts": 60.0,
+    "led_ratio": 0.6,
+}
 BOX = {"box_low": [1.0, 4.0, 40.0], "box_high": [15.0, 12.0, 120.0]}
 
 
 def edited(path, change):
+    """Change the record and hash it again: what is refused then is its content."""
     record = json.loads(path.read_text())
     change(record)
-    path.write_text(json.dumps(record))
+    content = {name: value for name, value in record.items() if name not in ("schema", "sha256")}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    path.write_text(json.dumps({**record, "sha256": hashlib.sha256(text.encode()).hexdigest()}))
     return path
 
 
@@ -115,6 +117,65 @@ def test_a_certificate_holds_within_six_percent_of_its_force(certificate, force_
     assert certificate.holds_at(force_n) is holds
 
 
+def settings_of(certificate, **changes):
+    camera = certificate.camera
+    same = {"exposure_us": camera.exposure_us, "gain": camera.gain, "cell_counts_per_n": certificate.cell.counts_per_n}
+    scale = changes.pop("scale", camera.scale)
+    return [problem.quantity for problem in certificate.other_settings(scale, **(same | changes))]
+
+
+@pytest.mark.parametrize(
+    ("changes", "problems"),
+    [
+        ({}, []),
+        ({"exposure_us": 3932}, []),
+        ({"exposure_us": 2000, "gain": 2.0}, []),
+        ({"exposure_us": 4100}, ["camera.exposure_us times camera.gain"]),
+        ({"gain": 2.0}, ["camera.exposure_us times camera.gain"]),
+        ({"cell_counts_per_n": 100_200.0}, ["cell.sensitivity_counts_per_n"]),
+        (
+            {"scale": PixelScale(0.05, 0.04), "cell_counts_per_n": -1.0},
+            ["mm_per_px_x, mm_per_px_y", "cell.sensitivity_counts_per_n"],
+        ),
+    ],
+)
+def test_settings_that_are_not_those_of_the_calibration_are_all_named(certificate, changes, problems):
+    assert settings_of(certificate, **changes) == problems
+
+
+def test_a_certificate_of_another_probe_and_model_says_both(certificate):
+    found = [problem.value for problem in certificate.foreign("TSIS-0008", Model(sha256="cd" * 32))]
+    assert found == ["for model abababababab", "for probe TSIS-0007"]
+
+
+def test_the_id_is_that_of_the_content_but_for_when_it_was_written(certificate):
+    assert certificate_id(replace(certificate, id="", made_at="2026-05-05T00:00:00Z")) == certificate.id
+    assert certificate_id(replace(certificate, operator="Another")) != certificate.id
+
+
+def test_a_file_in_which_one_digit_was_changed_is_refused(path):
+    path.write_text(path.read_text().replace('"slope": 2.0', '"slope": 2.1'))
+    with pytest.raises(InvalidQuantity, match="calibration sha256 is .* as stated: restore the file"):
+        read_calibration(path)
+
+
+def test_a_file_that_was_only_written_otherwise_is_taken(certificate, path):
+    path.write_text(json.dumps(json.loads(path.read_text())))
+    assert read_calibration(path).id == certificate.id
+
+
+def test_the_schema_before_is_refused_with_both(path):
+    path.write_text(path.read_text().replace("tsis.calibration/2", "tsis.calibration/1"))
+    with pytest.raises(InvalidQuantity, match="schema is tsis.calibration/1 in .*, but must be tsis.calibration/2"):
+        read_calibration(path)
+
+
+def test_the_summary_leaves_only_the_held_out_scenes_out(certificate, path):
+    record = json.loads(path.read_text())
+    left_out = set(record) - set(certificate.summary())
+    assert left_out == {"held_out", "sha256"}
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", "7", "{}", '{"schema": "tsis.calibration/2"}'])
 def test_what_is_no_certificate_is_refused_by_its_path(path, text):
     path.write_text(text)
@@ -138,9 +199,23 @@ def test_a_missing_certificate_is_refused_by_its_path(tmp_path):
         ("force_n", ..., "calibration"),
         ("force_n", 0.0, "calibration's force_n"),
         ("force_n", "0.5", "calibration's force_n"),
-        ("scale", ..., "calibration"),
-        ("scale", [0.03, 0.04], "calibration"),
-        ("scale", {"mm_per_px_x": 0.03, "mm_per_px_y": 0.0}, "mm_per_px_y"),
+        ("operator", 7, "operator"),
+        ("validity", ..., "calibration"),
+        ("validity", {"measured_at": "2026-01-01T00:00:00Z"}, "calibration"),
+        ("validity", {"measured_at": "2026-01-01T00:00:00Z", "expires_at": "soon"}, "expires_at"),
+        ("validity", {"measured_at": "2026-01-01T00:00:00Z", "expires_at": "2025-01-01T00:00:00Z"}, "expires_at"),
+        ("camera", ..., "calibration"),
+        ("camera", [0.03, 0.04], "calibration"),
+        ("camera", CAMERA | {"mm_per_px_y": 0.0}, "mm_per_px_y"),
+        ("camera", CAMERA | {"gain": 0.0}, "camera.gain"),
+        ("cell", None, "calibration"),
+        ("cell", {"counts_per_n": 0.0}, "cell.counts_per_n"),
+        ("untouched", {}, "calibration"),
+        ("untouched", UNTOUCHED | {"side_counts": [1.0, 2.0]}, "untouched.side_counts"),
+        ("untouched", UNTOUCHED | {"side_counts": [1.0, 2.0, "3", 4.0]}, "untouched counts"),
+        ("untouched", UNTOUCHED | {"pressed_counts": 0.0}, "untouched.pressed_counts"),
+        ("untouched", UNTOUCHED | {"spread_counts": -1.0}, "untouched.spread_counts"),
+        ("untouched", UNTOUCHED | {"led_ratio": 0.0}, "untouched.led_ratio"),
         ("extra", 1, "calibration"),
         ("settings", ..., "calibration"),
         ("settings", 3, "calibration"),

@@ -59,6 +59,7 @@ def test_a_refusal_is_one_sentence_with_quantity_value_bound_and_action():
         (Bound(1.0, math.inf, "us"), "at least 1 us"),
         (Bound(1.0, math.inf, "us", low_included=False), "above 1 us"),
         (Bound(0.0, 1.0, ""), "at least 0 and at most 1"),
+        (Bound(-math.inf, 1.5, "counts"), "at most 1.5 counts"),
     ],
 )
 def test_a_bound_reads_as_words(bound, words):

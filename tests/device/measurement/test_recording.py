@@ -11,7 +11,7 @@ import pytest
 
 from device.measurement.durable import write_and_sync
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.recording import CameraSettings, Recording, read_recording, write_recording
+from device.measurement.recording import CameraSettings, RecordedCell, Recording, read_recording, write_recording
 from device.measurement.tactile_image import Frame
 
 CAMERA = CameraSettings(
@@ -33,6 +33,7 @@ def small_recording(bits=8):
         position_mm=(6.0, -1.5),
         truth=Inclusion(10.0, 5.0, 80.0),
         simulated=True,
+        cell=RecordedCell(100_000.0, -8200.0),
     )
 
 
@@ -94,10 +95,15 @@ def test_a_zip_of_the_folder_or_of_its_content_comes_back_too(tmp_path, bits, pr
 
 
 def test_what_need_not_be_known_may_be_absent(folder):
-    for name in ("truth", "position_mm", "calibration_id", "simulated"):
+    for name in ("truth", "position_mm", "calibration_id", "simulated", "cell"):
         with_value(folder, name, ...)
     found = read_recording(folder)
     assert (found.truth, found.position_mm, found.calibration_id, found.simulated) == (None, (0.0, 0.0), None, False)
+    assert found.cell is None
+
+
+def test_a_tare_that_is_not_known_is_null(folder):
+    assert read_recording(with_value(folder, "cell.tare_counts", None)).cell == RecordedCell(100_000.0)
 
 
 def test_frames_of_a_role_come_in_order():
@@ -112,6 +118,7 @@ def test_the_file_on_disk_is_the_contract(folder):
     assert record["frames"][1] == {
         "file": "frames/001.png", "role": "reference", "t_s": 0.1, "force_n": 0.25, "led_ratio": [0.0, 0.2, 0.4, 1.0]
     }  # fmt: skip
+    assert record["cell"] == {"counts_per_n": 100000.0, "tare_counts": -8200.0}
     assert record["truth"] == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
     assert sorted(p.name for p in (folder / "frames").iterdir()) == ["000.png", "001.png", "002.png", "003.png"]
 
@@ -168,6 +175,11 @@ def test_the_file_on_disk_is_the_contract(folder):
         ("position_mm", ["1", "2"], "position_mm"),
         ("simulated", "no", "simulated"),
         ("simulated", 1, "simulated"),
+        ("cell", 5, "cell"),
+        ("cell.counts_per_n", ..., "cell.counts_per_n"),
+        ("cell.counts_per_n", 0.0, "cell.counts_per_n"),
+        ("cell.tare_counts", "8200", "cell.tare_counts"),
+        ("cell.tare_counts", float("nan"), "cell.tare_counts"),
         ("truth", 5, "truth.size_mm"),
         ("truth", {}, "truth.size_mm"),
         ("truth.depth_mm", ..., "truth.depth_mm"),

@@ -53,6 +53,7 @@ def test_a_fault_of_a_press_waits_for_that_press(clock):
         (Fault("led_stuck_on", side="+y"), (0.6, 1.0, 0.4, 0.3)),
         (Fault("led_dimmed", side="-x", ratio=0.5), (0.6, 0.5, 0.2, 0.3)),
         (Fault("led_open", side="+x"), (0.0, 0.5, 0.4, 0.3)),
+        (Fault("led_swapped", side="+x", other_side="-y"), (0.3, 0.5, 0.4, 0.6)),
         (Fault("led_driver_hot"), (0.0, 0.0, 0.0, 0.0)),
         (Fault("led_dimmed"), (0.54, 0.45, 0.36, 0.27)),
     ],
@@ -66,12 +67,25 @@ def test_a_dead_led_is_dark_even_when_it_is_dimmed_and_a_stuck_one_shines_while_
     assert FaultTimeline(faults, clock=clock).led_output((0.0,) * 4, 100.0) == (0.0, 0.0, 1.0, 0.0)
 
 
+def test_swapped_plugs_are_before_the_leds(clock):
+    """The output of +x feeds the LED at -x, which is dead."""
+    faults = [Fault("led_dead", side="-x"), Fault("led_swapped", side="+x", other_side="-x")]
+    assert FaultTimeline(faults, clock=clock).led_output((0.6, 0.0, 0.4, 0.0), 100.0) == (0.4, 0.0, 0.0, 0.0)
+
+
 def test_foreign_light_adds_up_and_the_wettest_counts(clock):
     faults = [Fault("ambient_light", ratio=0.1), Fault("ambient_light", ratio=0.2, from_s=1.0)]
     faults += [Fault("wet_face", ratio=0.4), Fault("wet_face", ratio=0.7, from_s=1.0)]
     timeline = FaultTimeline(faults, clock=clock)
     assert (timeline.ambient_ratio(100.5), timeline.wet_ratio(100.5)) == pytest.approx((0.1, 0.4))
     assert (timeline.ambient_ratio(101.0), timeline.wet_ratio(101.0)) == pytest.approx((0.3, 0.7))
+
+
+def test_dirt_lets_out_light_only_of_leds_that_are_on(clock):
+    timeline = FaultTimeline([Fault("dirty_face", ratio=0.2)], clock=clock)
+    assert timeline.stray_ratio((0.5, 0.5, 0.0, 0.0), 100.5) == pytest.approx(0.05)
+    assert timeline.stray_ratio((0.0,) * 4, 100.5) == 0.0
+    assert NO_FAULTS.stray_ratio((1.0,) * 4, 100.5) == 0.0
 
 
 def test_a_clock_that_jumped_shows_another_time_and_the_monotonic_clock_does_not(clock):
@@ -103,6 +117,8 @@ def test_without_faults_nothing_is_wrong():
         ({"kind": "camera_stall", "from_press": -1}, "faults.from_press", "at least 0"),
         ({"kind": "led_dead"}, "faults.side", "missing, but must be given for led_dead: add it"),
         ({"kind": "led_dead", "side": "left"}, "faults.side", r"one of \+x, \+y, -x, -y"),
+        ({"kind": "led_swapped", "side": "+x"}, "faults.other_side", "given for led_swapped"),
+        ({"kind": "led_swapped", "side": "+x", "other_side": "up"}, "faults.other_side", r"one of \+x, \+y, -x, -y"),
         ({"kind": "camera_stall", "side": "+x"}, "faults.side", "left out of camera_stall: remove it"),
         ({"kind": "led_dimmed", "ratio": 1.1}, "faults.ratio", "at most 1"),
         ({"kind": "clock_jump"}, "faults.step_s", "given for clock_jump"),
@@ -113,3 +129,13 @@ def test_a_fault_that_makes_no_sense_is_refused_by_its_key(settings, quantity, w
     with pytest.raises(InvalidQuantity, match=words) as refusal:
         Fault(**settings)
     assert refusal.value.quantity == quantity
+
+
+def test_a_call_is_held_up_until_the_fault_is_over(clock, monkeypatch):
+    faults = FaultTimeline([Fault("i2c_frozen", until_s=0.05)], clock=clock)
+    monkeypatch.setattr(
+        "device.simulation.faults.time.sleep", lambda seconds: setattr(clock, "now_s", clock.now_s + seconds)
+    )
+    faults.hold_up("i2c_frozen")
+    assert clock.now_s >= 100.05
+    NO_FAULTS.hold_up("i2c_frozen")

@@ -1,6 +1,7 @@
 """The virtual hand follows the screen as a person does: late, at a limited rate, and never quite still."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -103,6 +104,40 @@ def test_it_lifts_at_the_end_and_follows_no_longer(end):
     assert hand.force_n(30.0) == pytest.approx(0.4)
 
 
+def test_it_overshoots_comes_back_and_then_holds():
+    """Half of 0.4 N beyond, 0.15 s after it has arrived at 2 s."""
+    hand = hand_at(replace(STEADY, overshoot_ratio=0.5), ("press_beside", 1.0))
+    assert hand.force_n(2.0) == pytest.approx(0.4)
+    assert hand.force_n(2.15) == pytest.approx(0.6)
+    assert max(hand.force_n(t_s) for t_s in np.linspace(0, 9, 2000)) <= 0.6 + 1e-9
+    assert hand.force_n(9.0) == pytest.approx(0.4, abs=1e-6)
+
+
+def test_it_fades_from_when_it_has_arrived():
+    hand = hand_at(replace(STEADY, fade_n_per_s=-0.05), ("press_beside", 1.0), ("lift", 9.0))
+    assert [hand.force_n(t_s) for t_s in (2.0, 4.0)] == pytest.approx([0.4, 0.3])
+    assert hand.force_n(11.0) == 0.0
+
+
+def test_it_corrects_a_held_force_when_it_is_told_to_and_only_if_it_is_of_that_kind():
+    for guidance in ("press_harder", "press_lighter"):
+        hand = hand_at(replace(STEADY, corrects_to_n=0.5), ("press_beside", 1.0), (guidance, 4.0))
+        assert hand.force_n(4.2) == pytest.approx(0.4)
+        assert hand.force_n(9.0) == pytest.approx(0.5)
+
+
+def test_it_lifts_early_as_often_as_it_does_and_again_at_the_next_press():
+    hand = hand_at(replace(STEADY, early_lifts=1, lifts_after_s=1.5), ("press_beside", 0.0))
+    assert hand.force_n(1.6) == pytest.approx(0.4)
+    assert hand.force_n(3.0) == 0.0
+    hand.follow("press_beside", 3.0)
+    assert hand.force_n(20.0) == pytest.approx(0.4)
+    for guidance, t_s in (("lift", 20.0), ("press_lesion", 30.0)):
+        hand.follow(guidance, t_s)
+    assert hand.force_n(31.6) == pytest.approx(0.4)
+    assert hand.force_n(40.0) == 0.0
+
+
 SLOW = HandSettings(ramp_rate_n_per_s=0.1, reaction_s=0.2, tremor_n=0.0, drift_n=0.0)
 
 
@@ -165,6 +200,13 @@ def test_a_long_session_of_presses_is_followed_to_the_end():
         ("ramp_rate_n_per_s", 0.01, 10),
         ("reaction_s", 0, 5),
         ("aim_n", 0, 5),
+        ("ramp_aim_n", 0, 5),
+        ("corrects_to_n", 0, 5),
+        ("overshoot_ratio", 0, 5),
+        ("fade_n_per_s", -5, 5),
+        ("early_lifts", 0, 1000),
+        ("lifts_after_s", 0.01, 60),
+        ("tremor_hz", 1, 30),
         ("tremor_n", 0, 1),
         ("drift_n", 0, 1),
     ],
@@ -182,3 +224,12 @@ def test_a_hand_that_misses_and_leans_presses_beside_the_middle_at_an_angle():
     hand.begin()
     hand.follow("press_lesion", 0.0)
     assert hand.place(1.0) == Placement(3.0, -1.0, 0.0, 2.0)
+
+
+@pytest.mark.parametrize(("taken_up", "put_down"), [("hold_block", "lift"), ("put_weight", "take_weight_off")])
+def test_in_a_self_test_it_takes_up_the_probe_by_itself(taken_up, put_down):
+    hand = VirtualHand(STEADY)
+    hand.follow(taken_up, 0.0)
+    assert hand.force_n(5.0) == pytest.approx(0.4)
+    hand.follow(put_down, 5.0)
+    assert hand.force_n(9.0) == 0.0

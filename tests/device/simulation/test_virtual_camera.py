@@ -133,6 +133,39 @@ def test_what_the_sensor_does_not_have_is_adjusted_without_a_word(camera):
     assert configuration["raw"] == {"format": "R8", "size": (64, 32), "stride": 64}
 
 
+def test_controls_of_a_running_camera_act_two_frames_later_and_the_metadata_say_so(camera):
+    """The frame under way and the next are as they were: the first other one begins one to two frames later."""
+    camera.start()
+    before_ns = time.monotonic_ns()
+    camera.set_controls({"ExposureTime": 3_000, "AnalogueGain": 4.0})
+    after_ns, flush_ns, seen = time.monotonic_ns(), 1, set()
+    while (3_000, 4.0) not in seen:
+        request = camera.capture_request(flush=flush_ns, wait=1.0)
+        metadata, flush_ns = request.get_metadata(), request.get_metadata()["SensorTimestamp"]
+        request.release()
+        start_ns = flush_ns - 1000 * metadata["ExposureTime"]
+        seen.add((metadata["ExposureTime"], metadata["AnalogueGain"]))
+        if metadata["ExposureTime"] == 3_000:
+            assert start_ns > before_ns + 1000 * FRAME_US
+        else:
+            assert start_ns <= after_ns + 1000 * FRAME_US
+    assert seen <= {(EXPOSURE_US, 1.5), (3_000, 4.0)}
+
+
+def test_unpacked_formats_of_more_bits_have_two_bytes_a_pixel_the_low_one_first():
+    """1023 at the top of 16 bits is 0x3FF at their low end."""
+    white = np.full((32, 64), 1023 << 6, np.uint16)
+    camera = VirtualPicamera2(
+        lambda _: white, width_px=64, height_px=32, led_ratio_at=lambda _: (0.0,) * 4, raw_formats=("R8", "R10")
+    )
+    camera.configure(camera.create_video_configuration(raw={"size": (64, 32), "format": "R10"}, controls=CONTROLS))
+    assert camera.camera_configuration()["raw"] == {"format": "R10", "size": (64, 32), "stride": 128}
+    camera.start()
+    rows = camera.capture_request(wait=1.0).make_array("raw")
+    assert (rows.shape, rows.dtype) == ((32, 128), np.uint8)
+    assert rows[0, :4].tolist() == [0xFF, 0x03, 0xFF, 0x03]
+
+
 def test_errors_are_worded_as_the_real_ones(camera):
     configuration = camera.create_video_configuration()
     with pytest.raises(RuntimeError, match=r"^Control AwbEnable is not advertised by libcamera$"):
@@ -150,9 +183,6 @@ def test_errors_are_worded_as_the_real_ones(camera):
     request.release()
     with pytest.raises(RuntimeError, match=r"^CompletedRequest: lock now has negative ref_count$"):
         request.release()
-    camera.close()
-    with pytest.raises(RuntimeError, match=r"^Camera has not been configured$"):
-        camera.start()
 
 
 def camera_with(fault: Fault, render=lambda exposure: np.zeros((32, 64), np.uint8)) -> VirtualPicamera2:
@@ -185,6 +215,21 @@ def test_the_time_stamps_of_a_late_camera_skip_frames():
     skipped = np.diff(stamps_ns) / (1000 * FRAME_US)
     assert (skipped % LATE_CAMERA_KEEPS_EVERY == 0).all()
     assert (skipped > 0).all()
+
+
+def test_a_stale_frame_is_the_exposure_before_under_its_own_time_stamp():
+    """The light is the time: what it was at the start of the exposure that is shown, one frame too early."""
+    exposures: list[ExposureRequest] = []
+
+    def remember(exposure: ExposureRequest) -> np.ndarray:
+        exposures.append(exposure)
+        return np.zeros((32, 64), np.uint8)
+
+    camera = camera_with(Fault("camera_stale"), remember)
+    request = camera.capture_request(flush=time.monotonic_ns() + 3000 * FRAME_US, wait=1.0)
+    request.make_array("raw")
+    begun_s = 1e-9 * request.get_metadata()["SensorTimestamp"] - 1e-6 * EXPOSURE_US
+    assert exposures[0].led_ratio[0] == pytest.approx(begun_s - 1e-6 * FRAME_US)
 
 
 def test_the_lower_half_of_a_torn_frame_is_the_exposure_before():

@@ -1,15 +1,22 @@
-"""The choice of a mode over REST, against a procedure that only writes down what it is asked for."""
+"""Modes and certificates over REST, against a procedure that only writes down what it is asked for."""
 
 import asyncio
 import types
+from dataclasses import replace
 
 import httpx
 import pytest
+from small_certificate import small_certificate
 
 from device.config import Config
 from device.errors import ModeUnavailable
+from device.instrument.calibration_watch import CalibrationWatch
+from device.instrument.self_test.job import SelfTestJob
+from device.instrument.self_test.result import Result
 from device.instrument.status import PressJob
+from device.records.calibrations import Calibrations
 from device.web.app import create_app
+from device.web.schema import SelfTest
 
 
 class Procedure:
@@ -17,12 +24,21 @@ class Procedure:
 
     def __init__(self):
         self.config, self.modes, self.is_simulated, self.asked = Config(), ("paper", "standard"), True, []
+        self.calibration = CalibrationWatch(None)
 
     def request(self, mode=None):
         self.asked.append(mode)
         if mode not in (None, *self.modes):
             raise ModeUnavailable(f"This probe has no model for the mode {mode}.", "Choose one of those it has.")
         return PressJob("p-1", mode or "paper")
+
+    def request_self_test(self, *, on_block, weight_n):
+        self.asked.append((on_block, weight_n))
+        return SelfTestJob("s-1", "2026-01-01T00:00:00Z", on_block, weight_n)
+
+    @property
+    def self_test(self):
+        return SelfTestJob("s-1", "2026-01-01T00:00:00Z", state="done", results=(Result("Light", "LED +x", "passed"),))
 
 
 @pytest.fixture
@@ -76,3 +92,53 @@ def test_the_device_says_how_long_its_leds_were_on_and_in_which_modes_it_measure
         {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5},
         {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0},
     ]
+
+
+@pytest.mark.parametrize(
+    ("content", "asked"),
+    [({}, (False, None)), ({"json": {"on_block": True, "weight_n": 0.5}}, (True, 0.5))],
+)
+def test_a_self_test_is_started_and_found_where_it_says(ask, procedure, content, asked):
+    answer = ask("POST", "/api/v1/self-test", **content)
+    assert (answer.status_code, answer.headers["location"]) == (202, "/api/v1/self-test")
+    assert SelfTest.model_validate(answer.json()).state == "waiting"
+    assert procedure.asked == [asked]
+
+
+def test_the_results_of_a_self_test_are_as_described_and_say_that_the_probe_is_simulated(ask):
+    answer = ask("GET", "/api/v1/self-test").json()
+    assert SelfTest.model_validate(answer).verdict == "passed"
+    assert answer["simulated"] is True
+    assert [result["check"] for result in answer["results"]] == ["LED +x"]
+
+
+def test_an_unknown_wish_for_a_self_test_is_refused(ask, procedure):
+    answer = ask("POST", "/api/v1/self-test", json={"weight_g": 50})
+    assert (answer.status_code, answer.json()["code"]) == (422, "E803")
+    assert procedure.asked == []
+
+
+def test_the_certificates_are_listed_with_the_active_one_and_the_one_in_use(ask, procedure, tmp_path):
+    """Activated since the start: it is in use only from the next one on."""
+    procedure.config = replace(procedure.config, calibration=tmp_path)
+    assert ask("GET", "/api/v1/calibrations").json() == {"active": None, "in_use": None, "calibrations": []}
+    used, newer = small_certificate(), small_certificate(operator="Another")
+    for certificate in (used, newer):
+        (tmp_path / f"{certificate.id}.json").write_text(certificate.to_json())
+    Calibrations(tmp_path).activate(newer.id)
+    procedure.calibration = CalibrationWatch(used)
+    answer = ask("GET", "/api/v1/calibrations").json()
+    assert (answer["active"], answer["in_use"]) == (newer.id, used.id)
+    listed = {one["id"]: one for one in answer["calibrations"]}
+    assert listed[newer.id]["operator"] == "Another"
+    assert "held_out" not in listed[used.id]
+
+
+def test_certificates_are_not_written_over_rest(ask):
+    assert ask("POST", "/api/v1/calibrations", json={}).status_code == 405
+
+
+def test_a_folder_of_certificates_that_is_gone_is_a_problem_with_its_code(ask, procedure, tmp_path):
+    procedure.config = replace(procedure.config, calibration=tmp_path / "none")
+    answer = ask("GET", "/api/v1/calibrations")
+    assert (answer.status_code, answer.json()["code"]) == (503, "E402")

@@ -1,12 +1,15 @@
-"""The status as the screen gets it: faults and warnings with code, severity, cause and remedy."""
+"""The status as the screen gets it: faults and warnings with code, title, severity, cause and remedy."""
 
 import types
 
 import pytest
 
 from device.config import PressSection
-from device.errors import ClockJumpError, LightBusError, UnpluggedCellError
+from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
+from device.instrument.guidance import Guidance
+from device.instrument.press_state import PressState
 from device.instrument.status import PressJob, Status
+from device.web import schema
 from device.web.events import snapshot
 
 
@@ -43,9 +46,22 @@ def test_a_probe_without_a_fault_tells_its_force_and_no_fault(told):
 def test_a_fault_comes_before_the_warnings_and_each_says_what_it_is(told):
     fault, warning = LightBusError("The bus is stuck.", "Switch off."), ClockJumpError("It was set.", "Check it.")
     status = told(Status(fault=fault, warnings=(warning,)), Force())
+    assert schema.Status.model_validate(status).step == "starting"
     assert status["faults"] == [
-        {"code": "E202", "severity": "fault", "cause": "The bus is stuck.", "remedy": "Switch off."},
-        {"code": "E701", "severity": "warning", "cause": "It was set.", "remedy": "Check it."},
+        {
+            "code": "E202",
+            "title": "I2C bus stuck",
+            "severity": "fault",
+            "cause": "The bus is stuck.",
+            "remedy": "Switch off.",
+        },
+        {
+            "code": "E701",
+            "title": "Clock was set",
+            "severity": "warning",
+            "cause": "It was set.",
+            "remedy": "Check it.",
+        },
     ]
 
 
@@ -72,6 +88,11 @@ def test_a_ramp_has_the_forces_at_which_frames_are_still_wanted(told):
     assert reference["band_n"] == pytest.approx((0.06, 0.62))
 
 
+def test_the_state_of_the_press_is_told_by_its_code(told):
+    assert told(Status(), Force())["press_state"] == "idle"
+    assert told(Status(state=PressState.TOO_HARD), Force())["press_state"] == "too_hard"
+
+
 def test_before_a_press_the_mode_is_that_of_the_settings(told):
     status = told(Status(press=PressJob("p-1", "standard", "done"), wanted_n=()), Force())
     assert (status["mode"], status["kind"], status["wanted_n"]) == ("paper", "hold", (0.5,))
@@ -80,3 +101,10 @@ def test_before_a_press_the_mode_is_that_of_the_settings(told):
 def test_a_press_that_failed_has_its_code(told):
     status = told(Status(press=PressJob("p-1", "paper", "failed", code="E203", reason="No light.")), Force())
     assert (status["press"]["code"], status["press"]["warnings"]) == ("E203", ())
+
+
+def test_a_part_that_makes_no_progress_is_a_fault_whatever_the_frozen_procedure_says(told):
+    stall = StalledError("The LED chip made no progress for 7.6 s.", "Wait.")
+    status = told(Status(step="reference", guidance=Guidance.HOLD_STILL, stall=stall), Force())
+    assert (status["step"], status["guidance"]["code"]) == ("fault", "fault")
+    assert [fault["code"] for fault in status["faults"]] == ["E901"]

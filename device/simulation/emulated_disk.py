@@ -1,11 +1,13 @@
-"""A disk that fills up: the kernel's own "no space left", from /dev/full.
+"""A disk that fills up, with the kernel's own "no space left" from /dev/full, or that can only be read.
 
 Only what goes through the store's `Disk` is refused; the database beside it is on the real disk. Linux only.
-Source: full(4).
+Source: full(4); errno(3), EROFS, which Linux answers once it has remounted a failing card read-only.
 """
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 from pathlib import Path
 
@@ -16,7 +18,7 @@ FULL = Path("/dev/full")
 
 
 class EmulatedDisk:
-    """The disk of a scenario: full while it says so, else the real one. Implements the store's `Disk`."""
+    """The disk of a scenario: full or read-only while it says so, else the real one. Implements the store's `Disk`."""
 
     def __init__(self, faults: FaultTimeline) -> None:
         self._faults = faults
@@ -26,5 +28,7 @@ class EmulatedDisk:
         return 0 if self._faults.is_active("disk_full") else shutil.disk_usage(folder).free
 
     def write(self, path: Path, content: bytes) -> None:
-        """Write and synchronise a file; raise `OSError` ENOSPC while the disk is full."""
+        """Write and synchronise a file; raise `OSError` ENOSPC while the disk is full, EROFS while it is read-only."""
+        if self._faults.is_active("disk_read_only"):
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
         write_and_sync(FULL if self._faults.is_active("disk_full") else path, content)

@@ -1,11 +1,11 @@
-"""A disk that is full for a while: the kernel says so itself."""
+"""A disk that is full for a while, as the kernel says itself, or that cannot be written."""
 
 import errno
 
 import pytest
 
+from device.simulation.emulated_disk import EmulatedDisk
 from device.simulation.faults import Fault, FaultTimeline
-from device.simulation.full_disk import EmulatedDisk
 
 
 def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_again(tmp_path):
@@ -19,4 +19,13 @@ def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_aga
     now_s[0] = 1.0
     disk.write(tmp_path / "frame", b"counts")
     assert (tmp_path / "frame").read_bytes() == b"counts"
+    assert disk.free_bytes(tmp_path) > 0
+
+
+def test_a_read_only_disk_takes_nothing_and_still_has_space(tmp_path):
+    disk = EmulatedDisk(FaultTimeline([Fault("disk_read_only")]))
+    with pytest.raises(OSError, match="Read-only file system") as refused:
+        disk.write(tmp_path / "frame", b"counts")
+    assert refused.value.errno == errno.EROFS
+    assert list(tmp_path.iterdir()) == []
     assert disk.free_bytes(tmp_path) > 0

@@ -1,0 +1,94 @@
+"""Whether the certificate still holds: by the wall clock, and by what the untouched probe looks like at each start.
+
+An untouched face that was dark at calibration cannot show LEDs that fade: then only light that was added to it counts
+(`UntouchedFace.is_resolved`); LEDs that fade are seen under the load of a press, as E206.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from device.errors import (
+    CalibrationEndsSoon,
+    ClockBehindError,
+    DeviceError,
+    ExpiredCalibration,
+    LargeDriftError,
+    MissingCalibration,
+    SlightDriftError,
+)
+from device.measurement.calibration import Calibration
+from device.measurement.tactile_image import Frame
+from device.measurement.untouched_face import Drift
+
+WARN_RATIO, BLOCK_RATIO = 0.10, 0.25
+"""Change of the untouched face that is warned of, and that nothing is measured with."""
+UNTOUCHED_N = 0.01
+"""A touch by this force lets out a twentieth of the light of a press (the simulated probe's skin); 0.03 N, a tenth."""
+SOON_DAYS = 30.0
+OWN_WARNINGS = (CalibrationEndsSoon, SlightDriftError)
+CALIBRATE = "Calibrate the probe and activate the new certificate, then start the daemon again."
+WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
+
+
+class CalibrationWatch:
+    """Judges the certificate that the daemon started with, or the lack of one."""
+
+    def __init__(self, calibration: Calibration | None) -> None:
+        """Take the certificate, None for a probe that was never calibrated."""
+        self.calibration = calibration
+        self._ending: CalibrationEndsSoon | None = None
+        self._drift: SlightDriftError | LargeDriftError | None = None
+
+    @property
+    def id(self) -> str:
+        """The id of the certificate, empty without one."""
+        return self.calibration.id if self.calibration else ""
+
+    def require_valid(self, now: str) -> None:
+        """Raise the `DeviceError` by which nothing may be measured at a time (RFC 3339)."""
+        if self.calibration is None:
+            raise MissingCalibration("The probe is not calibrated: no certificate is active.", CALIBRATE)
+        validity = self.calibration.validity
+        if validity.is_before(now):
+            cause = f"The clock says {now[:10]}, before the calibration of {validity.measured_at[:10]}."
+            raise ClockBehindError(cause, "Set the board's clock, and check its time server.")
+        days_left = validity.days_left(now)
+        if days_left < 0:
+            raise ExpiredCalibration(f"The calibration has expired on {validity.expires_at}.", CALIBRATE)
+        self._ending = None
+        if days_left < SOON_DAYS:
+            cause = f"The calibration expires on {validity.expires_at}, in {days_left:.0f} days."
+            self._ending = CalibrationEndsSoon(cause, "Calibrate the probe before that day.")
+
+    def require_no_drift(self, unloaded: Sequence[Frame]) -> None:
+        """Raise `LargeDriftError` when unloaded frames, dark and lit, are too far from the certificate's.
+
+        Frames under a slight touch say nothing about it: then what the last untouched ones said holds.
+        """
+        if self.calibration is None:
+            return
+        if max(abs(frame.force_n) for frame in unloaded) <= UNTOUCHED_N:
+            self._drift = _judged(self.calibration.untouched.drift(unloaded))
+        if isinstance(self._drift, LargeDriftError):
+            raise self._drift
+
+    def warned(self, others: Sequence[DeviceError]) -> tuple[DeviceError, ...]:
+        """Return these warnings with those of the certificate brought up to date."""
+        own = [one for one in (self._ending, self._drift) if isinstance(one, OWN_WARNINGS)]
+        return (*(one for one in others if not isinstance(one, OWN_WARNINGS)), *own)
+
+
+def _judged(drift: Drift) -> SlightDriftError | LargeDriftError | None:
+    size = abs(drift.change_ratio)
+    if size > BLOCK_RATIO:
+        return LargeDriftError(f"{_described(drift)}, above {BLOCK_RATIO:.0%}.", WIPE)
+    return SlightDriftError(f"{_described(drift)}, above {WARN_RATIO:.0%}.", WIPE) if size > WARN_RATIO else None
+
+
+def _described(drift: Drift) -> str:
+    if drift.is_of_its_own_light:
+        more = "brighter" if drift.change_ratio > 0 else "dimmer"
+        return f"The untouched face is {abs(drift.change_ratio):.0%} {more} at {drift.side} than at the calibration"
+    light = f"{drift.change_ratio:.0%} of a press's light"
+    return f"The untouched face lets out light at {drift.side} that it did not at the calibration: {light}"

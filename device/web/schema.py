@@ -1,0 +1,144 @@
+"""What the API answers with, as its OpenAPI schema describes it: states and fault codes as enumerations.
+
+Answers are described, not filtered: fields are only ever added within v1, so a client ignores those it does not know.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from device.faults.table import FaultCode
+from device.instrument.press_state import PressState
+from device.instrument.self_test.job import SelfTestState
+from device.instrument.self_test.result import Verdict
+from device.instrument.status import JobState, Step
+from device.measurement.mode import Mode
+
+PressStateCode = StrEnum("PressStateCode", [(state.name, state.code) for state in PressState])  # type: ignore[misc]
+"""Every state of a press. (The type check cannot see members that a table makes.)"""
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+
+class Problem(_Body):
+    """An error, RFC 9457: `detail` is the cause, `remedy` what to do."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    code: FaultCode
+    remedy: str
+
+
+class Fault(_Body):
+    """A fault or warning: what the screen calls it, the cause with what was measured, and what to do."""
+
+    code: FaultCode
+    title: str
+    severity: Literal["fault", "warning"]
+    cause: str
+    remedy: str
+
+
+class Press(_Body):
+    """A press; `code` is that of the fault that ended it."""
+
+    id: str
+    mode: Mode
+    state: JobState
+    progress: float
+    reason: str
+    code: FaultCode | None
+    measurement_id: str | None
+    warnings: list[Fault]
+    light_on_s: float
+
+
+class Check(_Body):
+    """One check of the self-test: the measured value in its unit, its bound in words, and what to do."""
+
+    part: str
+    check: str
+    verdict: Verdict
+    value: float | None
+    unit: str
+    bound: str
+    cause: str
+    remedy: str
+    code: FaultCode | None
+
+
+class SelfTest(_Body):
+    """A self-test; `failed` as a state means that it was not brought to its end."""
+
+    simulated: bool
+    id: str
+    started_at: str
+    on_block: bool
+    weight_n: float | None
+    state: SelfTestState
+    verdict: Verdict
+    results: list[Check]
+
+
+class SelfTestSummary(_Body):
+    """How far the self-test is: the number of checks that are done."""
+
+    id: str
+    state: SelfTestState
+    verdict: Verdict
+    checks: int
+
+
+class GuidanceLine(_Body):
+    """What the operator should do now."""
+
+    code: str
+    text: str
+
+
+class Status(_Body):
+    """One moment of the probe. Forces in N, the band and what is still wanted included."""
+
+    simulated: bool
+    serial: str
+    software: str
+    step: Step
+    press_state: PressStateCode
+    guidance: GuidanceLine
+    force_n: float | None
+    mode: Mode
+    kind: Literal["ramp", "hold"]
+    target_n: float
+    band_n: tuple[float, float]
+    wanted_n: list[float]
+    full_scale_n: float
+    frames_taken: int
+    frames_needed: int
+    press: Press | None
+    measurement_id: str | None
+    self_test: SelfTestSummary | None
+    faults: list[Fault]
+
+
+def answers(status: int, model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+    """Return the description of a route's good answer, for FastAPI's `responses`."""
+    return {status: {"model": model}}
+
+
+def _problem_schema() -> dict[str, Any]:
+    """Return the problem's schema; its codes are those of the faults, which the schema names elsewhere already."""
+    schema = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
+    return {key: value for key, value in schema.items() if key != "$defs"}
+
+
+PROBLEM: dict[int | str, dict[str, Any]] = {
+    "default": {"description": "Any error", "content": {"application/problem+json": {"schema": _problem_schema()}}}
+}
+"""What every route may answer instead."""

@@ -1,0 +1,116 @@
+"""`host_tools calibrate`: phantom recordings to a certificate, written once, or to all that speaks against it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from device.measurement.durable import write_once
+from device.measurement.features import FEATURE_NAMES
+from device.measurement.inversion import FEATURE_UNITS, ModelBundle
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording import read_recording
+from device.simulation.surface_table import load_surface_table
+from host_tools.calibration_gates import CalibrationRejected, Gate
+from host_tools.commands.model import MODELS
+from host_tools.commands.output import note
+
+if TYPE_CHECKING:
+    from host_tools.calibrate import Calibrated
+
+MODEL = MODELS / "paper"
+TABLE = MODELS / "simulated_probe"
+
+
+def calibrate(
+    recordings: Annotated[list[Path], typer.Argument(help="Phantom recordings with truth.")],
+    out: Annotated[Path, typer.Option(help="Certificate to write, NAME.json; or its folder, for ID.json in it.")],
+    operator: Annotated[str, typer.Option(help="Who calibrates.")] = "",
+    phantom_serial: Annotated[str, typer.Option(help="Serial number of the set of phantoms.")] = "",
+    valid_days: Annotated[
+        float | None,
+        typer.Option(help="Days from the first recording, 1-36500; 365, or of a simulated probe all of them."),
+    ] = None,
+    model: Annotated[Path, typer.Option(help="Bundle the certificate is for.")] = MODEL,
+    table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = TABLE,
+    force_n: Annotated[float, typer.Option(help="Force the probe is pressed with.")] = 0.5,
+    as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
+) -> None:
+    """Fit the three regressions from image to deformation features and write the certificate, once.
+
+    Gates of number, spread and age of the phantoms, R2, leave-one-out error, dark level and saturation must all be
+    passed; otherwise nothing is written and the exit code is 1. An existing file is never replaced.
+    """
+    from host_tools.calibrate import Provenance
+    from host_tools.calibrate import calibrate as run_calibration
+
+    _require_new(out)
+    try:
+        done = run_calibration(
+            [read_recording(path) for path in recordings],
+            ModelBundle.load(model),
+            load_surface_table(table),
+            force_n=force_n,
+            provenance=Provenance(operator, phantom_serial, valid_days=valid_days),
+        )
+    except CalibrationRejected as rejection:
+        if not as_json:
+            raise
+        print(json.dumps({"accepted": False, "problems": [_problem(one) for one in rejection.problems]}))
+        raise typer.Exit(1) from rejection
+    path = _issue(done, out)
+    if as_json:
+        print(json.dumps(_record(done, path)))
+    else:
+        _show(done, path)
+
+
+def _issue(done: Calibrated, out: Path) -> Path:
+    """Write the certificate under the name that is asked for, or its own, and return its path."""
+    path = out if out.suffix == ".json" else out / f"{done.certificate.id}.json"
+    _require_new(path)
+    write_once(path, done.certificate.to_json().encode())
+    return path
+
+
+def _require_new(path: Path) -> None:
+    if path.suffix == ".json" and path.exists():
+        raise InvalidQuantity("certificate", path, "a new file", "a certificate is written once: give another name")
+
+
+def _problem(problem: InvalidQuantity) -> dict[str, str]:
+    value = str(problem.value)
+    return {"quantity": problem.quantity, "value": value, "bound": problem.bound, "action": problem.action}
+
+
+def _record(done: Calibrated, path: Path) -> dict[str, Any]:
+    certificate = done.certificate
+    return {
+        "accepted": True,
+        "id": certificate.id,
+        "path": str(path),
+        "expires_at": certificate.validity.expires_at,
+        "gates": [gate.as_record() for gate in done.gates],
+    }
+
+
+def _show(done: Calibrated, path: Path) -> None:
+    certificate = done.certificate
+    for image, line, name in zip(FEATURE_NAMES, certificate.regressions, FEATURE_UNITS, strict=True):
+        law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"
+        print(f"{law:76} R2 {line.r_squared:.5f}  leave-one-out {line.leave_one_out_std:.3g}")
+    for gate in done.gates:
+        print(_gate_line(gate))
+    if not certificate.untouched.is_resolved:
+        note.print(
+            "The untouched face is too dark to tell fading LEDs: only light added to it will be warned of.",
+            soft_wrap=True,
+        )
+    print(f"certificate {certificate.id} in {path}, until {certificate.validity.expires_at}")
+
+
+def _gate_line(gate: Gate) -> str:
+    return f"{gate.quantity:48} {gate.value:<10.4g} {gate.bound}"

@@ -1,0 +1,98 @@
+"""Nothing heavy runs on the event loop: pictures, archives, the store and the estimate are made in other threads."""
+
+import asyncio
+import inspect
+import json
+import threading
+import types
+
+import httpx
+import pytest
+from fastapi.routing import APIRoute
+
+from device.config import Config
+from device.instrument.status import StatusBoard
+from device.web import app as app_module
+from device.web.app import create_app
+from device.web.events import status_events
+
+MEASUREMENT = {"id": "m-1", "recording_id": "r-1", "features": {"total": 1.0}}
+
+
+class Witness:
+    """A store and a procedure that note on which thread they are asked."""
+
+    def __init__(self, folder):
+        self.folder, self.threads = folder, {}
+        self.config, self.modes, self.is_simulated = Config(), ("paper",), True
+        self.light_on_s, self.board = 0.0, StatusBoard()
+        self.bench = types.SimpleNamespace(force=types.SimpleNamespace(latest_n=0.25))
+
+    def note(self, what, answer):
+        self.threads[what] = threading.get_ident()
+        return answer
+
+    def measurement(self, measurement_id):
+        return self.note("measurement", MEASUREMENT)
+
+    def measurements(self, *, before_seq, limit):
+        return self.note("measurements", [MEASUREMENT])
+
+    def recording_folder(self, recording_id):
+        return self.note("recording", self.folder)
+
+    def press(self, press_id):
+        return self.note("press", {"id": press_id})
+
+    def require_ready(self):
+        self.note("ready", None)
+
+
+@pytest.fixture
+def witness(tmp_path, monkeypatch):
+    (tmp_path / "recording.json").write_text("{}")
+    witness = Witness(tmp_path)
+    monkeypatch.setattr(app_module, "tactile_png", lambda folder: witness.note("picture", b"png"))
+    return witness
+
+
+HEAVY = {
+    "measurements": "measurements",
+    "measurements/m-1": "measurement",
+    "measurements/m-1/features": "measurement",
+    "measurements/m-1/image.png": "picture",
+    "measurements/m-1/recording.zip": "recording",
+    "presses/p-1": "press",
+    "health/ready": "ready",
+}
+
+
+@pytest.mark.parametrize("path", HEAVY)
+def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(witness, path):
+    app = create_app(witness, witness)
+
+    async def ask():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://probe") as client:
+            return threading.get_ident(), await client.get(f"/api/v1/{path}")
+
+    loop_thread, answer = asyncio.run(ask())
+    assert answer.status_code == 200
+    assert witness.threads[HEAVY[path]] != loop_thread
+
+
+def test_only_the_event_stream_runs_on_the_event_loop(witness):
+    routes = [route for route in create_app(witness, witness).routes if isinstance(route, APIRoute)]
+    on_the_loop = [route.path for route in routes if inspect.iscoroutinefunction(route.endpoint)]
+    assert on_the_loop == ["/api/v1/events"]
+
+
+def test_an_event_is_small_and_touches_neither_disk_nor_store(witness):
+    """It is what the board and the cell's newest sample say: some 1 kB, 16 times a second for each client."""
+
+    async def first_event():
+        return await anext(status_events(witness))
+
+    event = asyncio.run(first_event())
+    assert len(event) < 2000
+    assert json.loads(event.partition("data: ")[2])["press_state"] == "idle"
+    assert witness.threads == {}

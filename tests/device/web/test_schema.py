@@ -1,0 +1,51 @@
+"""The OpenAPI schema: codes are an enumeration of the table of faults, wherever an answer may carry one."""
+
+import types
+
+import pytest
+
+from device.errors import LightError
+from device.faults.table import FAULTS
+from device.instrument.press_state import PressState
+from device.instrument.status import PressJob
+from device.web.app import create_app
+from device.web.schema import Press
+
+CODES = "#/components/schemas/FaultCode"
+
+
+@pytest.fixture(scope="module")
+def schema():
+    return create_app(types.SimpleNamespace(), types.SimpleNamespace()).openapi()
+
+
+def test_the_enumeration_is_the_table(schema):
+    assert schema["components"]["schemas"]["FaultCode"]["enum"] == [fault.code for fault in FAULTS]
+
+
+def test_the_codes_of_faults_and_presses_are_of_the_enumeration(schema):
+    models = schema["components"]["schemas"]
+    assert models["Fault"]["properties"]["code"]["$ref"] == CODES
+    assert models["Press"]["properties"]["code"]["anyOf"] == [{"$ref": CODES}, {"type": "null"}]
+    assert models["Status"]["properties"]["faults"]["items"]["$ref"] == "#/components/schemas/Fault"
+
+
+def test_the_states_of_a_press_are_an_enumeration(schema):
+    models = schema["components"]["schemas"]
+    assert models["PressStateCode"]["enum"] == [state.code for state in PressState]
+    assert models["Status"]["properties"]["press_state"]["$ref"] == "#/components/schemas/PressStateCode"
+
+
+def test_every_route_may_answer_with_a_problem_of_the_enumeration(schema):
+    for path in schema["paths"].values():
+        for route in path.values():
+            problem = route["responses"]["default"]["content"]["application/problem+json"]["schema"]
+            assert problem["properties"]["code"]["$ref"] == CODES
+
+
+def test_a_press_is_as_described_and_an_unknown_code_is_not():
+    warning = LightError("It broke.", "Mend it.").as_record()
+    record = PressJob("p-1", "paper", state="failed", code="E201", warnings=(warning,)).as_record()
+    assert Press.model_validate(record).code == "E201"
+    with pytest.raises(ValueError, match="code"):
+        Press.model_validate(record | {"code": "E999"})

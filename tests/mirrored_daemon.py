@@ -1,0 +1,41 @@
+"""The simulated daemon on an LED chip that outlives it: every transaction also goes to the bus in the test's process.
+
+As a program: `python mirrored_daemon.py SOCKET [ARGUMENT]...` is `python -m device [ARGUMENT]...`.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from typing import Any
+
+from i2c_over_socket import stand_in_for_the_kernel
+from smbus2 import SMBus, i2c_msg
+
+from device import assembly
+from device.simulation.i2c_bus import I2C_M_RD, EmulatedI2cBus, I2cMessage
+
+
+class MirroredBus(EmulatedI2cBus):
+    """The emulated bus; what it has carried is carried again to the chips outside."""
+
+    def __init__(self, *chips: Any, **settings: Any) -> None:
+        super().__init__(*chips, **settings)
+        self._outside = SMBus(1)
+
+    def i2c_rdwr(self, *i2c_msgs: I2cMessage) -> None:
+        super().i2c_rdwr(*i2c_msgs)
+        for message in i2c_msgs:
+            if not message.flags & I2C_M_RD:
+                self._outside.i2c_rdwr(i2c_msg.write(message.addr, bytes(message.buf[: message.len])))
+
+    def close(self) -> None:
+        super().close()
+        self._outside.close()
+
+
+if __name__ == "__main__":
+    stand_in_for_the_kernel(sys.argv[1])
+    assembly.EmulatedI2cBus = MirroredBus
+    sys.argv = ["device", *sys.argv[2:]]
+    runpy.run_module("device", run_name="__main__", alter_sys=True)

@@ -1,0 +1,44 @@
+"""A small calibration certificate for tests of what reads one: every number in it is made up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from device.measurement.calibration import Calibration, Regression, certificate_id
+from device.measurement.features import FeatureSettings
+from device.measurement.intervals import HeldOut
+from device.measurement.recording import CameraSettings, RecordedCell
+from device.measurement.untouched_face import UntouchedFace
+from device.measurement.validity import Validity
+
+
+def small_certificate(**changes: Any) -> Calibration:
+    """Return a certificate of 2026 with some of its fields changed, under the id of its content."""
+    truth = np.random.default_rng(1).uniform((1, 4, 40), (15, 12, 120), (100, 3)).round(3)
+    lines = (Regression(2.0, 0.5, 0.99, 0.01), Regression(-1.0, 0.0, 0.98, 0.02), Regression(0.1, -3.0, 0.97, 0.03))
+    certificate = Calibration(
+        id="",
+        made_at="2026-01-03T00:00:00Z",
+        validity=Validity("2026-01-02T03:04:05Z", "2027-01-02T03:04:05Z"),
+        operator="N. N.",
+        serial="TSIS-0007",
+        phantom_serial="PH-3",
+        model_sha256="ab" * 32,
+        model_card_sha256="ef" * 32,
+        force_n=0.5,
+        camera=CameraSettings(64, 48, 8, 0.03, 0.04, 4000.0, 1.0),
+        cell=RecordedCell(100_000.0, 8200.0),
+        untouched=UntouchedFace(4.0, (30.0, 40.0, 30.0, 40.0), 0.01, 100.0, 0.6),
+        settings=FeatureSettings(smoothing_mm=0.4),
+        regressions=lines,
+        phantoms=9,
+        held_out=HeldOut(truth.round(1), truth, np.array([1.0, 4.0, 40.0]), np.array([15.0, 12.0, 120.0])),
+        software="1.0",
+        software_sha256="cd" * 32,
+        simulated=False,
+    )
+    changed = replace(certificate, **changes)
+    return replace(changed, id=certificate_id(changed))

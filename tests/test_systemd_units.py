@@ -1,0 +1,62 @@
+"""The unit files, read by systemd itself, which only complains in words about a key or value that it does not know."""
+
+from __future__ import annotations
+
+import configparser
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from daemon_process import ROOT
+
+from device.instrument.watchdog import WITHOUT_SYSTEMD_S
+
+UNIT = ROOT / "systemd" / "tsis.service"
+PYTHON = "/opt/tsis/current/bin/python"
+needs_systemd = pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
+
+
+def here(folder: Path, text: str) -> Path:
+    """Return the unit as it would be if this interpreter were the installed one."""
+    path = folder / UNIT.name
+    path.write_text(text.replace(PYTHON, sys.executable))
+    return path
+
+
+def complaints(path: Path) -> str:
+    return subprocess.run(["systemd-analyze", "verify", str(path)], capture_output=True, text=True, check=False).stderr
+
+
+@needs_systemd
+def test_systemd_takes_every_line_of_the_unit(tmp_path):
+    assert complaints(here(tmp_path, UNIT.read_text())) == ""
+
+
+@needs_systemd
+@pytest.mark.parametrize(("line", "wrong"), [("WatchdogSec=15", "WatchdogSec=soon"), ("UMask=", "UMusk=")])
+def test_a_line_that_systemd_does_not_take_is_told(tmp_path, line, wrong):
+    assert line in UNIT.read_text()
+    assert complaints(here(tmp_path, UNIT.read_text().replace(line, wrong)))
+
+
+@needs_systemd
+def test_the_unit_shuts_the_daemon_in(tmp_path):
+    """systemd's own score: 10 is exposed, 2 is well shut in; the threshold is in tenths."""
+    command = ["systemd-analyze", "security", "--offline=true", "--threshold=20", "--no-pager"]
+    path = here(tmp_path, UNIT.read_text())
+    judged = subprocess.run([*command, str(path)], capture_output=True, text=True, check=False)
+    assert judged.returncode == 0, judged.stdout
+
+
+def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_end():
+    unit = configparser.RawConfigParser(strict=False)
+    unit.optionxform = str
+    unit.read(UNIT)
+    service = unit["Service"]
+    assert service["Type"] == "notify"
+    assert float(service["WatchdogSec"]) == WITHOUT_SYSTEMD_S
+    assert service["ExecStart"] == f"{PYTHON} -m device"
+    assert service["ExecStopPost"] == f"-{PYTHON} -m device.led_off"
+    assert service["Restart"] == "on-failure"
