@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse recordings, see settings, calibrations and faults, test itself, darken.
+"""`python -m device`: start the daemon, analyse or record presses, see settings, certificates and faults, test, darken.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -25,14 +25,17 @@ from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.faults.listing import add_faults_command, run_faults_command
 from device.instrument.calibration_watch import CalibrationWatch
+from device.instrument.phantom_press import PhantomPress
 from device.instrument.procedure import Procedure
 from device.instrument.restart_note import RestartNote
 from device.instrument.watchdog import Watchdog
 from device.led_off import led_off
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import read_recording
+from device.phantom_assembly import open_phantom_press
+from device.record_command import add_record_command, run_record_command
 from device.records.calibrations import Calibrations
 from device.self_test_command import add_self_test_command, run_self_test_command
 from device.settings.command import add_config_command, run_config_command
@@ -63,11 +66,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    verbs = "analyse | config | calibration | faults | self-test | led-off"
+    verbs = "analyse | record | config | calibration | faults | self-test | led-off"
     commands = parser.add_subparsers(dest="command", metavar=verbs)
     analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
     analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
     analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
+    add_record_command(commands)
     add_config_command(commands)
     add_calibration_command(commands)
     add_faults_command(commands)
@@ -88,6 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command == "analyse":
             return _analyse(options)
+        if options.command == "record":
+            return _record(options)
         if options.command == "config":
             return run_config_command(options)
         if options.command == "calibration":
@@ -153,6 +159,19 @@ def _self_test(options: argparse.Namespace) -> int:
     scenario = _scenario(options)
     config = _start_settings(options, scenario).config
     return run_self_test_command(options, lambda: _opened(config, scenario))
+
+
+def _record(options: argparse.Namespace) -> int:
+    """Record one press on a phantom: it is what a virtual probe is pressed on, whatever its scene says."""
+    scenario = _scenario(options)
+    settings = _start_settings(options, scenario)
+    if settings.warning:
+        print(f"{settings.warning.code} {settings.warning}", file=sys.stderr)
+
+    def opened(inclusion: Inclusion) -> PhantomPress:
+        return open_phantom_press(settings.config, scenario and replace(scenario, inclusion=inclusion))
+
+    return run_record_command(options, opened)
 
 
 def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:

@@ -5,10 +5,9 @@ Every part that fails to open is listed at once, each with its fault code, and w
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,21 +19,21 @@ from device.cell_assembly import commissioned, emulated_amplifier, open_cell, ta
 from device.certificate import active_calibration
 from device.config import SIMULATED_PROBE, Config
 from device.errors import ConfigError, DeviceError, ModelError
+from device.hand_assembly import SomeGuide, lead_by_hand
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.hardware.raw_mode import RAW_BITS
 from device.instrument.bench import Bench
 from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.clock_watch import ClockWatch
+from device.instrument.force_recorder import ForceRecorder
 from device.instrument.frame_check import FramePace
-from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
 from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
 from device.measurement.inversion import BundleRefused, ModelBundle
-from device.measurement.mode import Mode
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store
 from device.simulation.camera_server import CameraServer
@@ -87,17 +86,68 @@ class _Parts:
             raise StartFailed(self.faults)
 
 
+@dataclass(frozen=True)
+class OpenedProbe:
+    """The opened parts of a probe, None for one that failed, and what is simulated of it."""
+
+    config: Config
+    parts: _Parts
+    lights: Lights | None
+    camera: Camera | None
+    cell: LoadCell | None
+    clock: ClockWatch
+    disk: Disk | None = None
+    scenario: Scenario | None = None
+    faults: FaultTimeline = NO_FAULTS
+    folder_of: Callable[[Path], Path] = Path
+
+    @property
+    def simulated_truth(self) -> Inclusion | None:
+        """What a simulated probe is pressed on."""
+        return self.scenario.inclusion if self.scenario else None
+
+    def force(self, progress: ProgressBoard) -> ForceRecorder | None:
+        """Return the recorder of the tared load cell, or None when that failed."""
+        cell = self.cell
+        return self.parts.open(lambda: tared(self.config, cell, progress)) if cell else None
+
+    def store(self) -> Store | None:
+        """Return the store of the settings' data folder, or None when it did not open."""
+        return self.parts.open(lambda: Store(self.config.data, self.disk))
+
+    def bench(self, force: ForceRecorder | None, progress: ProgressBoard) -> Bench:
+        """Return light, camera and force as one, once no part has failed."""
+        self.parts.require_all()
+        # require_all has raised if any of these is missing; the type checker cannot know.
+        assert self.lights is not None
+        assert self.camera is not None
+        assert force is not None
+        pace = FramePace(self.config.camera.late_frames / self.config.camera.frame_rate_hz)
+        budget = LightBudget(self.config.light.max_on_s)
+        return Bench(self.lights, self.camera, force, pace, budget, progress)
+
+
 def open_probe(config: Config) -> Procedure:
     """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
+    return open_real(config, _procedure)
+
+
+def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
+    """Return the procedure of a virtual probe; raise `StartFailed` as `open_probe` does."""
+    return open_simulated(config, scenario, _procedure)
+
+
+def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
+    """Return what `on_top` makes of the real probe's parts; raise `StartFailed` with every part that failed."""
     parts = _Parts()
     lights = parts.open(lambda: open_led_driver(config.light))
     camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
-    return _procedure(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s))
+    return on_top(OpenedProbe(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s)))
 
 
-def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
-    """Return the procedure of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
+def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
+    """Return the same of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
     parts, faults = _Parts(), FaultTimeline(scenario.faults)
     bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
     config = replace(commissioned(config), model=bundles.folder(config.model))
@@ -126,12 +176,11 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     camera = parts.open(lambda: emulated_camera(config.camera, server.address))
     cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
-    procedure = _procedure(
-        config, parts, lights, camera, cell, clock, EmulatedDisk(faults), scenario, faults, bundles.folder
-    )
-    procedure.on_request(lambda mode: faults.begin_press())
-    _lead_by_hand(procedure, probe)
-    return procedure
+    disk = EmulatedDisk(faults)
+    guide = on_top(OpenedProbe(config, parts, lights, camera, cell, clock, disk, scenario, faults, bundles.folder))
+    guide.on_request(lambda mode: faults.begin_press())
+    lead_by_hand(guide, probe)
+    return guide
 
 
 def _require_own_serial(config: Config, scenario: Scenario) -> None:
@@ -160,71 +209,34 @@ def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureReques
     )
 
 
-def _lead_by_hand(procedure: Procedure, probe: VirtualProbe) -> None:
-    """Let the virtual hand read the screen: it takes up the probe when a press is requested."""
-
-    def follow(guidance: Guidance) -> None:
-        probe.hand.follow(guidance.code, time.monotonic())
-
-    def begin(mode: Mode) -> None:
-        probe.hand.begin()
-        guidance = procedure.board.now.guidance
-        if guidance is before_contact("reference", mode):  # shown since before the hand took up the probe
-            follow(guidance)
-
-    procedure.board.on_guidance(follow)
-    procedure.on_request(begin)
-
-
-def _procedure(
-    config: Config,
-    parts: _Parts,
-    lights: Lights | None,
-    camera: Camera | None,
-    cell: LoadCell | None,
-    clock: ClockWatch,
-    disk: Disk | None = None,
-    scenario: Scenario | None = None,
-    faults: FaultTimeline = NO_FAULTS,
-    folder_of: Callable[[Path], Path] = Path,
-) -> Procedure:
+def _procedure(probe: OpenedProbe) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing."""
-    progress = ProgressBoard()
-    force = parts.open(lambda: tared(config, cell, progress)) if cell else None
+    config, parts, progress = probe.config, probe.parts, ProgressBoard()
+    force = probe.force(progress)
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
     calibration = watch.calibration if watch else None
     answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None
-    store = parts.open(lambda: Store(config.data, disk))
-    parts.require_all()
-    # require_all has raised if any of these is missing; the type checker cannot know.
-    assert lights is not None
-    assert camera is not None
-    assert force is not None
+    store = probe.store()
+    bench = probe.bench(force, progress)
+    # Nothing has failed, or there were no bench; the type checker cannot know.
     assert answers is not None
     assert watch is not None
     assert store is not None
-    answers = answers.watched(progress, begin=partial(faults.hold_up, "inference_frozen"))
+    answers = answers.watched(progress, begin=partial(probe.faults.hold_up, "inference_frozen"))
     progress.exercise("inference", answers.prove)
     return Procedure(
         config,
-        Bench(
-            lights,
-            camera,
-            force,
-            FramePace(config.camera.late_frames / config.camera.frame_rate_hz),
-            LightBudget(config.light.max_on_s),
-            progress,
-        ),
+        bench,
         answers.estimator,
         store,
         modes=answers.modes,
         calibration=watch,
         opened=parts.opened,
-        clock=clock,
+        clock=probe.clock,
         progress=progress,
-        simulated_truth=scenario.inclusion if scenario else None,
-        folder_of=folder_of,
+        simulated_truth=probe.simulated_truth,
+        folder_of=probe.folder_of,
     )
 
 

@@ -54,7 +54,8 @@ WEAKEST_PEAK_MM = 5e-4
 class Provenance:
     """What no recording knows: who calibrated, on which set of phantoms, when, and for how many days it is to hold.
 
-    Without `made_at` (RFC 3339) it is now; without `valid_days`, a year, or of a simulated probe a hundred.
+    Without `phantom_serial` it is what the recordings say, without `made_at` (RFC 3339) now; without `valid_days`, a
+    year, or of a simulated probe a hundred.
     """
 
     operator: str = ""
@@ -113,7 +114,7 @@ def calibrate(
         validity=measured.validity,
         operator=stated.operator,
         serial=first.serial,
-        phantom_serial=stated.phantom_serial,
+        phantom_serial=stated.phantom_serial or first.phantom_serial,
         model_sha256=bundle.sha256,
         model_card_sha256=bundle.card_sha256,
         force_n=force_n,

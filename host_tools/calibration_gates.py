@@ -121,6 +121,7 @@ def _must_agree(recordings: Sequence[Recording]) -> Iterable[tuple[str, list[obj
     yield "serial", [one.serial for one in recordings], "calibrate each probe on its own"
     yield "camera", [one.camera for one in recordings], "record all phantoms with the same settings"
     yield "cell", [one.cell for one in recordings if one.cell], "record all phantoms with the same settings"
+    yield "phantom_serial", [one.phantom_serial or "none" for one in recordings], "calibrate on one set of phantoms"
 
 
 def number_gate(recordings: Sequence[Recording]) -> Gate:

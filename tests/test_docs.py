@@ -1,17 +1,20 @@
 """The documents are executed: their scene files are scenes, and the commands they name exist."""
 
 import re
+import shlex
 import tomllib
 
 import pytest
 import typer
 from daemon_process import ROOT
 
+from device.__main__ import _parser
 from device.measurement.toml_record import from_table
 from host_tools.__main__ import app
 from host_tools.scene import Scene
 
 FORWARD_MODEL = (ROOT / "docs" / "forward_model.md").read_text(encoding="utf-8")
+CONTRACTS = (ROOT / "docs" / "contracts.md").read_text(encoding="utf-8")
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 
 
@@ -31,6 +34,12 @@ def test_every_verb_and_option_that_a_page_names_exists(page):
             command = command.commands[rest.split()[0]]
         known = {option for parameter in command.params for option in parameter.opts}
         assert set(re.findall(r"--[a-z-]+", rest)) <= known, f"{page.name}: host_tools {verb}{rest}"
+
+
+def test_the_daemons_commands_to_calibrate_a_new_probe_are_commands():
+    section = CONTRACTS.split("### Calibrate a new probe\n")[1].split("\n## ")[0]
+    commands = re.findall(r"^python -m device (.*)$", section, re.MULTILINE)
+    assert [_parser().parse_args(shlex.split(one)).command for one in commands] == ["record", "calibration"]
 
 
 def test_every_file_that_the_forward_model_names_exists():

@@ -25,7 +25,7 @@ def recording_of(
     config: Config,
     *,
     started_at: str,
-    calibration_id: str,
+    calibration_id: str | None,
     simulated_truth: Inclusion | None,
 ) -> Recording:
     """Return a new recording of a probe's frames; a probe whose truth is known is a simulated one."""

@@ -80,7 +80,10 @@ class RecordedCell:
 
 @dataclass(frozen=True)
 class Recording:
-    """One press: frames of every role with their force, and where it came from. `truth` only for phantoms."""
+    """One press: frames of every role with their force, and where it came from.
+
+    `truth` only for phantoms, `phantom_serial` that of their set if it is known.
+    """
 
     id: str
     serial: str
@@ -93,6 +96,7 @@ class Recording:
     truth: Inclusion | None = None
     simulated: bool = False
     cell: RecordedCell | None = None
+    phantom_serial: str = ""
 
     def __post_init__(self) -> None:
         require_one_shape(self.frames)
@@ -178,6 +182,7 @@ def _as_json(recording: Recording) -> dict[str, Any]:
         "calibration_id": recording.calibration_id,
         "position_mm": recording.position_mm,
         "truth": asdict(recording.truth) if recording.truth else None,
+        "phantom_serial": recording.phantom_serial,
     }
 
 
@@ -228,6 +233,7 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth is not None else None,
         simulated=_optional(record, "simulated", bool, False),
         cell=_cell(_optional(record, "cell", dict, None)),
+        phantom_serial=_optional(record, "phantom_serial", str, ""),
     )
 
 

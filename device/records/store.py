@@ -131,11 +131,7 @@ class Store:
     def add_measurement(self, record: Record, recording: Recording) -> Record:
         """Keep a recording and its measurement; return the record with its sequence number."""
         folder = self._folder_of(recording.id)
-        try:
-            write_recording(recording, folder, write=self._disk.write)
-        except OSError as error:
-            kind = DiskFullError if _is_full(error) else StorageError
-            raise kind(f"The recording could not be written: {error}.", "Free space on the disk.") from error
+        self.write_out(recording, folder)
         try:
             with self._transaction() as db:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
@@ -145,6 +141,14 @@ class Store:
             shutil.rmtree(folder, ignore_errors=True)
             raise
         return whole
+
+    def write_out(self, recording: Recording, folder: Path) -> None:
+        """Write a recording to a new folder, durably, and remember nothing of it; raise `StorageError`."""
+        try:
+            write_recording(recording, folder, write=self._disk.write)
+        except OSError as error:
+            kind = DiskFullError if _is_full(error) else StorageError
+            raise kind(f"The recording could not be written: {error}.", "Free space on the disk.") from error
 
     def measurement(self, measurement_id: str) -> Record:
         """Return a measurement; raise `UnknownResource` when there is none of that id."""

@@ -29,7 +29,9 @@ def calibrate(
     recordings: Annotated[list[Path], typer.Argument(help="Phantom recordings with truth.")],
     out: Annotated[Path, typer.Option(help="Certificate to write, NAME.json; or its folder, for ID.json in it.")],
     operator: Annotated[str, typer.Option(help="Who calibrates.")] = "",
-    phantom_serial: Annotated[str, typer.Option(help="Serial number of the set of phantoms.")] = "",
+    phantom_serial: Annotated[
+        str, typer.Option(help="Serial number of the set of phantoms; the recordings' by default.")
+    ] = "",
     valid_days: Annotated[
         float | None,
         typer.Option(help="Days from the first recording, 1-36500; 365, or of a simulated probe all of them."),

@@ -89,6 +89,10 @@ def changed(recording, **changes):
             lambda all_of: [*all_of[:5], changed(all_of[5], camera=dataclasses.replace(all_of[5].camera, gain=2.0))],
             "camera is .* the same in all recordings",
         ),
+        (
+            lambda all_of: [*all_of[:5], changed(all_of[5], phantom_serial="PH-4")],
+            "phantom_serial is PH-4 and none, but must be the same in all recordings",
+        ),
         (lambda all_of: [all_of[0]] * 6, "all equal"),
     ],
 )
@@ -125,6 +129,14 @@ def test_the_certificate_says_from_where_it_comes_and_how_long_it_holds(real, bu
     assert (certificate.camera, certificate.cell) == (real[0].camera, real[0].cell)
     assert certificate.software_sha256 == source_sha256()
     assert all(gate.problem is None for gate in gates)
+
+
+def test_the_set_of_phantoms_is_that_of_the_recordings_unless_it_is_stated(real, bundle, table):
+    recorded = [changed(recording, phantom_serial="PH-4") for recording in real]
+    for stated, expected in (("", "PH-4"), ("PH-3", "PH-3")):
+        provenance = Provenance(phantom_serial=stated, made_at=MADE_AT)
+        certificate = calibrate(recorded, bundle, table, force_n=0.5, provenance=provenance).certificate
+        assert certificate.phantom_serial == expected
 
 
 def test_a_real_probe_is_calibrated_for_a_year_and_a_simulated_one_for_a_hundred(recordings, real, bundle, table):

@@ -34,6 +34,7 @@ def small_recording(bits=8):
         truth=Inclusion(10.0, 5.0, 80.0),
         simulated=True,
         cell=RecordedCell(100_000.0, -8200.0),
+        phantom_serial="PH-3",
     )
 
 
@@ -95,11 +96,11 @@ def test_a_zip_of_the_folder_or_of_its_content_comes_back_too(tmp_path, bits, pr
 
 
 def test_what_need_not_be_known_may_be_absent(folder):
-    for name in ("truth", "position_mm", "calibration_id", "simulated", "cell"):
+    for name in ("truth", "position_mm", "calibration_id", "simulated", "cell", "phantom_serial"):
         with_value(folder, name, ...)
     found = read_recording(folder)
     assert (found.truth, found.position_mm, found.calibration_id, found.simulated) == (None, (0.0, 0.0), None, False)
-    assert found.cell is None
+    assert (found.cell, found.phantom_serial) == (None, "")
 
 
 def test_a_tare_that_is_not_known_is_null(folder):
@@ -120,6 +121,7 @@ def test_the_file_on_disk_is_the_contract(folder):
     }  # fmt: skip
     assert record["cell"] == {"counts_per_n": 100000.0, "tare_counts": -8200.0}
     assert record["truth"] == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
+    assert record["phantom_serial"] == "PH-3"
     assert sorted(p.name for p in (folder / "frames").iterdir()) == ["000.png", "001.png", "002.png", "003.png"]
 
 
