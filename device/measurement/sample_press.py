@@ -26,6 +26,8 @@ WIDER, FREEDOM = 1.15, 6.0
 """Gaussians are drawn wider than they are, with the tails of Student's distribution: nothing may be missed."""
 DEFENSIVE_SHARE = 0.15
 """Share of the samples that go evenly to all cells, whatever their Gaussians promise."""
+FEWEST_EFFECTIVE = 20.0
+"""Fewer say nothing of the posterior: presses that the ranges hold leave hundreds."""
 SEED = 20130317
 EDGES = np.linspace(-1.0, 1.0, CELLS + 1)
 MIDDLES = (EDGES[1:] + EDGES[:-1]) / 2
@@ -38,7 +40,9 @@ STEPS = 12
 class PressFit:
     """Posterior of the coordinates [9] of `press_parameters.to_unit`.
 
-    `best`: the best fit; `mean`, `spread`: of the posterior; `effective_samples`: what the weighted ones are worth.
+    `best`: the best fit; `mean`, `spread`: of the posterior; `effective_samples`: what the weighted ones are worth. Too
+    few, because the best fit is driven into a corner of the ranges, tell nothing: the spread is then that of the ranges
+    and the mean the best fit.
     """
 
     best: Array
@@ -78,11 +82,13 @@ def sample_press(posterior: PressPosterior, start: Array) -> PressFit:
     best = best_fit(posterior, start)
     samples, log_proposal = _cells(posterior, best).draw(SAMPLES, np.random.default_rng(SEED))
     log = posterior.log_density(samples) - log_proposal
-    weight = np.exp(log - log.max())
+    weight = np.exp(log - max(log.max(), np.finfo(float).min))  # which is -inf when every sample lies outside
+    effective = float(weight.sum() ** 2 / np.sum(weight**2)) if weight.any() else 0.0
+    if effective < FEWEST_EFFECTIVE:
+        return PressFit(best, best, np.full(len(best), EVEN_STD), effective)
     weight /= weight.sum()
     mean = weight @ samples
-    spread = np.sqrt(weight @ (samples - mean) ** 2)
-    return PressFit(best, mean, spread, float(1 / np.sum(weight**2)))
+    return PressFit(best, mean, np.sqrt(weight @ (samples - mean) ** 2), effective)
 
 
 def _cells(posterior: PressPosterior, best: Array) -> _Cells:

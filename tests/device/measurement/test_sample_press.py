@@ -8,7 +8,7 @@ from small_surrogate import linear_surrogate
 from device.measurement.fit_press import PressPosterior
 from device.measurement.press_parameters import EVEN_STD, PARAMETERS
 from device.measurement.press_surrogate import MODULUS
-from device.measurement.sample_press import PressFit, sample_press
+from device.measurement.sample_press import FEWEST_EFFECTIVE, PressFit, sample_press
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +64,26 @@ def test_a_parameter_at_the_end_of_its_range_is_not_estimated_beyond_it(slopes):
 def test_a_start_outside_the_ranges_is_brought_inside(fit, row, slopes):
     outside = sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), np.full(len(PARAMETERS), 1.7))
     np.testing.assert_allclose(outside.best, fit.best, atol=1e-3)
+
+
+def test_a_row_that_drives_the_fit_into_a_corner_tells_nothing_and_is_never_not_a_number(slopes):
+    """Coordinates of 40 in all that shows: no sample has a density that counts, or only a few have."""
+    row = linear_surrogate(slopes).rows(40 * np.sign(TRUTH)[None])[0]
+    fit = sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), START)
+    assert fit.effective_samples < FEWEST_EFFECTIVE
+    np.testing.assert_array_equal(fit.spread, EVEN_STD)
+    np.testing.assert_array_equal(fit.mean, fit.best)
+
+
+@pytest.mark.parametrize("inside", [0, 1])
+def test_samples_that_all_miss_the_ranges_but_for_one_tell_nothing(inside, row, slopes, monkeypatch):
+    posterior = PressPosterior(row, linear_surrogate(slopes), NOISE)
+    density = posterior.log_density
+
+    def of_few(unit: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(len(unit)) < inside, density(unit), -np.inf) if len(unit) > 1 else density(unit)
+
+    monkeypatch.setattr(posterior, "log_density", of_few)
+    fit = sample_press(posterior, START)
+    assert fit.effective_samples <= inside
+    np.testing.assert_array_equal(fit.spread, EVEN_STD)
