@@ -1,6 +1,6 @@
 """Runs the acquisition of a press at 60 frames a second: frames delivered of those due, and how well force is known.
 
-The daemon's own camera driver, force recorder, bench and press machine, on an emulated camera whose picture is ready
+The daemon's own camera process, force recorder, bench and press machine, on an emulated camera whose picture is ready
 made and on the bytes of an emulated amplifier at 80 samples a second; full frames, in real time.
 Usage: python tests/bench_acquisition.py [SECONDS [FRAMES_A_SECOND]]
 """
@@ -20,9 +20,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from device.camera_assembly import emulated_camera
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
 from device.config import CameraSection, Config, simulated_config
-from device.hardware.camera import RawMonoCamera
 from device.instrument.bench import Bench
 from device.instrument.capture import Capture
 from device.instrument.force_recorder import ForceRecorder
@@ -30,6 +30,7 @@ from device.instrument.frame_check import TearWatch
 from device.instrument.press_machine import Press, PressRules
 from device.instrument.status import StatusBoard
 from device.measurement.tactile_image import Frame
+from device.simulation.camera_server import CameraServer
 from device.simulation.faults import NO_FAULTS
 from device.simulation.hand import HandSettings, VirtualHand
 from device.simulation.scenario import CellSettings
@@ -82,18 +83,13 @@ def _open(opened: ExitStack, config: Config, hand: VirtualHand) -> Bench:
     opened.callback(force.close)
     shape = config.camera.height_px, config.camera.width_px
     picture = np.random.default_rng(1).integers(60, 100, shape, dtype=np.uint8)
-    picam2 = VirtualPicamera2(
-        lambda exposure: picture, width_px=shape[1], height_px=shape[0], led_ratio_at=lambda t_s: LIT
+    server = CameraServer(
+        lambda: VirtualPicamera2(
+            lambda exposure: picture, width_px=shape[1], height_px=shape[0], led_ratio_at=lambda t_s: LIT
+        )
     )
-    section = config.camera
-    camera = RawMonoCamera(
-        picam2,
-        width_px=section.width_px,
-        height_px=section.height_px,
-        exposure_us=section.exposure_us,
-        gain=section.gain,
-        frame_rate_hz=section.frame_rate_hz,
-    )
+    opened.callback(server.close)
+    camera = emulated_camera(config.camera, server.address)
     opened.callback(camera.close)
     return Bench(DarkLights(), camera, force)
 
