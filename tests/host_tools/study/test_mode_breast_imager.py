@@ -39,4 +39,4 @@ def test_an_interval_that_misses_the_modulus_counts(phantoms):
 
 def test_without_any_answer_nothing_passes(phantoms):
     assert not any(benchmark.passed for benchmark in _judged("standard", phantoms, [[REFUSED], [REFUSED]]))
-    assert _row("standard", phantoms[0], [REFUSED])[3:] == ("0 of 1", "-", "0", "-")
+    assert _row("standard", phantoms[0], [REFUSED])[3:] == ("0 of 1", "-", "0", "0", "-")
