@@ -62,11 +62,11 @@ def to_unit(values: Array) -> Array:
 
 
 def from_unit(unit: Array) -> Array:
-    """Return parameters [..., 9] of coordinates; the inverse of `to_unit`."""
+    """Return parameters [..., 9] of coordinates; the inverse of `to_unit`, and exact at the ends of the ranges."""
     low, high = _evenly(LOW), _evenly(HIGH)
     values = low + (unit + 1) / 2 * (high - low)
     values[..., BY_RATIO] = np.exp(values[..., BY_RATIO])
-    return np.asarray(values)
+    return np.where(unit == -1, LOW, np.where(unit == 1, HIGH, values))
 
 
 def unknowns_to_unit(values: Array) -> Array:

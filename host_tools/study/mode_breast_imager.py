@@ -16,13 +16,18 @@ from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
 from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_parameters import NOMINAL, PARAMETERS
+from device.measurement.press_surrogate import MODULUS, SIZE
 from device.measurement.profile_estimate import estimate_profile
 from device.measurement.profile_model import ProfileModel
 from device.simulation.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.inverse.limits import limits
+from host_tools.inverse.protocol import read_protocol
 from host_tools.inverse.recorded_presses import in_parallel, recorded_press
 from host_tools.inverse.seeds import derived_seed, press_seed
 from host_tools.phantom_sets import BREAST_IMAGER_SLAB_MM, Phantom, breast_imager
+from host_tools.scene import Scene
+from host_tools.study.accuracy_map import PROTOCOLS
 from host_tools.study.benchmark import Benchmark, Chapter, Table, at_least, at_most
 
 PUBLISHED_PERCENT = 7.5
@@ -55,12 +60,34 @@ def breast_imager_chapter(
         ),
         source="Egorov & Sarvazyan, IEEE Trans. Medical Imaging 27 (2008), table II",
         benchmarks=tuple(benchmarks),
-        tables=(Table("Each inclusion, mean over its recordings", HEADER, tuple(rows)),),
+        tables=(
+            Table("Each inclusion, mean over its recordings", HEADER, tuple(rows)),
+            known_at_best(phantoms, modes, jobs=jobs),
+        ),
     )
 
 
 HEADER = ("mode", "size (mm)", "modulus (kPa)", "answered", "size found", "size determined", "E determined",
           "90 % interval of E (kPa)")  # fmt: skip
+
+
+def known_at_best(phantoms: Sequence[Phantom], modes: Sequence[Mode], *, jobs: int = -1) -> Table:
+    """Return how well size and modulus of each phantom can be known in the protocol of each mode, its box as prior."""
+    protocols = [read_protocol(PROTOCOLS / f"{mode}.toml") for mode in modes]
+
+    def stds_percent(i: int) -> tuple[str, ...]:
+        scene = phantoms[i].scene or Scene(phantoms[i].inclusion)
+        stds = [100 * limits(scene, protocol).std_with_box for protocol in protocols]
+        return tuple(f"{std[unknown]:.0f} %" for unknown in (SIZE, MODULUS) for std in stds)
+
+    truths = [(f"{one.inclusion.size_mm:g}", f"{one.inclusion.youngs_modulus_kpa:g}") for one in phantoms]
+    rows = zip(truths, in_parallel(stds_percent, len(phantoms), jobs), strict=True)
+    columns = (f"{name}, {mode}" for name in ("size", "Young's modulus") for mode in modes)
+    return Table(
+        "Known at best: standard deviations by the Cramer-Rao bound with the box as prior (`host_tools limits`)",
+        ("size (mm)", "modulus (kPa)", *columns),
+        tuple((*truth, *stds) for truth, stds in rows),
+    )
 
 
 def estimates(

@@ -7,6 +7,8 @@ depth and 2.51 % in modulus at best.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -29,8 +31,8 @@ SIZES_MM, DEPTHS_MM, MODULI_KPA = (5.0, 15.0), (4.0, 8.0), (40.0, 120.0)
 DETERMINED_SIZES_MM, DETERMINED_DEPTHS_MM = (8.0, 15.0), (4.0, 6.0)
 """The part of it for which one of the modulus was."""
 BOUNDS_PERCENT = (0.5, 1.0, 2.5)
-STARTS = (-0.7, 0.0, 0.7)
-"""Coordinates of the modulus from which a fit is begun: it has local minima."""
+STARTS = tuple(product((-0.5, 0.5), (-0.5, 0.5), (-0.7, 0.0, 0.7)))
+"""Coordinates of size, depth and modulus from which fits are begun; the best counts, for there are local minima."""
 
 
 def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: int = 1, jobs: int = -1) -> Chapter:
@@ -75,7 +77,7 @@ def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array, std:
     fits = [
         least_squares(
             lambda at: (surrogate.rows(whole(at)[None])[0] - row) / std,
-            np.array([0.0, 0.0, start]),
+            np.array(start),
             jac=lambda at: surrogate.rows_and_jacobian(whole(at))[1][:, : len(UNKNOWNS)] / std[:, None],
             bounds=(-1.0, 1.0),
             x_scale=1e-2,

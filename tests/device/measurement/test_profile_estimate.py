@@ -52,7 +52,7 @@ def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, profile
     """A deep small lump says nothing of its modulus: 10-160 kPa are left."""
     estimate = estimate_profile(pressed("standard", (9.0, 9.0, 100.0)), "standard", profile_model, calibration)
     modulus = estimate.youngs_modulus_kpa
-    assert (modulus.low, modulus.high) == (pytest.approx(10.0), pytest.approx(160.0))
+    assert (modulus.low, modulus.high) == (10.0, 160.0)  # exactly: the truth may be one of them
     assert not modulus.identifiable
     assert estimate.status == "not_identifiable"
     assert "Young's modulus" in estimate.reason

@@ -50,7 +50,7 @@ def test_mean_and_spread_are_those_of_linear_algebra(found, row, slopes):
 
 
 def test_what_the_row_does_not_tell_keeps_its_even_prior(found):
-    """Walkers that begin within a hundredth of the truth find the whole range."""
+    """Walkers that begin within a fifth of the truth find the whole range."""
     assert found.mean[MODULUS] == pytest.approx(0.0, abs=0.1)
     assert found.std[MODULUS] == pytest.approx(EVEN_STD, rel=0.1)
 
