@@ -18,8 +18,8 @@ from device.measurement.quantities import InvalidQuantity
 
 START_TIMEOUT_S = 20.0
 """For an interpreter, picamera2 and the first configuration, on a board that is still starting other things."""
-GRACE_S = 1.0
-"""So much later than the frame itself may the process say that none came."""
+GRACE_S = 2.0
+"""So much later than the frame itself may the process say that none came: on a busy board it is late, not hung."""
 CLOSE_TIMEOUT_S, KILL_TIMEOUT_S = 3.0, 3.0
 REMEDY = "It is started again by itself; if this stays, check the camera's ribbon cable and restart the probe."
 
