@@ -5,7 +5,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-camera-virtual check bench verify sweep train evaluate modes lock clean
+.PHONY: help setup run test test-camera-virtual check bench verify sweep train evaluate modes pages lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -72,6 +72,11 @@ modes: .venv/all.stamp ## measure what the modes of a press are worth; write doc
 
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
 	$(HOST_TOOLS) evaluate
+
+pages: sweep ## measure again and write docs/accuracy.md, features.md and paper_protocol.md
+	$(HOST_TOOLS) limits --map --out docs/accuracy.md
+	$(HOST_TOOLS) features --out docs/features.md
+	$(HOST_TOOLS) paper --out docs/paper_protocol.md
 
 lock: .venv/all.stamp ## choose and pin newest versions again
 	$(PY) -m pip install --quiet uv

@@ -112,7 +112,7 @@ class LateFrameError(CameraError):
 
 
 class TornFrameError(CameraError):
-    """Frames are put together from two exposures, again and again."""
+    """Frames are put together from two exposures, again and again, or one was overwritten before it was read."""
 
     code = "E103"
     title = "Torn frames"

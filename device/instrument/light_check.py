@@ -20,7 +20,7 @@ ONE_SIDED = 1.3
 FEWEST_COUNTS = 2.0
 """Mean light above dark below which nothing is told about a side or a press."""
 FIRST_PRESSES = 3
-"""So many presses of a session say how bright a side is, when commissioning did not."""
+"""So many presses since the start say how bright a side is, when commissioning did not."""
 
 Levels = tuple[float, ...]
 """Mean counts above dark of each side alone, at full brightness, in the order of `SIDES`."""
@@ -87,9 +87,9 @@ def require_every_side(levels: Levels, min_side_ratio: float) -> None:
 
 
 class DimmingWatch:
-    """Compares each side's light with that of commissioning, else with that of the first presses of this session.
+    """Compares each side's light with that of commissioning, else with that of the first presses since the start.
 
-    Skin reflects differently from person to person, so against a session's first presses a change of patient looks
+    Skin reflects differently from person to person, so against the first presses a change of patient looks
     like dimming: it is a warning, and the commissioned levels hold on the phantom they were taken on.
     """
 

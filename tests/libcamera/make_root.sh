@@ -23,7 +23,7 @@ install="apt-get install -y -qq --no-install-recommends"
 inside apt-get update -qq
 inside $install python3-venv python3-dev build-essential libcap-dev ca-certificates
 inside $install -t trixie-backports libcamera-tools libcamera-ipa python3-libcamera # 0.4 of trixie has broken metadata
-# This machine's package index, and whom it trusts.
+# pip's index and certificates are those of the host.
 for file in /etc/pip.conf /etc/ssl/certs/ca-certificates.crt; do
   [[ ! -e $file ]] || install -D -m 644 "$file" "$root$file"
 done
@@ -33,7 +33,7 @@ inside /venv/bin/pip install --quiet picamera2 pytest
 install -D -m 644 "$here/virtual.yaml" "$root/usr/share/libcamera/pipeline/virtual/virtual.yaml"
 install -D -m 644 "$here/dmabuf_shim.c" "$root/opt/tsis/dmabuf_shim.c"
 inside gcc -O2 -Wall -Werror -shared -fPIC -o /opt/tsis/dmabuf_shim.so /opt/tsis/dmabuf_shim.c -ldl
-inside mkdir -p /opt/tsis/frames /work
+inside mkdir -p /opt/tsis/frames /src
 inside /venv/bin/python -c '
 from PIL import Image
 for number, grey in enumerate((40, 70, 100)):
