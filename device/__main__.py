@@ -201,8 +201,10 @@ def _serve(options: argparse.Namespace) -> int:
             settings.keep()
             _run_server(procedure, listening)
         finally:
-            watchdog.close()
-            procedure.close()
+            try:
+                watchdog.close()
+            finally:
+                procedure.close()
     return 0
 
 

@@ -64,6 +64,7 @@ class Tlc59116:
         # Brightness before output mode: whatever the registers held, no side flashes.
         self._chip.write(AUTO_INCREMENT_PWM | Register.PWM0, [0] * PWM_CHANNELS)
         self._chip.write(AUTO_INCREMENT_ALL | Register.LEDOUT0, SIDES_IN_PWM_MODE)
+        self._obeys_brightness = True
         self._chip.require_identity("TLC59116", AUTO_INCREMENT_ALL | Register.SUBADR1, IDENTITY)
         held = self._chip.read(AUTO_INCREMENT_ALL | Register.LEDOUT0, len(SIDES_IN_PWM_MODE))
         self._chip.require_held("output modes", SIDES_IN_PWM_MODE, held)
@@ -77,6 +78,7 @@ class Tlc59116:
         """
         pwm = brightness_counts(ratio, FULL_SCALE)
         self._chip.write(AUTO_INCREMENT_PWM | Register.PWM0, pwm)
+        self._obey_brightness()
         acknowledged_s = time.monotonic()
         mode1, _mode2, *held = self._chip.read(AUTO_INCREMENT_ALL | Register.MODE1, Register.PWM0 + LED_COUNT)
         if mode1 & OSCILLATOR_OFF:
@@ -107,13 +109,20 @@ class Tlc59116:
         raise OpenLedError(cause, "Check the LED board's cable; have the LED replaced.")
 
     def _sides_without_current(self) -> list[str]:
+        self._obeys_brightness = False
         self._chip.write(Register.LEDOUT0, [SIDES_FULLY_ON])
         try:
             time.sleep(FLAGS_SETTLE_S)
             [flags] = self._chip.read(Register.EFLAG1, 1)
         finally:
-            self._chip.write(Register.LEDOUT0, SIDES_IN_PWM_MODE[:1])
+            self._obey_brightness()
         return [side for number, side in enumerate(SIDES) if not flags >> number & 1]
+
+    def _obey_brightness(self) -> None:
+        """Leave full brightness, also that of a check whose last write was not acknowledged."""
+        if not self._obeys_brightness:
+            self._chip.write(Register.LEDOUT0, SIDES_IN_PWM_MODE[:1])
+            self._obeys_brightness = True
 
     def close(self) -> None:
         """Darken all sides and release the bus, also when darkening fails (`LightError`)."""

@@ -15,7 +15,7 @@ from device.config import Config
 from device.instrument.bench import DARK, Bench
 from device.instrument.frame_check import TearWatch
 from device.instrument.frame_level import require_lit
-from device.instrument.guidance import before_contact
+from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import (
     Levels,
     growth_ratio,
@@ -35,6 +35,7 @@ from device.measurement.tactile_image import SIDES, Frame, LedRatio, Role, satur
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02
+CANCELLED = "Cancelled by the operator."
 
 
 class PressEnded(Exception):  # noqa: N818 - not every end is an error
@@ -64,18 +65,32 @@ class Capture:
         self._dark_counts = self._before_s = 0.0
 
     def unloaded(self) -> list[Frame]:
-        """Return dark and lit frames of the untouched probe; waits until it is untouched.
+        """Return dark and lit frames of the untouched probe; waits until it is, and takes them again if it was not.
 
         Raises `CalledAway` when something else is to be done meanwhile, `StuckLightError` or `AmbientLightError` when
         the dark ones are not dark, `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not
         flow.
         """
+        guidance = self.board.now.guidance
+        while True:
+            self._wait_until_untouched()
+            self.board.update(guidance=guidance)
+            began_s = time.monotonic()
+            frames = self._untouched_frames()
+            # A flat field under load would be wrong in every pixel, and nothing else would tell.
+            if self.stopping.is_set() or self.bench.peak_n(began_s, frames[-1].t_s) < self.press.contact_n:
+                return frames
+            self.board.update(guidance=Guidance.LIFT)
+
+    def _wait_until_untouched(self) -> None:
         self.bench.light(DARK)
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
             self._progress.beat()
             if self.called_away.is_set():
                 raise CalledAway
             time.sleep(POLL_S)
+
+    def _untouched_frames(self) -> list[Frame]:
         self.bench.check_lights()
         dark = self._agreeing("dark", DARK)
         for frame in dark:
@@ -215,6 +230,6 @@ class Capture:
         self._progress.beat()
         self.bench.budget.require_left()
         if self.cancelled.is_set():
-            self._become(self.machine.reject("Cancelled by the operator.", "cancelled"))
+            self._become(self.machine.reject(CANCELLED, "cancelled"))
         if self.stopping.is_set():
             self._become(self.machine.reject("The daemon was stopped during the press.", "failed"))

@@ -15,7 +15,7 @@ from pathlib import Path
 from device.config import Config
 from device.errors import DeviceError, NoContrastError
 from device.instrument.bench import DARK, Bench
-from device.instrument.capture import CalledAway, Capture, PressEnded
+from device.instrument.capture import CANCELLED, CalledAway, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance
 from device.instrument.light_check import DimmingWatch
@@ -99,7 +99,7 @@ class PhantomPress:
                 raise CalledAway
             return capture.unloaded()
         except CalledAway:
-            raise PressEnded("cancelled", "Cancelled by the operator.") from None
+            raise PressEnded("cancelled", CANCELLED) from None
 
     def _pressed(self, capture: Capture, mode: Mode) -> list[Frame]:
         """Return the frames beside the inclusion and on it; each side's light is looked at as in any press."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import uuid
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
 from device.instrument.status import PressJob, StatusBoard
@@ -66,6 +67,11 @@ class PressRequests:
             if job.state == "computing":
                 raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
             self._cancelled.set()
+
+    @property
+    def deciding(self) -> AbstractContextManager[bool]:
+        """While it is held, nobody cancels: for the step after which a press can no longer be cancelled."""
+        return self._lock
 
     @property
     def is_waiting(self) -> bool:

@@ -20,7 +20,7 @@ from device.errors import BusyError, DeviceError, LightError, NoContrastError
 from device.instrument.bench import DARK, Bench
 from device.instrument.brightness_loop import BrightnessLoop
 from device.instrument.calibration_watch import CalibrationWatch
-from device.instrument.capture import POLL_S, CalledAway, Capture, PressEnded
+from device.instrument.capture import CANCELLED, POLL_S, CalledAway, Capture, PressEnded
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
@@ -83,6 +83,7 @@ class Procedure:
         self._requests = PressRequests(
             self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
         )
+        self.progress.exercise("storage", self._look_at_disk)
         test = SelfTest(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
@@ -161,7 +162,7 @@ class Procedure:
 
     def _one_press(self) -> None:
         self.progress.beat()
-        self.store.require_space(self.config.store.min_free_mb)
+        self._look_at_disk()
         if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
             self._save_light_hours()
         self._warn(self._clock.warning())
@@ -209,7 +210,10 @@ class Procedure:
             self._darken()
             self.board.update(step="computing", guidance=Guidance.LIFT)
             self._warn(self._clock.warning())
-            self._set_job(job, state="computing", progress=0.9)
+            with self._requests.deciding:  # whoever has cancelled until here was in time
+                if self._capture.cancelled.is_set():
+                    raise PressEnded("cancelled", CANCELLED)
+                self._set_job(job, state="computing", progress=0.9)
             measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]), job.mode)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
@@ -259,7 +263,12 @@ class Procedure:
     def _keep(self, recording: Recording, mode: Mode) -> dict[str, Any]:
         estimate = self._estimator(recording, mode)
         record = measurement_record(recording, estimate, mode, self.board.now.warnings)
-        return self.store.add_measurement(record, recording)
+        with self.progress.inside("storage"):
+            return self.store.add_measurement(record, recording)
+
+    def _look_at_disk(self) -> None:
+        with self.progress.inside("storage"):
+            self.store.require_space(self.config.store.min_free_mb)
 
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:

@@ -16,7 +16,7 @@ from typing import Literal
 
 from device.errors import CameraProcessError, DeviceError
 
-Part = Literal["camera", "light", "force", "inference"]
+Part = Literal["camera", "light", "force", "inference", "storage"]
 BEAT_S = 1.0
 """A part that has not been used for so long is exercised: seldom enough to cost nothing."""
 
@@ -39,9 +39,10 @@ PARTS: dict[Part, PartKind] = {
     "light": PartKind("the LED chip", "procedure", 0.5),
     "force": PartKind("the load cell", "force", 0.3),
     "inference": PartKind("the inference", "procedure", 2.0),
+    "storage": PartKind("the disk", "procedure", 2.0),
 }
 """A camera's process that hung is ended and started again within 25 s. An estimate of mode precise takes 3 s on a
-workstation, some times that on the probe's board."""
+workstation, some times that on the probe's board; its recording is 88 files, each brought to the disk by itself."""
 
 
 @dataclass(frozen=True)

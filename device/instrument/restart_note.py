@@ -57,5 +57,8 @@ class RestartNote:
             log.error("The reason of the restart cannot be kept in %s: %s.", self._path, error.strerror)
 
     def remove(self) -> None:
-        """Take back what was written: there will be no restart."""
-        self._path.unlink(missing_ok=True)
+        """Take back what was written: there will be no restart. A disk that refuses it is logged, and stops nothing."""
+        try:
+            self._path.unlink(missing_ok=True)
+        except OSError as error:
+            log.error("The note of a restart, %s, cannot be removed: %s.", self._path, error.strerror)

@@ -13,7 +13,7 @@ import shutil
 import sqlite3
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +116,8 @@ class Store:
             kind = DiskFullError if _is_full(error) else StorageError
             raise kind(f"A file could not be written and read: {error}.", "Free space, or check the disk.") from error
         finally:
-            path.unlink(missing_ok=True)
+            with suppress(OSError):  # a read-only disk refuses that too, and its fault is already under way
+                path.unlink(missing_ok=True)
 
     def save_press(self, job: Record) -> None:
         """Keep the state of a press job."""

@@ -240,3 +240,22 @@ def test_a_check_that_fails_on_the_bus_leaves_no_side_fully_on():
     with pytest.raises(LightError, match="does not answer"):
         lights.check_outputs()
     assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_check_whose_last_write_fails_is_dark_again_with_the_next_darkness():
+    """The write that ends full brightness is not acknowledged: until it is, brightness 0 alone would not darken."""
+    lights, bus, chip = with_faults()
+    carry, failing = bus.i2c_rdwr, [True]
+
+    def fail_once(*messages):
+        if failing and bytes(messages[0].buf[:2]) == b"\x14\xaa":
+            failing.clear()
+            raise OSError(121, "Remote I/O error")
+        carry(*messages)
+
+    bus.i2c_rdwr = fail_once
+    with pytest.raises(LightError, match="does not answer"):
+        lights.check_outputs()
+    assert chip.led_ratio() == (1.0, 1.0, 1.0, 1.0)
+    lights.set_ratio((0.0, 0.0, 0.0, 0.0))
+    assert chip.led_ratio() == (0.0, 0.0, 0.0, 0.0)

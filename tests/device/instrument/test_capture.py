@@ -276,6 +276,18 @@ def test_unloaded_frames_wait_in_the_dark_until_the_probe_is_lifted(capture_of):
     assert {frame.force_n for frame in frames} == {0.0}
 
 
+def test_unloaded_frames_that_were_touched_meanwhile_are_taken_again_and_the_operator_is_told_to_lift(capture_of):
+    """A tap between two looks at the force: a flat field under load would be wrong in every pixel."""
+    capture, peaks_n, told = capture_of(0.0, 0.0, 0.0), [0.3, 0.0], []
+    capture.bench.peak_n = lambda since_s, t_s: peaks_n.pop(0)
+    capture.board.on_guidance(told.append)
+    frames = capture.unloaded()
+    assert capture.bench.taken == 4 * UNLOADED_FRAMES
+    assert [frame.t_s for frame in frames] == list(range(2 * UNLOADED_FRAMES + 1, 4 * UNLOADED_FRAMES + 1))
+    assert told == [Guidance.LIFT, Guidance.WAIT]
+    assert capture.bench.lights[-1] == DARK
+
+
 def test_a_probe_that_is_never_lifted_does_not_keep_the_daemon_from_stopping(capture_of):
     capture = capture_of(0.5)
     capture.stopping.set()
@@ -441,6 +453,7 @@ def test_the_board_tells_every_state_of_a_press(capture_of):
 def test_a_torn_frame_and_its_neighbour_are_taken_again(capture_of):
     """Frame 5 is the first with light, and half of it is still dark."""
     capture = capture_of(0.0, 0.1, torn=(5,))
+    capture.bench.peak_n = lambda since_s, t_s: 0.0
     frames = capture.unloaded()
     assert [frame.t_s for frame in frames if frame.role == "reference"] == [7, 8, 9, 10]
     assert {frame.counts.min() for frame in frames if frame.role == "reference"} == {24}

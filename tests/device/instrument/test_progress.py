@@ -44,7 +44,9 @@ def stalled(board):
     return stall.parts if stall else ()
 
 
-@pytest.mark.parametrize(("part", "limit_s"), [("camera", 20.0), ("light", 5.0), ("force", 3.0), ("inference", 20.0)])
+@pytest.mark.parametrize(
+    ("part", "limit_s"), [("camera", 20.0), ("light", 5.0), ("force", 3.0), ("inference", 20.0), ("storage", 20.0)]
+)
 def test_a_part_is_stalled_after_its_own_time(board, clock, part, limit_s):
     clock.now_s += limit_s
     assert part not in stalled(board)
@@ -74,7 +76,7 @@ def test_the_load_cells_loop_hangs_alone(board, clock):
     with board.inside("force"):
         for _ in range(21):
             clock.now_s += 1.0
-            for part in ("camera", "light", "inference"):
+            for part in ("camera", "light", "inference", "storage"):
                 use(board, clock, part)
         assert stalled(board) == ("force",)
 
@@ -126,7 +128,7 @@ def test_a_stall_is_told_in_words(board, clock):
     clock.now_s += 20.25
     use(board, clock, "inference")
     use(board, clock, "force")
-    assert str(board.stall(WATCHDOG_S)) == "the camera and the LED chip made no progress for 20.2 s"
+    assert str(board.stall(WATCHDOG_S)) == "the camera, the LED chip and the disk made no progress for 20.2 s"
 
 
 def test_a_beat_exercises_what_has_been_idle_and_nothing_else(board, clock):
@@ -135,13 +137,13 @@ def test_a_beat_exercises_what_has_been_idle_and_nothing_else(board, clock):
     def exercise(part):
         return lambda: (used.append(part), use(board, clock, part))
 
-    for part in ("camera", "light", "inference"):
+    for part in ("camera", "light", "inference", "storage"):
         board.exercise(part, exercise(part))
     clock.now_s += BEAT_S
     use(board, clock, "camera")
     board.beat()
     board.beat()
-    assert used == ["light", "inference"]
+    assert used == ["light", "inference", "storage"]
 
 
 def test_a_fault_of_one_part_keeps_no_other_from_being_exercised(board, clock):
