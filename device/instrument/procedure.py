@@ -11,7 +11,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from device.instrument.capture import CANCELLED, POLL_S, CalledAway, Capture, Pr
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
+from device.instrument.press_book import SAVE_LIGHT_EVERY_S, PressBook
 from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
 from device.instrument.press_state import PressState
@@ -44,8 +44,6 @@ log = logging.getLogger(__name__)
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
-SAVE_LIGHT_EVERY_S = 10.0
-"""So much light may be missing from the hours counter after a power cut, and that of the press under way."""
 
 Estimator = Callable[[Recording, Mode], Estimate]
 
@@ -83,6 +81,7 @@ class Procedure:
         self._requests = PressRequests(
             self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
         )
+        self._book = PressBook(self.board, store, bench.budget)
         self.progress.exercise("storage", self._look_at_disk)
         test = SelfTest(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
@@ -143,7 +142,7 @@ class Procedure:
     def _run(self) -> None:
         self._run_presses()
         try:
-            self._save_light_hours()
+            self._book.save_light_hours()
         except DeviceError as error:
             log.error("%s %s", error.code, error)
 
@@ -163,9 +162,8 @@ class Procedure:
     def _one_press(self) -> None:
         self.progress.beat()
         self._look_at_disk()
-        if self.bench.budget.unsaved_s >= SAVE_LIGHT_EVERY_S:
-            self._save_light_hours()
-        self._warn(self._clock.warning())
+        self._book.save_light_hours(at_least_s=SAVE_LIGHT_EVERY_S)
+        self._book.warn(self._clock.warning())
         self.calibration.require_valid(self._clock.now())
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
@@ -194,26 +192,26 @@ class Procedure:
         self.bench.budget.begin_press()
         self._capture.clear()
         try:
-            self._set_job(job, state="capturing", progress=0.1)
+            self._book.note(job, state="capturing", progress=0.1)
             self.board.update(step="reference", measurement_id=None)
             reference = self._capture.loaded("reference", job.mode)
             levels = self._capture.side_levels(reference)
-            self._warn(self._dimming.warning(levels))
-            self._warn(self._brightness.saw(levels))
+            self._book.warn(self._dimming.warning(levels))
+            self._book.warn(self._brightness.saw(levels))
             self._capture.release()
             self.board.update(guidance=Guidance.LIFT)
             self._capture.lifted()
-            self._set_job(job, state="capturing", progress=0.5)
+            self._book.note(job, state="capturing", progress=0.5)
             self.board.update(step="lesion")
             press = self._capture.loaded("press", job.mode)
             self._capture.release()
             self._darken()
             self.board.update(step="computing", guidance=Guidance.LIFT)
-            self._warn(self._clock.warning())
+            self._book.warn(self._clock.warning())
             with self._requests.deciding:  # whoever has cancelled until here was in time
                 if self._capture.cancelled.is_set():
                     raise PressEnded("cancelled", CANCELLED)
-                self._set_job(job, state="computing", progress=0.9)
+                self._book.note(job, state="computing", progress=0.9)
             measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]), job.mode)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
@@ -225,31 +223,12 @@ class Procedure:
             self._capture.done()
             # The screen first: whoever is told that the press has ended finds its result there.
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
-            self._set_job(job, state="done", progress=1.0, measurement_id=measurement["id"])
-
-    def _save_light_hours(self) -> None:
-        seconds = self.bench.budget.unsaved_s
-        self.store.add_light_on_s(seconds)
-        self.bench.budget.note_saved(seconds)
+            self._book.note(job, state="done", progress=1.0, measurement_id=measurement["id"])
 
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self._capture.end(reason)
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
-        self._set_job(job, state=state, reason=reason, code=code)
-
-    def _warn(self, warning: DeviceError | None) -> None:
-        """Show what does not end a press; the next change of its job keeps it with the press."""
-        if warning:
-            log.warning("%s %s", warning.code, warning)
-            others = tuple(one for one in self.board.now.warnings if one.code != warning.code)
-            self.board.update(warnings=(*others, warning))
-
-    def _set_job(self, job: PressJob, **changes: Any) -> None:
-        warnings = tuple(warning.as_record() for warning in self.board.now.warnings)
-        light_on_s = round(self.bench.budget.press_s, 2)
-        changed = replace(self.board.now.press or job, warnings=warnings, light_on_s=light_on_s, **changes)
-        self.store.save_press(changed.as_record())
-        self.board.update(press=changed)
+        self._book.note(job, state=state, reason=reason, code=code)
 
     def _recording(self, started_at: str, frames: list[Frame]) -> Recording:
         return recording_of(
@@ -276,7 +255,7 @@ class Procedure:
         self._capture.end(str(error), "failed")
         # The fault first: whoever is told that the press has ended finds out why.
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)
-        self._fail_press(error)
+        self._book.fail(self._requests.withdraw(), error)
         self._darken()
         self._capture.stopping.wait(AFTER_FAULT_S)
 
@@ -285,18 +264,4 @@ class Procedure:
         try:
             self.bench.light(DARK)
         except LightError as error:
-            log.error("%s %s", error.code, error)
-
-    def _fail_press(self, end: DeviceError) -> None:
-        """End the press that is under way or asked for, so that the next may begin: also when the store is at fault."""
-        waiting = self._requests.withdraw()
-        job = waiting or self.board.now.press
-        if job is None or job.state in ENDED:
-            return
-        light_on_s = 0.0 if waiting else round(self.bench.budget.press_s, 2)
-        failed = replace(job, state="failed", reason=str(end), code=end.code, light_on_s=light_on_s)
-        self.board.update(press=failed)
-        try:
-            self.store.save_press(failed.as_record())
-        except DeviceError as error:
             log.error("%s %s", error.code, error)

@@ -491,7 +491,7 @@ def test_a_warning_between_two_presses_is_told_once_and_with_the_next_press(rig)
     warning = ClockJumpError("The clock was set by +3600.0 s.", "Check it.")
     rig.until(lambda: rig.board.now.step == "ready")
     for _ in range(2):
-        rig.procedure._warn(warning)
+        rig.procedure._book.warn(warning)
     assert rig.board.now.warnings == (warning,)
     assert rig.press()["warnings"] == [warning.as_record()]
     assert rig.press()["warnings"] == []
@@ -500,7 +500,7 @@ def test_a_warning_between_two_presses_is_told_once_and_with_the_next_press(rig)
 def test_a_warning_that_lasts_is_told_with_every_press_beside_those_of_one_press(rig):
     lasting = LastGoodConfigError("The settings files are bad.", "Correct them.")
     rig.board.update(warnings=(lasting,))
-    rig.procedure._warn(ClockJumpError("The clock was set by +3600.0 s.", "Check it."))
+    rig.procedure._book.warn(ClockJumpError("The clock was set by +3600.0 s.", "Check it."))
     told = [[warning["code"] for warning in rig.press()["warnings"]] for _ in range(3)]
     assert told == [["E002", "E701"], ["E002"], ["E002"]]
 
