@@ -49,8 +49,7 @@ class Ready:
 
 def serve_camera(pipe: Connection, ring_name: str, shape: tuple[int, int], opener: CameraOpener) -> None:
     """Send `Ready`, then a `CaptureReply` for every `CaptureRequest`; or, instead of either, the error it ended in."""
-    for stop in (signal.SIGINT, signal.SIGTERM):  # they reach both processes; the daemon says when to end
-        signal.signal(stop, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both processes; the daemon says when to end
     threading.Thread(target=_end_with_the_daemon, daemon=True).start()
     ring = FrameRing.attach(ring_name, shape)
     try:
