@@ -1,4 +1,4 @@
-"""Feeds systemd's watchdog while camera, LED chip, load cell and inference all go on, and only then.
+"""Feeds systemd's watchdog while camera, LED chip, load cell, inference and disk go on, and only then.
 
 A part that stops is first a fault on the screen and a note on the disk; then nothing more is fed, and systemd kills the
 daemon, darkens the LEDs and starts it again. Its own thread does no more than look at the other loops' progress.
