@@ -16,20 +16,29 @@ from device.measurement.quantities import Bound, require
 TRUTHS, SPREADS = 17, 5
 TRUTH_LENGTH = 0.15
 """Presses this far apart in truth are as unlike as those one standard deviation of the log spread apart."""
-FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.05
+FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.06
 """Presses of which a bound is the quantile, and their share of all: 400 leave an error of 1.5 % of coverage."""
+
+
+RAREST_RATIO = 0.05
+"""An unknown that fewer presses than this share determine is left undetermined: its bands could not be judged."""
+WIDE_OPEN = 1e6
+"""So many spreads hold all of the range."""
 
 
 def confidence_bands(truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
     """Return bands for each unknown of truths, means and spreads [n, 3] in coordinates.
 
-    Only presses that determine an unknown count for it. Raises `InvalidQuantity` when these are too few.
+    Only presses that determine an unknown count for it; where they are rare, the bands hold all of the range. Raises
+    `InvalidQuantity` when they are not rare, but too few to learn from.
     """
     return tuple(_bands(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
 
 
 def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
     known = spread < IDENTIFIABLE_RATIO * EVEN_STD
+    if known.mean() < RAREST_RATIO:
+        return _wide_open()
     require("presses that determine an unknown", int(known.sum()), Bound(2 * FEWEST, np.inf, ""), "simulate more")
     neighbours = int(np.clip(NEIGHBOUR_RATIO * known.sum(), FEWEST, MOST))
     truth, unusual, log_spread = truth[known], ((truth - mean) / spread)[known], np.log(spread[known])
@@ -43,6 +52,11 @@ def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
             near = np.argpartition(distance, neighbours - 1)[:neighbours]
             table[i, j] = np.quantile(unusual[near], tails, method="weibull")  # covers the share, of few presses too
     return Bands(truths, spreads, table[..., 0], table[..., 1])
+
+
+def _wide_open() -> Bands:
+    ends = np.array([-1.0, 1.0])
+    return Bands(ends, ends, np.full((2, 2), -WIDE_OPEN), np.full((2, 2), WIDE_OPEN))
 
 
 def widened(bands: tuple[Bands, ...], truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:

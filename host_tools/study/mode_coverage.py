@@ -12,6 +12,7 @@ from typing import Any
 from device.measurement.estimate import SPOKEN
 from device.measurement.mode import Mode
 from device.measurement.quantities import UNKNOWNS
+from host_tools.inverse.confidence_bands import RAREST_RATIO
 from host_tools.inverse.mode_statistics import OCTILES
 from host_tools.study.benchmark import Benchmark, Chapter, Table, at_least
 
@@ -28,8 +29,9 @@ def coverage_chapter(cards: Mapping[Mode, Mapping[str, Any]]) -> Chapter:
         entry = card["modes"][mode]
         for name in UNKNOWNS:
             case = f"{mode}, {SPOKEN[name]}"
-            benchmarks += _judged(case, entry["simulated"]["presses"], entry["simulated"][name])
-            benchmarks.append(_recorded(case, entry["recorded"]["presses"], entry["recorded"][name]))
+            if entry["simulated"][name]["determined"]:
+                benchmarks += _judged(case, entry["simulated"]["presses"], entry["simulated"][name])
+                benchmarks.append(_recorded(case, entry["recorded"]["presses"], entry["recorded"][name]))
             rows.append(_row(case, entry["simulated"][name]))
     numbers = ", ".join(f"{card['modes'][mode]['simulated']['presses']} in {mode}" for mode, card in cards.items())
     return Chapter(
@@ -37,7 +39,8 @@ def coverage_chapter(cards: Mapping[Mode, Mapping[str, Any]]) -> Chapter:
         claim=(
             f"Random presses with camera noise and every nuisance ({numbers}), and recordings of the simulated camera. "
             "Counted are presses that determine the unknown; the others get the whole range as their interval, and "
-            f"`not identifiable`. Octiles with fewer than {FEWEST_IN_OCTILE} determined presses are shown, not judged. "
+            f"`not identifiable`. An unknown that fewer than {RAREST_RATIO:.0%} determine is never called determined. "
+            f"Octiles with fewer than {FEWEST_IN_OCTILE} determined presses are shown, not judged. "
             "Recordings are fewer: their coverage may fall short by twice its standard error. Presses in which the "
             "device would see no lump are counted, too."
         ),

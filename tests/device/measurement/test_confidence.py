@@ -38,6 +38,11 @@ def test_an_unknown_that_the_press_does_not_narrow_down_keeps_all_of_its_range()
     assert bands(-1.0, 1.0).interval(0.3, 0.28).is_identifiable
 
 
+def test_an_interval_that_is_all_of_the_range_narrows_nothing_down():
+    """Six spreads of 0.25 reach from the middle beyond both ends."""
+    assert bands(-6.0, 6.0).interval(0.0, 0.25) == (-1.0, 1.0, False)
+
+
 def test_an_answer_unusual_for_every_truth_is_given_two_spreads_on_each_side():
     assert bands(5.0, 6.0).interval(1.0, 0.1)[:2] == pytest.approx((0.8, 1.0))
 

@@ -32,9 +32,19 @@ def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
 
 
 def test_too_few_presses_that_determine_an_unknown_are_refused():
-    truth = np.linspace(-1, 1, 1000)[:, None]
-    with pytest.raises(InvalidQuantity, match="presses that determine an unknown is 0, but must be at least 120"):
-        confidence_bands(truth, truth, np.full_like(truth, 0.5))
+    truth = np.linspace(-1, 1, 100)[:, None]
+    with pytest.raises(InvalidQuantity, match="presses that determine an unknown is 100, but must be at least 120"):
+        confidence_bands(truth, truth, np.full_like(truth, 0.2))
+
+
+@pytest.mark.parametrize(("share", "is_determined"), [(0.04, False), (0.5, True)])
+def test_an_unknown_that_presses_rarely_determine_is_never_called_determined(share, is_determined):
+    """Answers that are exactly right cannot tell how wide the bands of the few are to be."""
+    truth = np.linspace(-1, 1, 1000)
+    spread = np.where(np.arange(1000) % 100 < 100 * share, 0.1, 0.5)
+    bands = confidence_bands(*(column[:, None] for column in (truth, truth, spread)))[0]
+    assert bands.interval(0.3, 0.1).is_identifiable == is_determined
+    assert (bands.interval(0.3, 0.1)[:2] == (-1.0, 1.0)) != is_determined
 
 
 def flat_bands(bound: float) -> tuple[Bands, ...]:

@@ -49,6 +49,17 @@ def test_an_octile_in_which_nothing_is_determined_shows_no_coverage():
     assert table.rows[0][3:5] == ("5.0 % (-)", "5.0 % (90%)")
 
 
+def test_an_unknown_that_is_never_determined_is_not_judged():
+    stated = cards(0.9, [None] * 8)
+    for card in stated.values():
+        for entry in card["modes"].values():
+            for presses in entry.values():
+                presses[UNKNOWNS[2]] = presses[UNKNOWNS[2]] | {"coverage": None, "determined": 0.0}
+    chapter = coverage_chapter(stated)
+    assert chapter.passed
+    assert {one.case for one in chapter.benchmarks} == {f"{m}, {n}" for m in stated for n in ("size", "depth")}
+
+
 @pytest.mark.parametrize(("presses", "passes"), [(528, True), (544, False)])
 def test_an_octile_of_few_determined_presses_is_not_judged(presses, passes):
     """Of 528 presses an octile has 66, and 59 determined; of 544 it has 61."""
