@@ -1,7 +1,7 @@
 """Frames of a hold that are unlike the others: a flash, a bubble, a slip. To the worst of them, or none.
 
 Compared is the light above dark in blocks of the face, brought to one force by the power that contact follows; so both
-the mean level and the profile count. Ramps are not looked at: no two of their frames ought to be alike.
+the mean level and the profile count. Frames of a ramp are compared otherwise: device/instrument/ramp_outliers.py.
 Source: median and median absolute deviation, Rousseeuw & Croux, J. Am. Stat. Assoc. 88 (1993).
 """
 
@@ -42,7 +42,7 @@ def worst_outlier(frames: Sequence[Frame], dark_counts: float) -> Outlier | None
     """
     if len(frames) < FEWEST_FRAMES:
         return None
-    deviations = _deviations([_light_at_one_force(frame, dark_counts) for frame in frames])
+    deviations = _deviations([light_at_one_force(frame, dark_counts) for frame in frames])
     sigma = MAD_TO_SIGMA * float(np.median(deviations))
     worst = int(np.argmax(deviations))
     if deviations[worst] <= max(ROBUST_SIGMAS * sigma, DEVIATION_RATIO):
@@ -50,7 +50,8 @@ def worst_outlier(frames: Sequence[Frame], dark_counts: float) -> Outlier | None
     return Outlier(frames[worst], float(deviations[worst]))
 
 
-def _light_at_one_force(frame: Frame, dark_counts: float) -> NDArray[np.float64]:
+def light_at_one_force(frame: Frame, dark_counts: float) -> NDArray[np.float64]:
+    """Return the light above dark in blocks [6, 8] of a frame, over the power of its force that contact follows."""
     rows, columns = BLOCKS
     blocks = cv2.resize(frame.counts.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
     return np.asarray((blocks - dark_counts) / max(frame.force_n, 1e-6) ** EXPONENT, dtype=np.float64)

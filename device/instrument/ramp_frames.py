@@ -13,6 +13,7 @@ from device.instrument.frame_check import TearWatch
 from device.instrument.guidance import Guidance
 from device.instrument.outlier_frames import Outlier
 from device.instrument.press_state import PressState
+from device.instrument.ramp_outliers import ramp_outlier
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.measurement.tactile_image import Frame, Role
 
@@ -66,8 +67,11 @@ class RampFrames:
         return Guidance.SLOWER if state is PressState.UNSTEADY else self._advise(frame.force_n)
 
     def drop_outlier(self, dark_counts: float) -> Outlier | None:
-        """Return None: no two frames of a ramp ought to be alike, and torn ones are not kept."""
-        return None
+        """Drop the frame that lies furthest from the course of the others and return it; None when all follow it."""
+        worst = ramp_outlier(self.frames, dark_counts)
+        if worst:
+            self._kept = {target: kept for target, kept in self._kept.items() if kept is not worst.frame}
+        return worst
 
     def begin_again(self) -> None:
         """Forget all frames: the probe was lifted."""

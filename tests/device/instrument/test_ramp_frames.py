@@ -1,5 +1,7 @@
 """Which frames of a slow press count: one for each of five forces, 0.1 to 0.5 N, told as a list of forces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -129,6 +131,24 @@ def test_neighbours_in_time_are_compared_however_far_apart_the_kept_frames_are(r
     """The kept frames differ by 20 counts each, above the 10 of a tear; but no row of them is a step."""
     see(ramp, *np.linspace(0.1, 0.5, 41))
     assert ramp.is_complete
+
+
+def test_a_frame_that_leaves_the_course_of_the_others_is_taken_again_from_above():
+    """The eighth of ten forces, 0.8 N, has a fifth more light than the others let expect."""
+    ramp = RampFrames(tuple(np.linspace(0.1, 1.0, 10)), TearWatch(100.0))
+    see(ramp, *np.linspace(0.1, 1.0, 10))
+    assert ramp.drop_outlier(0.0) is None
+    ramp.begin_again()
+    for number, force_n in enumerate(np.linspace(0.1, 1.0, 10)):
+        flash = frame(force_n) if number != 7 else frame(1.2 * force_n)
+        ramp.see(replace(flash, force_n=force_n), CAPTURING)
+    assert ramp.is_complete
+    assert ramp.drop_outlier(0.0).frame.force_n == pytest.approx(0.8)
+    assert ramp.wanted_n == pytest.approx((0.8,))
+    assert see(ramp, 0.95) == [DOWN]
+    see(ramp, 0.8, 0.9, 1.0)
+    assert ramp.is_complete
+    assert ramp.drop_outlier(0.0) is None
 
 
 def test_the_smallest_force_is_told_from_the_largest(ramp):

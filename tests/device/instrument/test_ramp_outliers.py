@@ -1,0 +1,85 @@
+"""Which frame of a ramp is unlike the course of the others: none of an honest press, and any that flashes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.instrument.outlier_frames import DEVIATION_RATIO
+from device.instrument.ramp_outliers import FEWEST_FRAMES, ramp_outlier
+from device.measurement.press_noise import ErrorLevels
+from device.measurement.reference_light import EXPONENT
+from device.measurement.tactile_image import Frame
+from host_tools.inverse.press_samples import draw_parameters
+from host_tools.inverse.recorded_presses import recorded_press
+
+DARK_COUNTS = 4.0
+FORCES_N = np.linspace(0.08, 0.6, 10)
+
+
+def flashed(frame, ratio):
+    light = DARK_COUNTS + ratio * (frame.counts - DARK_COUNTS)
+    return replace(frame, counts=np.clip(np.round(light), 0, 255).astype(np.uint8))
+
+
+def ramp(forces_n=FORCES_N, seed=1):
+    """Return frames whose light, over the power of the force that contact follows, is 150 + 50 sqrt(F)."""
+    rng = np.random.default_rng(seed)
+    light = [force_n**EXPONENT * (150 + 50 * force_n**0.5) + rng.normal(0, 1.5, (48, 64)) for force_n in forces_n]
+    return [
+        Frame(np.clip(np.round(DARK_COUNTS + one), 0, 255).astype(np.uint8), "press", 0.0, force_n, (0.6,) * 4)
+        for one, force_n in zip(light, forces_n, strict=True)
+    ]
+
+
+@pytest.fixture(scope="module")
+def honest_ramps(tables):
+    """Frames of the press and of the one beside it, of random lumps with every drift."""
+    parameters = draw_parameters(8, np.random.default_rng(5))
+    recordings = [recorded_press(tables, one, "standard", 1000 + i, levels=ErrorLevels()) for i, one in
+                  enumerate(parameters)]  # fmt: skip
+    return [
+        [frame for frame in recording.frames if frame.role == role and frame.force_n > 0.02]
+        for recording in recordings
+        for role in ("reference", "press")
+    ]
+
+
+def test_an_honest_press_on_any_lump_has_no_outlier(honest_ramps):
+    assert [ramp_outlier(frames, DARK_COUNTS) for frames in honest_ramps] == [None] * len(honest_ramps)
+
+
+@pytest.mark.parametrize("ratio", [0.85, 1.15])
+def test_a_flash_of_a_seventh_is_found_in_any_frame_of_an_honest_press(honest_ramps, ratio):
+    for frames in honest_ramps:
+        for number, frame in enumerate(frames):
+            changed = [*frames[:number], flashed(frame, ratio), *frames[number + 1 :]]
+            assert ramp_outlier(changed, DARK_COUNTS).frame is changed[number], number
+
+
+@pytest.mark.parametrize("number", [0, 1, 5, 9])
+def test_the_deviation_is_that_from_what_the_others_say_of_the_force(number):
+    """A fifth less of one frame's light is a fifth of that force's light; the mean light is the unit."""
+    frames = ramp()
+    at_one_force = [(one.counts.mean() - DARK_COUNTS) / one.force_n**EXPONENT for one in frames]
+    frames[number] = flashed(frames[number], 0.8)
+    found = ramp_outlier(frames, DARK_COUNTS)
+    assert found.frame is frames[number]
+    assert found.deviation_ratio == pytest.approx(0.2 * at_one_force[number] / np.mean(at_one_force), rel=0.05)
+
+
+def test_a_deviation_below_the_bound_is_none_however_smooth_the_others_are():
+    frames = ramp()
+    frames[4] = flashed(frames[4], 1 - 0.7 * DEVIATION_RATIO)
+    assert ramp_outlier(frames, DARK_COUNTS) is None
+
+
+def test_of_a_few_frames_nobody_can_say_which_is_unlike_the_others():
+    frames = ramp(np.linspace(0.08, 0.6, FEWEST_FRAMES - 1))
+    frames[3] = flashed(frames[3], 1.5)
+    assert ramp_outlier(frames, DARK_COUNTS) is None
+
+
+def test_dark_frames_are_not_judged():
+    dark = [replace(frame, counts=np.full((48, 64), DARK_COUNTS, np.uint8)) for frame in ramp()]
+    assert ramp_outlier(dark, DARK_COUNTS) is None
