@@ -33,7 +33,7 @@ from device.led_off import led_off
 from device.measurement.inversion import BundleRefused, ModelBundle
 from device.measurement.mode import mode_named, mode_of
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.recording import read_recording
+from device.measurement.recording_file import read_recording
 from device.phantom_assembly import open_phantom_press
 from device.record_command import add_record_command, run_record_command
 from device.records.calibrations import Calibrations

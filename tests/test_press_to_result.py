@@ -18,7 +18,7 @@ from device.assembly import StartFailed, open_simulated_probe
 from device.config import PressSection, simulated_config
 from device.errors import StorageError
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
-from device.measurement.recording import read_recording
+from device.measurement.recording_file import read_recording
 from device.records.store import Store
 from device.simulation.scenario import Scenario
 

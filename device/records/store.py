@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import DiskFullError, StorageError, UnknownResource
-from device.measurement.recording import Recording, write_recording
+from device.measurement.recording import Recording
+from device.measurement.recording_file import write_recording
 from device.records.disk import Disk, LocalDisk, read_uncached
 
 Record = dict[str, Any]

@@ -12,7 +12,7 @@ from device.measurement.durable import write_once
 from device.measurement.features import FEATURE_NAMES
 from device.measurement.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.recording import read_recording
+from device.measurement.recording_file import read_recording
 from device.simulation.surface_table import load_surface_table
 from host_tools.calibration_gates import CalibrationRejected, Gate
 from host_tools.commands.model import MODELS

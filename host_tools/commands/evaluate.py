@@ -16,7 +16,8 @@ from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode, mode_named, mode_of
 from device.measurement.mode_models import with_models
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.recording import Recording, read_recording
+from device.measurement.recording import Recording
+from device.measurement.recording_file import read_recording
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.model import MODELS, phantoms_of

@@ -10,7 +10,7 @@ import typer
 
 from device.measurement.inversion import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording import write_recording
+from device.measurement.recording_file import write_recording
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.virtual_probe import ProbeTables

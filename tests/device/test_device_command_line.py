@@ -11,7 +11,7 @@ from daemon_process import ROOT
 from device import __main__ as command_line
 from device.__main__ import main
 from device.measurement.estimate import estimate_recording
-from device.measurement.recording import write_recording
+from device.measurement.recording_file import write_recording
 from device.settings.last_good import NAME
 from device.web.events import snapshot
 

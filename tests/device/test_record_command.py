@@ -11,7 +11,8 @@ from daemon_process import QUICK_HAND, ROOT
 
 from device.__main__ import main
 from device.measurement.quantities import Inclusion
-from device.measurement.recording import RecordedCell, read_recording
+from device.measurement.recording import RecordedCell
+from device.measurement.recording_file import read_recording
 from host_tools.calibration_gates import unusable
 
 PHANTOM = ("--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80")

@@ -27,7 +27,8 @@ from device.instrument.restart_note import RestartNote
 from device.instrument.self_test import run as self_test_run
 from device.instrument.watchdog import Watchdog
 from device.measurement.mode import Mode
-from device.measurement.recording import Recording, read_recording
+from device.measurement.recording import Recording
+from device.measurement.recording_file import read_recording
 from device.measurement.toml_record import from_table
 from device.records.store import ENDED
 from device.simulation.faults import PARAMETERS, Fault

@@ -9,7 +9,7 @@ from toolkit_process import run_toolkit
 
 from device.measurement.calibration import read_calibration
 from device.measurement.quantities import Inclusion
-from device.measurement.recording import write_recording
+from device.measurement.recording_file import write_recording
 from device.simulation.scenario import Scenario
 from host_tools.phantom import Protocol, phantom_recording
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from device.errors import DiskFullError, StorageError, UnknownResource
-from device.measurement.recording import CameraSettings, Recording, read_recording
+from device.measurement.recording import CameraSettings, Recording
+from device.measurement.recording_file import read_recording
 from device.measurement.tactile_image import Frame
 from device.records.store import Store
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from device.measurement.press_parameters import NOMINAL
-from device.measurement.recording import write_recording
+from device.measurement.recording_file import write_recording
 from host_tools.__main__ import app
 from host_tools.inverse.recorded_presses import recorded_press
 
