@@ -30,8 +30,9 @@ from device.instrument.procedure import Procedure
 from device.instrument.restart_note import RestartNote
 from device.instrument.watchdog import Watchdog
 from device.led_off import led_off
-from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.inversion import ModelBundle
 from device.measurement.mode import mode_named, mode_of
+from device.measurement.model_card import BundleRefused
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording_file import read_recording
 from device.phantom_assembly import open_phantom_press

@@ -15,9 +15,10 @@ from device.instrument.procedure import Estimator
 from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
-from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.mode_models import ModeModels, with_models
+from device.measurement.model_card import BundleRefused
 from device.measurement.recording import Recording
 
 

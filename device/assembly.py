@@ -32,7 +32,8 @@ from device.instrument.light_budget import LightBudget
 from device.instrument.procedure import Procedure
 from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
-from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.inversion import ModelBundle
+from device.measurement.model_card import BundleRefused
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.records.disk import Disk
 from device.records.store import Store

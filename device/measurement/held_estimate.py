@@ -17,7 +17,8 @@ from device.measurement.interval_estimate import (
     with_numbers,
     without_numbers,
 )
-from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.inversion import ModelBundle
+from device.measurement.model_card import BundleRefused
 from device.measurement.press_parameters import unknowns_to_unit
 from device.measurement.profile_model import bands_of
 from device.measurement.quantities import InvalidQuantity

@@ -8,10 +8,9 @@ Source of the format: the model bundle of docs/contracts.md, schema `tsis.model/
 from __future__ import annotations
 
 import hashlib
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import onnxruntime
@@ -19,11 +18,9 @@ from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
 
 from device.measurement.held_profile import HELD_NAMES
+from device.measurement.model_card import CARD_FILE, MODEL_FILE, BundleRefused, ModelCard, read_bundle_file
 from device.measurement.press_profile import ROW_NAMES
-from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
-
-SCHEMA = "tsis.model/1"
-MODEL_FILE, CARD_FILE = "model.onnx", "model.json"
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
 FEATURE_UNITS = {"max_deformation_mm": "mm", "central_deformation_mm3": "mm3", "deformation_area_mm2": "mm2"}
 """The features of the paper's network: O1, O2, O3, in this order."""
@@ -35,7 +32,6 @@ HELD_UNITS = {name: "N" if name == "force_n" else "" for name in HELD_NAMES}
 GOLDEN_TOLERANCE = 1e-4
 """Relative. Rounding of float32 is 6e-8; processors differ far less than this, wrong weights far more."""
 
-_REMEDY = "Install the bundle again, or train and export it anew."
 _RUNTIME_ERRORS = (
     runtime_errors.Fail,
     runtime_errors.InvalidArgument,
@@ -44,14 +40,6 @@ _RUNTIME_ERRORS = (
     runtime_errors.NotImplemented,
     runtime_errors.RuntimeException,
 )
-
-
-class BundleRefused(ValueError):  # noqa: N818 - reads as what it says: this bundle was refused
-    """A model bundle that must not be used; says which field, its value, the bound and what to do."""
-
-    def __init__(self, folder: Path, field: str, value: object, bound: str, action: str = _REMEDY) -> None:
-        self.folder, self.field, self.value, self.bound = folder, field, value, bound
-        super().__init__(f"Model bundle {folder}: {field} is {value}, but must be {bound}. {action}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +65,8 @@ class ModelBundle:
     def __init__(self, folder: Path, card: bytes, network: bytes) -> None:
         """Use `load`: it alone reads the files. Raises `BundleRefused`."""
         self._made_of = folder, card, network
-        self.card, self.card_sha256 = _parsed(folder, card), hashlib.sha256(card).hexdigest()
-        fields = _Fields(folder, self.card)
+        fields = ModelCard(folder, card)
+        self.card, self.card_sha256 = fields.fields, hashlib.sha256(card).hexdigest()
         self.name = str(fields.of("name", str))
         self.sha256 = _verified_hash(fields, network)
         self.feature_names = _verified_names(fields)
@@ -94,7 +82,7 @@ class ModelBundle:
     @classmethod
     def load(cls, folder: Path) -> ModelBundle:
         """Return the bundle in a folder; raises `BundleRefused` when anything in it is missing or does not hold."""
-        return cls(folder, _read(folder, CARD_FILE), _read(folder, MODEL_FILE))
+        return cls(folder, read_bundle_file(folder, CARD_FILE), read_bundle_file(folder, MODEL_FILE))
 
     def estimate(self, features: NDArray[np.floating[Any]]) -> Raw:
         """Return the raw estimate of features [n, F], in the order and units of `feature_names`.
@@ -144,80 +132,14 @@ class ModelBundle:
         return largest
 
 
-class _Fields:
-    """Reads typed fields of model.json by dotted path, and refuses the bundle when one is missing or wrong."""
-
-    def __init__(self, folder: Path, card: dict[str, Any]) -> None:
-        self.folder, self.card = folder, card
-
-    def refuse(self, field: str, value: object, bound: str) -> NoReturn:
-        raise BundleRefused(self.folder, field, value, bound)
-
-    def of(self, path: str, kind: type, *within: str) -> Any:
-        """Return the field of a dotted path, or of a key `within` it that may hold dots itself."""
-        value: Any = self.card
-        for key in (*path.split("."), *within):
-            value = value.get(key) if isinstance(value, dict) else None
-        if not isinstance(value, kind):
-            self.refuse(
-                ".".join((path, *within)),
-                "missing" if value is None else repr(value),
-                f"present and of type {kind.__name__}",
-            )
-        return value
-
-    def ranges(self, group: str, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
-        """Return (low, high) of each name under training_range."""
-        return {name: self._range(f"training_range.{group}", name) for name in names}
-
-    def _range(self, group: str, name: str) -> tuple[float, float]:
-        values, path = self.of(group, list, name), f"{group}.{name}"
-        anywhere = Bound(-np.inf, np.inf, "")
-        if len(values) != 2 or not all(isinstance(v, int | float) and anywhere.holds(v) for v in values):
-            self.refuse(path, values, "two finite numbers")
-        low, high = map(float, values)
-        if not low < high:
-            self.refuse(path, values, "the lower number first")
-        return low, high
-
-    def table(self, path: str, columns: int) -> NDArray[np.float64]:
-        """Return a table [n, columns], n >= 1, of finite numbers."""
-        values = self.of(path, list)
-        try:
-            table = np.array(values, dtype=np.float64)
-        except (TypeError, ValueError):
-            self.refuse(path, "no table of numbers", f"[n, {columns}] numbers")
-        if table.ndim != 2 or table.shape[1] != columns or not len(table) or not np.all(np.isfinite(table)):
-            self.refuse(path, f"of shape {list(table.shape)}", f"[n, {columns}] finite numbers")
-        return table
-
-
-def _read(folder: Path, file: str) -> bytes:
-    try:
-        return (folder / file).read_bytes()
-    except OSError as error:
-        raise BundleRefused(folder, file, f"unreadable ({error.strerror})", "a readable file") from error
-
-
-def _parsed(folder: Path, content: bytes) -> dict[str, Any]:
-    try:
-        card = json.loads(content)
-    except ValueError as error:
-        raise BundleRefused(folder, CARD_FILE, f"not JSON ({error})", "valid JSON") from error
-    if not isinstance(card, dict) or card.get("schema") != SCHEMA:
-        found = card.get("schema") if isinstance(card, dict) else None
-        raise BundleRefused(folder, "schema", repr(found), repr(SCHEMA), "Use a bundle made for this software version.")
-    return card
-
-
-def _verified_hash(fields: _Fields, network: bytes) -> str:
+def _verified_hash(fields: ModelCard, network: bytes) -> str:
     stated, found = fields.of("sha256", str), hashlib.sha256(network).hexdigest()
     if stated != found:
         fields.refuse(f"sha256 of {MODEL_FILE}", found, f"{stated} as {CARD_FILE} states")
     return found
 
 
-def _verified_names(fields: _Fields) -> tuple[str, ...]:
+def _verified_names(fields: ModelCard) -> tuple[str, ...]:
     features = fields.of("features", list)
     for units in (FEATURE_UNITS, PROFILE_UNITS, HELD_UNITS):
         if features == [{"name": name, "unit": unit} for name, unit in units.items()]:
@@ -227,7 +149,7 @@ def _verified_names(fields: _Fields) -> tuple[str, ...]:
     fields.refuse("features", [entry.get("name") if isinstance(entry, dict) else entry for entry in features], bound)
 
 
-def _open_session(fields: _Fields, network: bytes) -> onnxruntime.InferenceSession:
+def _open_session(fields: ModelCard, network: bytes) -> onnxruntime.InferenceSession:
     try:
         return open_session(network)
     except _RUNTIME_ERRORS as error:
@@ -244,7 +166,7 @@ def open_session(network: bytes) -> onnxruntime.InferenceSession:
     return onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
 
 
-def _verify_contract(fields: _Fields, session: onnxruntime.InferenceSession, feature_count: int) -> None:
+def _verify_contract(fields: ModelCard, session: onnxruntime.InferenceSession, feature_count: int) -> None:
     expected = {
         "inputs": [("features", "tensor(float)", feature_count)],
         "outputs": [("estimate", "tensor(float)", len(UNKNOWNS)), ("spread", "tensor(float)", len(UNKNOWNS))],

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from device.measurement.confidence import Bands
 from device.measurement.fit_press import PressPosterior, best_fit, beyond_range
-from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
+from device.measurement.model_card import BundleRefused
 from device.measurement.press_noise import PressNoise
 from device.measurement.press_parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
 from device.measurement.press_surrogate import TISSUE, PressSurrogate, load_surrogate

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from device.measurement.durable import sync_directory, write_and_sync
-from device.measurement.inversion import CARD_FILE, FEATURE_UNITS, MODEL_FILE, SCHEMA, open_session
+from device.measurement.inversion import FEATURE_UNITS, open_session
+from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
 from device.measurement.quantities import UNKNOWNS
 from host_tools.inverse.evaluate import ErrorTable
 from host_tools.inverse.network import LAYERS, LOG_RATIOS, Array, Ensemble, unpack

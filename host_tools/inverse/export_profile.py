@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from device.measurement.inversion import CARD_FILE, HELD_UNITS, MODEL_FILE, PROFILE_UNITS, SCHEMA
+from device.measurement.inversion import HELD_UNITS, PROFILE_UNITS
+from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
 from device.measurement.press_parameters import NUISANCES, RANGES
 from device.measurement.profile_model import SURROGATE_FILE
 from device.measurement.quantities import UNKNOWNS

@@ -12,7 +12,8 @@ from device.config import Config
 from device.errors import ModelError
 from device.instrument.self_test.result import Result, broken, judged, not_tested
 from device.measurement.held_estimate import HeldModel
-from device.measurement.inversion import GOLDEN_TOLERANCE, BundleRefused, ModelBundle
+from device.measurement.inversion import GOLDEN_TOLERANCE, ModelBundle
+from device.measurement.model_card import BundleRefused
 from device.measurement.profile_model import ProfileModel
 from device.measurement.quantities import Bound, InvalidQuantity
 

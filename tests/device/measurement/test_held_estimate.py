@@ -7,7 +7,7 @@ import pytest
 
 from device.measurement.held_estimate import HeldModel, estimate_held
 from device.measurement.held_profile import HELD_NAMES, held_press
-from device.measurement.inversion import BundleRefused
+from device.measurement.model_card import BundleRefused
 from device.measurement.press_profile import press_profile
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ring_means import RINGS

@@ -3,7 +3,8 @@
 import pytest
 from daemon_process import ROOT
 
-from device.measurement.inversion import BundleRefused, ModelBundle
+from device.measurement.inversion import ModelBundle
+from device.measurement.model_card import BundleRefused
 from device.simulation.emulated_bundles import EmulatedBundles
 from device.simulation.faults import NO_FAULTS, Fault, FaultTimeline
 

@@ -13,7 +13,7 @@ import pytest
 from small_surrogate import COLUMNS, random_surrogate, white_noise
 
 from device.measurement.confidence import Bands
-from device.measurement.inversion import BundleRefused
+from device.measurement.model_card import BundleRefused
 from device.measurement.press_parameters import NUISANCES, PARAMETERS, RANGES
 from device.measurement.press_profile import ROW_NAMES
 from device.measurement.profile_model import SURROGATE_FILE, ProfileModel
