@@ -22,7 +22,7 @@ import numpy as np
 
 from device.camera_assembly import emulated_camera
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
-from device.config import CameraSection, Config, simulated_config
+from device.config import Config, simulated_config
 from device.instrument.bench import Bench
 from device.instrument.capture import Capture
 from device.instrument.force_recorder import ForceRecorder
@@ -30,6 +30,7 @@ from device.instrument.frame_check import TearWatch
 from device.instrument.press_machine import Press, PressRules
 from device.instrument.status import StatusBoard
 from device.measurement.tactile_image import Frame
+from device.settings.camera_section import CameraSection
 from device.simulation.camera_server import CameraServer
 from device.simulation.faults import NO_FAULTS
 from device.simulation.hand import HandSettings, VirtualHand

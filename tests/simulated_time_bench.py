@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from device.config import CameraSection, Config
+from device.config import Config
 from device.errors import DeviceError
 from device.hardware.interfaces import CameraFrame
 from device.instrument import bench as bench_module
@@ -24,6 +24,7 @@ from device.instrument.light_budget import LightBudget
 from device.instrument.status import StatusBoard
 from device.measurement.mode import Mode
 from device.measurement.tactile_image import Frame, PixelScale
+from device.settings.camera_section import CameraSection
 from device.simulation.hand import HandSettings, VirtualHand
 
 SHAPE, SCALE = (44, 64), PixelScale(0.35, 0.36)

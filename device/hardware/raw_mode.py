@@ -23,7 +23,7 @@ class RawMode:
     """A mode of the sensor and the frame that is made of it; sizes are (width, height) in pixels.
 
     `crop_px` is the part in the middle of the sensor that a frame shows, to half a pixel. It is no larger than the
-    sensor and no smaller than the frame (device/config.py refuses both).
+    sensor and no smaller than the frame (device/settings/camera_section.py refuses both).
     """
 
     sensor_px: tuple[int, int]

@@ -5,12 +5,12 @@ Which frame counts is for the press machine to say. Source: Lee & Won 2013, sect
 
 from __future__ import annotations
 
-from device.config import PressSection
 from device.instrument.frame_check import TearWatch
 from device.instrument.guidance import HELD_GUIDANCE, Guidance
 from device.instrument.outlier_frames import Outlier, worst_outlier
 from device.instrument.press_state import PressState
 from device.measurement.tactile_image import Frame
+from device.settings.press_section import PressSection
 
 TOUCH_RATIO = 0.7
 """A frame on the way to the hold, at less than this part of its force, shows what the force does to the image."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from math import hypot
 from typing import Any, Literal
 
-from device.config import PressSection
 from device.instrument.press_reasons import off_centre, too_hard
 from device.instrument.press_state import ACTIVE, SEEING, TOUCHING, TRANSITIONS, IllegalTransition, PressState
 from device.measurement.estimate import SATURATED_RATIO
 from device.measurement.tactile_image import Role
+from device.settings.press_section import PressSection
 
 Ending = Literal["rejected", "cancelled", "failed"]
 

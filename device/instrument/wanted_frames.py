@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from device.config import PressSection
 from device.instrument.frame_check import TearWatch
 from device.instrument.guidance import Guidance
 from device.instrument.hold_frames import HoldFrames
@@ -13,6 +12,7 @@ from device.instrument.press_state import PressState
 from device.instrument.ramp_frames import RampFrames, ramp_targets_n
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.tactile_image import Frame, Role
+from device.settings.press_section import PressSection
 
 
 class WantedFrames(Protocol):

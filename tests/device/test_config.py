@@ -5,21 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from device.config import (
-    CameraSection,
-    CellSection,
-    ClockSection,
-    Config,
-    LightSection,
-    PressSection,
-    ServerSection,
-    StoreSection,
-    simulated_config,
-)
+from device.config import ClockSection, Config, ServerSection, StoreSection, simulated_config
 from device.errors import ConfigError
-from device.hardware.raw_mode import RawMode
 from device.measurement.quantities import InvalidQuantity
+from device.settings.camera_section import CameraSection
+from device.settings.cell_section import CellSection
 from device.settings.layers import read_config
+from device.settings.light_section import LightSection
+from device.settings.press_section import PressSection
 
 SECTIONS = {
     "camera": CameraSection,
@@ -104,10 +97,6 @@ def test_only_this_machine_is_served_unless_told_otherwise():
     assert Config().server.host == "127.0.0.1"
 
 
-def test_the_band_lies_around_the_target_by_its_ratio():
-    assert PressSection(target_n=0.8, band_ratio=0.1).band_n == pytest.approx((0.72, 0.88))
-
-
 def test_what_is_written_holds_and_the_rest_stays(read):
     config = read('serial = "TSIS-0042"\nmodel = "m"\n[light]\nratio = [0.1, 0.2, 0.3, 1.0]\n[press]\ntarget_n = 2\n'
                   "overload_n = 4\n")  # fmt: skip
@@ -129,24 +118,6 @@ def test_beyond_its_bound_every_setting_is_refused_by_its_name(name, low, high):
             section_with(name, value)
 
 
-@pytest.mark.parametrize("target_n", [0.1, 20.0])
-def test_both_ends_of_the_targets_bound_are_taken(target_n):
-    assert PressSection(target_n=target_n, contact_n=0.01, overload_n=50.0).target_n == target_n
-
-
-@pytest.mark.parametrize("target_n", [0.09, 20.1])
-def test_a_target_beyond_its_bound_is_refused(target_n):
-    with pytest.raises(InvalidQuantity, match=r"^press\.target_n is"):
-        PressSection(target_n=target_n, contact_n=0.01, overload_n=50.0)
-
-
-def test_the_overload_lies_above_the_hold_and_the_contact_below_half_of_it():
-    with pytest.raises(InvalidQuantity, match=r"^press\.overload_n is 0\.95, but must be at least 0\.96 "):
-        PressSection(target_n=0.8, overload_n=0.95)
-    with pytest.raises(InvalidQuantity, match=r"^press\.contact_n is 0\.055, but must be .* at most 0\.05 "):
-        PressSection(target_n=0.1, contact_n=0.055)
-
-
 def test_the_mode_is_one_of_those_there_are(read):
     assert read('[press]\nmode = "precise"\n').press.mode == "precise"
     with pytest.raises(ConfigError, match="press.mode is 'fast', but must be one of quick, standard, precise, paper"):
@@ -157,45 +128,6 @@ def test_the_load_cells_protocol_is_one_of_those_there_are(read):
     assert read('[cell]\nprotocol = "mantracourt"\n').cell.protocol == "mantracourt"
     with pytest.raises(ConfigError, match="cell.protocol is 'modbus', but must be one of openscale, mantracourt"):
         read('[cell]\nprotocol = "modbus"\n')
-
-
-@pytest.mark.parametrize("rate_hz", [0.9, 240.1])
-def test_a_frame_rate_beyond_its_bound_is_refused(rate_hz):
-    with pytest.raises(InvalidQuantity, match=r"^camera\.frame_rate_hz is"):
-        CameraSection(frame_rate_hz=rate_hz)
-
-
-def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
-    with pytest.raises(InvalidQuantity, match="at most 10000 us, one frame"):
-        CameraSection(frame_rate_hz=100.0, exposure_us=10_001)
-
-
-def test_a_frame_is_the_whole_sensor_pixel_by_pixel_unless_told_otherwise():
-    assert CameraSection().raw_mode == RawMode.whole(768, 492)
-    assert CameraSection().sensor_scale == CameraSection().scale
-
-
-def test_a_larger_sensor_has_smaller_pixels_on_the_face():
-    """1070 of its columns are 768 of a frame, of 0.03125 mm; 800 rows are 492 of 0.03646 mm: square within 0.03 %."""
-    camera = CameraSection(sensor_width_px=1280, sensor_height_px=800, crop_width_px=1070, raw_format="R10")
-    assert camera.raw_mode == RawMode((1280, 800), (1070, 800), (768, 492), "R10")
-    assert camera.sensor_scale.mm_per_px_x == pytest.approx(0.0224299, abs=1e-7)
-    assert camera.sensor_scale.mm_per_px_y == pytest.approx(0.0224229, abs=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"sensor_width_px": 640}, r"camera.sensor_width_px is 640, but must be at least 768 and .*frame's or more"),
-        ({"sensor_height_px": 400, "crop_height_px": 300}, "camera.sensor_height_px is 400, but must be at least 492"),
-        ({"crop_width_px": 800}, r"camera.crop_width_px is 800, but must be at least 768 and at most 768 px"),
-        ({"sensor_height_px": 800, "crop_height_px": 400}, "camera.crop_height_px is 400, but must be at least 492"),
-        ({"raw_format": "R10_CSI2P"}, "camera.raw_format is 'R10_CSI2P', but must be one of R8, R10, R12, R16"),
-    ],
-)
-def test_a_part_of_the_sensor_that_is_not_on_it_or_less_than_a_frame_is_refused(settings, message):
-    with pytest.raises(InvalidQuantity, match=message):
-        CameraSection(**settings)
 
 
 def test_a_pca9685_has_the_address_of_the_common_board_unless_given():

@@ -20,7 +20,7 @@ import pytest
 from device import assembly
 from device.answers import Answers
 from device.assembly import open_simulated_probe
-from device.config import CameraSection, PressSection, simulated_config
+from device.config import simulated_config
 from device.instrument.press_state import PressState
 from device.instrument.procedure import Procedure
 from device.instrument.ramp_frames import ramp_targets_n
@@ -28,6 +28,8 @@ from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.mode import FRAMES, MODES, Mode
 from device.measurement.recording import Recording
 from device.records.store import ENDED
+from device.settings.camera_section import CameraSection
+from device.settings.press_section import PressSection
 from device.simulation import virtual_probe
 from device.simulation.faults import Fault
 from device.simulation.hand import HandSettings, VirtualHand

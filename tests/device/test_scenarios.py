@@ -18,7 +18,7 @@ import pytest
 from daemon_process import ROOT
 
 from device.assembly import StartFailed, open_simulated_probe
-from device.config import CameraSection, LightSection, PressSection, simulated_config
+from device.config import simulated_config
 from device.errors import DeviceError, MissingCalibration
 from device.instrument import bench, force_recorder, procedure, watchdog
 from device.instrument.light_check import level_counts
@@ -31,6 +31,9 @@ from device.measurement.recording import Recording
 from device.measurement.recording_file import read_recording
 from device.measurement.toml_record import from_table
 from device.records.store import ENDED
+from device.settings.camera_section import CameraSection
+from device.settings.light_section import LightSection
+from device.settings.press_section import PressSection
 from device.simulation.faults import PARAMETERS, Fault
 from device.simulation.hand import HandSettings
 from device.simulation.scenario import Scenario, read_scenario

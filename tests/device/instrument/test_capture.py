@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from device.config import Config, LightSection, PressSection
+from device.config import Config
 from device.errors import AmbientLightError, DarkSideError, NoContrastError, TornFrameError
 from device.instrument import capture as capture_module
 from device.instrument.bench import DARK
@@ -17,6 +17,8 @@ from device.instrument.press_state import PressState
 from device.instrument.status import StatusBoard
 from device.measurement.mode import FRAMES, Frames
 from device.measurement.tactile_image import Frame
+from device.settings.light_section import LightSection
+from device.settings.press_section import PressSection
 
 PRESS = PressSection(target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, timeout_s=20.0)
 LIGHT = LightSection(ratio=(0.1, 0.2, 0.3, 0.4))

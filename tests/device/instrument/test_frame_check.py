@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from device.config import CameraSection
 from device.errors import LateFrameError, TornFrameError
 from device.instrument.frame_check import LATE_FRAMES, LOOKED_AT_FRAMES, TORN_PAIRS, FramePace, TearWatch, largest_step
 from device.measurement.tactile_image import Frame
+from device.settings.camera_section import CameraSection
 
 HEIGHT, WIDTH = 120, 160
 Y, X = np.mgrid[:HEIGHT, :WIDTH]

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from device.config import PressSection
 from device.instrument.frame_check import TearWatch
 from device.instrument.guidance import Guidance
 from device.instrument.hold_frames import HoldFrames
 from device.instrument.press_state import PressState
 from device.measurement.tactile_image import Frame
+from device.settings.press_section import PressSection
 
 PRESS = PressSection(target_n=0.5, band_ratio=0.05)
 STATES = (PressState.TOO_LIGHT, PressState.CAPTURING)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from device.config import CameraSection, Config
+from device.config import Config
 from device.instrument.press_cost import PressCost, press_cost
 from device.measurement.mode import FRAMES, MODES
+from device.settings.camera_section import CameraSection
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -5,11 +5,11 @@ import re
 import pytest
 from daemon_process import ROOT
 
-from device.config import PressSection
 from device.instrument import press_machine
 from device.instrument.outlier_frames import DEVIATION_RATIO, ROBUST_SIGMAS
 from device.instrument.press_state import TOUCHING, TRANSITIONS, PressState
 from device.measurement.estimate import SATURATED_RATIO
+from device.settings.press_section import PressSection
 
 PAGE = (ROOT / "docs" / "press.md").read_text(encoding="utf-8")
 

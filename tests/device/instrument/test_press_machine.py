@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from device.config import PressSection
 from device.instrument.press_machine import (
     MAX_LIFTS,
     MAX_REPLACED,
@@ -18,6 +17,7 @@ from device.instrument.press_machine import (
     PressRules,
 )
 from device.instrument.press_state import ACTIVE, SEEING, TOUCHING, TRANSITIONS, IllegalTransition, PressState
+from device.settings.press_section import PressSection
 
 SECTION = PressSection(
     target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, timeout_s=10.0, steady_n=0.02, max_offset_mm=2.5

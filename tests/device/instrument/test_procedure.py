@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_certificate import small_certificate
 
-from device.config import CameraSection, Config, PressSection
+from device.config import Config
 from device.errors import (
     BusyError,
     CalibrationEndsSoon,
@@ -35,6 +35,8 @@ from device.measurement.tactile_image import Frame
 from device.measurement.untouched_face import UntouchedFace
 from device.measurement.validity import Validity
 from device.records.store import ENDED, Store
+from device.settings.camera_section import CameraSection
+from device.settings.press_section import PressSection
 
 AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
 DARK_FACE = UntouchedFace(4.0, (0.0, 0.0, 0.0, 0.0), 0.0, 60.0, 0.6)

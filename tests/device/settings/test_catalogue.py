@@ -8,8 +8,9 @@ from typing import get_type_hints
 import pytest
 from daemon_process import ROOT
 
-from device.config import Config, LightSection
+from device.config import Config
 from device.settings.catalogue import SETTINGS, Known
+from device.settings.light_section import LightSection
 from device.settings.page import markdown
 from device.settings.setting import Setting
 

@@ -4,11 +4,11 @@ import types
 
 import pytest
 
-from device.config import PressSection
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
 from device.instrument.guidance import Guidance
 from device.instrument.press_state import PressState
 from device.instrument.status import PressJob, Status
+from device.settings.press_section import PressSection
 from device.web import schema
 from device.web.events import snapshot
 

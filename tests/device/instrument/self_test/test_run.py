@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from device.config import CameraSection, Config, LightSection, simulated_config
+from device.config import Config, simulated_config
 from device.errors import CameraError, LightError, LoadCellError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.bench import DARK
@@ -20,6 +20,8 @@ from device.instrument.self_test.run import SelfTest
 from device.instrument.status import StatusBoard
 from device.measurement.tactile_image import SIDES, Frame
 from device.records.store import Store
+from device.settings.camera_section import CameraSection
+from device.settings.light_section import LightSection
 
 CONFIG = replace(simulated_config(), light=LightSection(ratio=(0.1, 0.2, 0.3, 0.4)))
 ON_BLOCK = SelfTestJob("j", "2026-01-01T00:00:00Z", on_block=True, weight_n=1.0)
