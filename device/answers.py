@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from device.config import Config
 from device.errors import ConfigError, MissingCalibration, ModelError
-from device.instrument.procedure import Estimator
+from device.instrument.press_answers import Estimator
 from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate

@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 from device.config import Config
 from device.errors import BusyError, DeviceError, LightError, NoContrastError
@@ -23,8 +22,8 @@ from device.instrument.capture import CANCELLED, POLL_S, CalledAway, Capture, Pr
 from device.instrument.clock_watch import ClockWatch
 from device.instrument.guidance import Guidance, before_contact
 from device.instrument.light_check import DimmingWatch
+from device.instrument.press_answers import Estimator, PressAnswers
 from device.instrument.press_book import SAVE_LIGHT_EVERY_S, PressBook
-from device.instrument.press_record import measurement_record, recording_of
 from device.instrument.press_requests import PressRequests
 from device.instrument.press_state import PressState
 from device.instrument.progress import ProgressBoard
@@ -32,10 +31,8 @@ from device.instrument.self_test.job import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
 from device.instrument.self_test.run import SelfTest
 from device.instrument.status import PressJob, StatusBoard
-from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording import Recording
 from device.measurement.tactile_image import Frame
 from device.records.store import ENDED, Store
 
@@ -44,8 +41,6 @@ log = logging.getLogger(__name__)
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
-
-Estimator = Callable[[Recording, Mode], Estimate]
 
 
 class Procedure:
@@ -73,7 +68,7 @@ class Procedure:
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
-        self._estimator, self._truth = estimator, simulated_truth
+        self._answers = PressAnswers(config, calibration, estimator, store, self.progress, simulated_truth)
         self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
@@ -90,7 +85,7 @@ class Procedure:
     @property
     def is_simulated(self) -> bool:
         """Whether hand, light and tissue are simulated; everything above the chips is not."""
-        return self._truth is not None
+        return self._answers.is_simulated
 
     def require_ready(self) -> None:
         """Raise the fault that keeps a press from being measured, if there is one."""
@@ -172,14 +167,12 @@ class Procedure:
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
             self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
-        job = self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S)
-        if job:
+        if job := self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S):
             self._measure(job, unloaded)
 
     def _next_job(self, until_s: float) -> PressJob | None:
-        while time.monotonic() < until_s and not (
-            self._capture.stopping.is_set() or self._capture.called_away.is_set()
-        ):
+        away = (self._capture.stopping, self._capture.called_away)
+        while time.monotonic() < until_s and not any(event.is_set() for event in away):
             is_touched = self.bench.force.latest_n >= self.config.press.contact_n
             if job := self._requests.begin(is_touched=is_touched):
                 return job
@@ -192,27 +185,12 @@ class Procedure:
         self.bench.budget.begin_press()
         self._capture.clear()
         try:
-            self._book.note(job, state="capturing", progress=0.1)
-            self.board.update(step="reference", measurement_id=None)
-            reference = self._capture.loaded("reference", job.mode)
-            levels = self._capture.side_levels(reference)
-            self._book.warn(self._dimming.warning(levels))
-            self._book.warn(self._brightness.saw(levels))
-            self._capture.release()
-            self.board.update(guidance=Guidance.LIFT)
-            self._capture.lifted()
-            self._book.note(job, state="capturing", progress=0.5)
-            self.board.update(step="lesion")
-            press = self._capture.loaded("press", job.mode)
-            self._capture.release()
-            self._darken()
-            self.board.update(step="computing", guidance=Guidance.LIFT)
-            self._book.warn(self._clock.warning())
+            frames = [*unloaded, *self._press_frames(job)]
             with self._requests.deciding:  # whoever has cancelled until here was in time
                 if self._capture.cancelled.is_set():
                     raise PressEnded("cancelled", CANCELLED)
                 self._book.note(job, state="computing", progress=0.9)
-            measurement = self._keep(self._recording(started_at, [*unloaded, *reference, *press]), job.mode)
+            measurement = self._answers.keep(frames, job.mode, started_at, self.board.now.warnings)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
         except NoContrastError as error:
@@ -225,25 +203,30 @@ class Procedure:
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
             self._book.note(job, state="done", progress=1.0, measurement_id=measurement["id"])
 
+    def _press_frames(self, job: PressJob) -> list[Frame]:
+        """Lead the hand through the press beside the lesion and the one on it; return the frames of both."""
+        self._book.note(job, state="capturing", progress=0.1)
+        self.board.update(step="reference", measurement_id=None)
+        reference = self._capture.loaded("reference", job.mode)
+        levels = self._capture.side_levels(reference)
+        self._book.warn(self._dimming.warning(levels))
+        self._book.warn(self._brightness.saw(levels))
+        self._capture.release()
+        self.board.update(guidance=Guidance.LIFT)
+        self._capture.lifted()
+        self._book.note(job, state="capturing", progress=0.5)
+        self.board.update(step="lesion")
+        press = self._capture.loaded("press", job.mode)
+        self._capture.release()
+        self._darken()
+        self.board.update(step="computing", guidance=Guidance.LIFT)
+        self._book.warn(self._clock.warning())
+        return [*reference, *press]
+
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self._capture.end(reason)
         self.board.update(step="rejected", guidance=Guidance.REJECTED)
         self._book.note(job, state=state, reason=reason, code=code)
-
-    def _recording(self, started_at: str, frames: list[Frame]) -> Recording:
-        return recording_of(
-            frames,
-            self.config,
-            started_at=started_at,
-            calibration_id=self.calibration.id,
-            simulated_truth=self._truth,
-        )
-
-    def _keep(self, recording: Recording, mode: Mode) -> dict[str, Any]:
-        estimate = self._estimator(recording, mode)
-        record = measurement_record(recording, estimate, mode, self.board.now.warnings)
-        with self.progress.inside("storage"):
-            return self.store.add_measurement(record, recording)
 
     def _look_at_disk(self) -> None:
         with self.progress.inside("storage"):
