@@ -19,7 +19,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from device.simulation.virtual_camera import CameraCrash, VirtualPicamera2
+from device.simulation.faulty_frames import CameraCrash
+from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_request import VirtualRequest
 
 LOOK_EVERY_S = 0.05

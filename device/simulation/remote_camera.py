@@ -14,7 +14,7 @@ from multiprocessing.connection import Client
 from typing import Any
 
 from device.simulation.camera_server import Call, RequestNumber
-from device.simulation.virtual_camera import CameraCrash
+from device.simulation.faulty_frames import CameraCrash
 
 
 class RemotePicamera2:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from device.measurement.tactile_image import Counts, LedRatio
 from device.simulation.faults import NO_FAULTS, FaultTimeline
+from device.simulation.faulty_frames import FaultyFrames
 from device.simulation.frame_clock import ClockedFrame, FrameClock, Timing
 from device.simulation.virtual_request import ExposureRequest, VirtualRequest
 
@@ -34,14 +35,6 @@ CONTROL_DELAY_FRAMES = 2
 STRIDE_ALIGNMENT = 64
 GAIN_STEP = 1 / 16
 LONGEST_FRAME_US = 1_000_000
-LATE_CAMERA_KEEPS_EVERY = 10
-"""A camera that leaves out frames delivers those whose number is a multiple of this."""
-LOOK_EVERY_S = 0.01
-"""How soon a call that hangs notices that the fault is over."""
-
-
-class CameraCrash(Exception):  # noqa: N818 - the camera's library ends its process without a word
-    """Here the process that called the camera's library dies."""
 
 
 class VirtualPicamera2:
@@ -67,7 +60,7 @@ class VirtualPicamera2:
         self._render = render
         self._size = (width_px, height_px)
         self._raw_formats, self._raw_format, self._stride = raw_formats, raw_formats[0], 0
-        self._led_ratio_at, self._faults = led_ratio_at, faults
+        self._led_ratio_at, self._frames = led_ratio_at, FaultyFrames(faults)
         shortest_us = round(1e6 / max_frame_rate_hz)
         # A monochrome sensor advertises no white balance and no colour controls.
         self.camera_controls: dict[str, tuple[Any, Any, Any]] = {
@@ -157,10 +150,7 @@ class VirtualPicamera2:
         Blocks while the camera is stopped or all buffers are out; after `wait` seconds raises a bare `TimeoutError`
         and leaves its job behind, which keeps a buffer until `cancel_all_and_flush`.
         """
-        if self._faults.is_active("camera_crashed"):
-            raise CameraCrash
-        while self._faults.is_active("camera_hung"):  # whatever `wait` says
-            time.sleep(LOOK_EVERY_S)
+        self._frames.answer()
         deadline_ns = math.inf if wait is None else time.monotonic_ns() + 1e9 * wait
         with self._changed:
             self._changed.wait_for(self._is_flowing, wait)
@@ -171,7 +161,8 @@ class VirtualPicamera2:
             with self._changed:
                 self._abandoned_jobs += 1
             raise TimeoutError
-        return VirtualRequest(self, self._exposure(self._shown_in(frame)), frame, self._torn_into(frame))
+        shown, torn_into = self._frames.shown_in(frame), self._frames.torn_into(frame)
+        return VirtualRequest(self, self._exposure(shown), frame, self._exposure(torn_into) if torn_into else None)
 
     def cancel_all_and_flush(self) -> None:
         """Drop the jobs that timed-out captures left behind."""
@@ -202,29 +193,12 @@ class VirtualPicamera2:
         assert self._clock is not None
         finished = self._clock.last_ended_before(time.monotonic_ns())
         frame = self._clock.frame(max(self._next_number, finished, self._clock.first_begun_after(flush_ns)))
-        while frame.exposure_end_ns <= deadline_ns and not self._is_delivered(frame):
+        while frame.exposure_end_ns <= deadline_ns and not self._frames.is_delivered(frame):
             frame = self._clock.frame(frame.number + 1)
         if frame.exposure_end_ns > deadline_ns:
             return None
         self._next_number = frame.number + 1
         return frame
-
-    def _is_delivered(self, frame: ClockedFrame) -> bool:
-        start_s = 1e-9 * frame.exposure_start_ns
-        if self._faults.is_active("camera_late", start_s) and frame.number % LATE_CAMERA_KEEPS_EVERY:
-            return False
-        return not self._faults.is_active("camera_stall", start_s)
-
-    def _shown_in(self, frame: ClockedFrame) -> ClockedFrame:
-        """Return the frame whose exposure is delivered as that of `frame`: the one before when the camera is stale."""
-        is_stale = frame.number > 0 and self._faults.is_active("camera_stale", 1e-9 * frame.exposure_start_ns)
-        return frame.clock.frame(frame.number - 1) if is_stale else frame
-
-    def _torn_into(self, frame: ClockedFrame) -> ExposureRequest | None:
-        """Return the exposure that the lower rows of a torn frame show, or None when it is whole."""
-        if frame.number == 0 or not self._faults.is_active("camera_torn", 1e-9 * frame.exposure_start_ns):
-            return None
-        return self._exposure(frame.clock.frame(frame.number - 1))
 
     def _exposure(self, frame: ClockedFrame) -> ExposureRequest:
         start_s, exposure_s = 1e-9 * frame.exposure_start_ns, 1e-9 * frame.timing.exposure_ns

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from device.simulation.faults import Fault, FaultTimeline
-from device.simulation.virtual_camera import BUFFER_COUNT, LATE_CAMERA_KEEPS_EVERY, VirtualPicamera2
+from device.simulation.faulty_frames import LATE_CAMERA_KEEPS_EVERY
+from device.simulation.virtual_camera import BUFFER_COUNT, VirtualPicamera2
 from device.simulation.virtual_request import ExposureRequest
 
 FRAME_US, EXPOSURE_US = 10_000, 2_000
