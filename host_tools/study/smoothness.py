@@ -10,11 +10,10 @@ from itertools import product
 from typing import Any, Literal
 
 import numpy as np
-from ngsolve import TRIG, VOL, Det, Grad, Id, IntegrationRule
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.face_state import FloatArray
-from host_tools.forward.morph import DEPTH_RATIO, SIZE_RATIO, morphed_mesh
+from host_tools.forward.morph import DEPTH_RATIO, SIZE_RATIO, smallest_jacobian
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solve import solve
 from host_tools.scene import Scene
@@ -78,21 +77,11 @@ def corners() -> list[Inclusion]:
     return [Inclusion(size * T, depth * T, 80.0) for size, depth in product(SIZE_RATIO, DEPTH_RATIO)]
 
 
-def smallest_jacobian() -> float:
+def least_jacobian() -> float:
     """Return the least local volume ratio of the map, over the corners, edges' middles and centre of the box."""
     T = Scene().tissue.thickness_mm
     places = product(np.linspace(*SIZE_RATIO, 3) * T, np.linspace(*DEPTH_RATIO, 3) * T)
-    return min(_smallest_jacobian(Inclusion(float(size), float(depth), 80.0)) for size, depth in places)
-
-
-def _smallest_jacobian(inclusion: Inclusion) -> float:
-    mesh = morphed_mesh(Scene(inclusion), order=3)
-    shift = mesh.deformation
-    mesh.UnsetDeformation()
-    points = mesh.MapToAllElements(IntegrationRule(TRIG, 8), VOL)
-    jacobian = np.asarray(Det(Grad(shift) + Id(2))(points))
-    mesh.SetDeformation(shift)
-    return float(jacobian.min())
+    return min(smallest_jacobian(Scene(Inclusion(float(size), float(depth), 80.0))) for size, depth in places)
 
 
 def jump(inclusion: Inclusion) -> FloatArray:
@@ -126,7 +115,7 @@ def chapter(quick: bool) -> Chapter:
         )
         for where, value in ((w, np.abs(j[[0, 1, 3]]).max()) for w, j in jumps.items())
     )
-    folding = at_least("whole box", "smallest Jacobian of the map", smallest_jacobian(), 0.05)
+    folding = at_least("whole box", "smallest Jacobian of the map", least_jacobian(), 0.05)
     rows = [(q, kind, *(f"{v:.1e}" for v in np.abs(s).max(axis=0))) for (q, kind), s in found.items()]
     steps = [(where, *(f"{v:+.1e}" for v in j)) for where, j in jumps.items()]
     return Chapter(
