@@ -14,7 +14,7 @@ from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, req
 from host_tools.commands.output import require_writable
 from host_tools.scene import Press, Scene
 
-PLOTS, PICTURES = (".png", ".pdf", ".svg"), (".png",)
+PLOTS, PICTURES, SCENES = (".png", ".pdf", ".svg"), (".png",), (".toml",)
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
 
 
@@ -36,6 +36,7 @@ def simulate(
     as_json: Annotated[bool, typer.Option("--json", help="Print the whole solution as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write a figure (PNG, PDF, SVG).")] = None,
     frame: Annotated[Path | None, typer.Option(help="Write a camera frame (PNG, 8 bit, linear optics).")] = None,
+    save_scene: Annotated[Path | None, typer.Option(help="Write the scene, with every key of it (TOML).")] = None,
     exposure_us: Annotated[float, typer.Option(help="Exposure of the frame.")] = 4000.0,
     seed: Annotated[int, typer.Option(help="Seed of the frame's noise.")] = 1,
 ) -> None:
@@ -45,11 +46,16 @@ def simulate(
 
     require_writable(plot, PLOTS)
     require_writable(frame, PICTURES)
+    require_writable(save_scene, SCENES)
     require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
     require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
     asked = _scene(
         scene, (size_mm, depth_mm, modulus_kpa), tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n)
     )
+    if save_scene:
+        from host_tools.scene_file import write_scene
+
+        write_scene(asked, save_scene)
     plan = model_plan(asked, tolerance=_ratio(tolerance), strain=strain)
     solution = solve(asked, plan, estimate_error=True)
     if plot:

@@ -7,8 +7,8 @@ import pytest
 from toolkit_process import run_toolkit
 
 from device.measurement.quantities import Inclusion
-from host_tools.scene import Press, Scene
-from host_tools.scene_file import write_scene
+from host_tools.scene import Press, Scene, Tissue
+from host_tools.scene_file import read_scene, write_scene
 
 LUMP = ("--size-mm", 10, "--depth-mm", 6, "--modulus-kpa", 80)
 
@@ -34,6 +34,24 @@ def test_a_scene_file_is_solved_and_options_change_it(tmp_path):
     )
     assert whole["force_n"] == softer["force_n"] == pytest.approx(0.2)
     assert softer["indentation_mm"] > 1.8 * whole["indentation_mm"]
+
+
+def test_the_scene_that_was_asked_for_is_saved_with_every_key_and_solved_again_from_its_file(tmp_path):
+    path = tmp_path / "scene.toml"
+    options = ("--tissue-modulus-kpa", 2.5, "--force-n", 0.2, "--json")
+    asked = json.loads(run_toolkit("simulate", *LUMP, *options, "--save-scene", path).stdout)
+    assert read_scene(path) == Scene(
+        Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2), tissue=Tissue(youngs_modulus_kpa=2.5)
+    )
+    assert "thickness_mm = 30.0" in path.read_text()
+    again = json.loads(run_toolkit("simulate", "--scene", path, "--json").stdout)
+    assert again["max_deformation_mm"] == pytest.approx(asked["max_deformation_mm"], rel=1e-9)
+
+
+def test_a_scene_is_saved_as_toml_alone(tmp_path):
+    refused = run_toolkit("simulate", *LUMP, "--save-scene", tmp_path / "scene.yaml")
+    assert refused.returncode != 0
+    assert "but must be of type .toml" in refused.stderr
 
 
 def test_the_poisson_ratio_of_everything_can_be_given():
