@@ -18,7 +18,7 @@ from device.errors import (
     SlightDriftError,
 )
 from device.measurement.calibration import Calibration
-from device.measurement.tactile_image import Frame
+from device.measurement.tactile_image import Frame, LedRatio
 from device.measurement.untouched_face import Drift
 
 WARN_RATIO, BLOCK_RATIO = 0.10, 0.25
@@ -44,6 +44,11 @@ class CalibrationWatch:
     def id(self) -> str:
         """The id of the certificate, empty without one."""
         return self.calibration.id if self.calibration else ""
+
+    @property
+    def lit_ratio(self) -> LedRatio | None:
+        """The brightness under which unloaded frames are to be taken for comparison; None without a certificate."""
+        return self.calibration.untouched.lit_ratio if self.calibration else None
 
     def require_valid(self, now: str) -> None:
         """Raise the `DeviceError` by which nothing may be measured at a time (RFC 3339)."""

@@ -100,6 +100,14 @@ class Capture:
         self.bench.light(DARK)
         return dark + lit
 
+    def relit(self, unloaded: list[Frame], ratio: LedRatio) -> list[Frame]:
+        """Return the same with frames lit at another brightness, taken now; as they are if it is theirs. Ends dark."""
+        if ratio == self.lit:
+            return unloaded
+        lit = self._agreeing("reference", ratio)
+        self.bench.light(DARK)
+        return [frame for frame in unloaded if frame.role == "dark"] + lit
+
     def loaded(self, role: Role, mode: Mode) -> list[Frame]:
         """Return the frames of one press, as many as the mode needs.
 

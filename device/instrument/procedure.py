@@ -162,13 +162,20 @@ class Procedure:
         self.calibration.require_valid(self._clock.now())
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
-        self.calibration.require_no_drift(unloaded)
-        self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
+        self._require_no_drift(unloaded)
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)
             self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
         if job := self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S):
             self._measure(job, unloaded)
+
+    def _require_no_drift(self, unloaded: list[Frame]) -> None:
+        """Compare the untouched face with the certificate's, under the light of then: the loop may have moved ours."""
+        ratio = self.calibration.lit_ratio or self._capture.lit
+        try:
+            self.calibration.require_no_drift(self._capture.relit(unloaded, ratio))
+        finally:
+            self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
 
     def _next_job(self, until_s: float) -> PressJob | None:
         away = (self._capture.stopping, self._capture.called_away)

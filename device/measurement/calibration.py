@@ -190,8 +190,8 @@ def read_calibration(path: Path) -> Calibration:
     try:
         for name, kind in (("validity", Validity), ("camera", CameraSettings), ("cell", RecordedCell)):
             record[name] = kind(**record[name])
-        side_counts = tuple(record["untouched"].pop("side_counts"))
-        record["untouched"] = UntouchedFace(side_counts=side_counts, **record["untouched"])
+        face: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in record["untouched"].items()}
+        record["untouched"] = UntouchedFace(**face)
         record["settings"] = FeatureSettings(**record["settings"])
         record["regressions"] = tuple(Regression(**line) for line in record["regressions"])
         held_out = {name: np.array(rows, dtype=float) for name, rows in record["held_out"].items()}

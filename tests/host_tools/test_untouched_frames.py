@@ -2,10 +2,17 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 
+from device.config import simulated_config
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.tactile_image import Frame
+from device.measurement.untouched_face import side_levels
+from device.simulation.hand import BESIDE_MM
+from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import VirtualProbe
 from host_tools.phantom import Protocol, phantom_recording
 from host_tools.untouched_frames import untouched_face
 
@@ -35,3 +42,38 @@ def test_without_dark_or_lit_frames_there_is_nothing_to_keep(recording, roles, w
     frames = tuple(frame for frame in recording.frames if frame.role in roles)
     with pytest.raises(InvalidQuantity, match=words):
         untouched_face([dataclasses.replace(recording, frames=frames)])
+
+
+def test_sides_that_are_trimmed_are_each_kept_with_their_own_brightness(recording):
+    trimmed = (0.5, 0.6, 0.7, 0.6)
+    frames = tuple(
+        dataclasses.replace(frame, led_ratio=trimmed) if any(frame.led_ratio) else frame for frame in recording.frames
+    )
+    assert untouched_face([dataclasses.replace(recording, frames=frames)]).led_ratio == trimmed
+
+
+@pytest.mark.parametrize(
+    ("light", "force_n", "own"), [("linear", 0.0, (0.41, 0.37)), ("physical", 0.5, (0.366, 0.364))]
+)
+def test_the_quarter_next_to_a_side_gets_less_than_half_its_light_from_that_side(tables, light, force_n, own):
+    """So light cannot be put at another brightness side by side: the other LEDs would be taken for this one."""
+    camera = simulated_config().camera
+    width_px, height_px = camera.raw_mode.sensor_px
+    probe = VirtualProbe(Scenario(light=light), tables, (height_px, width_px), camera.sensor_scale)
+    shares = np.array([quarters_of(probe, force_n, np.eye(4)[side]) for side in range(4)])
+    np.testing.assert_allclose(shares.diagonal() / shares.sum(axis=0), [*own, *own], atol=0.006)
+
+
+def quarters_of(probe, force_n, led_ratio):
+    """Light [4] next to each side, in counts, without the camera's dark."""
+    place = Placement(*BESIDE_MM, 0.0, 0.0)
+    lit, dark = (
+        Frame(
+            probe.frame_counts(
+                force_n=force_n, place=place, led_ratio=tuple(ratio), exposure_us=4000.0, gain=1.0, frame_number=1
+            ),
+            "reference", 0.0, force_n, tuple(ratio),
+        )
+        for ratio in (led_ratio, np.zeros(4))
+    )  # fmt: skip
+    return side_levels([lit])[0] - side_levels([dark])[0]

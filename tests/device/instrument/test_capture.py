@@ -259,6 +259,18 @@ def test_unloaded_frames_are_dark_then_lit_and_the_light_goes_off(capture_of):
     assert capture.bench.lights[-1] == DARK
 
 
+def test_unloaded_frames_are_lit_anew_for_another_brightness_only(capture_of):
+    capture = capture_of(0.0, 0.0)
+    frames = capture.unloaded()
+    taken = capture.bench.taken
+    assert capture.relit(frames, (0.1, 0.2, 0.3, 0.4)) == frames
+    assert capture.bench.taken == taken
+    relit = capture.relit(frames, (0.6, 0.6, 0.6, 0.6))
+    assert [frame for frame in relit if frame.role == "dark"] == frames[:UNLOADED_FRAMES]
+    assert [frame.led_ratio for frame in relit[UNLOADED_FRAMES:]] == [(0.6, 0.6, 0.6, 0.6)] * UNLOADED_FRAMES
+    assert capture.bench.lights[-1] == DARK
+
+
 def test_the_leds_currents_are_checked_with_the_unloaded_frames_and_before_each_press(capture_of):
     capture = capture_of(0.0, 0.0)
     capture.unloaded()

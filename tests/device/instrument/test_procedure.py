@@ -515,6 +515,21 @@ def test_light_that_lost_a_tenth_between_two_presses_is_warned_of(rig):
     assert [warning["code"] for warning in job["warnings"]] == ["E206"]
 
 
+def test_a_side_that_the_loop_drives_harder_is_compared_with_the_certificate_under_its_own_light(rig, monkeypatch):
+    """The press has the loop's light, its unloaded frames too; what is compared has the certificate's 0.6."""
+    harder, compared, recorded = (0.9, 0.6, 0.6, 0.6), [], []
+    judge = rig.procedure.calibration.require_no_drift
+    monkeypatch.setattr(
+        rig.procedure.calibration, "require_no_drift", lambda frames: (compared.append(frames), judge(frames))
+    )
+    rig.estimator = lambda recording: recorded.append(recording) or ANSWER
+    rig.procedure._brightness.ratio = harder
+    assert [rig.press()["state"] for _ in range(2)] == ["done", "done"]
+    assert {frame.led_ratio for frame in compared[-1] if frame.role == "reference"} == {(0.6, 0.6, 0.6, 0.6)}
+    assert {frame.led_ratio for frame in recorded[-1].frames if frame.role != "dark"} == {harder}
+    assert rig.board.now.fault is None
+
+
 @pytest.fixture
 def held_self_test(rig, monkeypatch):
     """A self-test of one check, which goes on until it is let go."""

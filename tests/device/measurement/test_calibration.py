@@ -68,7 +68,10 @@ def test_each_feature_goes_through_its_own_line(certificate):
     np.testing.assert_allclose(found, [[2.5, -2.0, 2.0], [0.5, 0.0, -3.0]])
 
 
-def test_a_certificate_comes_back_from_json_as_it_was(certificate, path):
+@pytest.mark.parametrize("led_ratio", [0.6, (0.5, 0.6, 0.7, 0.6)])
+def test_a_certificate_comes_back_from_json_as_it_was(certificate, path, led_ratio):
+    certificate = small_certificate(untouched=replace(certificate.untouched, led_ratio=led_ratio))
+    path.write_text(certificate.to_json())
     found = read_calibration(path)
     for name in ("estimate", "truth", "box_low", "box_high"):
         np.testing.assert_array_equal(getattr(found.held_out, name), getattr(certificate.held_out, name))
@@ -216,6 +219,7 @@ def test_a_missing_certificate_is_refused_by_its_path(tmp_path):
         ("untouched", UNTOUCHED | {"pressed_counts": 0.0}, "untouched.pressed_counts"),
         ("untouched", UNTOUCHED | {"spread_counts": -1.0}, "untouched.spread_counts"),
         ("untouched", UNTOUCHED | {"led_ratio": 0.0}, "untouched.led_ratio"),
+        ("untouched", UNTOUCHED | {"led_ratio": [0.6, 0.6]}, "untouched.led_ratio"),
         ("extra", 1, "calibration"),
         ("settings", ..., "calibration"),
         ("settings", 3, "calibration"),

@@ -1,5 +1,7 @@
 """The light of an untouched face near each side, and how far it is from a certificate's."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -62,9 +64,23 @@ def test_the_side_that_changed_most_is_named():
     assert SHINING.drift(unloaded(brighter_at_plus_y(20, 30))).side == "+y"
 
 
-def test_light_is_compared_at_the_same_brightness_of_the_leds():
-    """Half the brightness, half the light: nothing has drifted."""
-    assert SHINING.drift(unloaded(10, (0.3, 0.3, 0.3, 0.3))).change_ratio == pytest.approx(0.0)
+@pytest.mark.parametrize("ratio", [(0.9, 0.6, 0.6, 0.6), (0.3, 0.3, 0.3, 0.3)])
+def test_a_face_that_is_lit_otherwise_than_at_the_calibration_is_not_judged(ratio):
+    with pytest.raises(InvalidQuantity, match=r"led_ratio of unloaded frames is .* \(0\.6, 0\.6, 0\.6, 0\.6\)"):
+        SHINING.drift(unloaded(20, ratio))
+
+
+def test_sides_that_differed_at_the_calibration_keep_a_brightness_each():
+    trimmed = (0.5, 0.6, 0.7, 0.6)
+    face = dataclasses.replace(SHINING, led_ratio=trimmed)
+    assert (face.lit_ratio, SHINING.lit_ratio) == (trimmed, (0.6, 0.6, 0.6, 0.6))
+    assert face.drift(unloaded(20, trimmed)).change_ratio == 0.0
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1.1, (0.6, 0.6, 0.6), (0.6, 0.6, 0.6, 1.1), (0.0, 0.0, 0.0, 0.0)])
+def test_a_brightness_that_no_side_can_have_is_refused(ratio):
+    with pytest.raises(InvalidQuantity, match=r"untouched\.led_ratio"):
+        dataclasses.replace(SHINING, led_ratio=ratio)
 
 
 def test_of_a_dark_face_only_added_light_counts_in_parts_of_a_presss():
