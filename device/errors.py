@@ -316,6 +316,15 @@ class ClockBehindError(ModelError):
     title = "Clock before calibration"
 
 
+class UncheckedCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
+    """The untouched face was not compared with the calibration's since the start; it is measured all the same."""
+
+    code = "E409"
+    title = "Calibration not checked"
+    severity = "warning"
+    is_lasting = True
+
+
 class NoContrastError(DeviceError):
     """Pressing does not change the image; it ends this press, not the probe's readiness."""
 

@@ -1,7 +1,8 @@
-"""Whether the certificate still holds: by the wall clock, and by what the untouched probe looks like at each start.
+"""Whether the certificate still holds: by the wall clock, and by what the untouched probe looks like since the start.
 
 An untouched face that was dark at calibration cannot show LEDs that fade: then only light that was added to it counts
-(`UntouchedFace.is_resolved`); LEDs that fade are seen under the load of a press, as E206.
+(`UntouchedFace.is_resolved`); LEDs that fade are seen under the load of a press, as E206. A face that was not judged
+yet is warned of and measured with: the weight of a tilted probe is enough force to keep it from being judged.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from device.errors import (
     LargeDriftError,
     MissingCalibration,
     SlightDriftError,
+    UncheckedCalibration,
 )
 from device.measurement.calibration import Calibration
 from device.measurement.tactile_image import Frame, LedRatio
@@ -26,9 +28,13 @@ WARN_RATIO, BLOCK_RATIO = 0.10, 0.25
 UNTOUCHED_N = 0.01
 """A touch by this force lets out a twentieth of the light of a press (the simulated probe's skin); 0.03 N, a tenth."""
 SOON_DAYS = 30.0
-OWN_WARNINGS = (CalibrationEndsSoon, SlightDriftError)
+OWN_WARNINGS = (CalibrationEndsSoon, SlightDriftError, UncheckedCalibration)
 CALIBRATE = "Calibrate the probe and activate the new certificate, then start the daemon again."
 WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
+FREE = (
+    "Let nothing touch the probe; if the force stays, the load cell's zero is off by it: "
+    "start the probe again, untouched, for a new zero."
+)
 
 
 class CalibrationWatch:
@@ -39,6 +45,8 @@ class CalibrationWatch:
         self.calibration = calibration
         self._ending: CalibrationEndsSoon | None = None
         self._drift: SlightDriftError | LargeDriftError | None = None
+        self._unchecked: UncheckedCalibration | None = None
+        self._is_judged = False
 
     @property
     def id(self) -> str:
@@ -69,18 +77,30 @@ class CalibrationWatch:
     def require_no_drift(self, unloaded: Sequence[Frame]) -> None:
         """Raise `LargeDriftError` when unloaded frames, dark and lit, are too far from the certificate's.
 
-        Frames under a slight touch say nothing about it: then what the last untouched ones said holds.
+        Frames under a slight touch say nothing about it: then what the last untouched ones said holds, and without any
+        since the start it is warned that nothing was said.
         """
         if self.calibration is None:
             return
-        if max(abs(frame.force_n) for frame in unloaded) <= UNTOUCHED_N:
+        load_n = max((frame.force_n for frame in unloaded), key=abs)
+        if abs(load_n) <= UNTOUCHED_N:
             self._drift = _judged(self.calibration.untouched.drift(unloaded))
+            self._is_judged, self._unchecked = True, None
+            if isinstance(self._drift, LargeDriftError):
+                raise self._drift
+        else:
+            self._note_untold(f"{load_n:+.3f} N acts on the probe, above {UNTOUCHED_N:g} N.")
+
+    def _note_untold(self, why: str) -> None:
+        """Note that frames say nothing; raise the `LargeDriftError` of the last that did, with what keeps it there."""
         if isinstance(self._drift, LargeDriftError):
-            raise self._drift
+            raise LargeDriftError(f"{self._drift.cause} It was not looked at again: {why}", f"Wipe the face. {FREE}")
+        if not self._is_judged:
+            self._unchecked = UncheckedCalibration(f"The face was not compared since the start: {why}", FREE)
 
     def warned(self, others: Sequence[DeviceError]) -> tuple[DeviceError, ...]:
         """Return these warnings with those of the certificate brought up to date."""
-        own = [one for one in (self._ending, self._drift) if isinstance(one, OWN_WARNINGS)]
+        own = [one for one in (self._ending, self._drift, self._unchecked) if isinstance(one, OWN_WARNINGS)]
         return (*(one for one in others if not isinstance(one, OWN_WARNINGS)), *own)
 
 

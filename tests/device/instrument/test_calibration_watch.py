@@ -92,16 +92,45 @@ def test_a_face_that_was_wiped_is_measured_again_and_a_warning_is_withdrawn(watc
     assert codes(watch) == []
 
 
-def test_light_of_a_slight_touch_is_not_taken_for_drift(watch):
-    watch.require_no_drift(unloaded(40, force_n=0.03))
+@pytest.mark.parametrize("force_n", [0.03, -0.03, 0.011])
+def test_light_of_a_slight_touch_is_not_taken_for_drift_but_the_check_is_missing(watch, force_n):
+    """A zero that is off looks like a touch: the warning says by how much, and how to take a new one."""
+    watch.require_no_drift(unloaded(40, force_n))
+    [warning] = watch.warned(())
+    assert (warning.code, warning.is_lasting) == ("E409", True)
+    assert f"{force_n:+.3f} N acts on the probe, above 0.01 N" in warning.cause
+    assert "nothing touch the probe" in warning.remedy
+    assert "zero is off" in warning.remedy
+
+
+def test_the_check_is_missing_until_the_probe_is_free_and_not_again_by_a_later_touch(watch):
+    for force_n, expected in ((0.03, ["E409"]), (0.02, ["E409"]), (0.01, []), (0.03, [])):
+        watch.require_no_drift(unloaded(20, force_n))
+        assert codes(watch) == expected
+
+
+def test_a_slight_touch_does_not_withdraw_what_was_warned_of(watch):
+    watch.require_no_drift(unloaded(17))
+    watch.require_no_drift(unloaded(20, force_n=0.03))
+    assert codes(watch) == ["E405"]
+
+
+def test_a_face_that_has_drifted_and_is_then_touched_stays_blocked_and_says_what_keeps_it_so(watch):
+    with pytest.raises(LargeDriftError, match="dimmer|brighter") as judged:
+        watch.require_no_drift(unloaded(40))
+    assert "acts on the probe" not in str(judged.value)
+    with pytest.raises(LargeDriftError, match=r"not looked at again: -0\.030 N acts on the probe") as latched:
+        watch.require_no_drift(unloaded(20, force_n=-0.03))
+    assert latched.value.remedy.startswith("Wipe the face. Let nothing touch the probe")
+    assert "start the probe again" in latched.value.remedy
+    watch.require_no_drift(unloaded(20))
     assert codes(watch) == []
 
 
-def test_a_slight_touch_does_not_unblock_a_face_that_has_drifted(watch):
-    with pytest.raises(LargeDriftError):
-        watch.require_no_drift(unloaded(40))
-    with pytest.raises(LargeDriftError):
-        watch.require_no_drift(unloaded(20, force_n=0.03))
+def test_a_probe_without_a_certificate_has_no_check_to_miss():
+    watch = CalibrationWatch(None)
+    watch.require_no_drift(unloaded(20, force_n=0.03))
+    assert codes(watch) == []
 
 
 def test_warnings_of_others_stay(watch):
