@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from device.answers import Answers, answers_for
 from device.camera_assembly import emulated_camera, real_camera
-from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
+from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.certificate import active_calibration
 from device.config import SIMULATED_PROBE, Config
 from device.errors import ConfigError, DeviceError, ModelError
@@ -67,22 +67,27 @@ class _Parts:
     def __init__(self) -> None:
         self.faults: list[DeviceError] = []
         self.opened = ExitStack()
+        self._is_complete = True
 
     def open(self, opener: Callable[[], Part]) -> Part | None:
         try:
             part = opener()
         except DeviceError as error:
-            self.faults.append(error)
+            self._fail(error)
         except (InvalidQuantity, BundleRefused) as error:
-            self.faults.append(ModelError(str(error), "Then start the daemon again."))
+            self._fail(ModelError(str(error), "Then start the daemon again."))
         else:
             if hasattr(part, "close"):
                 self.opened.callback(part.close)
             return part
         return None
 
+    def _fail(self, fault: DeviceError) -> None:
+        self.faults.append(fault)
+        self._is_complete = False
+
     def require_all(self) -> None:
-        if self.faults:
+        if not self._is_complete:
             self.opened.close()
             raise StartFailed(self.faults)
 
@@ -111,6 +116,14 @@ class OpenedProbe:
         """Return the recorder of the tared load cell, or None when that failed."""
         cell = self.cell
         return self.parts.open(lambda: tared(self.config, cell, progress)) if cell else None
+
+    def force_once_lifted(self, progress: ProgressBoard) -> ForceRecorder | None:
+        """Return the same, also while its tare fails: that alone is told only beside what ends the start."""
+        cell = self.cell
+        force = self.parts.open(lambda: tared_once_lifted(self.config, cell, progress)) if cell else None
+        if force and force.fault:
+            self.parts.faults.append(force.fault)
+        return force
 
     def store(self) -> Store | None:
         """Return the store of the settings' data folder, or None when it did not open."""
@@ -211,9 +224,9 @@ def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureReques
 
 
 def _procedure(probe: OpenedProbe) -> Procedure:
-    """Tare, load model and calibration, open the store; then nothing is missing."""
+    """Tare, load model and calibration, open the store; then nothing is missing but the tare of a held probe."""
     config, parts, progress = probe.config, probe.parts, ProgressBoard()
-    force = probe.force(progress)
+    force = probe.force_once_lifted(progress)
     bundle = parts.open(lambda: ModelBundle.load(config.model))
     watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
     calibration = watch.calibration if watch else None

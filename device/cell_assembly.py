@@ -1,14 +1,18 @@
-"""Puts the load cell together: its line, real or emulated, its two tares, and the recorder of force on top."""
+"""Puts the load cell together: its line, real or emulated, its two tares, and the recorder of force on top.
+
+A daemon whose probe is held while it starts has a recorder at fault, which tares once it is lifted.
+"""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import replace
 
 from device.config import Config
-from device.hardware.interfaces import CellCounts, ForceScale, LoadCell
+from device.hardware.interfaces import CellCounts, CellSample, ForceScale, LoadCell
 from device.hardware.load_cell import measure_tare, open_load_cell
-from device.instrument.force_recorder import ForceRecorder
+from device.instrument.force_recorder import ForceRecorder, Zero
 from device.instrument.load_limit import LoadLimit
 from device.instrument.progress import ProgressBoard
 from device.simulation.emulated_amplifier import EmulatedAmplifier, EmulatedBridge
@@ -21,8 +25,6 @@ from device.simulation.virtual_probe import VirtualProbe
 log = logging.getLogger(__name__)
 
 TARE_SAMPLES = 20
-FIRST_SAMPLE_S = 5.0
-"""Opening the port resets an OpenScale: its banner may last three seconds."""
 
 
 def open_cell(config: Config, device: str) -> LoadCell:
@@ -54,20 +56,29 @@ def commissioned(config: Config) -> Config:
 
 
 def tared(config: Config, cell: LoadCell, progress: ProgressBoard | None = None) -> ForceRecorder:
-    """Take the tare of this start and begin to record; raise the `LoadCellError` that forbids it.
+    """Take the tare of this start and record from then on; raise the `LoadCellError` that forbids it."""
+    recorder = tared_once_lifted(config, cell, progress)
+    if fault := recorder.fault:
+        recorder.close()
+        raise fault
+    return recorder
 
-    Newtons count from this tare, overload from that of commissioning.
+
+def tared_once_lifted(config: Config, cell: LoadCell, progress: ProgressBoard | None = None) -> ForceRecorder:
+    """Take the tare of this start and record from then on; until it holds, the recorder is at fault and tries again."""
+    return ForceRecorder(cell, lambda read: _zero(config, read), progress)
+
+
+def _zero(config: Config, read: Callable[[], CellSample]) -> Zero:
+    """Return scale and limit by a tare: newtons count from it, overload from that of commissioning.
+
+    Raises the `LoadCellError` that forbids it.
     """
     settings, sensitivity = config.cell, config.cell.sensitivity_counts_per_n
-    tare_counts = measure_tare(
-        cell,
-        samples=TARE_SAMPLES,
-        max_spread_counts=settings.tare_spread_n * sensitivity,
-        timeout_s=FIRST_SAMPLE_S,
-    )
+    tare_counts = measure_tare(read, samples=TARE_SAMPLES, max_spread_counts=settings.tare_spread_n * sensitivity)
     at_commissioning = settings.commissioned_tare_counts
-    log.info("tare %.0f counts, at commissioning %s", tare_counts, at_commissioning)
     zero_counts = tare_counts if at_commissioning is None else CellCounts(at_commissioning)
     limit = LoadLimit(ForceScale(sensitivity, zero_counts), settings.max_load_n, settings.tare_drift_n)
     limit.require_tare(tare_counts)
-    return ForceRecorder(cell, ForceScale(sensitivity, tare_counts), limit, progress)
+    log.info("tare %.0f counts, at commissioning %s", tare_counts, at_commissioning)
+    return ForceScale(sensitivity, tare_counts), limit

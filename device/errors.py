@@ -255,6 +255,13 @@ class DetachedCellError(LoadCellError):
     title = "Load cell detached"
 
 
+class UnsteadyTareError(LoadCellError):
+    """The load cell's readings vary while its zero is taken: the probe is held, or something touches it."""
+
+    code = "E308"
+    title = "Zero not taken"
+
+
 class ModelError(DeviceError):
     """A model bundle is missing, tampered with, or not made for this probe."""
 

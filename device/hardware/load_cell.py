@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import serial
 
-from device.errors import LoadCellError
+from device.errors import UnsteadyTareError
 from device.hardware.cell_line import CellLine
-from device.hardware.interfaces import CellCounts, LoadCell
+from device.hardware.interfaces import CellCounts, CellSample, LoadCell
 from device.hardware.mantracourt import Mantracourt
 from device.hardware.openscale import OpenScale
 from device.measurement.quantities import Bound, require
@@ -26,17 +28,17 @@ def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", s
     return OpenScale(CellLine(device, open_port))
 
 
-def measure_tare(cell: LoadCell, *, samples: int, max_spread_counts: float, timeout_s: float) -> CellCounts:
-    """Return the mean of `samples` readings (counts) of the unloaded probe; `timeout_s` is for each reading.
+def measure_tare(read: Callable[[], CellSample], *, samples: int, max_spread_counts: float) -> CellCounts:
+    """Return the mean of `samples` readings (counts) of the unloaded probe, each of them by `read`.
 
-    Raises `LoadCellError` when largest minus smallest exceeds `max_spread_counts`: the probe was touched.
+    Raises `UnsteadyTareError` when largest minus smallest exceeds `max_spread_counts`: the probe was touched.
     """
     action = "ask for at least one reading and a positive spread"
     require("samples", samples, Bound(1, 100_000, ""), action)
     require("max_spread_counts", max_spread_counts, Bound(0.0, 2.0**24, "counts", low_included=False), action)
-    counts = [cell.read(timeout_s=timeout_s).counts for _ in range(samples)]
+    counts = [read().counts for _ in range(samples)]
     spread_counts = max(counts) - min(counts)
     if spread_counts > max_spread_counts:
         cause = f"Load cell varies by {spread_counts:g} counts during tare, above the {max_spread_counts:g} allowed."
-        raise LoadCellError(cause, "Hold the probe free and still, and tare again.")
+        raise UnsteadyTareError(cause, "Lift the probe and let nothing touch it, until it is ready.")
     return CellCounts(sum(counts) / samples)

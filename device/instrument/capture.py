@@ -88,6 +88,8 @@ class Capture:
             self._progress.beat()
             if self.called_away.is_set():
                 raise CalledAway
+            if self.board.now.guidance is Guidance.WAIT:  # of the start: nothing else has told the operator
+                self.board.update(guidance=Guidance.LIFT)
             time.sleep(POLL_S)
 
     def _untouched_frames(self) -> list[Frame]:

@@ -1,7 +1,7 @@
 """The load cell's stream to force over time: newtons on the one clock, interpolated to when a frame was exposed.
 
-One thread owns the serial line. A silent, unplugged or overloaded cell is a fault that is kept until samples come that
-it can bear.
+One thread owns the serial line. It first takes the tare, again and again while that fails, as when the probe is held. A
+silent, unplugged or overloaded cell is a fault that is kept until samples come that it can bear.
 """
 
 from __future__ import annotations
@@ -9,18 +9,24 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from device.errors import LoadCellError, OverloadedCellError
-from device.hardware.interfaces import ForceScale, LoadCell, Newtons
+from device.hardware.interfaces import CellSample, ForceScale, LoadCell, Newtons
 from device.instrument.load_limit import LoadLimit
 from device.instrument.progress import ProgressBoard
 
 KEPT_SAMPLES = 1000
+FIRST_SAMPLE_S = 5.0
+"""Opening the port resets an OpenScale: its banner may last three seconds."""
 SILENCE_S = 1.0
 RETRY_S = 0.2
+
+Zero = tuple[ForceScale, LoadLimit]
+Tare = Callable[[Callable[[], CellSample]], Zero]
+"""Readings of the cell, one a call, to the scale of this start and the load from the zero of commissioning."""
 
 
 def force_range_n(samples: Sequence[tuple[float, float]], *, around_line: bool) -> Newtons:
@@ -36,45 +42,55 @@ def force_range_n(samples: Sequence[tuple[float, float]], *, around_line: bool) 
 class ForceRecorder:
     """Force history of the last seconds."""
 
-    def __init__(
-        self, cell: LoadCell, scale: ForceScale, limit: LoadLimit, progress: ProgressBoard | None = None
-    ) -> None:
-        """Start recording; there is a sample when this returns. Raises `LoadCellError` when none comes."""
-        self._cell, self._scale, self._limit = cell, scale, limit
+    def __init__(self, cell: LoadCell, tare: Tare, progress: ProgressBoard | None = None) -> None:
+        """Start to tare and record; when this returns there is a sample, or a `fault` that says why there is none yet.
+
+        `tare` raises the `LoadCellError` that forbids it; then it is asked again.
+        """
+        self._cell, self._tare = cell, tare
+        self._zero: Zero | None = None
+        self._timeout_s = FIRST_SAMPLE_S
         self._samples: deque[tuple[float, Newtons]] = deque(maxlen=KEPT_SAMPLES)
         self._news, self._stopping = threading.Condition(), threading.Event()
         self.fault: LoadCellError | None = None
         self._progress = progress or ProgressBoard()
         self._thread = threading.Thread(target=self._run, name="force", daemon=True)
         self._thread.start()
-        try:
-            self._await_first()
-        except LoadCellError:
-            self.close()
-            raise
-
-    def _await_first(self) -> None:
         with self._news:
-            if not self._news.wait_for(lambda: self._samples, timeout=2 * SILENCE_S):
-                raise self.fault or LoadCellError("The load cell gives no samples.", "Check its cable and its power.")
+            if not self._news.wait_for(lambda: self._samples or self.fault, timeout=2 * FIRST_SAMPLE_S):
+                self.fault = LoadCellError("The load cell gives no samples.", "Check its cable and its power.")
 
     def _run(self) -> None:
         while not self._stopping.is_set():
             try:
-                with self._progress.inside("force"):
-                    sample = self._cell.read(timeout_s=SILENCE_S)
-                self._limit.require_bearable(sample.counts)
+                self._zero = self._zero or self._tare(self._read)
+                self._record(*self._zero)
             except OverloadedCellError as error:
-                self.fault = error  # and the next sample at once: those behind it must not grow old
-                continue
+                self._fail(error)  # and the next sample at once: those behind it must not grow old
             except LoadCellError as error:
-                self.fault = error
+                self._fail(error)
                 self._stopping.wait(RETRY_S)
-                continue
-            with self._news:
-                self._samples.append((sample.t_s, self._scale.newtons(sample.counts)))
-                self.fault = None
-                self._news.notify_all()
+
+    def _read(self) -> CellSample:
+        """Return the next sample; a tare that needs many of them ends with the recorder."""
+        if self._stopping.is_set():
+            raise LoadCellError("The load cell is read no more.", "Start the daemon again.")
+        timeout_s, self._timeout_s = self._timeout_s, SILENCE_S
+        with self._progress.inside("force"):
+            return self._cell.read(timeout_s=timeout_s)
+
+    def _record(self, scale: ForceScale, limit: LoadLimit) -> None:
+        sample = self._read()
+        limit.require_bearable(sample.counts)
+        with self._news:
+            self._samples.append((sample.t_s, scale.newtons(sample.counts)))
+            self.fault = None
+            self._news.notify_all()
+
+    def _fail(self, error: LoadCellError) -> None:
+        with self._news:
+            self.fault = error
+            self._news.notify_all()
 
     @property
     def latest_n(self) -> Newtons:
@@ -110,8 +126,11 @@ class ForceRecorder:
 
     @property
     def zero_shift_n(self) -> Newtons:
-        """Return how far the tare of this start is from that of commissioning."""
-        return self._limit.commissioned.newtons(self._scale.tare_counts)
+        """Return how far the tare of this start is from that of commissioning; raises the fault until it is taken."""
+        if self._zero is None:
+            raise self.fault or LoadCellError("The load cell is not tared.", "Lift the probe.")
+        scale, limit = self._zero
+        return limit.commissioned.newtons(scale.tare_counts)
 
     def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
         """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""

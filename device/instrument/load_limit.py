@@ -28,7 +28,7 @@ class LoadLimit:
             raise ZeroShiftError(
                 f"The load cell's zero is {tare_counts:.0f} counts, {drift_n:+.2f} N from the "
                 f"{self.commissioned.tare_counts:.0f} of commissioning, above the {self.max_drift_n:g} N allowed.",
-                "Hold the probe free and start again; if it stays, have the load cell checked and commissioned anew.",
+                "Lift the probe and let nothing touch it; if it stays, have its load cell checked and commissioned.",
             )
 
     def require_bearable(self, counts: CellCounts) -> None:

@@ -41,6 +41,7 @@ class HandSettings:
     `ramp_aim_n` how far that goes. `corrects_to_n`: where it takes a held force when the screen says harder or lighter,
     not at all without. `overshoot_ratio`: how far it first goes beyond its aim. `fade_n_per_s`: how fast a force that
     it means to hold changes. `early_lifts`: so often it lifts a press `lifts_after_s` after it has begun it.
+    `held_n`: the force with which it holds the probe on something from the start on, until the screen shows a fault.
     """
 
     rate_n_per_s: float = 0.45
@@ -53,6 +54,7 @@ class HandSettings:
     fade_n_per_s: float = 0.0
     early_lifts: int = 0
     lifts_after_s: float = 1.0
+    held_n: float = 0.0
     tremor_hz: float = TREMOR_HZ
     tremor_n: float = 0.002
     drift_n: float = 0.006
@@ -65,7 +67,7 @@ class HandSettings:
         require("hand.rate_n_per_s", self.rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
         require("hand.ramp_rate_n_per_s", self.ramp_rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
         require("hand.reaction_s", self.reaction_s, Bound(0.0, 5.0, "s"), ACTION)
-        for name in ("aim_n", "ramp_aim_n"):
+        for name in ("aim_n", "ramp_aim_n", "held_n"):
             require(f"hand.{name}", getattr(self, name), Bound(0.0, 5.0, "N"), ACTION)
         if self.corrects_to_n is not None:
             require("hand.corrects_to_n", self.corrects_to_n, Bound(0.0, 5.0, "N"), ACTION)
@@ -119,8 +121,9 @@ class VirtualHand:
     def __init__(self, settings: HandSettings) -> None:
         self.settings = settings
         self._lock = Lock()
-        self._moves = deque([Move(0.0, 0.0, 0.0, settings.rate_n_per_s, BESIDE_MM)], maxlen=REMEMBERED_MOVES)
-        self._following = self._is_ramp = False
+        at_first = Move(0.0, settings.held_n, settings.held_n, settings.rate_n_per_s, BESIDE_MM)
+        self._moves = deque([at_first], maxlen=REMEMBERED_MOVES)
+        self._following, self._is_ramp = settings.held_n > 0.0, False
         self._lifts_left = settings.early_lifts
         self._ramp_rate_n_per_s = settings.ramp_rate_n_per_s
 

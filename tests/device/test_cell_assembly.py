@@ -6,6 +6,8 @@ import pytest
 
 from device.assembly import StartFailed, open_simulated_probe
 from device.config import simulated_config
+from device.errors import ZeroShiftError
+from device.phantom_assembly import open_phantom_press
 from device.simulation.scenario import CellSettings, Scenario
 
 
@@ -27,10 +29,19 @@ def opened(tmp_path):
 
 
 @pytest.mark.parametrize("settings", [{}, {"commissioned_tare_counts": -50_000.0}])
-def test_a_zero_far_from_that_of_commissioning_keeps_the_probe_from_starting(opened, settings):
+def test_a_zero_far_from_that_of_commissioning_keeps_the_probe_from_measuring(opened, settings):
     """30 000 counts are 0.22 N from the virtual probe's own 8200, and 0.8 N from what the settings may say."""
+    procedure = opened(30_000.0, **settings)
+    for refused in (procedure.require_ready, lambda: procedure.bench.force.latest_n):
+        with pytest.raises(ZeroShiftError, match="from the .* of commissioning"):
+            refused()
+
+
+def test_a_zero_far_from_that_of_commissioning_keeps_a_phantom_from_being_recorded(tmp_path):
+    """It is told at once: a command has no screen on which to wait."""
+    config = replace(simulated_config(), data=tmp_path)
     with pytest.raises(StartFailed) as refusal:
-        opened(30_000.0, **settings)
+        open_phantom_press(config, Scenario(cell=CellSettings(zero_counts=30_000.0)))
     assert [fault.code for fault in refusal.value.faults] == ["E306"]
 
 

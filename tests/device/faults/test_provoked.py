@@ -21,6 +21,7 @@ PROVOKED_BY = {
     "test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_recovers",
     "E210": "device/instrument/test_brightness_loop.py::"
     "test_a_side_at_full_brightness_that_misses_its_share_is_warned_of_by_name",
+    "E308": "device/hardware/test_load_cell.py::test_tare_is_refused_when_the_probe_is_touched",
     "E402": "device/test_scenarios.py::test_a_probe_that_was_never_calibrated_runs_and_takes_no_press",
     "E403": "device/test_device_command_line.py::test_a_certificate_of_another_probe_keeps_the_probe_from_starting",
     "E407": "device/instrument/test_calibration_watch.py::"

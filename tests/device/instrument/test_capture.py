@@ -290,6 +290,16 @@ def test_unloaded_frames_wait_in_the_dark_until_the_probe_is_lifted(capture_of):
     assert {frame.force_n for frame in frames} == {0.0}
 
 
+def test_whoever_holds_the_probe_since_the_start_is_told_to_lift_it(capture_of):
+    """Only then: after a press the screen says so by itself, or shows its result."""
+    for shown, told in ((Guidance.WAIT, [Guidance.LIFT, Guidance.WAIT]), (Guidance.DONE, [])):
+        capture, read = capture_of(0.5, 0.5, 0.0, 0.0), []
+        capture.board.update(guidance=shown)
+        capture.board.on_guidance(read.append)
+        capture.unloaded()
+        assert read == told
+
+
 def test_unloaded_frames_that_were_touched_meanwhile_are_taken_again_and_the_operator_is_told_to_lift(capture_of):
     """A tap between two looks at the force: a flat field under load would be wrong in every pixel."""
     capture, peaks_n, told = capture_of(0.0, 0.0, 0.0), [0.3, 0.0], []

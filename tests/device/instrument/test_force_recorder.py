@@ -6,7 +6,7 @@ from queue import Empty, Queue
 
 import pytest
 
-from device.errors import LoadCellError, OverloadedCellError
+from device.errors import LoadCellError, OverloadedCellError, ZeroShiftError
 from device.hardware.interfaces import CellSample, ForceScale
 from device.instrument import force_recorder
 from device.instrument.force_recorder import ForceRecorder
@@ -16,6 +16,12 @@ SCALE = ForceScale(sensitivity_counts_per_n=1000.0, tare_counts=500.0)
 LIMIT = LoadLimit(ForceScale(sensitivity_counts_per_n=1000.0, tare_counts=0.0), max_load_n=5.0, max_drift_n=1.0)
 """At commissioning the zero was 0 counts: today's 500 counts of weight are half a newton of the load it bears."""
 UNPLUGGED = LoadCellError("The cell is gone.", "Plug it in.")
+HELD = ZeroShiftError("The zero is 2 N off.", "Lift the probe.")
+
+
+def tare(read):
+    """The tare of a probe that nobody touches; it takes no reading."""
+    return SCALE, LIMIT
 
 
 class ScriptedCell:
@@ -55,7 +61,7 @@ def cell():
 
 @pytest.fixture
 def recorder(cell):
-    recorder = ForceRecorder(cell, SCALE, LIMIT)
+    recorder = ForceRecorder(cell, tare)
     recorder.at(4.0)
     yield recorder
     closing = threading.Thread(target=recorder.close)
@@ -160,17 +166,52 @@ def test_what_was_recorded_before_a_fault_is_still_known(recorder, cell):
     assert recorder.at(1.5) == pytest.approx(1.0)
 
 
-def test_a_cell_that_never_speaks_is_refused_at_the_start_and_closed(monkeypatch):
+def test_a_cell_that_is_silent_at_the_start_is_a_fault_until_it_speaks(monkeypatch):
     monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
+    monkeypatch.setattr(force_recorder, "FIRST_SAMPLE_S", 0.05)
     cell = ScriptedCell()
-    with pytest.raises(LoadCellError, match="silent|no samples"):
-        ForceRecorder(cell, SCALE, LIMIT)
+    recorder = ForceRecorder(cell, tare)
+    with pytest.raises(LoadCellError, match="silent"):
+        _ = recorder.latest_n
+    cell.say((1.0, 2500.0))
+    assert recorder.at(1.0) == pytest.approx(2.0)
+    recorder.close()
     assert cell.is_closed
+
+
+def tare_of_a_held_probe(read):
+    """Two readings are a tare; above 1000 counts the probe is held."""
+    counts = max(read().counts for _ in range(2))
+    if counts > 1000.0:
+        raise HELD
+    return SCALE, LIMIT
+
+
+def test_a_probe_that_is_held_at_the_start_is_a_fault_until_it_is_lifted_and_then_tared(monkeypatch):
+    monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
+    cell = ScriptedCell(*((float(k), 2500.0) for k in range(2)))
+    recorder = ForceRecorder(cell, tare_of_a_held_probe)
+    for ask in (lambda: recorder.latest_n, lambda: recorder.zero_shift_n, lambda: recorder.mean_n(window_s=1.0)):
+        with pytest.raises(LoadCellError):
+            ask()
+    cell.say(*((2.0 + k, 2500.0) for k in range(6)), *((8.0 + k, 500.0) for k in range(2)), (10.0, 600.0))
+    assert recorder.at(10.0, timeout_s=5.0) == pytest.approx(0.1)
+    assert recorder.fault is None
+    assert recorder.zero_shift_n == pytest.approx(0.5)
+    recorder.close()
+
+
+def test_a_recorder_that_is_closed_while_it_tares_ends(monkeypatch):
+    monkeypatch.setattr(force_recorder, "RETRY_S", 60.0)
+    recorder = ForceRecorder(ScriptedCell((0.0, 2500.0), (1.0, 2500.0)), tare_of_a_held_probe)
+    assert recorder.fault is HELD
+    recorder.close()
+    assert not recorder._thread.is_alive()
 
 
 def test_closing_releases_the_cell(cell, monkeypatch):
     monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
-    recorder = ForceRecorder(cell, SCALE, LIMIT)
+    recorder = ForceRecorder(cell, tare)
     recorder.close()
     assert cell.is_closed
 

@@ -29,6 +29,16 @@ def test_a_hand_that_has_not_taken_up_the_probe_does_nothing():
     assert hand.force_n(10.0) == 0.0
 
 
+def test_a_hand_that_holds_the_probe_at_the_start_lifts_it_when_the_screen_shows_the_fault():
+    hand = VirtualHand(replace(STEADY, held_n=0.5))
+    hand.follow("wait", 1.0)
+    assert hand.force_n(2.0) == 0.5
+    hand.follow("fault", 3.0)
+    assert [hand.force_n(t_s) for t_s in (3.2, 3.7, 4.3)] == pytest.approx([0.5, 0.25, 0.0])
+    hand.follow("press_beside", 5.0)
+    assert hand.force_n(9.0) == 0.0
+
+
 def test_it_acts_only_after_its_reaction_time():
     """Read at 1 s, acted upon at 1.2 s, then 0.5 N/s."""
     hand = hand_at(STEADY, ("press_beside", 1.0))
@@ -200,6 +210,7 @@ def test_a_long_session_of_presses_is_followed_to_the_end():
         ("ramp_rate_n_per_s", 0.01, 10),
         ("reaction_s", 0, 5),
         ("aim_n", 0, 5),
+        ("held_n", 0, 5),
         ("ramp_aim_n", 0, 5),
         ("corrects_to_n", 0, 5),
         ("overshoot_ratio", 0, 5),
