@@ -121,8 +121,8 @@ class OpenedProbe:
         """Return the same, also while its tare fails: that alone is told only beside what ends the start."""
         cell = self.cell
         force = self.parts.open(lambda: tared_once_lifted(self.config, cell, progress)) if cell else None
-        if force and force.fault:
-            self.parts.faults.append(force.fault)
+        if force and (fault := force.fault):
+            self.parts.faults.append(fault)
         return force
 
     def store(self) -> Store | None:
