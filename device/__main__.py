@@ -19,7 +19,7 @@ from pathlib import Path
 import uvicorn
 
 from device.answers import Answers, answers_for
-from device.assembly import StartFailed, open_probe, open_simulated_probe
+from device.assembly import open_probe, open_simulated_probe
 from device.calibration_command import add_calibration_command, run_calibration_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
@@ -35,6 +35,7 @@ from device.measurement.mode import mode_named, mode_of
 from device.measurement.model_card import BundleRefused
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording_file import read_recording
+from device.opened_parts import StartFailed
 from device.phantom_assembly import open_phantom_press
 from device.record_command import add_record_command, run_record_command
 from device.records.calibrations import Calibrations

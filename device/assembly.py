@@ -1,24 +1,23 @@
 """Puts the daemon together: real chips, or emulated ones under the very same drivers.
 
-Every part that fails to open is listed at once, each with its fault code, and what had opened is closed again.
+Every part that fails to open is listed at once: device/opened_parts.py.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeVar
+from typing import Any
 
 from device.answers import Answers, answers_for
 from device.camera_assembly import emulated_camera, real_camera
 from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.certificate import active_calibration
 from device.config import SIMULATED_PROBE, Config
-from device.errors import ConfigError, DeviceError, ModelError
+from device.errors import ConfigError
 from device.hand_assembly import SomeGuide, lead_by_hand
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
@@ -33,8 +32,8 @@ from device.instrument.procedure import Procedure
 from device.instrument.progress import ProgressBoard
 from device.measurement.calibration import Calibration
 from device.measurement.inversion import ModelBundle
-from device.measurement.model_card import BundleRefused
-from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.quantities import Inclusion
+from device.opened_parts import OpenedParts
 from device.records.disk import Disk
 from device.records.store import Store
 from device.simulation.camera_server import CameraServer
@@ -50,54 +49,13 @@ from device.simulation.virtual_camera import VirtualPicamera2
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from device.simulation.virtual_request import ExposureRequest
 
-Part = TypeVar("Part")
-
-
-class StartFailed(Exception):  # noqa: N818 - reads as what happened
-    """Parts that did not open, each with code, cause and remedy."""
-
-    def __init__(self, faults: list[DeviceError]) -> None:
-        self.faults = faults
-        super().__init__("\n".join(f"{fault.code} {fault}" for fault in faults))
-
-
-class _Parts:
-    """Opens parts one by one, remembers what failed, and closes the others when anything did."""
-
-    def __init__(self) -> None:
-        self.faults: list[DeviceError] = []
-        self.opened = ExitStack()
-        self._is_complete = True
-
-    def open(self, opener: Callable[[], Part]) -> Part | None:
-        try:
-            part = opener()
-        except DeviceError as error:
-            self._fail(error)
-        except (InvalidQuantity, BundleRefused) as error:
-            self._fail(ModelError(str(error), "Then start the daemon again."))
-        else:
-            if hasattr(part, "close"):
-                self.opened.callback(part.close)
-            return part
-        return None
-
-    def _fail(self, fault: DeviceError) -> None:
-        self.faults.append(fault)
-        self._is_complete = False
-
-    def require_all(self) -> None:
-        if not self._is_complete:
-            self.opened.close()
-            raise StartFailed(self.faults)
-
 
 @dataclass(frozen=True)
 class OpenedProbe:
     """The opened parts of a probe, None for one that failed, and what is simulated of it."""
 
     config: Config
-    parts: _Parts
+    parts: OpenedParts
     lights: Lights | None
     camera: Camera | None
     cell: LoadCell | None
@@ -153,7 +111,7 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
 
 def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
     """Return what `on_top` makes of the real probe's parts; raise `StartFailed` with every part that failed."""
-    parts = _Parts()
+    parts = OpenedParts()
     lights = parts.open(lambda: open_led_driver(config.light))
     camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
@@ -162,7 +120,7 @@ def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> Som
 
 def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
     """Return the same of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
-    parts, faults = _Parts(), FaultTimeline(scenario.faults)
+    parts, faults = OpenedParts(), FaultTimeline(scenario.faults)
     bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
     config = replace(commissioned(config), model=bundles.folder(config.model))
     parts.open(lambda: _require_own_serial(config, scenario))

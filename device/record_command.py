@@ -16,13 +16,13 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from device.assembly import StartFailed
 from device.errors import DeviceError, StorageError
 from device.instrument.capture import PressEnded
 from device.instrument.guidance import Guidance
 from device.instrument.phantom_press import Phantom, PhantomPress
 from device.measurement.mode import MODES
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.opened_parts import StartFailed
 
 EXAMPLES = """examples:
   python -m device record --size-mm 10 --depth-mm 6 --modulus-kpa 80 --out phantoms/1

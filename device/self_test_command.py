@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from device.assembly import StartFailed
 from device.instrument.guidance import Guidance
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.result import Result, broken, overall
+from device.opened_parts import StartFailed
 from device.text_table import aligned
 
 EXAMPLES = """examples:

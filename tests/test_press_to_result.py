@@ -14,11 +14,12 @@ import pytest
 from daemon_process import QUICK_HAND, Daemon
 
 from device.answers import answers_for
-from device.assembly import StartFailed, open_simulated_probe
+from device.assembly import open_simulated_probe
 from device.config import simulated_config
 from device.errors import StorageError
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.measurement.recording_file import read_recording
+from device.opened_parts import StartFailed
 from device.records.store import Store
 from device.settings.press_section import PressSection
 from device.simulation.scenario import Scenario

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from device.answers import Answers, answers_for
-from device.assembly import StartFailed, open_simulated_probe
+from device.assembly import open_simulated_probe
 from device.config import simulated_config
 from device.errors import ConfigError, ModelError
 from device.instrument.progress import ProgressBoard
 from device.measurement.estimate import estimate_recording
 from device.measurement.inversion import Raw
 from device.measurement.mode import MODES
+from device.opened_parts import StartFailed
 from device.settings.press_section import PressSection
 from device.simulation.scenario import Scenario
 

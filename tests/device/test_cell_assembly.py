@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from device.assembly import StartFailed, open_simulated_probe
+from device.assembly import open_simulated_probe
 from device.config import simulated_config
 from device.errors import ZeroShiftError
+from device.opened_parts import StartFailed
 from device.phantom_assembly import open_phantom_press
 from device.simulation.scenario import CellSettings, Scenario
 

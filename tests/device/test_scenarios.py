@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
-from device.assembly import StartFailed, open_simulated_probe
+from device.assembly import open_simulated_probe
 from device.config import simulated_config
 from device.errors import DeviceError, MissingCalibration
 from device.instrument import bench, force_recorder, procedure, watchdog
@@ -30,6 +30,7 @@ from device.measurement.mode import Mode
 from device.measurement.recording import Recording
 from device.measurement.recording_file import read_recording
 from device.measurement.toml_record import from_table
+from device.opened_parts import StartFailed
 from device.records.store import ENDED
 from device.settings.camera_section import CameraSection
 from device.settings.light_section import LightSection
