@@ -43,6 +43,7 @@ from device.self_test_command import add_self_test_command, run_self_test_comman
 from device.settings.command import add_config_command, run_config_command
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, read_config, read_layers
+from device.settings.override import overridden
 from device.simulation.scenario import Scenario, read_scenario
 from device.web.app import create_app
 
@@ -115,13 +116,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> StartSettings:
-    """Return the settings: those of this machine's files, or the simulated probe's own, or what its one file says."""
+    """Return the settings: those of this machine's files, or the simulated probe's own, or what its one file says.
+
+    Those of the scene lie over the simulated probe's.
+    """
     if not scenario:
         settings = start_settings(read_layers(layer_files(options.root, options.config)))
     elif options.config:
         settings = start_settings(read_layers([options.config]))
     else:
         settings = StartSettings(simulated_config(scenario.serial))
+    if scenario:
+        settings = replace(settings, config=overridden(settings.config, scenario.settings))
     if options.port is None:
         return settings
     config = settings.config

@@ -9,6 +9,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 from types import NoneType, UnionType
@@ -19,7 +20,8 @@ from device.measurement.quantities import InvalidQuantity
 Record = TypeVar("Record")
 
 ACCEPTED: dict[Any, tuple[type, ...]] = {
-    float: (int, float), int: (int,), str: (str,), bool: (bool,), Path: (str,), tuple: (list,)
+    float: (int, float), int: (int,), str: (str,), bool: (bool,), Path: (str,), tuple: (list,),
+    dict: (dict,), datetime: (datetime,),
 }  # fmt: skip
 """What TOML must hold for a field of each type."""
 

@@ -1,6 +1,6 @@
-"""A disk that fills up, with the kernel's own "no space left" from /dev/full, or that can only be read.
+"""A disk that fills up, with the kernel's own "no space left" from /dev/full, can only be read, or does not answer.
 
-Only what goes through the store's `Disk` is refused; the database beside it is on the real disk. Linux only.
+Only what goes through the store's `Disk` is refused or held up; the database beside it is on the real disk. Linux only.
 Source: full(4); errno(3), EROFS, which Linux answers once it has remounted a failing card read-only.
 """
 
@@ -18,17 +18,22 @@ FULL = Path("/dev/full")
 
 
 class EmulatedDisk:
-    """The disk of a scenario: full or read-only while it says so, else the real one. Implements the store's `Disk`."""
+    """The disk of a scenario: full, read-only or frozen while it says so, else the real one.
+
+    Implements the store's `Disk`; while it is frozen no call returns.
+    """
 
     def __init__(self, faults: FaultTimeline) -> None:
         self._faults = faults
 
     def free_bytes(self, folder: Path) -> int:
         """Return the space that is left for a folder."""
+        self._faults.hold_up("disk_frozen")
         return 0 if self._faults.is_active("disk_full") else shutil.disk_usage(folder).free
 
     def write(self, path: Path, content: bytes) -> None:
         """Write and synchronise a file; raise `OSError` ENOSPC while the disk is full, EROFS while it is read-only."""
+        self._faults.hold_up("disk_frozen")
         if self._faults.is_active("disk_read_only"):
             raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
         write_and_sync(FULL if self._faults.is_active("disk_full") else path, content)

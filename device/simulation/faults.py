@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.tactile_image import SIDES, LedRatio
@@ -44,8 +45,10 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "cell_frozen": (),
     "inference_frozen": (),
     "clock_jump": ("step_s",),
+    "clock_set": ("date",),
     "disk_full": (),
     "disk_read_only": (),
+    "disk_frozen": (),
     "bundle_tampered": (),
 }
 """Every kind of fault, and what it takes besides its times."""
@@ -56,6 +59,7 @@ REQUIRED = {
     "led_open": ("side",),
     "led_swapped": ("side", "other_side"),
     "clock_jump": ("step_s",),
+    "clock_set": ("date",),
 }
 DEFAULT_RATIO = {"led_dimmed": 0.9, "ambient_light": 0.05, "wet_face": 1.0, "dirty_face": 0.03}
 I2C_ERRNO = {"i2c_nack": 121, "i2c_stuck": errno.ETIMEDOUT}
@@ -71,7 +75,8 @@ class Fault:
     `from_s` and `until_s` count from the start of the simulation, or with `from_press` = n from the n-th press that
     was requested. `side`: of one LED, all four without; `other_side`: whose plug it has (led_swapped). `ratio`: light
     that is left (led_dimmed), added light in units of full light (ambient_light, and dirty_face with all LEDs full),
-    part of the face that is wet (wet_face). `step_s`: by how much the wall clock is off.
+    part of the face that is wet (wet_face). `step_s`: by how much the wall clock is off (clock_jump); `date`: what it
+    shows at first (clock_set).
     """
 
     kind: str
@@ -82,6 +87,7 @@ class Fault:
     other_side: str | None = None
     ratio: float | None = None
     step_s: float | None = None
+    date: datetime | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in PARAMETERS:
@@ -90,7 +96,7 @@ class Fault:
         if not self.until_s > self.from_s:
             raise InvalidQuantity("faults.until_s", self.until_s, f"above from_s, {self.from_s:g} s", ACTION)
         require("faults.from_press", self.from_press, Bound(0, 1000, "(0: the start)"), ACTION)
-        for name in ("side", "other_side", "ratio", "step_s"):
+        for name in ("side", "other_side", "ratio", "step_s", "date"):
             self._require_parameter(name)
         for name in ("side", "other_side"):
             if getattr(self, name) not in (None, *SIDES):
@@ -99,6 +105,8 @@ class Fault:
             require("faults.ratio", self.ratio, Bound(0.0, 1.0, ""), ACTION)
         if self.step_s is not None:
             require("faults.step_s", self.step_s, Bound(-1e10, 1e10, "s"), ACTION)
+        if self.date is not None and self.date.tzinfo is None:
+            raise InvalidQuantity("faults.date", self.date, "a time with its zone, as 2027-01-31T12:00:00Z", ACTION)
 
     def _require_parameter(self, name: str) -> None:
         is_given = getattr(self, name) is not None
@@ -174,8 +182,12 @@ class FaultTimeline:
 
     def wall_time_s(self) -> float:
         """Return the seconds since 1970 that the board's clock shows now: wrong while it is set wrong."""
-        jumps = self._active("clock_jump", self._clock())
-        return self._wall_clock() + sum(fault.step_s or 0.0 for fault in jumps)
+        now_s = self._clock()
+        shown_s = self._wall_clock()
+        for fault in self._active("clock_set", now_s):
+            begun_s = self._origins_s[fault.from_press] + fault.from_s
+            shown_s = fault.date.timestamp() + now_s - begun_s if fault.date else shown_s
+        return shown_s + sum(fault.step_s or 0.0 for fault in self._active("clock_jump", now_s))
 
     def _active(self, kind: str, t_s: float) -> Iterator[Fault]:
         for fault in self._faults:

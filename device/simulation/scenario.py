@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.toml_record import read_toml
@@ -47,6 +48,7 @@ class Scenario:
     An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 4-6.25 kPa, 27-36 mm.
     `expects` is the fault code it must raise, `self_test_fails` the check of its self-test that must fail.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
+    `settings` are those of the daemon, as in its file, that the scene needs otherwise than they are.
     """
 
     inclusion: Inclusion = DEFAULT_INCLUSION
@@ -62,6 +64,7 @@ class Scenario:
     seed: int = 1
     neighbour: Neighbour | None = None
     faults: tuple[Fault, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
     expects: str = ""
     self_test_fails: str = ""
 

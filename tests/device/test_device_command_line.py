@@ -122,6 +122,19 @@ def test_a_certificate_of_another_probe_keeps_the_probe_from_starting(run, model
     assert "for probe SIM-LINEAR, but must be for probe SIM-0001" in line
 
 
+def test_the_settings_of_a_scene_lie_over_the_probes_own_and_below_the_command_line(run, models, started, tmp_path):
+    (tmp_path / "scene.toml").write_text("[settings.press]\ntarget_n = 0.51\n[settings.server]\nport = 1\n")
+    assert run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")[0] == 0
+    assert [status["target_n"] for status in started] == [0.51]
+
+
+def test_a_scene_with_a_setting_that_there_is_not_is_refused(run, tmp_path):
+    (tmp_path / "scene.toml").write_text("[settings.light]\nmax_on = 1.0\n")
+    code, _, [line] = run("--simulate", "--port", 0, "--scene", "scene.toml")
+    assert code == 1
+    assert "did you mean light.max_on_s" in line
+
+
 def test_the_settings_of_another_probe_are_refused_for_the_simulated_one(run, models, tmp_path):
     settings = (tmp_path / "probe.toml").read_text().replace("SIM-0001", "SIM-0002")
     (tmp_path / "probe.toml").write_text(settings)

@@ -17,15 +17,6 @@ PROVOKED_BY = {
     "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
-    "E209": "device/test_scenarios.py::"
-    "test_light_that_is_on_for_too_long_goes_off_with_a_fault_and_the_device_recovers",
-    "E210": "device/instrument/test_brightness_loop.py::"
-    "test_a_side_at_full_brightness_that_misses_its_share_is_warned_of_by_name",
-    "E308": "device/hardware/test_load_cell.py::test_tare_is_refused_when_the_probe_is_touched",
-    "E402": "device/test_scenarios.py::test_a_probe_that_was_never_calibrated_runs_and_takes_no_press",
-    "E403": "device/test_device_command_line.py::test_a_certificate_of_another_probe_keeps_the_probe_from_starting",
-    "E407": "device/instrument/test_calibration_watch.py::"
-    "test_the_last_month_is_warned_of_and_the_warning_ends_with_it",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
@@ -34,7 +25,8 @@ PROVOKED_BY = {
     "E805": "device/web/test_app.py::test_a_mode_without_a_model_is_refused_with_its_own_code",
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
-"""Codes that a request, a setting or a restart provokes, no scene: file below tests/ and test, which names the code."""
+"""What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""
+NO_PARTS = {"0": "settings files and the daemon itself", "8": "requests", "9": "a restart"}
 
 
 @cache
@@ -60,6 +52,11 @@ def test_a_test_that_is_named_for_a_code_exists_and_names_it(code):
     assert name in tests, f"{file} has no test {name}"
     with_marks = [tests[name], *tests[name].decorator_list]
     assert any(f'"{code}' in (ast.get_source_segment(text, node) or "") for node in with_marks), f"it names no {code}"
+
+
+def test_every_fault_of_a_part_of_the_probe_has_a_scenario():
+    assert {code[1] for code in PROVOKED_BY} <= set(NO_PARTS)
+    assert {fault.code for fault in FAULTS if fault.code[1] not in NO_PARTS} <= codes_of_scenarios()
 
 
 def test_a_code_is_not_named_in_both_places_and_only_if_it_exists():

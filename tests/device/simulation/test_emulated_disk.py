@@ -4,6 +4,7 @@ import errno
 
 import pytest
 
+from device.simulation import faults
 from device.simulation.emulated_disk import EmulatedDisk
 from device.simulation.faults import Fault, FaultTimeline
 
@@ -29,3 +30,21 @@ def test_a_read_only_disk_takes_nothing_and_still_has_space(tmp_path):
     assert refused.value.errno == errno.EROFS
     assert list(tmp_path.iterdir()) == []
     assert disk.free_bytes(tmp_path) > 0
+
+
+@pytest.mark.parametrize("call", ["write", "free_bytes"])
+def test_a_frozen_disk_answers_when_it_thaws_and_not_before(call, tmp_path, monkeypatch):
+    now_s, waits = [0.0], []
+
+    def wait(seconds):
+        waits.append(list(tmp_path.iterdir()))
+        now_s[0] += 1.0
+
+    monkeypatch.setattr(faults.time, "sleep", wait)
+    disk = EmulatedDisk(FaultTimeline([Fault("disk_frozen", until_s=3.0)], clock=lambda: now_s[0]))
+    if call == "write":
+        disk.write(tmp_path / "frame", b"counts")
+        assert (tmp_path / "frame").read_bytes() == b"counts"
+    else:
+        assert disk.free_bytes(tmp_path) > 0
+    assert waits == [[], [], []]

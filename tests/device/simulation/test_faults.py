@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
@@ -97,6 +99,16 @@ def test_a_clock_that_jumped_shows_another_time_and_the_monotonic_clock_does_not
     assert shown == [5000.0, 1400.0, 5000.0]
 
 
+def test_a_clock_that_was_set_goes_on_from_its_date_whatever_the_true_one_says(clock):
+    date = datetime(1970, 1, 1, 0, 10, tzinfo=UTC)
+    faults = [Fault("clock_set", date=date, from_s=2.0, until_s=6.0), Fault("clock_jump", step_s=60.0, from_s=4.0)]
+    timeline = FaultTimeline(faults, clock=clock, wall_clock=lambda: 5000.0)
+    shown = []
+    for clock.now_s in (100.0, 102.0, 103.0, 105.0, 106.0):
+        shown.append(timeline.wall_time_s())
+    assert shown == [5000.0, 600.0, 601.0, 663.0, 5060.0]
+
+
 def test_the_bus_answers_with_the_kernels_error_numbers(clock):
     for kind, number in (("i2c_nack", 121), ("i2c_stuck", 110), ("camera_stall", None)):
         assert FaultTimeline([Fault(kind)], clock=clock).i2c_errno() == number
@@ -115,6 +127,8 @@ def test_without_faults_nothing_is_wrong():
         ({"kind": "camera_stall", "from_s": 2.0, "until_s": 2.0}, "faults.until_s", "above from_s, 2 s"),
         ({"kind": "camera_stall", "until_s": float("nan")}, "faults.until_s", "nan"),
         ({"kind": "camera_stall", "from_press": -1}, "faults.from_press", "at least 0"),
+        ({"kind": "clock_set"}, "faults.date", "missing"),
+        ({"kind": "clock_set", "date": datetime(2069, 11, 25)}, "faults.date", "a time with its zone"),
         ({"kind": "led_dead"}, "faults.side", "missing, but must be given for led_dead: add it"),
         ({"kind": "led_dead", "side": "left"}, "faults.side", r"one of \+x, \+y, -x, -y"),
         ({"kind": "led_swapped", "side": "+x"}, "faults.other_side", "given for led_swapped"),
