@@ -42,10 +42,11 @@ check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 	.venv/bin/lint-imports
 	$(PY) tests/dead_links.py
 
-bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second
+bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; time the darkness after a kill
 	$(PY) tests/bench.py
 	$(PY) tests/bench_forward.py
 	$(PY) tests/bench_acquisition.py
+	$(PY) tests/bench_darkness.py
 
 verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md
 	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md

@@ -50,7 +50,7 @@ def served(bus: EmulatedI2cBus, path: Path) -> Iterator[None]:
 
 
 def _serve(bus: EmulatedI2cBus, connection: socket.socket) -> None:
-    with connection:
+    with connection, contextlib.suppress(ConnectionError):  # its process was killed in a transaction
         while request := connection.recv(LONGEST):
             connection.send(json.dumps(_carried(bus, json.loads(request))).encode())
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from cpu_time import ended_cpu_s
 from daemon_process import ROOT, Daemon
 from i2c_over_socket import served
 
@@ -22,6 +23,8 @@ from device.simulation.i2c_bus import EmulatedI2cBus
 from device.simulation.tlc59116_chip import Tlc59116Chip
 
 START_S = 60.0
+DARK_WITHIN_S = 1.0
+"""From the end of a daemon, however it came, to darkness."""
 
 
 class Supervisor:
@@ -64,13 +67,14 @@ class Supervisor:
         self.daemon.process.send_signal(signal.SIGABRT)
         return self.daemon.ended_code()
 
-    def stop_post(self) -> int:
-        """Run what darkens the LEDs after the daemon's end, however that came; return its exit code."""
+    def stop_post(self) -> tuple[int, float]:
+        """Run what darkens the LEDs after the daemon's end, however that came; return exit code and CPU time (s)."""
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         program = [str(ROOT / "tests" / "i2c_over_socket.py"), str(self._folder / "i2c"), "device.led_off"]
-        return subprocess.run(
-            [sys.executable, *program], cwd=self._folder, env={**os.environ, "PYTHONPATH": path}, check=False
-        ).returncode
+        environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        process = subprocess.Popen([sys.executable, *program], cwd=self._folder, env=environment)
+        cpu_s = ended_cpu_s(process)
+        return process.returncode, cpu_s
 
     def close(self) -> None:
         """End the daemon, if it still runs, and take its board away."""

@@ -5,17 +5,23 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from cpu_time import ended_cpu_s
 from daemon_process import ROOT
 from i2c_over_socket import served
+from supervisor import DARK_WITHIN_S
 
+from device import led_off as led_off_module
 from device.__main__ import main as daemon_main
-from device.led_off import main
+from device.hardware.led_driver import led_driver
+from device.led_off import PAUSE_S, led_off, main
 from device.settings.last_good import NAME
+from device.settings.light_section import LightSection
 from device.simulation.faults import Fault, FaultTimeline
 from device.simulation.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.pca9685_chip import Pca9685Chip
@@ -80,6 +86,33 @@ def test_the_light_that_a_killed_daemon_left_on_goes_off(board_of, kind, program
     board.kill_while_lit()
     command = ("led-off",) if program[0] == "device" else ()
     assert board.run(*program, "probe.toml", *command) == (0, "")
+    assert board.chip.led_ratio() == DARK
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_the_light_of_a_killed_daemon_is_off_within_a_second_of_the_processors_time(board_of, kind):
+    """The second counts on an idle probe; here other programs run, so the child's CPU time stands for the wall's.
+
+    What is left of the wall's time is the machine's, and the program's own pauses, which the next test adds up.
+    `make bench` takes the time on the wall, from the kill to the chip's darkness (tests/bench_darkness.py).
+    """
+    board = board_of(kind)
+    board.kill_while_lit()
+    with board.start("device.led_off", "--config", "probe.toml") as process:
+        cpu_s = ended_cpu_s(process)
+    assert cpu_s < DARK_WITHIN_S
+    assert board.chip.led_ratio() == DARK
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+@pytest.mark.parametrize("nacks", [0, 2])
+def test_it_pauses_only_for_the_chips_oscillator_and_before_it_asks_again(board_of, monkeypatch, kind, nacks):
+    board, pauses_s = board_of(kind), list[float]()
+    board.chip.nacks_to_come = nacks
+    monkeypatch.setattr(time, "sleep", pauses_s.append)
+    monkeypatch.setattr(led_off_module, "open_led_driver", lambda light: led_driver(light, board.bus))
+    led_off(LightSection(chip=kind))
+    assert sum(pauses_s) <= nacks * PAUSE_S + 0.01
     assert board.chip.led_ratio() == DARK
 
 
