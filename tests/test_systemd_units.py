@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import configparser
+import re
 import shutil
 import subprocess
 import sys
@@ -50,13 +51,22 @@ def test_the_unit_shuts_the_daemon_in(tmp_path):
     assert judged.returncode == 0, judged.stdout
 
 
-def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_end():
+def service_of(path: Path) -> configparser.SectionProxy:
     unit = configparser.RawConfigParser(strict=False)
     unit.optionxform = str
-    unit.read(UNIT)
-    service = unit["Service"]
+    unit.read(path)
+    return unit["Service"]
+
+
+def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_end():
+    service = service_of(UNIT)
     assert service["Type"] == "notify"
     assert float(service["WatchdogSec"]) == WITHOUT_SYSTEMD_S
     assert service["ExecStart"] == f"{PYTHON} -m device"
     assert service["ExecStopPost"] == f"-{PYTHON} -m device.led_off"
     assert service["Restart"] == "on-failure"
+
+
+def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
+    made = re.findall("^g ([a-z0-9]+) ", (UNIT.parent / "tsis.sysusers.conf").read_text(), re.MULTILINE)
+    assert set(service_of(UNIT)["SupplementaryGroups"].split()) == {"video", "dialout", *made}
