@@ -67,6 +67,15 @@ def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_en
     assert service["Restart"] == "on-failure"
 
 
+def test_the_daemon_can_write_its_state_and_nothing_else():
+    """systemd 252 gives a ConfigurationDirectory= to the unit's user, who could then write the settings."""
+    service = service_of(UNIT)
+    assert service["ProtectSystem"] == "strict"
+    assert service["StateDirectory"] == "tsis"
+    others = ("Configuration", "Cache", "Logs", "Runtime")
+    assert not {*(f"{kind}Directory" for kind in others), "ReadWritePaths", "BindPaths"} & set(service)
+
+
 def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
     made = re.findall("^g ([a-z0-9]+) ", (UNIT.parent / "tsis.sysusers.conf").read_text(), re.MULTILINE)
     assert set(service_of(UNIT)["SupplementaryGroups"].split()) == {"video", "dialout", *made}
