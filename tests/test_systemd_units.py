@@ -13,10 +13,18 @@ import pytest
 from daemon_process import ROOT
 
 from device.instrument.watchdog import WITHOUT_SYSTEMD_S
+from device.settings.catalogue import SETTINGS
 
 UNIT = ROOT / "systemd" / "tsis.service"
+RULES = ROOT / "systemd" / "tsis-force.rules"
 PYTHON = "/opt/tsis/current/bin/python"
 needs_systemd = pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
+
+
+def udev_version() -> int:
+    if not shutil.which("udevadm"):
+        return 0
+    return int(subprocess.run(["udevadm", "--version"], capture_output=True, text=True, check=True).stdout.split()[0])
 
 
 def here(folder: Path, text: str) -> Path:
@@ -79,3 +87,14 @@ def test_the_daemon_can_write_its_state_and_nothing_else():
 def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
     made = re.findall("^g ([a-z0-9]+) ", (UNIT.parent / "tsis.sysusers.conf").read_text(), re.MULTILINE)
     assert set(service_of(UNIT)["SupplementaryGroups"].split()) == {"video", "dialout", *made}
+
+
+def test_the_rule_names_the_load_cell_as_the_settings_do():
+    [line] = [line for line in RULES.read_text().splitlines() if line and not line.startswith("#")]
+    assert re.findall(r'SYMLINK\+="(.*?)"', line) == [SETTINGS["cell.device"].default.removeprefix("/dev/")]
+
+
+@pytest.mark.skipif(udev_version() < 254, reason="no udevadm that verifies (systemd 254)")
+def test_udev_takes_the_rule():
+    judged = subprocess.run(["udevadm", "verify", str(RULES)], capture_output=True, text=True, check=False)
+    assert judged.returncode == 0, judged.stderr
