@@ -5,7 +5,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-camera-virtual check bench verify sweep train evaluate modes pages lock clean
+.PHONY: help setup run test test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -34,6 +34,9 @@ test: .venv/all.stamp ## run all tests
 
 test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian chroot under build (root, 1.7 GB)
 	tests/libcamera/run.sh build/trixie
+
+test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
+	tests/systemd/run.sh build/bookworm
 
 check: .venv/all.stamp ## lint, format, types, import arrows, dead links
 	.venv/bin/ruff check .

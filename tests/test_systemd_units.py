@@ -1,4 +1,7 @@
-"""The unit files, read by systemd itself, which only complains in words about a key or value that it does not know."""
+"""The unit files, read by systemd itself, which only complains in words about a key or value that it does not know.
+
+`make test-systemd` runs them.
+"""
 
 from __future__ import annotations
 
@@ -87,6 +90,12 @@ def test_the_daemon_can_write_its_state_and_nothing_else():
 def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
     made = re.findall("^g ([a-z0-9]+) ", (UNIT.parent / "tsis.sysusers.conf").read_text(), re.MULTILINE)
     assert set(service_of(UNIT)["SupplementaryGroups"].split()) == {"video", "dialout", *made}
+
+
+def test_the_unit_that_is_run_under_a_real_systemd_differs_only_in_its_hardware():
+    simulated = service_of(ROOT / "tests" / "systemd" / "simulated.conf")
+    assert set(simulated) == {"ExecStart", "Environment"}
+    assert "--simulate" in simulated["ExecStart"]
 
 
 def test_the_rule_names_the_load_cell_as_the_settings_do():
