@@ -23,9 +23,9 @@ def flashed(frame, ratio):
 
 
 def ramp(forces_n=FORCES_N, seed=1):
-    """Return frames whose light, over the power of the force that contact follows, is 150 + 50 sqrt(F)."""
+    """Return frames whose light is 10 + 200 F - 80 F^2, with a camera's noise."""
     rng = np.random.default_rng(seed)
-    light = [force_n**EXPONENT * (150 + 50 * force_n**0.5) + rng.normal(0, 1.5, (48, 64)) for force_n in forces_n]
+    light = [10 + 200 * force_n - 80 * force_n**2 + rng.normal(0, 1.5, (48, 64)) for force_n in forces_n]
     return [
         Frame(np.clip(np.round(DARK_COUNTS + one), 0, 255).astype(np.uint8), "press", 0.0, force_n, (0.6,) * 4)
         for one, force_n in zip(light, forces_n, strict=True)
@@ -78,6 +78,12 @@ def test_of_a_few_frames_nobody_can_say_which_is_unlike_the_others():
     frames = ramp(np.linspace(0.08, 0.6, FEWEST_FRAMES - 1))
     frames[3] = flashed(frames[3], 1.5)
     assert ramp_outlier(frames, DARK_COUNTS) is None
+
+
+def test_light_that_no_force_changes_is_none():
+    """Gel on the face: a fault of its own, that needs all frames."""
+    wet = [replace(frame, counts=np.full((48, 64), 120, np.uint8)) for frame in ramp()]
+    assert ramp_outlier(wet, DARK_COUNTS) is None
 
 
 def test_dark_frames_are_not_judged():
