@@ -59,7 +59,7 @@ class Bands:
             at = min(max(mean, -1.0), 1.0)
             return Interval(max(-1.0, at - 2 * spread), min(1.0, at + 2 * spread), True)
         half_step = 1 / (GRID - 1)
-        low_end, high_end = max(-1.0, usual[0] - half_step), min(1.0, usual[-1] + half_step)
+        low_end, high_end = max(-1.0, float(usual[0]) - half_step), min(1.0, float(usual[-1]) + half_step)
         return Interval(low_end, high_end, high_end - low_end < 2)
 
     def bounds(self, truth: Array, spread: float) -> tuple[Array, Array]:

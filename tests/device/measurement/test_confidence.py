@@ -43,6 +43,12 @@ def test_an_interval_that_is_all_of_the_range_narrows_nothing_down():
     assert bands(-6.0, 6.0).interval(0.0, 0.25) == (-1.0, 1.0, False)
 
 
+@pytest.mark.parametrize("bound", [1.64, 6.0])
+def test_an_interval_is_made_of_what_json_knows(bound):
+    interval = bands(-bound, bound).interval(np.float64(0.2), np.float64(0.2))
+    assert [type(one) for one in interval] == [float, float, bool]
+
+
 def test_an_answer_unusual_for_every_truth_is_given_two_spreads_on_each_side():
     assert bands(5.0, 6.0).interval(1.0, 0.1)[:2] == pytest.approx((0.8, 1.0))
 
