@@ -30,7 +30,7 @@ run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCEN
 	@exec $(PY) -m device --simulate --port $(PORT) $(if $(SCENE),--scene $(SCENE))
 
 test: .venv/all.stamp ## run all tests
-	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadgroup
+	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadscope
 
 test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian chroot under build (root, 1.7 GB)
 	tests/libcamera/run.sh build/trixie

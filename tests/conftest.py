@@ -1,15 +1,14 @@
-"""Shared fixtures: the committed model and table, a recording of the simulated probe, and a running daemon.
-
-Run in parallel (`-n`), the tests of a file stay together, and those in which a virtual hand presses in real time are
-one group: two hands at once would each see frames come late.
-"""
+"""Shared fixtures: the committed model and table, a recording of the simulated probe, and a running daemon."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon
+from schedule import OneHand
+from xdist.remote import Producer
 
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.inversion import ModelBundle
@@ -20,15 +19,16 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.phantom import Protocol, phantom_recording
 
 MODELS = ROOT / "models"
-IN_REAL_TIME = "browser/", "device/test_modes", "device/test_scenarios", "test_press_to_result", "test_watchdog"
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put every test into the group of its file, or of all that run in real time."""
-    for item in items:
-        path = item.path.relative_to(ROOT / "tests").as_posix()
-        item.add_marker(pytest.mark.xdist_group("real time" if path.startswith(IN_REAL_TIME) else path))
+def pytest_xdist_auto_num_workers() -> int:
+    """Return the workers of `-n auto`: one of them mostly waits for a hand (tests/schedule.py)."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OneHand:
+    """Return what shares the tests out among the workers."""
+    return OneHand(config, log)
 
 
 @pytest.fixture(scope="session")
