@@ -20,11 +20,13 @@ from scipy.special import ive
 
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS
-from device.measurement.ring_means import RING_RADII_MM, RINGS
+from device.measurement.ring_means import RING_MM, RING_RADII_MM, RINGS
 
 Array = NDArray[np.float64]
 Rows = TypeVar("Rows", Array, NDArray[np.float32])
 LOADS = len(PROFILE_FORCES_N)
+CIRCLE_MM = RING_MM / 24
+"""Distance of the circles of which a ring is made."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +61,14 @@ class PressNoise:
 
 
 def light_ratio(rows: Rows) -> Rows:
-    """Return by how much a ratio of the light moves each column of rows [..., P]: 1 + contrast there, 1 elsewhere."""
+    """Return by how much a ratio of the light moves each column of rows [..., P]: 1 + contrast there, 1 in growth.
+
+    An offset is the first harmonic of the contrast, mean over the loads: what is seen there is the mean light's.
+    """
     light = np.ones_like(rows)
-    light[..., :CONTRAST_COLUMNS] += rows[..., :CONTRAST_COLUMNS]
+    contrast = rows[..., :CONTRAST_COLUMNS]
+    light[..., :CONTRAST_COLUMNS] += contrast
+    light[..., -OFFSET_COLUMNS:] += contrast.reshape(*rows.shape[:-1], LOADS, RINGS).mean(axis=-2)[..., 1:]
     return light
 
 
@@ -74,6 +81,7 @@ def drift_directions(rows: Rows) -> tuple[Rows, Rows]:
     light = light_ratio(rows)
     gain, zero = np.zeros_like(rows), np.zeros_like(rows)
     gain[..., :CONTRAST_COLUMNS] = light[..., :CONTRAST_COLUMNS]
+    gain[..., -OFFSET_COLUMNS:] = rows[..., -OFFSET_COLUMNS:]
     below = rows[..., CONTRAST_COLUMNS : CONTRAST_COLUMNS + GROWTH_COLUMNS]
     log_light = below.reshape(*rows.shape[:-1], LOADS - 1, RINGS)  # over that at the largest force, where it is 0
     slope_per_n = np.einsum("kl,...lj->...kj", _SLOPE_PER_N[:, :-1].astype(rows.dtype), log_light)
@@ -116,10 +124,19 @@ def smooth_ring_errors(levels: ErrorLevels, *, harmonic: int) -> tuple[Array, Ar
 
 
 def ring_correlation(length_mm: float, *, harmonic: int) -> Array:
-    """Return the correlation [J, J] of ring means (0) or first harmonics (1) of a smooth random field of variance 1.
+    """Return the covariance [J, J] of soft rings' means (0) or first harmonics (1) of a smooth field of variance 1.
 
-    The field's correlation is exp(-distance^2 / (2 length^2)); over the angle it averages to a Bessel function.
+    The field's correlation is exp(-distance^2 / (2 length^2)). A ring averages circles by their length and its weight:
+    neighbours differ by less than circles of their radii would, the innermost ones by more.
     """
-    r = RING_RADII_MM
-    mean = ive(harmonic, np.outer(r, r) / length_mm**2) * np.exp(-((r[:, None] - r) ** 2) / (2 * length_mm**2))
+    r: Array = CIRCLE_MM * (np.arange(round(RINGS * RING_MM / CIRCLE_MM), dtype=np.float64) + 0.5)
+    of_circle = np.maximum(1 - np.abs(r - RING_RADII_MM[:, None]) / RING_MM, 0) * r
+    of_circle /= of_circle.sum(axis=1, keepdims=True)
+    return np.asarray(of_circle @ circle_correlation(r, length_mm, harmonic=harmonic) @ of_circle.T)
+
+
+def circle_correlation(r_mm: Array, length_mm: float, *, harmonic: int) -> Array:
+    """Return the same [n, n] of circles of radii [n]: over the angle the correlation averages to a Bessel function."""
+    mean = ive(harmonic, np.outer(r_mm, r_mm) / length_mm**2)
+    mean *= np.exp(-((r_mm[:, None] - r_mm) ** 2) / (2 * length_mm**2))
     return np.asarray(mean * (1 if harmonic == 0 else 2))

@@ -7,6 +7,7 @@ from small_surrogate import COLUMNS, EXACT, white_noise
 from device.measurement.press_noise import (
     ErrorLevels,
     PressNoise,
+    circle_correlation,
     drift_directions,
     light_ratio,
     ring_correlation,
@@ -14,7 +15,8 @@ from device.measurement.press_noise import (
 )
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
-from device.measurement.ring_means import RING_RADII_MM, RINGS
+from device.measurement.ring_means import RING_MM, RING_RADII_MM, RINGS, ring_weights
+from device.measurement.tactile_image import PixelScale
 
 POWER = 0.8
 GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
@@ -42,8 +44,8 @@ def test_without_drift_and_smooth_errors_only_the_camera_is_left(row):
 
 @pytest.mark.parametrize("length_mm", [1.0, 2.5, 6.0])
 @pytest.mark.parametrize("harmonic", [0, 1])
-def test_the_correlation_of_rings_is_the_fields_averaged_over_both_angles(length_mm, harmonic):
-    """Rings are a(r) = mean of 2 f(r, angle) cos(angle), or without the 2 cos; trapezia are exact on a circle."""
+def test_the_correlation_of_circles_is_the_fields_averaged_over_both_angles(length_mm, harmonic):
+    """They are a(r) = mean of 2 f(r, angle) cos(angle), or without the 2 cos; trapezia are exact on a circle."""
     angle = 2 * np.pi * np.arange(256) / 256
     basis = np.ones_like(angle) if harmonic == 0 else 2 * np.cos(angle)
     x, y = np.multiply.outer(RING_RADII_MM, (np.cos(angle), np.sin(angle))).transpose(1, 0, 2)
@@ -52,7 +54,24 @@ def test_the_correlation_of_rings_is_the_fields_averaged_over_both_angles(length
         for j in range(RINGS):
             distance2 = np.subtract.outer(x[i], x[j]) ** 2 + np.subtract.outer(y[i], y[j]) ** 2
             expected[i, j] = basis @ np.exp(-distance2 / (2 * length_mm**2)) @ basis / len(angle) ** 2
-    np.testing.assert_allclose(ring_correlation(length_mm, harmonic=harmonic), expected, atol=1e-10)
+    found = circle_correlation(RING_RADII_MM, length_mm, harmonic=harmonic)
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("length_mm", [2.0, 3.0])
+@pytest.mark.parametrize("harmonic", [0, 1])
+def test_the_correlation_of_rings_is_that_of_what_the_profile_reads_of_a_smooth_field(length_mm, harmonic):
+    """The profile's own rings of every pixel's picture, times the field's correlation between any two pixels."""
+    scale = PixelScale(0.3, 0.3)
+    shape = 68, 68
+    x, y = (part.ravel() for part in np.broadcast_arrays(*scale.coordinates_mm(shape)))
+    rings, everywhere = ring_weights(shape, scale), np.ones(shape, bool)
+    pixels = [rings.means(one.reshape(shape), everywhere) for one in np.eye(x.size, dtype=np.float32)]
+    read = np.array([one.mean if harmonic == 0 else one.cosine[0] for one in pixels]).T
+    seen = np.hypot(x, y) < RINGS * RING_MM
+    distance2 = np.subtract.outer(x[seen], x[seen]) ** 2 + np.subtract.outer(y[seen], y[seen]) ** 2
+    expected = read[:, seen] @ np.exp(-distance2 / (2 * length_mm**2)) @ read[:, seen].T
+    np.testing.assert_allclose(ring_correlation(length_mm, harmonic=harmonic), expected, atol=0.01)
 
 
 def test_a_field_that_is_the_same_everywhere_moves_all_rings_and_no_harmonic():
@@ -60,19 +79,25 @@ def test_a_field_that_is_the_same_everywhere_moves_all_rings_and_no_harmonic():
     np.testing.assert_allclose(ring_correlation(1e5, harmonic=1), 0.0, atol=1e-7)
 
 
-def test_a_short_field_averages_out_along_a_ring_but_not_in_the_middle():
-    """Far above its length a ring of radius r holds some sqrt(2 pi) r / length patches of their own."""
+def test_a_short_field_averages_out_along_a_circle_but_not_in_the_middle():
+    """Far above its length a circle of radius r holds some sqrt(2 pi) r / length patches of their own."""
     length_mm = 0.05
-    variance = np.diag(ring_correlation(length_mm, harmonic=0))
+    variance = np.diag(circle_correlation(RING_RADII_MM, length_mm, harmonic=0))
     assert variance[0] == 1.0
     np.testing.assert_allclose(variance[1:], length_mm / (np.sqrt(2 * np.pi) * RING_RADII_MM[1:]), rtol=1e-3)
 
 
 def test_more_light_moves_a_contrast_by_the_light_that_is_there(row):
-    """(1 + g) (1 + c) - 1 = c + g (1 + c); growth and offset are ratios that it leaves."""
+    """(1 + g) (1 + c) - 1 = c + g (1 + c); growth is a ratio that it leaves, an offset a part of the contrast."""
     gain, _ = drift_directions(row)
     np.testing.assert_allclose(gain[:CONTRAST_COLUMNS], 1 + row[:CONTRAST_COLUMNS], rtol=1e-14)
-    np.testing.assert_array_equal(gain[CONTRAST_COLUMNS:], 0.0)
+    np.testing.assert_array_equal(gain[GROWTH], 0.0)
+    np.testing.assert_array_equal(gain[GROWTH.stop :], row[GROWTH.stop :])
+
+
+def test_an_offsets_light_is_the_mean_over_the_loads_at_its_ring(row):
+    contrast = row[:CONTRAST_COLUMNS].reshape(-1, RINGS)
+    np.testing.assert_allclose(light_ratio(row)[GROWTH.stop :], 1 + contrast.mean(axis=0)[1:], rtol=1e-14)
 
 
 def test_a_drift_of_the_cells_zero_looks_up_the_reference_at_another_force(row):
@@ -108,15 +133,16 @@ def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones
     flat = smooth_errors(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))
     model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
     np.testing.assert_array_equal(flat[first, second], flat[first, first])
-    assert flat[0, 0] == pytest.approx(1e-4)
+    assert flat[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().flat_field_mm, harmonic=0)[0, 0])
     np.testing.assert_array_equal(model[first, second], 0.0)
-    assert model[0, 0] == pytest.approx(1e-4)
+    assert model[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0])
 
 
 def test_growth_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
     model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
     middle = model[GROWTH, GROWTH][::RINGS, ::RINGS]
-    np.testing.assert_allclose(middle, 1e-4 * (np.eye(3) + 1), rtol=1e-12)
+    in_the_middle = ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0]
+    np.testing.assert_allclose(middle, 1e-4 * in_the_middle * (np.eye(3) + 1), rtol=1e-12)
 
 
 def test_smooth_errors_grow_with_the_light_they_are_a_ratio_of():
@@ -124,5 +150,6 @@ def test_smooth_errors_grow_with_the_light_they_are_a_ratio_of():
     camera = np.zeros((COLUMNS, COLUMNS))
     dark, bright = (PressNoise(camera, levels).covariance(np.full(COLUMNS, c)) for c in (0.0, 0.5))
     np.testing.assert_allclose(np.diag(bright)[:CONTRAST_COLUMNS], 2.25 * np.diag(dark)[:CONTRAST_COLUMNS], rtol=1e-12)
-    np.testing.assert_allclose(np.diag(bright)[CONTRAST_COLUMNS:], np.diag(dark)[CONTRAST_COLUMNS:], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[GROWTH], np.diag(dark)[GROWTH], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[GROWTH.stop :], 2.25 * np.diag(dark)[GROWTH.stop :], rtol=1e-12)
     assert np.diag(PressNoise(camera, EXACT).covariance(np.ones(COLUMNS))).max() == 0
