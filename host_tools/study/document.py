@@ -94,7 +94,7 @@ def _overview(chapters: Mapping[str, Timed]) -> Iterator[tuple[str, ...]]:
             yield chapter.title, "skipped", "", "", ""
             continue
         worst = max(chapter.benchmarks, key=_share)
-        nearest = f"{worst.quantity}: {worst.error:.1e} of {worst.bound:.2g}"
+        nearest = f"{worst.quantity}: {worst.error:.1e} of {worst.bound:.3g}"
         yield chapter.title, str(len(chapter.benchmarks)), nearest, f"{timed.seconds:.1f}", _word(chapter.passed)
 
 
@@ -135,7 +135,7 @@ def _chapter(chapter: Chapter) -> Iterator[str]:
 
 def _worst(benchmarks: Sequence[Benchmark]) -> str:
     worst = max(benchmarks, key=_share)
-    return f"the one nearest to its bound: {worst.case}, {worst.quantity}, {worst.error:.1e} of {worst.bound:.2g}"
+    return f"the one nearest to its bound: {worst.case}, {worst.quantity}, {worst.error:.1e} of {worst.bound:.3g}"
 
 
 BENCHMARK_HEADER = ("case", "quantity", "measured", "exact", "error", "bound", "")
@@ -144,7 +144,7 @@ BENCHMARK_HEADER = ("case", "quantity", "measured", "exact", "error", "bound", "
 def benchmark_row(benchmark: Benchmark) -> tuple[str, ...]:
     """Return a benchmark as the cells under `BENCHMARK_HEADER`."""
     exact = "" if benchmark.exact is None else f"{benchmark.exact:.6g}"
-    error, bound = f"{benchmark.error:.1e}", f"{benchmark.bound:.2g}"
+    error, bound = f"{benchmark.error:.1e}", f"{benchmark.bound:.3g}"
     return benchmark.case, benchmark.quantity, f"{benchmark.measured:.6g}", exact, error, bound, _word(benchmark.passed)
 
 
