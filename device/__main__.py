@@ -206,7 +206,8 @@ def _serve(options: argparse.Namespace) -> int:
         procedure.start()
         watchdog.start()
         try:
-            settings.keep()
+            if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
+                settings.keep()
             _run_server(procedure, listening)
         finally:
             try:

@@ -1,6 +1,7 @@
 """Puts the load cell together: its line, real or emulated, its two tares, and the recorder of force on top.
 
-A daemon whose probe is held while it starts has a recorder at fault, which tares once it is lifted.
+A daemon whose probe is held, or its cell unplugged, while it starts has a recorder at fault, which tares once it is
+lifted or plugged in.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ TARE_SAMPLES = 20
 
 
 def open_cell(config: Config, device: str) -> LoadCell:
-    """Open the line at a path by the settings' protocol; raise `UnpluggedCellError` when it is missing or in use."""
+    """Open the line at a path by the settings' protocol, or let the first read do so that finds it plugged in."""
     settings = config.cell
     return open_load_cell(device, settings.baud, settings.protocol, settings.station)
 

@@ -62,11 +62,22 @@ def test_the_unit_shuts_the_daemon_in(tmp_path):
     assert judged.returncode == 0, judged.stdout
 
 
-def service_of(path: Path) -> configparser.SectionProxy:
+def section_of(path: Path, name: str) -> configparser.SectionProxy:
     unit = configparser.RawConfigParser(strict=False)
     unit.optionxform = str
     unit.read(path)
-    return unit["Service"]
+    return unit[name]
+
+
+def service_of(path: Path) -> configparser.SectionProxy:
+    return section_of(path, "Service")
+
+
+@pytest.mark.parametrize("driver", ["usbserial", "cdc_acm"])
+def test_a_load_cell_that_is_plugged_in_later_finds_its_driver_loaded_before_the_daemon(driver):
+    unit = section_of(UNIT, "Unit")
+    assert f"modprobe@{driver}.service" in unit["Wants"].split()
+    assert f"modprobe@{driver}.service" in unit["After"].split()
 
 
 def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_end():

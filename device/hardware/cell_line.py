@@ -1,7 +1,7 @@
 """A serial port that may go and come back, to the lines that its amplifier sends.
 
-Nothing is kept across an unplugging: half a line from before must not be glued to the first one after. Each call opens
-the port once if it is closed, so how often that is tried is the caller's to say.
+The port need not be there yet. Nothing is kept across an unplugging: half a line from before must not be glued to the
+first one after. Each call opens the port once if it is closed, so how often that is tried is the caller's to say.
 Source: pyserial 3.5 (SerialException is an OSError; `in_waiting` of a port that is gone raises a plain OSError).
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import termios
 from collections.abc import Callable
+from contextlib import suppress
 
 import serial
 
@@ -51,10 +52,12 @@ class CellLine:
     """The serial line of a load cell's amplifier."""
 
     def __init__(self, name: str, open_port: Callable[[], serial.Serial], *, end: bytes = b"\n") -> None:
-        """Open the port; raise `UnpluggedCellError` when it is missing or in use. `end` ends a line."""
+        """Open the port; one that is missing or in use is for the next call to open. `end` ends a line."""
         self.name, self._open_port = name, open_port
         self._buffer = LineBuffer(end)
-        self._port: serial.Serial | None = self._opened()
+        self._port: serial.Serial | None = None
+        with suppress(UnpluggedCellError):
+            self._port = self._opened()
 
     @property
     def dropped_lines(self) -> int:
@@ -64,7 +67,7 @@ class CellLine:
     def receive(self) -> list[bytes]:
         """Return the lines that have become complete, waiting at most `POLL_S` for a byte.
 
-        Raises `UnpluggedCellError` when the port is gone; the next call then tries to open it again.
+        Raises `UnpluggedCellError` when the port is missing, in use or gone; the next call then tries to open it again.
         """
         port = self._port = self._port or self._opened()
         try:

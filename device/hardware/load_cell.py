@@ -15,7 +15,7 @@ from device.measurement.quantities import Bound, require
 
 
 def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", station: int = 1) -> LoadCell:
-    """Open the serial port for this program alone; raise `UnpluggedCellError` when it is missing or in use.
+    """Open the serial port for this program alone, or let the first read do so that finds it plugged in.
 
     `protocol` is "openscale" or "mantracourt"; only the latter has a `station`.
     """

@@ -1,7 +1,7 @@
 """The load cell's stream to force over time: newtons on the one clock, interpolated to when a frame was exposed.
 
-One thread owns the serial line. It first takes the tare, again and again while that fails, as when the probe is held. A
-silent, unplugged or overloaded cell is a fault that is kept until samples come that it can bear.
+One thread owns the serial line. It first takes the tare, again and again while that fails, as when the probe is held or
+its cell unplugged. A silent, unplugged or overloaded cell is a fault that is kept until samples come that it can bear.
 """
 
 from __future__ import annotations

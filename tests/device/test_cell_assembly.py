@@ -1,14 +1,18 @@
 """The load cell of the simulated probe: its tares, that of commissioning and that of this start, on either protocol."""
 
+import threading
 from dataclasses import replace
 
 import pytest
 
 from device.assembly import open_simulated_probe
+from device.cell_assembly import open_cell, tared_once_lifted
 from device.config import simulated_config
-from device.errors import ZeroShiftError
+from device.errors import UnpluggedCellError, ZeroShiftError
 from device.opened_parts import StartFailed
 from device.phantom_assembly import open_phantom_press
+from device.simulation.emulated_amplifier import EmulatedBridge
+from device.simulation.openscale_line import EmulatedOpenScale
 from device.simulation.scenario import CellSettings, Scenario
 
 
@@ -50,3 +54,23 @@ def test_a_zero_far_from_that_of_commissioning_keeps_a_phantom_from_being_record
 def test_a_zero_near_that_of_commissioning_is_the_zero_of_force(opened, protocol):
     """Twenty readings of 40 counts' noise: the tare is good to 0.1 mN, and the force read to 0.4 mN."""
     assert abs(opened(20_000.0, protocol=protocol).bench.force.latest_n) < 0.004
+
+
+def test_a_cell_that_is_plugged_in_after_the_start_is_tared_then(tmp_path):
+    """The path is a link, as udev's is: it comes with the amplifier."""
+    bridge = EmulatedBridge(lambda _t_s: 20_000.0, noise_counts=40.0, seed=1)
+    amplifier = EmulatedOpenScale(bridge)
+    path = tmp_path / "force"
+    config = simulated_config()
+    recorder = tared_once_lifted(config, open_cell(config, str(path)))
+    try:
+        for asked in (lambda: recorder.latest_n, lambda: recorder.zero_shift_n):
+            with pytest.raises(UnpluggedCellError, match=f"{path} cannot be opened"):
+                asked()
+        path.symlink_to(amplifier.device_path)
+        waiting = threading.Event()
+        assert any(recorder.fault is None or waiting.wait(0.01) for _ in range(2000))
+        assert abs(recorder.latest_n) < 0.004
+    finally:
+        recorder.close()
+        amplifier.close()

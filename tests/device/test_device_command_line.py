@@ -246,6 +246,16 @@ def test_settings_with_which_the_probe_did_not_start_are_not_kept_as_good(run, m
     assert not (tmp_path / "var" / NAME).exists()
 
 
+def test_a_probe_without_its_load_cell_is_served_at_fault_and_its_settings_are_not_kept_as_good(
+    run, models, started, tmp_path
+):
+    """`cell.device` may be what is wrong."""
+    (tmp_path / "scene.toml").write_text('[[faults]]\nkind = "cell_unplugged"\n')
+    assert run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")[0] == 0
+    assert [[fault["code"] for fault in status["faults"]] for status in started] == [["E304"]]
+    assert not (tmp_path / "var" / NAME).exists()
+
+
 def test_without_a_settings_file_the_simulated_probe_keeps_none(run, started, tmp_path):
     assert run("--simulate", "--port", 0)[0] == 0
     assert not (tmp_path / "var" / NAME).exists()

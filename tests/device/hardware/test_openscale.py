@@ -231,12 +231,21 @@ def test_nothing_is_ever_sent_to_the_amplifier(line):
 
 def test_a_second_program_cannot_open_the_same_port(line):
     with pytest.raises(LoadCellError, match="cannot be opened"):
-        open_load_cell(line.path)
+        open_load_cell(line.path).read(timeout_s=0.5)
 
 
-def test_a_missing_port_is_a_load_cell_error_naming_it():
-    with pytest.raises(LoadCellError, match="/dev/no-such-port cannot be opened"):
-        open_load_cell("/dev/no-such-port")
+def test_a_missing_port_is_a_load_cell_error_naming_it_until_it_is_plugged_in(line, tmp_path):
+    link = tmp_path / "force"
+    cell = open_load_cell(str(link))
+    for _ in range(2):
+        with pytest.raises(UnpluggedCellError, match=f"{link} cannot be opened"):
+            cell.read(timeout_s=0.5)
+    line.cell.close()
+    link.symlink_to(line.path)
+    assert reads_again(cell)
+    line.send(b"8,0.5,kg,9,\r\n")
+    assert read_counts(cell, 1) == [9.0]
+    cell.close()
 
 
 def test_both_ends_of_24_bit_are_readings():
