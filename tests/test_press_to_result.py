@@ -122,13 +122,21 @@ def test_bad_requests_are_problem_documents_with_a_remedy(daemon, path, method, 
     assert answer.json["remedy"]
 
 
-def test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so(daemon):
+def test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so(daemon):
     first = daemon.ask("/api/v1/presses", "POST", {})
-    second = daemon.ask("/api/v1/presses", "POST", {})
-    assert second.status == 409
-    assert second.json["code"] == "E801"
+    second, tare = daemon.ask("/api/v1/presses", "POST", {}), daemon.ask("/api/v1/tare", "POST")
+    for refused in (second, tare):
+        assert (refused.status, refused.json["code"]) == (409, "E801")
     assert daemon.ask(first.headers["location"], "DELETE").status == 202
     assert daemon.ended(first.headers["location"])["state"] == "cancelled"
+
+
+def test_a_probe_that_runs_is_tared_and_presses_on(daemon):
+    """Twenty readings of 40 counts' noise, twice: 0.1 mN."""
+    tare = daemon.ask("/api/v1/tare", "POST")
+    assert (tare.status, set(tare.json)) == (200, {"moved_n", "zero_shift_n"})
+    assert abs(tare.json["moved_n"]) < 0.001
+    assert daemon.press()["state"] == "done"
 
 
 def test_a_press_that_is_too_hard_is_rejected_with_both_numbers(tmp_path):

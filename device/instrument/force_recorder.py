@@ -2,6 +2,7 @@
 
 One thread owns the serial line. It first takes the tare, again and again while that fails, as when the probe is held or
 its cell unplugged. A silent, unplugged or overloaded cell is a fault that is kept until samples come that it can bear.
+What is kept are counts: they become newtons when they are asked for, by the tare of then.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from device.errors import LoadCellError, OverloadedCellError
-from device.hardware.interfaces import CellSample, ForceScale, LoadCell, Newtons
+from device.hardware.interfaces import CellCounts, CellSample, ForceScale, LoadCell, Newtons
 from device.instrument.load_limit import LoadLimit
 from device.instrument.progress import ProgressBoard
 
@@ -50,7 +51,7 @@ class ForceRecorder:
         self._cell, self._tare = cell, tare
         self._zero: Zero | None = None
         self._timeout_s = FIRST_SAMPLE_S
-        self._samples: deque[tuple[float, Newtons]] = deque(maxlen=KEPT_SAMPLES)
+        self._samples: deque[tuple[float, CellCounts]] = deque(maxlen=KEPT_SAMPLES)
         self._news, self._stopping = threading.Condition(), threading.Event()
         self.fault: LoadCellError | None = None
         self._progress = progress or ProgressBoard()
@@ -64,7 +65,8 @@ class ForceRecorder:
         while not self._stopping.is_set():
             try:
                 self._zero = self._zero or self._tare(self._read)
-                self._record(*self._zero)
+                _, limit = self._zero
+                self._record(limit)
             except OverloadedCellError as error:
                 self._fail(error)  # and the next sample at once: those behind it must not grow old
             except LoadCellError as error:
@@ -79,11 +81,11 @@ class ForceRecorder:
         with self._progress.inside("force"):
             return self._cell.read(timeout_s=timeout_s)
 
-    def _record(self, scale: ForceScale, limit: LoadLimit) -> None:
+    def _record(self, limit: LoadLimit) -> None:
         sample = self._read()
         limit.require_bearable(sample.counts)
         with self._news:
-            self._samples.append((sample.t_s, scale.newtons(sample.counts)))
+            self._samples.append((sample.t_s, sample.counts))
             self.fault = None
             self._news.notify_all()
 
@@ -92,13 +94,44 @@ class ForceRecorder:
             self.fault = error
             self._news.notify_all()
 
+    def retare(self) -> Newtons:
+        """Take the tare anew, of samples from now on; return by how much (N) the zero has moved.
+
+        Raises the `LoadCellError` that forbids it, or that the cell is at fault by: then the zero is what it was. How
+        far it may go counts from that of commissioning, without which the first tare of this start stands in.
+        """
+        with self._news:
+            if self.fault:
+                raise self.fault
+            before, limit = self._tared()
+            scale, _ = self._tare(self._next)
+            limit.require_tare(scale.tare_counts)
+            self._zero = scale, limit
+        return before.newtons(scale.tare_counts)
+
+    def _next(self) -> CellSample:
+        """Return the next sample that is recorded; raise the `LoadCellError` that comes instead."""
+        with self._news:
+            if not self._news.wait(SILENCE_S) or self.fault:
+                raise self.fault or _no_sample(SILENCE_S)
+            return CellSample(*self._samples[-1])
+
+    def _tared(self) -> Zero:
+        if self._zero is None:
+            raise self.fault or LoadCellError("The load cell is not tared.", "Lift the probe.")
+        return self._zero
+
+    def _newtons(self, counts: CellCounts) -> Newtons:
+        scale, _ = self._tared()
+        return scale.newtons(counts)
+
     @property
     def latest_n(self) -> Newtons:
         """Return the newest force; raise `LoadCellError` when the cell is at fault."""
         with self._news:
             if self.fault:
                 raise self.fault
-            return self._samples[-1][1]
+            return self._newtons(self._samples[-1][1])
 
     def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> Newtons:
         """Return the force at a time on the monotonic clock, waiting until a later sample has come.
@@ -109,33 +142,29 @@ class ForceRecorder:
         with self._news:
             while not self._samples or self._samples[-1][0] < t_s:
                 if not self._news.wait(max(0.0, deadline_s - time.monotonic())) and time.monotonic() >= deadline_s:
-                    raise self.fault or LoadCellError(
-                        f"The load cell gave no sample for {timeout_s:g} s.", "Check its cable and its power."
-                    )
-            times, forces = np.array(self._samples).T
+                    raise self.fault or _no_sample(timeout_s)
+            times, counts = np.array(self._samples).T
         if t_s < times[0]:
             raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
-        return Newtons(float(np.interp(t_s, times, forces)))
+        return self._newtons(CellCounts(float(np.interp(t_s, times, counts))))
 
     def mean_n(self, *, window_s: float) -> Newtons:
         """Return the mean force of the last seconds, as far as they are known; raises as `latest_n` does."""
         newest_n, now_s = self.latest_n, time.monotonic()
         with self._news:
-            inside = [force for t, force in self._samples if now_s - window_s <= t]
+            inside = [self._newtons(counts) for t, counts in self._samples if now_s - window_s <= t]
         return Newtons(sum(inside) / len(inside)) if inside else newest_n
 
     @property
     def zero_shift_n(self) -> Newtons:
-        """Return how far the tare of this start is from that of commissioning; raises the fault until it is taken."""
-        if self._zero is None:
-            raise self.fault or LoadCellError("The load cell is not tared.", "Lift the probe.")
-        scale, limit = self._zero
+        """Return how far the tare of now is from that of commissioning; raises the fault until it is taken."""
+        scale, limit = self._tared()
         return limit.commissioned.newtons(scale.tare_counts)
 
     def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
         """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""
         with self._news:
-            inside = [(t - t_s, force) for t, force in self._samples if t_s - window_s <= t <= t_s]
+            inside = [(t - t_s, self._newtons(counts)) for t, counts in self._samples if t_s - window_s <= t <= t_s]
         return force_range_n(inside, around_line=around_line) if inside else Newtons(float("inf"))
 
     def peak_n(self, since_s: float, t_s: float) -> Newtons:
@@ -145,10 +174,14 @@ class ForceRecorder:
         """
         at_the_end = self.at(t_s)
         with self._news:
-            return max([at_the_end, *(force for t, force in self._samples if since_s < t <= t_s)])
+            return max([at_the_end, *(self._newtons(counts) for t, counts in self._samples if since_s < t <= t_s)])
 
     def close(self) -> None:
         """Stop the thread and release the cell."""
         self._stopping.set()
         self._thread.join(timeout=2 * SILENCE_S)
         self._cell.close()
+
+
+def _no_sample(waited_s: float) -> LoadCellError:
+    return LoadCellError(f"The load cell gave no sample for {waited_s:g} s.", "Check its cable and its power.")

@@ -22,7 +22,7 @@ class LoadLimit:
     max_drift_n: float
 
     def require_tare(self, tare_counts: CellCounts) -> None:
-        """Raise `ZeroShiftError` when the tare of this start is too far from that of commissioning."""
+        """Raise `ZeroShiftError` when a tare is too far from that of commissioning."""
         drift_n = self.commissioned.newtons(tare_counts)
         if abs(drift_n) > self.max_drift_n:
             raise ZeroShiftError(

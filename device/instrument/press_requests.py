@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import threading
 import uuid
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 
 from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
 from device.instrument.status import PressJob, StatusBoard
@@ -21,10 +21,21 @@ class PressRequests:
     """At most one press that waits; none while another is under way."""
 
     def __init__(
-        self, board: StatusBoard, store: Store, *, modes: tuple[Mode, ...], mode: Mode, cancelled: threading.Event
+        self,
+        board: StatusBoard,
+        store: Store,
+        *,
+        modes: tuple[Mode, ...],
+        mode: Mode,
+        cancelled: threading.Event,
+        called_away: threading.Event,
     ) -> None:
-        """Take `modes`, those that the probe has, `mode`, that of a press unless asked otherwise, and what ends one."""
-        self._board, self._store, self._modes, self._mode, self._cancelled = board, store, modes, mode, cancelled
+        """Take `modes`, those that the probe has, `mode`, that of a press unless asked otherwise, and what ends one.
+
+        None begins while something else is to be done first: `called_away`.
+        """
+        self._board, self._store, self._modes, self._mode = board, store, modes, mode
+        self._cancelled, self._called_away = cancelled, called_away
         self._waiting: PressJob | None = None
         self._listeners: list[Callable[[Mode], None]] = []
         self._lock = threading.Lock()
@@ -47,10 +58,7 @@ class PressRequests:
             status = self._board.now
             if status.hindrance:
                 raise status.hindrance
-            if self._waiting or (status.press and status.press.state not in ENDED):
-                raise BusyError("A press is already under way.", "Wait until it has ended, or cancel it.")
-            if status.self_test and status.self_test.is_under_way:
-                raise BusyError("The self-test is under way.", "Wait until it has ended.")
+            self._require_idle()
             job = self._new_job(mode)
             self._store.save_press(job.as_record())
             self._waiting = job
@@ -68,6 +76,20 @@ class PressRequests:
                 raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
             self._cancelled.set()
 
+    @contextmanager
+    def idle(self) -> Iterator[None]:
+        """While it is held no press begins; raises `BusyError` when a press or the self-test is under way."""
+        with self._lock:
+            self._require_idle()
+            yield
+
+    def _require_idle(self) -> None:
+        status = self._board.now
+        if self._waiting or (status.press and status.press.state not in ENDED):
+            raise BusyError("A press is under way.", "Wait until it has ended, or cancel it.")
+        if status.self_test and status.self_test.is_under_way:
+            raise BusyError("The self-test is under way.", "Wait until it has ended.")
+
     @property
     def deciding(self) -> AbstractContextManager[bool]:
         """While it is held, nobody cancels: for the step after which a press can no longer be cancelled."""
@@ -81,7 +103,7 @@ class PressRequests:
     def begin(self, *, is_touched: bool) -> PressJob | None:
         """Put the press that was asked for, or that the touched probe begins, on the board and return it."""
         with self._lock:
-            if not (self._waiting or is_touched):
+            if self._called_away.is_set() or not (self._waiting or is_touched):
                 return None
             job, self._waiting = self._waiting or self._new_job(self._mode), None
             self._board.update(press=job, warnings=self._warnings_since_last_press())

@@ -14,7 +14,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from device.config import Config
-from device.errors import BusyError, DeviceError, LightError, NoContrastError
+from device.errors import DeviceError, LightError, NoContrastError
+from device.hardware.interfaces import Newtons
 from device.instrument.bench import DARK, Bench
 from device.instrument.brightness_loop import BrightnessLoop
 from device.instrument.calibration_watch import CalibrationWatch
@@ -34,7 +35,7 @@ from device.instrument.status import PressJob, StatusBoard
 from device.measurement.mode import Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.tactile_image import Frame
-from device.records.store import ENDED, Store
+from device.records.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -74,7 +75,12 @@ class Procedure:
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
-            self.board, store, modes=modes, mode=config.press.mode, cancelled=self._capture.cancelled
+            self.board,
+            store,
+            modes=modes,
+            mode=config.press.mode,
+            cancelled=self._capture.cancelled,
+            called_away=self._capture.called_away,
         )
         self._book = PressBook(self.board, store, bench.budget)
         self.progress.exercise("storage", self._look_at_disk)
@@ -115,6 +121,18 @@ class Procedure:
         """Cancel the press under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
 
+    def tare(self) -> Newtons:
+        """Take the load cell's tare anew while nothing touches the probe; return by how much (N) the zero has moved.
+
+        Raises `BusyError` while a press or a self-test is under way, and the `LoadCellError` that forbids the tare,
+        such as `ZeroShiftError` under load: then the zero is what it was.
+        """
+        with self._requests.idle():
+            moved_n = self.bench.force.retare()
+            self._capture.called_away.set()  # the unloaded frames were taken by the zero of before
+        log.info("tared by request: the zero has moved by %+.4f N", moved_n)
+        return moved_n
+
     def request_self_test(self, *, on_block: bool = False, weight_n: float | None = None) -> SelfTestJob:
         """Ask for a self-test, with the probe held on the reference block and with a known weight (N) if given.
 
@@ -124,10 +142,8 @@ class Procedure:
         if weight_n is not None:
             bound = Bound(2 * self.config.press.contact_n, self.config.cell.max_load_n, "N")
             require("weight_n", weight_n, bound, "take another weight")
-        press = self.board.now.press
-        if self._requests.is_waiting or (press and press.state not in ENDED):
-            raise BusyError("A press is under way.", "Wait until it has ended, or cancel it.")
-        return self._self_tests.ask(on_block=on_block, weight_n=weight_n)
+        with self._requests.idle():
+            return self._self_tests.ask(on_block=on_block, weight_n=weight_n)
 
     @property
     def self_test(self) -> SelfTestJob:
@@ -143,6 +159,7 @@ class Procedure:
 
     def _run_presses(self) -> None:
         while not self._capture.stopping.is_set():
+            self._capture.called_away.clear()
             try:
                 self._self_tests.run_if_asked()
                 self._one_press()

@@ -23,7 +23,7 @@ from device.records.store import Store
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
-from device.web.schema import PROBLEM, Press, SelfTest, Status, answers
+from device.web.schema import PROBLEM, Press, SelfTest, Status, Tare, answers
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -61,6 +61,7 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
     _add_presses(app, procedure, store)
     _add_measurements(app, store)
     _add_self_test(app, procedure)
+    _add_tare(app, procedure)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)
@@ -178,6 +179,14 @@ def _add_self_test(app: FastAPI, procedure: Procedure) -> None:
     def self_test() -> dict[str, Any]:
         """Return the self-test under way, or the last one."""
         return record(procedure.self_test)
+
+
+def _add_tare(app: FastAPI, procedure: Procedure) -> None:
+    @app.post(f"{API}/tare", responses=answers(200, Tare))
+    def tare() -> dict[str, float]:
+        """Take the load cell's tare anew, with the probe held free; refused when it is held, pressed or at fault."""
+        moved_n = procedure.tare()
+        return {"moved_n": round(moved_n, 4), "zero_shift_n": round(procedure.bench.force.zero_shift_n, 4)}
 
 
 def _zipped(folder: Path) -> bytes:

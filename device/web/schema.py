@@ -96,6 +96,13 @@ class SelfTestSummary(_Body):
     checks: int
 
 
+class Tare(_Body):
+    """A tare that was taken: by how much the zero of force has moved, and how far it is from that of commissioning."""
+
+    moved_n: float
+    zero_shift_n: float
+
+
 class GuidanceLine(_Body):
     """What the operator should do now."""
 

@@ -189,6 +189,19 @@ def test_a_fault_takes_the_view_with_its_code_and_title(page: Page, tmp_path: Pa
     daemon.stop()
 
 
+def test_the_operator_tares_between_presses_and_reads_what_came_of_it(page: Page, tmp_path: Path):
+    daemon = Daemon(tmp_path, "[hand]\nreaction_s = 1.0\n")
+    page.goto(daemon.url)
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    page.locator("#tare").click()
+    expect(page.locator("#status-line")).to_contain_text("Tared. The zero has moved by")
+    _require_fits(page)
+    page.locator("#press-button").click()
+    expect(page.locator("#press-button")).to_have_text("Cancel")
+    expect(page.locator("#tare")).to_be_disabled()
+    daemon.stop()
+
+
 def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page, tmp_path: Path):
     """Two swapped plugs: the page says what to do, then names both, before all that is well."""
     scene = '[[faults]]\nkind = "led_swapped"\nside = "+x"\nother_side = "-x"\n[hand]\nreaction_s = 1.0\n'

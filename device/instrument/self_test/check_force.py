@@ -11,8 +11,8 @@ WEIGHT_TOLERANCE_RATIO = 0.02
 
 
 def rest_results(force_n: float, zero_shift_n: float, max_rest_n: float, max_shift_n: float) -> list[Result]:
-    """Return the zero of the free probe: from this start's tare, and from that of commissioning (N)."""
-    free = "Hold the probe free and repeat the test; if it stays, start the daemon again, which tares."
+    """Return the zero of the free probe: from the last tare, and from that of commissioning (N)."""
+    free = "Hold the probe free and repeat the test; if it stays, tare."
     moved = "Hold the probe free and start again; if it stays, have the load cell checked and commissioned anew."
     rest, shift = Bound(-max_rest_n, max_rest_n, "N"), Bound(-max_shift_n, max_shift_n, "N")
     return [

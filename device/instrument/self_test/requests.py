@@ -45,11 +45,11 @@ class SelfTestRequests:
 
     def run_if_asked(self) -> None:
         """Run the self-test that was asked for, if there is one; on the procedure's thread."""
-        if not self._asked.is_set():
+        job = self._board.now.self_test
+        if job is None or job.state != "waiting":
             return
-        self._asked.clear()
         self._board.update(step="self_test", guidance=Guidance.WAIT)
-        job = replace(self.last, state="running")
+        job = replace(job, state="running")
         end: SelfTestState = "failed"
         try:
             for results in self._test.results(job):

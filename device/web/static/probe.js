@@ -56,6 +56,10 @@ export const startPress = (mode) => ask("POST", "/presses", JSON.stringify(mode 
 export const cancelPress = (id) => ask("DELETE", `/presses/${encodeURIComponent(id)}`);
 export const imageUrl = (id) => `${API}/measurements/${encodeURIComponent(id)}/image.png`;
 
+export async function takeTare() {
+  return (await ask("POST", "/tare")).json();
+}
+
 export const startSelfTest = (wanted) => ask("POST", "/self-test", JSON.stringify(wanted));
 
 export async function fetchSelfTest() {

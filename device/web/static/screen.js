@@ -4,7 +4,7 @@
 import { byId, element, setAttribute, setText } from "./dom.js";
 import { showGauge } from "./gauge.js";
 import { chosenMode, offerModes, showModes } from "./modes.js";
-import { cancelPress, fetchDevice, fetchMeasurement, followStatus, startPress } from "./probe.js";
+import { cancelPress, fetchDevice, fetchMeasurement, followStatus, startPress, takeTare } from "./probe.js";
 import { describeEstimate, showMeasurement } from "./result.js";
 import { showSelfTest } from "./self_test.js";
 
@@ -33,15 +33,18 @@ const RAMP_HINTS = {
 const PRESS_WORDS = { rejected: "Rejected.", cancelled: "Cancelled.", failed: "Failed." };
 const LONG_INSTRUCTION = 40; // characters; more would need a third line
 const RELOAD_MS = 1000;
+const TOLD_MS = 5000;
 
 const panel = byId("panel");
 const button = byId("press-button");
+const tareButton = byId("tare");
 let status = null;
 let measurement = null;
 let offersAreKnown = false;
 let loading = false;
 let sending = false;
 let problem = "";
+let tared = "";
 let faultsShown = "";
 
 const pressUnderWay = () => UNDER_WAY.has(status?.press?.state);
@@ -80,6 +83,7 @@ function describeStatus() {
   const hint = (status.kind === "ramp" && RAMP_HINTS[status.step]) || (STEP_HINTS[status.step] ?? "");
   const pressWord = PRESS_WORDS[status.press?.state];
   if (problem) return { word: "Not done.", reason: problem, tone: "caution" };
+  if (tared) return { word: "Tared.", reason: tared, tone: "good" };
   if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
   if (resultShown()) return describeEstimate(measurement.estimate);
   return { word: "", reason: hint, tone: "calm" };
@@ -129,6 +133,7 @@ function showButton() {
   setText(button, pressUnderWay() ? "Cancel" : start);
   button.classList.toggle("button-cancel", pressUnderWay());
   button.disabled = sending || status.step === "starting" || status.step === "self_test";
+  tareButton.disabled = sending || pressUnderWay() || status.step === "self_test";
 }
 
 function show() {
@@ -186,24 +191,35 @@ function showConnection(lost) {
 function receive(next) {
   // After an update of the probe, the page that is already open must not stay the old one.
   if (status && status.software !== next.software) location.reload();
-  if (status && status.step !== next.step) problem = "";
+  if (status && status.step !== next.step) problem = tared = "";
   status = next;
   showConnection(false);
   loadWhatIsMissing();
   show();
 }
 
-button.addEventListener("click", async () => {
+/** Send one command at a time; a refusal takes the place of what was said of the one before. */
+async function send(command) {
   sending = true;
-  problem = "";
-  button.disabled = true;
+  problem = tared = "";
+  button.disabled = tareButton.disabled = true;
   try {
-    await (pressUnderWay() ? cancelPress(status.press.id) : startPress(chosenMode()));
+    await command();
   } catch (error) {
     problem = error.message;
   } finally {
     sending = false;
   }
+}
+
+button.addEventListener("click", () => {
+  send(() => (pressUnderWay() ? cancelPress(status.press.id) : startPress(chosenMode())));
+});
+tareButton.addEventListener("click", () => {
+  send(async () => {
+    tared = `The zero has moved by ${(await takeTare()).moved_n.toFixed(3)} N.`;
+    setTimeout(() => { tared = ""; }, TOLD_MS);
+  });
 });
 
 followStatus(receive, () => showConnection(true));

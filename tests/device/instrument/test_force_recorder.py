@@ -1,5 +1,6 @@
 """Force over time, from a cell whose samples are written down here: 1000 counts are 1 N, 500 counts are no load."""
 
+import itertools
 import math
 import threading
 from queue import Empty, Queue
@@ -257,3 +258,80 @@ def test_the_history_does_not_grow_beyond_its_bound(cell, recorder):
     cell.say(*[(5.0 + k / 100, 500.0) for k in range(2 * force_recorder.KEPT_SAMPLES)])
     recorder.at(5.0 + (2 * force_recorder.KEPT_SAMPLES - 1) / 100)
     assert len(recorder._samples) == force_recorder.KEPT_SAMPLES
+
+
+def tare_of_two(read):
+    """The mean of two readings, of a probe that is held when it is above 1000 counts."""
+    counts = sum(read().counts for _ in range(2)) / 2
+    if counts > 1000.0:
+        raise HELD
+    return ForceScale(1000.0, counts), LoadLimit(ForceScale(1000.0, counts), max_load_n=5.0, max_drift_n=1.0)
+
+
+@pytest.fixture
+def first_tared():
+    """A recorder whose first tare is 500 counts; with it, how to ask for another while the cell goes on saying some."""
+    cell, times_s = ScriptedCell(*((t_s, 500.0) for t_s in (0.0, 0.5, 1.0))), itertools.count(2.0, 0.01)
+    recorder = ForceRecorder(cell, tare_of_two)
+
+    def retared(counts):
+        is_done = threading.Event()
+
+        def go_on():
+            while not is_done.wait(0.005):
+                cell.say((next(times_s), counts))
+
+        speaker = threading.Thread(target=go_on)
+        speaker.start()
+        try:
+            return recorder.retare()
+        finally:
+            is_done.set()
+            speaker.join()
+
+    yield recorder, cell, retared
+    cell.say(UNPLUGGED)
+    recorder.close()
+
+
+def test_a_tare_that_is_taken_anew_holds_for_what_was_recorded_before_it_too(first_tared):
+    """No step in the history: a press that begins now must not see the drift as a change of force."""
+    recorder, cell, retared = first_tared
+    assert recorder.at(1.0) == pytest.approx(0.0)
+    assert retared(550.0) == pytest.approx(0.05)
+    cell.say((1000.0, 1550.0))
+    assert recorder.at(1000.0) == pytest.approx(1.0)
+    assert recorder.at(1.0) == pytest.approx(-0.05)
+    assert recorder.range_n(1000.0, window_s=999.0) == pytest.approx(1.05)
+    assert recorder.zero_shift_n == pytest.approx(0.05)
+
+
+def test_a_tare_of_a_held_probe_is_refused_and_the_zero_is_what_it_was(first_tared):
+    recorder, _, retared = first_tared
+    with pytest.raises(ZeroShiftError):
+        retared(2500.0)
+    assert recorder.latest_n == pytest.approx(2.0)
+
+
+def test_tares_one_after_the_other_do_not_carry_the_zero_further_than_one_may(first_tared):
+    """Without a tare of commissioning the first one of the start counts: once 0.6 N is borne, twice is too much."""
+    recorder, _, retared = first_tared
+    assert retared(-100.0) == pytest.approx(-0.6)
+    with pytest.raises(ZeroShiftError, match=r"-1\.20 N from the 500 of commissioning"):
+        retared(-700.0)
+    assert recorder.zero_shift_n == pytest.approx(-0.6)
+
+
+def test_a_cell_at_fault_is_not_tared(first_tared):
+    recorder, cell, _ = first_tared
+    cell.say(UNPLUGGED)
+    assert reached(lambda: recorder.fault)
+    with pytest.raises(LoadCellError, match="The cell is gone"):
+        recorder.retare()
+
+
+def test_a_cell_that_falls_silent_while_it_is_tared_is_told(first_tared, monkeypatch):
+    recorder, _, _ = first_tared
+    monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
+    with pytest.raises(LoadCellError):
+        recorder.retare()

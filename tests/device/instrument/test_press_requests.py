@@ -30,8 +30,15 @@ def store(tmp_path):
 
 
 @pytest.fixture
-def requests(board, store, cancelled):
-    return PressRequests(board, store, modes=("paper", "quick"), mode="paper", cancelled=cancelled)
+def called_away():
+    return threading.Event()
+
+
+@pytest.fixture
+def requests(board, store, cancelled, called_away):
+    return PressRequests(
+        board, store, modes=("paper", "quick"), mode="paper", cancelled=cancelled, called_away=called_away
+    )
 
 
 def test_a_press_that_was_asked_for_waits_in_the_store_and_begins_untouched(requests, board, store):
@@ -108,3 +115,21 @@ def test_a_press_is_refused_while_a_self_test_waits_or_runs_and_taken_after_it(r
             requests.ask(None)
     board.update(self_test=SelfTestJob("s", "2026-01-01T00:00:00Z", state="done"))
     assert requests.ask(None).state == "waiting"
+
+
+def test_no_press_begins_while_something_else_is_to_be_done_first(requests, called_away):
+    job = requests.ask(None)
+    called_away.set()
+    assert requests.begin(is_touched=True) is None
+    called_away.clear()
+    assert requests.begin(is_touched=False) == job
+
+
+def test_what_needs_an_idle_probe_is_refused_while_a_press_waits_or_is_under_way(requests):
+    with requests.idle():
+        pass
+    requests.ask(None)
+    for _ in range(2):
+        with pytest.raises(BusyError, match="A press is under way"), requests.idle():
+            pass
+        requests.begin(is_touched=False)

@@ -20,6 +20,7 @@ from device.errors import (
     ModeUnavailable,
     StorageError,
     UnknownResource,
+    ZeroShiftError,
 )
 from device.instrument import procedure as procedure_module
 from device.instrument.calibration_watch import CalibrationWatch
@@ -31,6 +32,7 @@ from device.instrument.progress import ProgressBoard
 from device.instrument.self_test.result import Result
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording_file import read_recording
 from device.measurement.tactile_image import Frame
 from device.measurement.untouched_face import UntouchedFace
 from device.measurement.validity import Validity
@@ -51,13 +53,17 @@ class ObedientBench:
 
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
-        self.is_at_work = self.is_closed = False
+        self.is_at_work, self.is_closed, self.zero_n = False, False, 0.0
         self.budget, self.progress = LightBudget(), ProgressBoard()
 
     @property
     def latest_n(self):
         told_to_press = self.board.now.guidance.code.startswith(("press", "hold"))
-        return 0.5 if self.is_at_work and told_to_press else 0.0
+        return self.zero_n + (0.5 if self.is_at_work and told_to_press else 0.0)
+
+    def retare(self):
+        moved_n, self.zero_n = self.zero_n, 0.0
+        return moved_n
 
     def light(self, ratio):
         self.ratio = ratio
@@ -68,7 +74,7 @@ class ObedientBench:
     def take(self, role):
         if role == "press" and self.breaks:
             raise self.breaks.pop()
-        light = sum(self.ratio) * self.brightness if self.latest_n else 0.0
+        light = sum(self.ratio) * self.brightness if self.latest_n > self.zero_n else 0.0
         return Frame(np.full((64, 64), 4 + round(100 * light), np.uint8), role, 0.0, self.latest_n, self.ratio)
 
     def range_n(self, t_s, *, around_line):
@@ -577,6 +583,53 @@ def test_a_self_test_runs_while_the_probe_is_at_fault(rig, held_self_test):
     rig.until(lambda: not rig.procedure.self_test.is_under_way)
     assert rig.procedure.self_test.state == "done"
     rig.until(lambda: rig.board.now.step == "fault")
+
+
+def test_a_zero_that_looks_like_a_touch_is_tared_and_the_probe_takes_presses_again(rig):
+    """It drifts past the contact force, 0.05 N, during a press, after which the probe waits to be lifted."""
+    rig.estimator = lambda recording: (setattr(rig.bench, "zero_n", 0.06), ANSWER)[1]
+    rig.press()
+    rig.estimator = lambda recording: ANSWER
+    assert rig.procedure.tare() == 0.06
+    assert rig.press()["state"] == "done"
+
+
+def test_the_untouched_face_of_a_press_after_a_tare_is_taken_anew(rig, monkeypatch):
+    """The forces of its frames would count from the zero of before."""
+    taken, unloaded = [], rig.procedure._capture.unloaded
+    monkeypatch.setattr(rig.procedure._capture, "unloaded", lambda: taken.append(unloaded()) or taken[-1])
+    rig.bench.zero_n = 0.01
+    rig.press()
+    rig.until(lambda: taken)
+    rig.procedure.tare()
+    job = rig.press()
+    recording = read_recording(rig.store.recording_folder(rig.store.measurement(job["measurement_id"])["recording_id"]))
+    assert {frame.force_n for frame in recording.with_role("dark")} == {0.0}
+
+
+def test_a_tare_is_refused_during_a_press_and_a_self_test(rig, held_self_test):
+    rig.is_away, rig.bench.zero_n = True, 0.01
+    job = rig.procedure.request()
+    with pytest.raises(BusyError, match="A press is under way"):
+        rig.procedure.tare()
+    rig.procedure.cancel(job.id)
+    rig.until(lambda: rig.store.press(job.id)["state"] in ENDED)
+    rig.procedure.request_self_test()
+    with pytest.raises(BusyError, match="self-test"):
+        rig.procedure.tare()
+    assert rig.bench.zero_n == 0.01
+    held_self_test.set()
+
+
+def test_a_tare_that_is_refused_by_the_cell_changes_nothing(rig, monkeypatch):
+    def held():
+        raise ZeroShiftError("The zero is 2 N off.", "Lift the probe.")
+
+    monkeypatch.setattr(rig.bench, "retare", held)
+    with pytest.raises(ZeroShiftError):
+        rig.procedure.tare()
+    assert rig.board.now.step == "ready"
+    assert rig.press()["state"] == "done"
 
 
 @pytest.mark.parametrize("weight_n", [0.09, 5.1, float("nan")])

@@ -9,14 +9,14 @@ import pytest
 from small_certificate import small_certificate
 
 from device.config import Config
-from device.errors import ModeUnavailable
+from device.errors import BusyError, ModeUnavailable, ZeroShiftError
 from device.instrument.calibration_watch import CalibrationWatch
 from device.instrument.self_test.job import SelfTestJob
 from device.instrument.self_test.result import Result
 from device.instrument.status import PressJob
 from device.records.calibrations import Calibrations
 from device.web.app import create_app
-from device.web.schema import SelfTest
+from device.web.schema import SelfTest, Tare
 
 
 class Procedure:
@@ -25,12 +25,19 @@ class Procedure:
     def __init__(self):
         self.config, self.modes, self.is_simulated, self.asked = Config(), ("paper", "standard"), True, []
         self.calibration = CalibrationWatch(None)
+        self.bench = types.SimpleNamespace(force=types.SimpleNamespace(zero_shift_n=0.051))
+        self.refusal = None
 
     def request(self, mode=None):
         self.asked.append(mode)
         if mode not in (None, *self.modes):
             raise ModeUnavailable(f"This probe has no model for the mode {mode}.", "Choose one of those it has.")
         return PressJob("p-1", mode or "paper")
+
+    def tare(self):
+        if self.refusal:
+            raise self.refusal
+        return 0.01234567
 
     def request_self_test(self, *, on_block, weight_n):
         self.asked.append((on_block, weight_n))
@@ -116,6 +123,23 @@ def test_an_unknown_wish_for_a_self_test_is_refused(ask, procedure):
     answer = ask("POST", "/api/v1/self-test", json={"weight_g": 50})
     assert (answer.status_code, answer.json()["code"]) == (422, "E803")
     assert procedure.asked == []
+
+
+def test_a_tare_says_by_how_much_the_zero_has_moved_and_how_far_it_is_from_that_of_commissioning(ask):
+    answer = ask("POST", "/api/v1/tare")
+    assert answer.status_code == 200
+    assert Tare.model_validate(answer.json()) == Tare(moved_n=0.0123, zero_shift_n=0.051)
+
+
+@pytest.mark.parametrize(
+    ("refusal", "status"),
+    [(BusyError("A press is under way.", "Wait."), 409), (ZeroShiftError("It is 2 N off.", "Lift the probe."), 503)],
+)
+def test_a_tare_during_a_press_or_of_a_held_probe_is_a_problem_with_its_code(ask, procedure, refusal, status):
+    procedure.refusal = refusal
+    answer = ask("POST", "/api/v1/tare")
+    assert (answer.status_code, answer.json()["code"]) == (status, refusal.code)
+    assert answer.json()["remedy"] == refusal.remedy
 
 
 def test_the_certificates_are_listed_with_the_active_one_and_the_one_in_use(ask, procedure, tmp_path):
