@@ -1,7 +1,7 @@
 """`python -m device led-off`: darkens the LED chip whatever became of the daemon, as systemd's `ExecStopPost=`.
 
-Imports no more than the settings and the driver, so that `python -m device.led_off` is done long before the daemon
-would have started. A bus that is held low cannot be helped by any program: see docs/contracts.md.
+Imports no more than the settings and the driver, and no NumPy, so that `python -m device.led_off` is done long before
+the daemon would have started. A bus that is held low cannot be helped by any program: see docs/contracts.md.
 Exit codes: 0 dark, 1 not known to be dark, 2 usage.
 """
 

@@ -23,7 +23,8 @@ from device.instrument.force_recorder import force_range_n
 from device.instrument.light_budget import LightBudget
 from device.instrument.status import StatusBoard
 from device.measurement.mode import Mode
-from device.measurement.tactile_image import Frame, PixelScale
+from device.measurement.pixel_scale import PixelScale
+from device.measurement.tactile_image import Frame
 from device.settings.camera_section import CameraSection
 from device.simulation.hand import HandSettings, VirtualHand
 

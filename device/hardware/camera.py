@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from device.errors import CameraError
 from device.hardware.interfaces import CameraFrame
 from device.hardware.raw_mode import RawMode
+from device.hardware.raw_rows import frame_of_rows
 from device.measurement.quantities import Bound, InvalidQuantity, require
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class RawMonoCamera:
         except RuntimeError as error:
             raise CameraError(f"Camera cannot be started: {error}.", REMEDY) from error
         # Once for nothing: loading what scales a frame may take longer than the first frame may.
-        mode.frame(np.zeros((mode.sensor_px[1], self._stride_bytes), np.uint8))
+        frame_of_rows(np.zeros((mode.sensor_px[1], self._stride_bytes), np.uint8), mode)
 
     def _configure(self, controls: dict[str, Any]) -> int:
         """Configure the raw stream; return its rows' bytes, or raise `CameraError` when anything was adjusted."""
@@ -123,7 +124,7 @@ class RawMonoCamera:
         rows = request.make_array("raw")
         self._require_rows(rows)
         # The buffer is reused: the counts are a copy.
-        return CameraFrame(self._mode.frame(rows), exposure_start_s, exposure_us, gain)
+        return CameraFrame(frame_of_rows(rows, self._mode), exposure_start_s, exposure_us, gain)
 
     def _require_as_set(self, exposure_us: float, gain: float) -> None:
         """Refuse a frame that was not taken as it was asked for; the sensor's own steps are granted."""

@@ -8,12 +8,13 @@ All times are seconds of the one monotonic clock (`time.monotonic`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NewType, Protocol
+from typing import TYPE_CHECKING, NewType, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from device.measurement.led_sides import SIDES, LedRatio
 
-from device.measurement.tactile_image import SIDES, LedRatio
+if TYPE_CHECKING:  # what darkens the LEDs has to be quick (device/led_off.py)
+    import numpy as np
+    from numpy.typing import NDArray
 
 LED_COUNT = len(SIDES)
 

@@ -14,7 +14,7 @@ from device.errors import LightError
 from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
 from device.hardware.interfaces import LED_COUNT
 from device.hardware.pwm_clock import STEPS, PwmClock
-from device.measurement.tactile_image import LedRatio
+from device.measurement.led_sides import LedRatio
 
 
 class Register(IntEnum):

@@ -14,7 +14,7 @@ from enum import IntEnum
 from device.errors import HotLedDriverError, LightError, OpenLedError
 from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
 from device.hardware.interfaces import LED_COUNT
-from device.measurement.tactile_image import SIDES, LedRatio
+from device.measurement.led_sides import SIDES, LedRatio
 
 
 class Register(IntEnum):

@@ -12,7 +12,8 @@ from device.instrument.frame_level import LevelWatch
 from device.instrument.light_budget import LightBudget
 from device.instrument.press_machine import STEADY_WINDOW_S
 from device.instrument.progress import ProgressBoard
-from device.measurement.tactile_image import Frame, LedRatio, Role
+from device.measurement.led_sides import LedRatio
+from device.measurement.tactile_image import Frame, Role
 
 DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
 FRAME_TIMEOUT_S = 1.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from device.errors import LightLimitError
 from device.instrument.light_check import FEWEST_COUNTS, Levels
-from device.measurement.tactile_image import SIDES, LedRatio
+from device.measurement.led_sides import SIDES, LedRatio
 
 LOWEST_RATIO, HIGHEST_RATIO = 0.05, 1.0
 """Below a twentieth, a step of an 8-bit brightness is more than 8 % of it."""

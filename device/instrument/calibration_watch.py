@@ -20,7 +20,8 @@ from device.errors import (
     UncheckedCalibration,
 )
 from device.measurement.calibration import Calibration
-from device.measurement.tactile_image import Frame, LedRatio
+from device.measurement.led_sides import LedRatio
+from device.measurement.tactile_image import Frame
 from device.measurement.untouched_face import Drift
 
 WARN_RATIO, BLOCK_RATIO = 0.10, 0.25

@@ -30,8 +30,9 @@ from device.instrument.press_state import ACTIVE
 from device.instrument.progress import ProgressBoard
 from device.instrument.status import StatusBoard
 from device.instrument.wanted_frames import WantedFrames, wanted_frames
+from device.measurement.led_sides import SIDES, LedRatio
 from device.measurement.mode import Mode
-from device.measurement.tactile_image import SIDES, Frame, LedRatio, Role, saturated_ratio
+from device.measurement.tactile_image import Frame, Role, saturated_ratio
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from device.errors import AmbientLightError, DarkSideError, DimLightError, NoContrastError, StuckLightError
+from device.measurement.led_sides import SIDES
 from device.measurement.reference_light import reference_light
-from device.measurement.tactile_image import SIDES, Counts, Frame
+from device.measurement.tactile_image import Counts, Frame
 
 ONE_SIDED = 1.3
 """Light that is so much stronger in one half than in the other comes from a side of the waveguide."""

@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 
 from device.measurement.features import FeatureSettings, extract_features
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_profile import FLOOR_COUNTS, contrast_and_valid
 from device.measurement.reference_light import Image, reference_light
-from device.measurement.tactile_image import Frame, PixelScale, TactileImage
+from device.measurement.tactile_image import Frame, TactileImage
 
 BINNED_MM = 0.25
 HARD_RATIO = 0.7

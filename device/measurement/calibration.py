@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from device.measurement.features import FEATURE_NAMES, FeatureSettings
 from device.measurement.intervals import HeldOut
 from device.measurement.inversion import ModelBundle
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording import CameraSettings, RecordedCell
-from device.measurement.tactile_image import PixelScale
 from device.measurement.untouched_face import UntouchedFace
 from device.measurement.validity import Validity
 

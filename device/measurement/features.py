@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, require
-from device.measurement.tactile_image import Image, PixelScale, TactileImage
+from device.measurement.tactile_image import Image, TactileImage
 
 FEATURE_NAMES = ("centroid_intensity", "total_intensity", "bright_area_mm2")
 

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.reference_light import RAMP_RATIO
 
 Mode = Literal["quick", "standard", "precise", "paper"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 
+RAMP_RATIO = 2.0
+"""From this ratio of its largest to its smallest force on, a press is a ramp."""
 RAMP_FROM_N, RAMP_TO_N = 0.08, 0.60
 """Forces of a ramp's first and last frame: some 0.4 to 3 mm of indentation."""
 

@@ -15,11 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording import Recording
 from device.measurement.reference_light import BEYOND_RATIO, HeldLight, Image, RampLight, reference_light
 from device.measurement.ring_means import RING_RADII_MM, RingMeans, ring_weights
-from device.measurement.tactile_image import Frame, PixelScale
+from device.measurement.tactile_image import Frame
 
 Array = NDArray[np.float64]
 

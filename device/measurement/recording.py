@@ -10,15 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.tactile_image import (
-    Frame,
-    PixelScale,
-    TactileImage,
-    reference,
-    require_one_shape,
-    tactile_image,
-)
+from device.measurement.tactile_image import Frame, TactileImage, reference, require_one_shape, tactile_image
 
 REPAIR = "record the press again, or correct the file"
 

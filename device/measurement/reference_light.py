@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.mode import RAMP_RATIO
+
 Image = NDArray[np.float32]
 
 TOUCHED_RATIO = 0.1
 """Reference frames above this part of the largest reference force are the press; the others show an untouched face."""
-RAMP_RATIO = 2.0
-"""From this ratio of its largest to its smallest force on, a press is a ramp."""
 RAMP_DEGREE = 4
 BEYOND_RATIO = 0.75, 1.1
 """How far beyond the smallest and the largest force of a ramp its polynomial is followed."""

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.tactile_image import Image, PixelScale
+from device.measurement.pixel_scale import PixelScale
+from device.measurement.tactile_image import Image
 
 Array = NDArray[np.float64]
 

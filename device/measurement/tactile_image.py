@@ -2,7 +2,7 @@
 
 The reference is the lump-free press at the *force of the frame*: the hand never holds two presses equally hard, and
 1 % of force is several per cent of a lump's contrast (`reference_light`).
-Pixels are not square; anything with a length goes through `PixelScale`. Source: docs/measurement.md.
+Source: docs/measurement.md.
 """
 
 from __future__ import annotations
@@ -14,43 +14,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.led_sides import LedRatio
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.reference_light import HeldLight, RampLight, reference_light
 from device.measurement.reference_light import Image as Image
 
 Counts = NDArray[np.uint8] | NDArray[np.uint16]
 Role = Literal["dark", "reference", "press"]
-SIDES = ("+x", "+y", "-x", "-y")
-"""The sides of the waveguide in the order of every `LedRatio` and of the chip's outputs 0-3; each has one LED."""
-LedRatio = tuple[float, float, float, float]
-"""Brightness of the sides +x, +y, -x, -y as a ratio of full scale, 0..1."""
 
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
-
-
-@dataclass(frozen=True)
-class PixelScale:
-    """Size of a pixel on the sensing face in mm; the two differ on the paper's camera by 17 %."""
-
-    mm_per_px_x: float
-    mm_per_px_y: float
-
-    def __post_init__(self) -> None:
-        for name in ("mm_per_px_x", "mm_per_px_y"):
-            require(name, getattr(self, name), Bound(1e-4, 1.0, "mm"), "give the calibrated pixel size")
-
-    @property
-    def area_mm2(self) -> float:
-        """Area of one pixel."""
-        return self.mm_per_px_x * self.mm_per_px_y
-
-    def coordinates_mm(self, shape: tuple[int, int]) -> tuple[Image, Image]:
-        """Return x [1, width] and y [height, 1] of the pixel centres, 0 in the middle of the image."""
-        height, width = shape
-        x = (np.arange(width, dtype=np.float32) - (width - 1) / 2) * self.mm_per_px_x
-        y = (np.arange(height, dtype=np.float32) - (height - 1) / 2) * self.mm_per_px_y
-        return x[None, :], y[:, None]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.led_sides import SIDES, LedRatio
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.tactile_image import SIDES, Counts, Frame, LedRatio
+from device.measurement.tactile_image import Counts, Frame
 
 RESOLVED_COUNTS = 2.0
 """Light above dark, of 8 bits, below which a camera without noise would round a tenth of it away."""

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from device.measurement.led_sides import SIDES, LedRatio
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.tactile_image import SIDES, LedRatio
 
 PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_stall": (),

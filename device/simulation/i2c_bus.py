@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from device.measurement.tactile_image import LedRatio
+from device.measurement.led_sides import LedRatio
 from device.simulation.faults import NO_FAULTS, FaultTimeline
 
 I2C_M_RD = 0x0001

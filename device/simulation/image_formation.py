@@ -11,7 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from device.measurement.tactile_image import Image, LedRatio, PixelScale
+from device.measurement.led_sides import LedRatio
+from device.measurement.pixel_scale import PixelScale
+from device.measurement.tactile_image import Image
 from device.simulation.lens import Lens, Projection
 from device.simulation.lookup_optics import LookupOptics
 from device.simulation.renderer import LinearOptics

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, require
-from device.measurement.tactile_image import Image, PixelScale
+from device.measurement.tactile_image import Image
 
 ACTION = "use a real lens's data sheet"
 REACH = 4

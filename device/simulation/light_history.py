@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 
-from device.measurement.tactile_image import LedRatio
+from device.measurement.led_sides import LedRatio
 
 HISTORY = 1024
 """Changes that are remembered: seconds, even when the light is switched for every frame."""

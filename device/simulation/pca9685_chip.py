@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Callable
 
-from device.measurement.tactile_image import LedRatio
+from device.measurement.led_sides import LedRatio
 from device.simulation.light_history import LightHistory
 
 MODE1, MODE2, SUBADR1, LED0_ON_L, LED15_OFF_H = 0x00, 0x01, 0x02, 0x06, 0x45

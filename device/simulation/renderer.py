@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.led_sides import LedRatio
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound, require
-from device.measurement.tactile_image import Image, LedRatio, PixelScale
+from device.measurement.tactile_image import Image
 
 ACTION = "use physical optics"
 

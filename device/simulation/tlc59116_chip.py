@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from device.measurement.tactile_image import SIDES, LedRatio
+from device.measurement.led_sides import SIDES, LedRatio
 from device.simulation.faults import NO_FAULTS, FaultTimeline
 from device.simulation.light_history import LightHistory
 

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.tactile_image import Counts, LedRatio
+from device.measurement.led_sides import LedRatio
+from device.measurement.tactile_image import Counts
 from device.simulation.faults import NO_FAULTS, FaultTimeline
 from device.simulation.faulty_frames import FaultyFrames
 from device.simulation.frame_clock import ClockedFrame, FrameClock, Timing

@@ -10,8 +10,10 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from device.measurement.led_sides import LedRatio
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.tactile_image import Counts, LedRatio, PixelScale
+from device.measurement.tactile_image import Counts
 from device.simulation.hand import VirtualHand
 from device.simulation.image_formation import ImageFormation, LinearImage, ScatteredImage
 from device.simulation.lookup_optics import LookupOptics

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.tactile_image import LedRatio
+from device.measurement.led_sides import LedRatio
 from device.simulation.frame_clock import ClockedFrame
 
 if TYPE_CHECKING:

@@ -13,10 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.recording import Recording
-from device.measurement.tactile_image import Frame, Image, PixelScale
+from device.measurement.tactile_image import Frame, Image
 
 DRIFTING = "reference", "press"
 BELOW_ONE = 0.99

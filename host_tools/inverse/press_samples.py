@@ -14,11 +14,12 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_parameters import NUISANCES, PARAMETERS, from_unit
 from device.measurement.press_profile import PROFILE_FORCES_N, harmonic
 from device.measurement.quantities import Inclusion
 from device.measurement.ring_means import RingMeans, ring_weights
-from device.measurement.tactile_image import Image, PixelScale
+from device.measurement.tactile_image import Image
 from device.simulation.hand import BESIDE_MM
 from device.simulation.image_formation import ScatteredImage
 from device.simulation.lens import Lens

@@ -104,6 +104,11 @@ def test_the_light_of_a_killed_daemon_is_off_within_a_second_of_the_processors_t
     assert board.chip.led_ratio() == DARK
 
 
+def test_it_loads_no_numpy_which_would_be_half_of_its_time():
+    program = "import sys, device.led_off; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+
+
 @pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
 @pytest.mark.parametrize("nacks", [0, 2])
 def test_it_pauses_only_for_the_chips_oscillator_and_before_it_asks_again(board_of, monkeypatch, kind, nacks):

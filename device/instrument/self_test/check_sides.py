@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.instrument.self_test.result import Result, judged, not_tested
+from device.measurement.led_sides import SIDES
 from device.measurement.quantities import Bound
-from device.measurement.tactile_image import SIDES, Counts
+from device.measurement.tactile_image import Counts
 
 PART = "Light"
 OWN_SIDE = Bound(1.1, np.inf, "times")

@@ -25,7 +25,8 @@ from device.instrument.self_test.job import SelfTestJob
 from device.instrument.self_test.operator import Operator
 from device.instrument.self_test.result import Result, broken, not_tested, overall
 from device.instrument.status import StatusBoard
-from device.measurement.tactile_image import SIDES, Frame, LedRatio
+from device.measurement.led_sides import SIDES, LedRatio
+from device.measurement.tactile_image import Frame
 from device.records.store import Store
 
 DARK_FRAMES = 8

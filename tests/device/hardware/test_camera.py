@@ -14,8 +14,8 @@ from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.raw_mode import RawMode
 from device.hardware.tlc59116 import Tlc59116
+from device.measurement.led_sides import LedRatio
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.tactile_image import LedRatio
 from device.simulation.i2c_bus import EmulatedI2cBus
 from device.simulation.tlc59116_chip import Tlc59116Chip
 from device.simulation.virtual_camera import VirtualPicamera2

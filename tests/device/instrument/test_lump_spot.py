@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from device.instrument.lump_spot import lump_spot_mm
-from device.measurement.tactile_image import Frame, PixelScale
+from device.measurement.pixel_scale import PixelScale
+from device.measurement.tactile_image import Frame
 
 SCALE = PixelScale(0.25, 0.3)
 X_MM, Y_MM = SCALE.coordinates_mm((80, 96))

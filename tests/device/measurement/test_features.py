@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from device.measurement.features import FEATURE_NAMES, FeatureSettings, extract_features
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.tactile_image import PixelScale, TactileImage
+from device.measurement.tactile_image import TactileImage
 
 SCALE = PixelScale(0.03, 0.06)
 SHAPE = (400, 800)

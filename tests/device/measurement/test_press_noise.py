@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from small_surrogate import COLUMNS, EXACT, white_noise
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_noise import (
     ErrorLevels,
     PressNoise,
@@ -16,7 +17,6 @@ from device.measurement.press_noise import (
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
 from device.measurement.ring_means import RING_MM, RING_RADII_MM, RINGS, ring_weights
-from device.measurement.tactile_image import PixelScale
 
 POWER = 0.8
 GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)

@@ -7,8 +7,8 @@ r + h^2 / 6r, and the middle one h / 2.
 import numpy as np
 import pytest
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.ring_means import RING_AREAS_MM2, RING_MM, RING_RADII_MM, ring_weights
-from device.measurement.tactile_image import PixelScale
 
 SCALE = PixelScale(0.05, 0.0625)
 SHAPE = (336, 416)

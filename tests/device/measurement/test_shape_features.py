@@ -11,11 +11,11 @@ import pytest
 
 from device.measurement.feature_definitions import PAPER_FEATURES, PRESS_FEATURES, PROFILE_FEATURES, RAMP_FEATURES
 from device.measurement.features import FEATURE_NAMES
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_profile import PROFILE_FORCES_N, ROW_NAMES, PressProfile, harmonic
 from device.measurement.radial_gaussian import SIGMAS_MM, fit_gaussian
 from device.measurement.ring_means import RING_MM, RING_RADII_MM, RingMeans, ring_weights
 from device.measurement.shape_features import NOISE_MULTIPLE, shape_features
-from device.measurement.tactile_image import PixelScale
 
 SCALE, SHAPE = PixelScale(0.08, 0.08), (264, 264)
 X, Y = SCALE.coordinates_mm(SHAPE)

@@ -3,16 +3,10 @@
 import numpy as np
 import pytest
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.reference_light import EXPONENT, EXPONENT_SPREAD
-from device.measurement.tactile_image import (
-    FLOOR_COUNTS,
-    Frame,
-    PixelScale,
-    reference,
-    saturated_ratio,
-    tactile_image,
-)
+from device.measurement.tactile_image import FLOOR_COUNTS, Frame, reference, saturated_ratio, tactile_image
 
 SHAPE = (24, 32)
 SCALE = PixelScale(0.03, 0.04)
@@ -183,16 +177,3 @@ def test_saturation_is_counted_at_the_full_scale_of_eight_or_of_ten_bits_in_sixt
     assert saturated_ratio(counts) == 0.0
     counts[0, :3] = full
     assert saturated_ratio(counts) == 0.03
-
-
-def test_pixels_are_counted_from_the_middle_of_the_image_each_way_by_its_own_pitch():
-    x, y = PixelScale(0.5, 0.25).coordinates_mm((3, 4))
-    assert x.tolist() == [[-0.75, -0.25, 0.25, 0.75]]
-    assert y.tolist() == [[-0.25], [0.0], [0.25]]
-    assert PixelScale(0.5, 0.25).area_mm2 == 0.125
-
-
-@pytest.mark.parametrize("pitch", [0.0, -0.1, 1.1, np.nan])
-def test_an_impossible_pixel_size_is_refused_by_its_name(pitch):
-    with pytest.raises(InvalidQuantity, match="^mm_per_px_y is"):
-        PixelScale(0.03, pitch)

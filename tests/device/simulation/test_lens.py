@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.tactile_image import PixelScale
 from device.simulation.lens import Lens, Projection
 
 SHAPE, SCALE = (60, 80), PixelScale(0.1, 0.12)

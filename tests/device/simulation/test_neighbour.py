@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.tactile_image import PixelScale
 from device.simulation.neighbour import Neighbour, NeighbouredFace
 from device.simulation.pressed_face import Placement, PressedFace
 from device.simulation.scenario import Scenario, read_scenario

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.tactile_image import PixelScale
 from device.simulation.renderer import LinearOptics
 
 SHAPE = (61, 81)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from daemon_process import ROOT
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.tactile_image import PixelScale
 from device.simulation.hand import BESIDE_MM
 from device.simulation.light_table import load_light_table
 from device.simulation.off_axis_table import load_off_axis_table

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.recording import CameraSettings, Recording
-from device.measurement.tactile_image import Frame, PixelScale, Role
+from device.measurement.tactile_image import Frame, Role
 from host_tools.inverse.drifted_recording import drifted, smooth_field
 
 SHAPE = (48, 64)

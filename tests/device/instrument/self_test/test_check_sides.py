@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from device.instrument.self_test.check_sides import side_results, untested_sides
-from device.measurement.tactile_image import SIDES
+from device.measurement.led_sides import SIDES
 
 DARK = np.full((40, 60), 4.0)
 FULL = (0.6, 0.6, 0.6, 0.6)

@@ -18,7 +18,8 @@ from device.instrument.self_test import run as run_module
 from device.instrument.self_test.job import SelfTestJob
 from device.instrument.self_test.run import SelfTest
 from device.instrument.status import StatusBoard
-from device.measurement.tactile_image import SIDES, Frame
+from device.measurement.led_sides import SIDES
+from device.measurement.tactile_image import Frame
 from device.records.store import Store
 from device.settings.camera_section import CameraSection
 from device.settings.light_section import LightSection
