@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import cv2
 import typer
@@ -14,6 +14,10 @@ from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, req
 from host_tools.commands.output import require_writable
 from host_tools.scene import Press, Scene
 
+if TYPE_CHECKING:
+    from host_tools.forward.solution import Solution
+
+Strain = Literal["small", "finite", "auto"]
 PLOTS, PICTURES, SCENES = (".png", ".pdf", ".svg"), (".png",), (".toml",)
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
 
@@ -28,9 +32,7 @@ def simulate(
     offset_mm: Annotated[float | None, typer.Option(help="Lump's centre beside the probe's axis.")] = None,
     indentation_mm: Annotated[float | None, typer.Option(help="Prescribe the indentation (1 mm by default).")] = None,
     force_n: Annotated[float | None, typer.Option(help="Prescribe the force instead.")] = None,
-    strain: Annotated[
-        Literal["small", "finite", "auto"], typer.Option(help="Strain measure; auto asks the tolerance.")
-    ] = "small",
+    strain: Annotated[Strain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "small",
     tolerance: Annotated[str, typer.Option(help="Relative error allowed on O1-O3, such as 0.5% or 0.005.")] = "0.5%",
     explain: Annotated[bool, typer.Option(help="Print which model was chosen, and why.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the whole solution as JSON.")] = False,
@@ -41,38 +43,28 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of the frame's noise.")] = 1,
 ) -> None:
     """Solve one scene: deformation of the sensing face, contact pressure, force, and O1-O3 with their errors."""
-    from host_tools.forward.plan import model_plan
-    from host_tools.forward.solve import solve
-
-    require_writable(plot, PLOTS)
-    require_writable(frame, PICTURES)
-    require_writable(save_scene, SCENES)
-    require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
-    require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
+    _require_outputs(plot, frame, save_scene, exposure_us, seed)
     asked = _scene(
         scene, (size_mm, depth_mm, modulus_kpa), tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n)
     )
     if save_scene:
-        from host_tools.scene_file import write_scene
-
-        write_scene(asked, save_scene)
-    plan = model_plan(asked, tolerance=_ratio(tolerance), strain=strain)
-    solution = solve(asked, plan, estimate_error=True)
+        _save(asked, save_scene)
+    solution = _solution(asked, _ratio(tolerance), strain)
     if plot:
-        from host_tools.plots import plot_solution
-
-        plot_solution(solution, plot)
+        _plot(solution, plot)
     if frame:
-        from host_tools.frame import simulated_frame
+        _take_frame(solution, frame, exposure_us, seed)
+    _print(solution.as_record(), as_json=as_json, explain=explain)
 
-        cv2.imwrite(str(frame), simulated_frame(solution, exposure_us=exposure_us, seed=seed))
-    record = solution.as_record()
-    if as_json:
-        print(json.dumps(record))
-        return
-    if explain:
-        _print_plan(record["plan"])
-    _print_solution(record)
+
+def _require_outputs(
+    plot: Path | None, frame: Path | None, save_scene: Path | None, exposure_us: float, seed: int
+) -> None:
+    """Refuse what cannot be written, or no camera takes, before anything is computed."""
+    for path, endings in ((plot, PLOTS), (frame, PICTURES), (save_scene, SCENES)):
+        require_writable(path, endings)
+    require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
+    require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
 
 
 def _ratio(text: str) -> float:
@@ -127,6 +119,43 @@ def _inclusion(
             "inclusion", f"without {', '.join(missing)}", "whole", "give --size-mm, --depth-mm and --modulus-kpa"
         )
     return Inclusion(*(float(value) for value in unknowns if value is not None))
+
+
+def _save(scene: Scene, path: Path) -> None:
+    from host_tools.scene_file import write_scene
+
+    write_scene(scene, path)
+
+
+def _solution(scene: Scene, tolerance_ratio: float, strain: Strain) -> Solution:
+    """Return the solution by the cheapest model that holds the tolerance."""
+    from host_tools.forward.plan import model_plan
+    from host_tools.forward.solve import solve
+
+    plan = model_plan(scene, tolerance=tolerance_ratio, strain=strain)
+    return solve(scene, plan, estimate_error=True)
+
+
+def _plot(solution: Solution, path: Path) -> None:
+    from host_tools.plots import plot_solution
+
+    plot_solution(solution, path)
+
+
+def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int) -> None:
+    """Write the frame that the camera would take of the deformed face."""
+    from host_tools.frame import simulated_frame
+
+    cv2.imwrite(str(path), simulated_frame(solution, exposure_us=exposure_us, seed=seed))
+
+
+def _print(record: dict[str, Any], *, as_json: bool, explain: bool) -> None:
+    if as_json:
+        print(json.dumps(record))
+        return
+    if explain:
+        _print_plan(record["plan"])
+    _print_solution(record)
 
 
 def _print_plan(plan: dict[str, Any]) -> None:
