@@ -18,7 +18,7 @@ PROVOKED_BY = {
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
     "E801": "test_press_to_result.py::"
-    "test_a_second_press_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
+    "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E803": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E804": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
