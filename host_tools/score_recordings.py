@@ -6,8 +6,9 @@ What is scored is what the device would say: values clipped to their intervals, 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,13 @@ Array = NDArray[np.float64]
 FEWEST_A_OCTILE = 5
 
 
+class Sample(NamedTuple):
+    """A recording to score: what messages call it, and how it is read."""
+
+    name: str
+    read: Callable[[], Recording]
+
+
 @dataclass(frozen=True)
 class ScoredPress:
     """What a press was of, and what the device said."""
@@ -32,28 +40,45 @@ class ScoredPress:
     estimate: Estimate
 
 
+@dataclass(frozen=True)
+class Score:
+    """The presses that carry truth and can be read, and how many others there were."""
+
+    presses: tuple[ScoredPress, ...]
+    left_out: int = 0
+
+
 def score(
-    recordings: Iterable[tuple[str, Recording]],
+    samples: Iterable[Sample],
     estimate: Callable[[Recording], Estimate],
     on_excluded: Callable[[str], None] = lambda sentence: None,
-) -> Iterator[ScoredPress]:
-    """Yield the presses that carry truth and can be read; `on_excluded` hears of every other one, and why."""
-    for name, recording in recordings:
-        if recording.truth is None:
-            on_excluded(f"{name} is left out: it carries no truth.")
-            continue
+) -> Score:
+    """Return the score of recordings; `on_excluded` hears of every one that is left out, and why."""
+    presses, left_out = [], 0
+    for sample in samples:
         try:
-            yield ScoredPress(recording.truth, estimate(recording))
+            presses.append(_scored(sample, estimate))
         except InvalidQuantity as error:
-            on_excluded(f"{name} is left out: {error}")
+            on_excluded(f"{sample.name} is left out: {error}")
+            left_out += 1
+    return Score(tuple(presses), left_out)
 
 
-def print_score(presses: Sequence[ScoredPress], out: Console) -> None:
+def _scored(sample: Sample, estimate: Callable[[Recording], Estimate]) -> ScoredPress:
+    recording = sample.read()
+    if recording.truth is None:
+        raise InvalidQuantity("truth", "missing", "that of a phantom", "score recordings of phantoms")
+    return ScoredPress(recording.truth, estimate(recording))
+
+
+def print_score(scored: Score, out: Console) -> None:
     """Print the score; raises `InvalidQuantity` when there is no press to score."""
+    presses = scored.presses
     if not presses:
         raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
     status = Counter(press.estimate.status for press in presses)
-    out.print(f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common()))
+    headline = f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common())
+    out.print(headline + (f"; {scored.left_out} left out" if scored.left_out else ""))
     answered = [press for press in presses if press.estimate.size_mm.value is not None]
     if answered:
         out.print(_overall(answered))

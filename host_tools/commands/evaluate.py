@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -22,6 +23,9 @@ from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.model import MODELS, phantoms_of
 from host_tools.commands.output import note
+
+if TYPE_CHECKING:
+    from host_tools.score_recordings import Sample
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 PROBE = MODELS / "simulated_probe"
@@ -60,8 +64,8 @@ def evaluate(
         of_frames = mode_of([frame.force_n for frame in recording.with_role("press")])
         return models.estimate(recording, asked or of_frames, certificate)
 
-    named = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
-    print_score(list(score(named, answer, note.print)), out)
+    samples = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
+    print_score(score(samples, answer, partial(note.print, markup=False, soft_wrap=True)), out)
 
 
 def _certificate(light: str) -> str:
@@ -81,18 +85,23 @@ def _print_paper(
         print_intervals(rig, scenes=scenes, seed=seed, out=out)
 
 
-def _named(paths: list[Path] | None) -> Iterator[tuple[str, Recording]]:
-    return ((str(path), read_recording(path)) for path in paths or [])
+def _named(paths: list[Path] | None) -> Iterator[Sample]:
+    from host_tools.score_recordings import Sample
+
+    return (Sample(str(path), partial(read_recording, path)) for path in paths or [])
 
 
-def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[tuple[str, Recording]]:
+def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[Sample]:
     """Yield presses over the trained ranges that no training has seen, with every drift."""
     from device.measurement.press_noise import ErrorLevels
     from host_tools.inverse.press_samples import draw_parameters
     from host_tools.inverse.recorded_presses import recorded_press
     from host_tools.inverse.seeds import press_seed
+    from host_tools.score_recordings import Sample
 
     tables = ProbeTables.load(table)
     for number, parameters in enumerate(draw_parameters(scenes, np.random.default_rng([seed, 3]))):
-        recording = recorded_press(tables, parameters, mode, press_seed(seed, number), levels=ErrorLevels())
-        yield f"press {number}", recording
+        yield Sample(
+            f"press {number}",
+            partial(recorded_press, tables, parameters, mode, press_seed(seed, number), levels=ErrorLevels()),
+        )

@@ -13,7 +13,7 @@ from rich.console import Console
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity, Status
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
-from host_tools.score_recordings import ScoredPress, print_score, score
+from host_tools.score_recordings import Sample, Score, ScoredPress, print_score, score
 
 
 def estimate_of(quantities: Sequence[Quantity], status: Status = "ok") -> Estimate:
@@ -43,9 +43,9 @@ def of_size(truth_mm: float, answer: Quantity) -> ScoredPress:
     return ScoredPress(Inclusion(truth_mm, 6.0, 60.0), estimate_of([answer, *others]))
 
 
-def printed(presses: Sequence[ScoredPress]) -> str:
+def printed(presses: Sequence[ScoredPress], left_out: int = 0) -> str:
     out = Console(file=io.StringIO(), width=160)
-    print_score(presses, out)
+    print_score(Score(tuple(presses), left_out), out)
     return out.file.getvalue()
 
 
@@ -132,7 +132,11 @@ def test_fewer_than_five_presses_an_octile_are_not_split():
 
 def test_nothing_to_score_is_refused():
     with pytest.raises(InvalidQuantity, match="^presses with truth is 0, but must be at least one"):
-        print_score([], Console(file=io.StringIO()))
+        print_score(Score((), 2), Console(file=io.StringIO()))
+
+
+def test_what_is_left_out_is_counted_in_the_headline():
+    assert printed(FOUR, left_out=2).startswith("4 presses: 4 ok; 2 left out\n")
 
 
 def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(recording: Recording):
@@ -140,18 +144,29 @@ def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(
     bare = replace(recording, truth=None)
     short = replace(recording, frames=())
 
+    def damaged() -> Recording:
+        raise InvalidQuantity("size_mm", np.nan, "at least 0 mm", "correct it")
+
     def estimate(one: Recording) -> Estimate:
         if one is short:
             raise InvalidQuantity("press frames", 0, "at least 6", "press again")
         assert one.truth is not None
         return REFUSED
 
-    named = [("first", recording), ("nameless", bare), ("short", short), ("last", recording)]
-    found = list(score(named, estimate, heard.append))
-    assert [press.truth for press in found] == [recording.truth] * 2
-    assert all(press.estimate is REFUSED for press in found)
+    samples = [
+        Sample("first", lambda: recording),
+        Sample("nameless", lambda: bare),
+        Sample("damaged", damaged),
+        Sample("short", lambda: short),
+        Sample("last", lambda: recording),
+    ]
+    found = score(samples, estimate, heard.append)
+    assert [press.truth for press in found.presses] == [recording.truth] * 2
+    assert all(press.estimate is REFUSED for press in found.presses)
+    assert found.left_out == 3
     assert heard == [
-        "nameless is left out: it carries no truth.",
+        "nameless is left out: truth is missing, but must be that of a phantom: score recordings of phantoms.",
+        "damaged is left out: size_mm is nan, but must be at least 0 mm: correct it.",
         "short is left out: press frames is 0, but must be at least 6: press again.",
     ]
 

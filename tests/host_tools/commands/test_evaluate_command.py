@@ -1,5 +1,6 @@
 """`host_tools evaluate` on recordings of phantoms, each read by the mode that its frames are for."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -27,8 +28,20 @@ def test_recordings_are_scored_and_one_without_truth_is_named(folder):
     done = CliRunner().invoke(app, ["evaluate", *(str(folder / name) for name in ("standard", "quick", "nameless"))])
     assert done.exit_code == 0, done.output
     assert "2 presses" in done.output
-    assert "nameless is left out: it carries no truth" in done.output.replace("\n", "")
+    assert "nameless is left out: truth is missing" in done.output
     assert "truth inside 90 % intervals" in done.output
+
+
+def test_a_truth_that_is_no_number_leaves_only_its_recording_out_and_names_it(folder, tmp_path):
+    damaged = tmp_path / "damaged"
+    shutil.copytree(folder / "standard", damaged)
+    text = (damaged / "recording.json").read_text()
+    (damaged / "recording.json").write_text(text.replace('"size_mm": 12.0', '"size_mm": NaN'))
+    done = CliRunner().invoke(app, ["evaluate", str(damaged), str(folder / "standard")])
+    assert done.exit_code == 0, done.output
+    assert f"{damaged} is left out: size_mm is nan" in done.output
+    assert "1 presses: " in done.output
+    assert "; 1 left out" in done.output
 
 
 def test_a_mode_that_the_frames_are_not_for_leaves_the_recording_out(folder):
