@@ -1,12 +1,14 @@
 """Recordings that carry truth to a score: errors, coverage and refusals, over all presses and by octiles of the truth.
 
 What is scored is what the device would say: values clipped to their intervals, and only presses that it answers.
+Errors are compared with the Cramer-Rao bound in coordinates, which run from -1 to 1 over the trained range, the modulus
+by its logarithm: there the range bounds what a press that tells nothing adds, in per cent it would be all of the mean.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,6 +18,8 @@ from rich.console import Console
 from rich.table import Table
 
 from device.measurement.estimate import SPOKEN, Estimate
+from device.measurement.mode import Mode, mode_named
+from device.measurement.press_parameters import NOMINAL, unknowns_to_unit
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
 from host_tools.inverse.mode_statistics import OCTILES, octile_ends, octile_of
@@ -26,18 +30,34 @@ FEWEST_A_OCTILE = 5
 
 
 class Sample(NamedTuple):
-    """A recording to score: what messages call it, and how it is read."""
+    """A recording to score: what messages call it, how it is read, and what is known of its tissue, skin and place."""
 
     name: str
     read: Callable[[], Recording]
+    nuisances: Mapping[str, float] = NOMINAL
 
 
-@dataclass(frozen=True)
+LeastErrors = Callable[[Mode, Inclusion, Mapping[str, float]], Array]
+"""Mode, truth and nuisances to the least errors [3] of any estimate, in coordinates; nan where nothing bounds them."""
+
+
+def unbounded(mode: Mode, truth: Inclusion, nuisances: Mapping[str, float]) -> Array:
+    """Return that nothing bounds the errors of a press."""
+    return np.full(len(UNKNOWNS), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
 class ScoredPress:
-    """What a press was of, and what the device said."""
+    """What a press was of, what the device said, and the least errors [3] of any estimate, as `LeastErrors`."""
 
     truth: Inclusion
     estimate: Estimate
+    least_errors: Array
+
+    def coordinate_errors(self) -> Array:
+        """Return the errors [3] in coordinates of a press that is answered."""
+        found = np.array([getattr(self.estimate, name).value for name in UNKNOWNS])
+        return unknowns_to_unit(found) - unknowns_to_unit(np.array(self.truth.as_tuple()))
 
 
 @dataclass(frozen=True)
@@ -52,23 +72,25 @@ def score(
     samples: Iterable[Sample],
     estimate: Callable[[Recording], Estimate],
     on_excluded: Callable[[str], None] = lambda sentence: None,
+    least_errors: LeastErrors = unbounded,
 ) -> Score:
     """Return the score of recordings; `on_excluded` hears of every one that is left out, and why."""
     presses, left_out = [], 0
     for sample in samples:
         try:
-            presses.append(_scored(sample, estimate))
+            presses.append(_scored(sample, estimate, least_errors))
         except InvalidQuantity as error:
             on_excluded(f"{sample.name} is left out: {error}")
             left_out += 1
     return Score(tuple(presses), left_out)
 
 
-def _scored(sample: Sample, estimate: Callable[[Recording], Estimate]) -> ScoredPress:
+def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_errors: LeastErrors) -> ScoredPress:
     recording = sample.read()
     if recording.truth is None:
         raise InvalidQuantity("truth", "missing", "that of a phantom", "score recordings of phantoms")
-    return ScoredPress(recording.truth, estimate(recording))
+    found = estimate(recording)
+    return ScoredPress(recording.truth, found, least_errors(mode_named(found.mode), recording.truth, sample.nuisances))
 
 
 def print_score(scored: Score, out: Console) -> None:
@@ -101,13 +123,32 @@ def _overall(presses: Sequence[ScoredPress]) -> Table:
     table.add_row("skill against the range", *(f"{column.skill:.2f}" for column in columns))
     table.add_row("determined", *(f"{column.known.mean():.1%}" for column in columns))
     table.add_row("truth inside 90 % intervals of these", *(column.coverage() for column in columns))
+    for row in _bound_rows(columns):
+        table.add_row(*row)
     return table
 
 
+def _bound_rows(columns: Sequence[_Column]) -> Iterator[tuple[str, ...]]:
+    """Yield how near the answers come to the best that any could be; nothing where no press has a bound.
+
+    Root mean squares over all answered presses that have one, determined or not. Whether an unknown is determined is
+    read off the same noisy press as its value, and presses chosen by their own noise are not those of the bound.
+    """
+    counted, presses = columns[0].bounded.sum(), len(columns[0].bounded)
+    if not counted:
+        return
+    of = "" if counted == presses else f", {counted} of {presses}"
+    errors, least = zip(*(column.rms() for column in columns), strict=True)
+    yield f"RMS error, range as -1 to 1{of}", *(f"{value:.3f}" for value in errors)
+    yield f"least RMS error (bound){of}", *(f"{value:.3f}" for value in least)
+    yield f"RMS error / bound{of}", *(column.error_over_bound() for column in columns)
+
+
 def _by_octiles(presses: Sequence[ScoredPress]) -> Table:
-    table = Table("octile of the truth", "from", "to", "mean error", "determined", "covered")
-    for name in UNKNOWNS:
-        column = _Column(presses, name)
+    columns = [_Column(presses, name) for name in UNKNOWNS]
+    beside_bound = ["RMS error / bound"] if any(column.bounded.any() for column in columns) else []
+    table = Table("octile of the truth", "from", "to", "mean error", "determined", "covered", *beside_bound)
+    for name, column in zip(UNKNOWNS, columns, strict=True):
         if len(column.truth) < OCTILES * FEWEST_A_OCTILE:
             continue
         ends, octile = octile_ends(column.truth), octile_of(column.truth)
@@ -121,6 +162,7 @@ def _by_octiles(presses: Sequence[ScoredPress]) -> Table:
                 f"{column.percent[inside].mean():.2f} %",
                 f"{column.known[inside].mean():.0%}",
                 column.coverage(inside),
+                *(column.error_over_bound(inside) for _ in beside_bound),
             )
     return table
 
@@ -138,6 +180,10 @@ class _Column:
         self.covered = (low <= self.truth) & (self.truth <= high)
         self.percent = 100 * np.abs(value - self.truth) / self.truth
         self._error, self._std = value - self.truth, std
+        unknown = UNKNOWNS.index(name)
+        self._coordinate_error = np.array([press.coordinate_errors()[unknown] for press in presses])
+        self._least = np.array([press.least_errors[unknown] for press in presses])
+        self.bounded = np.isfinite(self._least)
 
     @property
     def error_over_spread(self) -> float:
@@ -154,3 +200,16 @@ class _Column:
         """Return the covered share of the determined presses among those chosen."""
         counted = self.known if chosen is None else self.known & chosen
         return f"{self.covered[counted].mean():.1%} of {counted.sum()}" if counted.any() else "-"
+
+    def rms(self, chosen: NDArray[np.bool_] | None = None) -> tuple[float, float]:
+        """Return root mean squares of errors and of their bounds, in coordinates, over the bounded presses chosen."""
+        counted = self.bounded if chosen is None else self.bounded & chosen
+        error, least = (np.sqrt(np.mean(part[counted] ** 2)) for part in (self._coordinate_error, self._least))
+        return float(error), float(least)
+
+    def error_over_bound(self, chosen: NDArray[np.bool_] | None = None) -> str:
+        """Return the first over the second; no press that has a bound, no number."""
+        if not (self.bounded if chosen is None else self.bounded & chosen).any():
+            return "-"
+        error, least = self.rms(chosen)
+        return f"{error / least:.2f}"

@@ -15,7 +15,7 @@ from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.estimate import Estimate
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode, mode_named, mode_of
-from device.measurement.mode_models import with_models
+from device.measurement.mode_models import ModeModels, with_models
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording
 from device.measurement.recording_file import read_recording
@@ -25,7 +25,7 @@ from host_tools.commands.model import MODELS, phantoms_of
 from host_tools.commands.output import note
 
 if TYPE_CHECKING:
-    from host_tools.score_recordings import Sample
+    from host_tools.score_recordings import LeastErrors, Sample
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 PROBE = MODELS / "simulated_probe"
@@ -65,7 +65,16 @@ def evaluate(
         return models.estimate(recording, asked or of_frames, certificate)
 
     samples = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
-    print_score(score(samples, answer, partial(note.print, markup=False, soft_wrap=True)), out)
+    say = partial(note.print, markup=False, soft_wrap=True)
+    print_score(score(samples, answer, say, _bound_of(models)), out)
+
+
+def _bound_of(models: ModeModels) -> LeastErrors:
+    """Return what bounds the errors of standard and precise; the bundles of the other modes hold no forward model."""
+    from host_tools.inverse.press_bound import least_errors
+    from host_tools.score_recordings import unbounded
+
+    return partial(least_errors, models.profile.answers) if models.profile else unbounded
 
 
 def _certificate(light: str) -> str:
@@ -94,6 +103,7 @@ def _named(paths: list[Path] | None) -> Iterator[Sample]:
 def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[Sample]:
     """Yield presses over the trained ranges that no training has seen, with every drift."""
     from device.measurement.press_noise import ErrorLevels
+    from device.measurement.press_parameters import PARAMETERS
     from host_tools.inverse.press_samples import draw_parameters
     from host_tools.inverse.recorded_presses import recorded_press
     from host_tools.inverse.seeds import press_seed
@@ -104,4 +114,5 @@ def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator
         yield Sample(
             f"press {number}",
             partial(recorded_press, tables, parameters, mode, press_seed(seed, number), levels=ErrorLevels()),
+            dict(zip(PARAMETERS, map(float, parameters), strict=True)),
         )

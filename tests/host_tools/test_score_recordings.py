@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from rich.console import Console
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity, Status
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording import Recording
-from host_tools.score_recordings import Sample, Score, ScoredPress, print_score, score
+from host_tools.score_recordings import Sample, Score, ScoredPress, print_score, score, unbounded
 
 
 def estimate_of(quantities: Sequence[Quantity], status: Status = "ok") -> Estimate:
@@ -37,10 +37,17 @@ def quantity(value: float, half_width: float, std: float = 1.0, *, known: bool =
 REFUSED = estimate_of([UNKNOWN_QUANTITY] * 3, "outside_range")
 
 
+NO_BOUND = unbounded("standard", Inclusion(10.0, 6.0, 60.0), {})
+
+
+def scored(truth: Inclusion, estimate: Estimate) -> ScoredPress:
+    return ScoredPress(truth, estimate, NO_BOUND)
+
+
 def of_size(truth_mm: float, answer: Quantity) -> ScoredPress:
     """Return a press whose depth and modulus are answered exactly."""
     others = quantity(6.0, 1.0), quantity(60.0, 5.0)
-    return ScoredPress(Inclusion(truth_mm, 6.0, 60.0), estimate_of([answer, *others]))
+    return scored(Inclusion(truth_mm, 6.0, 60.0), estimate_of([answer, *others]))
 
 
 def printed(presses: Sequence[ScoredPress], left_out: int = 0) -> str:
@@ -94,14 +101,14 @@ def test_error_over_spread_is_1_for_a_spread_as_large_as_the_error():
 
 
 def test_presses_without_numbers_are_counted_by_status_but_have_no_error():
-    text = printed([*FOUR, ScoredPress(Inclusion(10.0, 6.0, 60.0), REFUSED)])
+    text = printed([*FOUR, scored(Inclusion(10.0, 6.0, 60.0), REFUSED)])
     assert text.startswith("5 presses: 4 ok, 1 outside_range")
     assert "4 answered presses" in text
     assert row(text, "mean error")[0] == "10.00 %"
 
 
 def test_of_refused_presses_only_there_is_nothing_to_tabulate():
-    text = printed([ScoredPress(Inclusion(10.0, 6.0, 60.0), REFUSED)] * 2)
+    text = printed([scored(Inclusion(10.0, 6.0, 60.0), REFUSED)] * 2)
     assert text.strip() == "2 presses: 2 outside_range"
 
 
@@ -121,7 +128,7 @@ def replace_unknowns(press: ScoredPress, number: float) -> ScoredPress:
     """Return the press with depth and modulus of its own, answered exactly."""
     truth = replace(press.truth, depth_mm=number, youngs_modulus_kpa=number)
     exact = quantity(number, 1.0)
-    return ScoredPress(truth, replace(press.estimate, depth_mm=exact, youngs_modulus_kpa=exact))
+    return scored(truth, replace(press.estimate, depth_mm=exact, youngs_modulus_kpa=exact))
 
 
 def test_fewer_than_five_presses_an_octile_are_not_split():
@@ -174,5 +181,62 @@ def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(
 def test_each_unknown_is_scored_against_its_own_truth():
     """Answers 10, 20 and 30 % too large."""
     answers = [quantity(10.0 * factor, 5.0) for factor in (1.1, 1.2, 1.3)]
-    text = printed([ScoredPress(Inclusion(10.0, 10.0, 10.0), estimate_of(answers))])
+    text = printed([scored(Inclusion(10.0, 10.0, 10.0), estimate_of(answers))])
     assert row(text, "mean error") == ["10.00 %", "20.00 %", "30.00 %"]
+
+
+BOUND = np.array([0.05, 0.1, 0.4])
+
+
+def bounded(size_mm: float, least_errors: np.ndarray = BOUND) -> ScoredPress:
+    """Return a press of 8.5 mm, 8 mm deep, 40 kPa, the middle of all ranges, that is answered as of another size."""
+    middle = Inclusion(8.5, 8.0, 40.0)
+    answers = quantity(size_mm, 1.0), quantity(8.4, 1.0), quantity(80.0, 9.0, known=False)
+    return ScoredPress(middle, estimate_of(answers), least_errors)
+
+
+def test_errors_are_compared_with_the_bound_in_coordinates():
+    """6.5 mm of size, 4 mm of depth and a factor 4 of modulus are one: errors of 0.1, 0.1 and ln 2 / ln 4."""
+    text = printed([bounded(8.5 + 0.65), bounded(8.5 - 0.65)])
+    assert row(text, "RMS error, range as -1 to 1") == ["0.100", "0.100", "0.500"]
+    assert row(text, "least RMS error (bound)") == ["0.050", "0.100", "0.400"]
+    assert row(text, "RMS error / bound") == ["2.00", "1.00", "1.25"]
+
+
+def test_errors_and_bounds_are_root_mean_squares_of_all_presses():
+    """Errors 0 and 0.1, bounds 0.05 and 0.15: 0.0707 over 0.1118."""
+    text = printed([bounded(8.5), bounded(8.5 + 0.65, 3 * BOUND)])
+    assert row(text, "RMS error, range as -1 to 1")[0] == "0.071"
+    assert row(text, "least RMS error (bound)")[0] == "0.112"
+    assert row(text, "RMS error / bound")[0] == "0.63"
+
+
+def test_presses_without_a_bound_are_not_compared_with_one():
+    text = printed([bounded(8.5 + 0.65), bounded(2.0, NO_BOUND), bounded(2.0, NO_BOUND)])
+    assert row(text, "RMS error / bound, 1 of 3")[0] == "2.00"
+    assert "bound" not in printed(FOUR)
+
+
+def test_octiles_have_their_own_error_over_bound():
+    """Of 80 sizes the last ten alone are answered 0.65 mm, twice the bound, too large."""
+    sizes = np.linspace(3.0, 14.0, 80)
+    presses = []
+    for number, size in enumerate(sizes):
+        said = quantity(size + (0.65 if number >= 70 else 0.0), 1.0)
+        estimate = replace(bounded(8.5).estimate, size_mm=said)
+        presses.append(ScoredPress(Inclusion(size, 8.0, 40.0), estimate, BOUND))
+    text = printed(presses)
+    assert [row(text, f"size {octile}")[-1] for octile in (1, 7, 8)] == ["0.00", "0.00", "2.00"]
+
+
+def test_the_bound_is_of_the_mode_that_answered_and_of_the_nuisances_that_are_known(recording: Recording):
+    asked = []
+
+    def least_errors(mode: str, truth: Inclusion, nuisances: Mapping[str, float]) -> np.ndarray:
+        asked.append((mode, truth, nuisances))
+        return BOUND
+
+    samples = [Sample("random", lambda: recording, {"albedo": 0.45})]
+    found = score(samples, lambda one: estimate_of([quantity(10.0, 1.0)] * 3), least_errors=least_errors)
+    assert asked == [("standard", recording.truth, {"albedo": 0.45})]
+    assert found.presses[0].least_errors is BOUND

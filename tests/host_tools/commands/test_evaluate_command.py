@@ -54,3 +54,11 @@ def test_random_presses_of_a_mode_are_scored():
     done = CliRunner().invoke(app, ["evaluate", "--mode", "standard", "--scenes", "3"])
     assert done.exit_code == 0, done.output
     assert done.output.startswith("3 presses: ")
+    assert "RMS error / bound " in done.output
+
+
+def test_modes_quick_and_paper_have_no_bound(folder):
+    done = CliRunner().invoke(app, ["evaluate", str(folder / "quick")])
+    assert done.exit_code == 0, done.output
+    assert "skill against the range" in done.output
+    assert "bound" not in done.output
