@@ -23,11 +23,13 @@ from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.model import MODELS, phantoms_of
 from host_tools.commands.output import note
+from host_tools.commands.reference_scores import print_reference
 
 if TYPE_CHECKING:
     from host_tools.score_recordings import LeastErrors, Sample
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
+SCENES = 100
 PROBE = MODELS / "simulated_probe"
 
 
@@ -41,12 +43,21 @@ def evaluate(
     profile_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = PROBE,
     light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
-    scenes: Annotated[int, typer.Option(help="Random presses.")] = 100,
+    scenes: Annotated[
+        int | None, typer.Option(help="Random presses; 100, 160 without noise, 50 beside the posterior by default.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of scenes, camera and hand.")] = 1000,
+    noise_free: Annotated[
+        bool, typer.Option("--noise-free", help="Instead: ramps without noise, tissue and skin told.")
+    ] = False,
+    posterior: Annotated[
+        bool, typer.Option("--posterior", help="Instead: errors over those of the reference posterior; minutes.")
+    ] = False,
 ) -> None:
     """Score what the device answers: on recordings, or on random presses with every drift.
 
     In mode paper without recordings: the model's nine phantoms, noise-free and through the camera, and random scenes.
+    With --noise-free or --posterior, of modes standard and precise: exit code 1 when a figure misses its bound.
 
     Example: host_tools evaluate --mode precise --scenes 50
     """
@@ -54,6 +65,14 @@ def evaluate(
 
     out = Console(width=110, highlight=False)
     asked = mode_named(mode) if mode else None
+    if noise_free or posterior:
+        if recordings:
+            raise InvalidQuantity("recordings", len(recordings), "none", "leave out --noise-free and --posterior")
+        print_reference(
+            profile_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed
+        )
+        return
+    scenes = SCENES if scenes is None else scenes
     certificate = read_calibration(table / _certificate(light))
     if not recordings and asked in (None, "paper"):
         _print_paper(ModelBundle.load(model), certificate, table, light, scenes, seed, out)

@@ -50,6 +50,17 @@ def print_chapter(timed: Timed) -> int:
     return sum(not benchmark.passed for benchmark in chapter.benchmarks)
 
 
+def print_tables(chapter: Chapter) -> None:
+    """Print what a chapter claims, and the tables that `print_chapter` leaves to the documents."""
+    out = Console(width=140, highlight=False)
+    out.print(chapter.claim, markup=False)
+    for numbers in chapter.tables:
+        table = Table(*numbers.header, title=numbers.caption, title_justify="left")
+        for row in numbers.rows:
+            table.add_row(*map(escape, row))
+        out.print(table)
+
+
 def shown(path: Path) -> str:
     """Return a path as it would be typed at the root of the repository."""
     whole = path.resolve()

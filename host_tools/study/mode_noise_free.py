@@ -7,6 +7,7 @@ depth and 2.51 % in modulus at best.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -16,8 +17,9 @@ from scipy.optimize import least_squares
 from device.measurement.press_parameters import from_unit, to_unit
 from device.measurement.press_surrogate import DEPTH, MODULUS, SIZE, PressSurrogate
 from device.measurement.profile_model import ProfileAnswers
-from device.measurement.quantities import UNKNOWNS
+from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.inverse.mode_statistics import OCTILES, octile_of
 from host_tools.inverse.press_samples import draw_parameters, profile_rows
 from host_tools.inverse.recorded_presses import in_parallel
 from host_tools.inverse.seeds import derived_seed
@@ -25,7 +27,7 @@ from host_tools.study.benchmark import Chapter, Table, at_most
 
 Array = NDArray[np.float64]
 
-PRESSES = 160
+PRESSES, FEWEST_PRESSES = 160, 40
 SIZES_MM, DEPTHS_MM, MODULI_KPA = (5.0, 15.0), (4.0, 8.0), (40.0, 120.0)
 """The part of the paper's box for which a figure was asked."""
 DETERMINED_SIZES_MM, DETERMINED_DEPTHS_MM = (8.0, 15.0), (4.0, 6.0)
@@ -35,16 +37,24 @@ STARTS = tuple(product((-0.5, 0.5), (-0.5, 0.5), (-0.7, 0.0, 0.7)))
 """Coordinates of size, depth and modulus from which fits are begun; the best counts, for there are local minima."""
 
 
-def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: int = 1, jobs: int = -1) -> Chapter:
-    """Return the errors of size, depth and modulus from exact rows, columns weighed as the camera knows them."""
+def noise_free_chapter(
+    answers: ProfileAnswers, tables: ProbeTables, *, presses: int = PRESSES, seed: int = 1, jobs: int = -1
+) -> Chapter:
+    """Return the errors of size, depth and modulus from exact rows, columns weighed as the camera knows them.
+
+    Raises `InvalidQuantity` for fewer than 40 presses, of which there might be none that scores the modulus.
+    """
+    require("presses without noise", presses, Bound(FEWEST_PRESSES, np.inf, "presses"), "ask for more")
     surrogate, std = answers.surrogate, np.sqrt(np.diag(answers.noise["precise"].camera))
-    parameters = _parameters(derived_seed(seed, "noise-free"))
+    parameters = _parameters(presses, derived_seed(seed, "noise-free"))
     unit = to_unit(parameters)
-    rows = in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], PRESSES, jobs)
-    found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], unit[i], std), PRESSES, jobs))
+    rows = in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], presses, jobs)
+    found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], unit[i], std), presses, jobs))
     percent = 100 * np.abs(found - parameters[:, : len(UNKNOWNS)]) / parameters[:, : len(UNKNOWNS)]
     inside = _between(parameters[:, SIZE], DETERMINED_SIZES_MM) & _between(parameters[:, DEPTH], DETERMINED_DEPTHS_MM)
-    parts = [percent[:, SIZE], percent[:, DEPTH], percent[inside, MODULUS]]
+    everywhere = np.ones(presses, dtype=bool)
+    scored = (everywhere, everywhere, inside)
+    parts = [percent[chosen, i] for i, chosen in enumerate(scored)]
     rows_of_table = tuple(
         (name, str(len(part)), *(f"{value:.3f}" for value in (part.mean(), part.std(), part.min(), part.max())))
         for name, part in zip(UNKNOWNS, parts, strict=True)
@@ -52,7 +62,7 @@ def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: in
     return Chapter(
         title="Without noise, all else known",
         claim=(
-            f"{PRESSES} random presses of the simulated probe (size 5-15 mm, depth 4-8 mm, 40-120 kPa; the modulus is "
+            f"{presses} random presses of the simulated probe (size 5-15 mm, depth 4-8 mm, 40-120 kPa; the modulus is "
             "scored from 8 mm and down to 6 mm deep), rows without noise, tissue, skin and offset told."
         ),
         source="host_tools/study/mode_noise_free.py",
@@ -60,8 +70,21 @@ def noise_free_chapter(answers: ProfileAnswers, tables: ProbeTables, *, seed: in
             at_most(name, "mean error (%)", float(part.mean()), bound)
             for name, part, bound in zip(UNKNOWNS, parts, BOUNDS_PERCENT, strict=True)
         ),
-        tables=(Table("Errors in %", ("unknown", "presses", "mean", "SD", "min", "max"), rows_of_table),),
+        tables=(
+            Table("Errors in %", ("unknown", "presses", "mean", "SD", "min", "max"), rows_of_table),
+            _by_octiles([parameters[chosen, i] for i, chosen in enumerate(scored)], parts),
+        ),
     )
+
+
+def _by_octiles(truths: Sequence[Array], percents: Sequence[Array]) -> Table:
+    """Return the mean errors of each unknown by octiles of its truths [n]."""
+    rows = []
+    for name, truth, percent in zip(UNKNOWNS, truths, percents, strict=True):
+        of_octile = [percent[octile_of(truth) == number] for number in range(OCTILES)]
+        rows.append((name, *(f"{part.mean():.3f}" if len(part) else "-" for part in of_octile)))
+    header = ("unknown", *(f"octile {number + 1}" for number in range(OCTILES)))
+    return Table("Mean errors in % by octiles of the truth, lowest first", header, tuple(rows))
 
 
 def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array, std: Array) -> Array:
@@ -90,11 +113,11 @@ def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array, std:
     return from_unit(whole(min(fits, key=lambda fit: fit.cost).x))[: len(UNKNOWNS)]
 
 
-def _parameters(seed: int) -> Array:
+def _parameters(presses: int, seed: int) -> Array:
     rng = np.random.default_rng(seed)
-    drawn = draw_parameters(40 * PRESSES, rng)
+    drawn = draw_parameters(40 * presses, rng)
     inside = _between(drawn[:, SIZE], SIZES_MM) & _between(drawn[:, DEPTH], DEPTHS_MM)
-    return drawn[inside & _between(drawn[:, MODULUS], MODULI_KPA)][:PRESSES]
+    return drawn[inside & _between(drawn[:, MODULUS], MODULI_KPA)][:presses]
 
 
 def _between(values: Array, ends: tuple[float, float]) -> NDArray[np.bool_]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_surrogate import COLUMNS, linear_surrogate
+from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
 from device.measurement.press_parameters import HIGH, LOW, PARAMETERS, from_unit
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
-from host_tools.study.mode_noise_free import known_nuisances_fit
+from device.measurement.profile_model import ProfileAnswers
+from device.measurement.quantities import InvalidQuantity
+from host_tools.study import mode_noise_free
+from host_tools.study.mode_noise_free import known_nuisances_fit, noise_free_chapter
 
 GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
 ALIKE = np.ones(COLUMNS)
@@ -70,3 +73,37 @@ def test_a_fit_stays_inside_the_trained_ranges(slopes):
     assert found[0] == pytest.approx(HIGH[0], rel=1e-3)
     assert (found >= LOW[:3] - SIDE).all()
     assert (found <= HIGH[:3] + SIDE).all()
+
+
+def test_the_chapter_scores_each_unknown_over_all_presses_and_by_octiles(tables, monkeypatch):
+    """Presses that are answered with i % too much size, i being their rank by it: octiles of five ranks each."""
+    noise = {"precise": white_noise(0.01)}
+    fitted = []
+
+    def answer(surrogate, row, unit, std):
+        truth = from_unit(unit)[:3]
+        fitted.append(truth[0])
+        return truth
+
+    monkeypatch.setattr(mode_noise_free, "profile_rows", lambda tables, parameters: np.zeros((1, COLUMNS)))
+    monkeypatch.setattr(mode_noise_free, "known_nuisances_fit", answer)
+    answers = ProfileAnswers(linear_surrogate(np.zeros((len(PARAMETERS), GROWTH_COLUMNS))), noise)
+    noise_free_chapter(answers, tables, presses=40, jobs=1)
+    ranked = np.sort(fitted)
+
+    def larger(surrogate, row, unit, std):
+        truth = from_unit(unit)[:3]
+        return truth * [1 + np.searchsorted(ranked, truth[0]) / 100, 1.0, 1.0]
+
+    monkeypatch.setattr(mode_noise_free, "known_nuisances_fit", larger)
+    chapter = noise_free_chapter(answers, tables, presses=40, jobs=1)
+    overall, octiles = chapter.tables
+    assert overall.rows[0] == ("size_mm", "40", "19.500", f"{np.arange(40).std():.3f}", "0.000", "39.000")
+    assert octiles.rows[0] == ("size_mm", *(f"{2 + 5 * number:.3f}" for number in range(8)))
+    assert octiles.rows[1] == ("depth_mm", *["0.000"] * 8)
+    assert chapter.benchmarks[0].error == pytest.approx(19.5)
+
+
+def test_too_few_presses_for_a_score_of_the_modulus_are_refused(tables):
+    with pytest.raises(InvalidQuantity, match="presses without noise is 39, but must be at least 40 presses"):
+        noise_free_chapter(ProfileAnswers(linear_surrogate(np.zeros((9, GROWTH_COLUMNS))), {}), tables, presses=39)

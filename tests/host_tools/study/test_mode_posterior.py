@@ -10,8 +10,9 @@ from small_surrogate import linear_surrogate, white_noise
 from device.measurement.fit_press import PressPosterior
 from device.measurement.press_parameters import EVEN_STD, PARAMETERS
 from device.measurement.press_surrogate import MODULUS
+from device.measurement.quantities import InvalidQuantity
 from host_tools.study import mode_posterior
-from host_tools.study.mode_posterior import Sampled, sampled
+from host_tools.study.mode_posterior import OneScene, Sampled, posterior_chapter, sampled
 
 STEPS, BURN_IN = 1200, 400
 
@@ -78,3 +79,26 @@ def test_a_truth_at_the_end_of_its_range_is_begun_inside_it(slopes, monkeypatch)
     found = sampled(PressPosterior(row, linear_surrogate(slopes), white_noise(STD)), at_end, 4)
     assert 0.9 < found.mean[0] < 1
     assert np.isfinite(found.std).all()
+
+
+def test_the_chapter_sets_a_mode_that_is_asked_for_over_the_posterior_and_its_spread(monkeypatch):
+    """Errors of 0.3 where the posterior's mean errs by 0.2 and says 0.25: 1.5 of the mean's, 1.2 of the bound."""
+    asked = []
+
+    def compared(model, mode, *, seed, scenes, jobs):
+        asked.append((mode, scenes))
+        truth, alike = np.zeros(3), np.ones(3)
+        return [
+            OneScene(truth, Sampled(0.2 * alike, 0.25 * alike, 40.0), sign * 0.3 * alike, alike) for sign in (-1, 1)
+        ]
+
+    monkeypatch.setattr(mode_posterior, "compared", compared)
+    chapter = posterior_chapter(None, modes=("standard",), scenes=2)
+    assert asked == [("standard", 2)]
+    assert [one.error for one in chapter.benchmarks] == pytest.approx([1.5] * 3)
+    assert chapter.tables[0].rows[0] == ("standard, size_mm", "0.3000", "0.2000", "0.2500", "1.20")
+
+
+def test_one_scene_is_no_comparison():
+    with pytest.raises(InvalidQuantity, match="scenes is 1, but must be at least 2"):
+        posterior_chapter(None, scenes=1)

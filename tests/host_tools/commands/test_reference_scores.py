@@ -1,0 +1,83 @@
+"""`host_tools evaluate --noise-free` and `--posterior`: which chapters are measured, on what, and what is printed."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.__main__ import app
+from host_tools.study import mode_noise_free, mode_posterior
+from host_tools.study.benchmark import Chapter, Table, at_most
+
+
+def chapter(title: str, error: float = 0.4) -> Chapter:
+    table = Table("Shown numbers", ("unknown", "mean"), (("size_mm", "0.321"),))
+    return Chapter(title, f"Claim of {title}.", "here", (at_most("size_mm", "mean error (%)", error, 0.5),), (table,))
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, dict[str, object]]]:
+    """Chapters of two numbers; what they are asked for is kept."""
+    kept: list[tuple[str, dict[str, object]]] = []
+
+    def noise_free(answers: object, tables: object, **options: object) -> Chapter:
+        kept.append(("noise-free", options))
+        return chapter("Without noise")
+
+    def posterior(model: object, **options: object) -> Chapter:
+        kept.append(("posterior", options))
+        return chapter("Beside the posterior")
+
+    monkeypatch.setattr(mode_noise_free, "noise_free_chapter", noise_free)
+    monkeypatch.setattr(mode_posterior, "posterior_chapter", posterior)
+    return kept
+
+
+def evaluate(*options: str):
+    return CliRunner().invoke(app, ["evaluate", *options])
+
+
+def test_both_chapters_are_printed_with_their_benchmarks_and_tables(asked):
+    done = evaluate("--noise-free", "--posterior")
+    assert done.exit_code == 0, done.output
+    for words in (
+        "Without noise",
+        "Beside the posterior",
+        "Claim of Without noise.",
+        "Shown numbers",
+        "0.321",
+        "holds",
+    ):
+        assert words in done.output
+    assert asked == [
+        ("noise-free", {"presses": 160, "seed": 1000}),
+        ("posterior", {"modes": ("standard", "precise"), "scenes": 50, "seed": 1000}),
+    ]
+
+
+def test_mode_scenes_and_seed_are_those_asked_for(asked):
+    assert evaluate("--posterior", "--mode", "precise", "--scenes", "7", "--seed", "3").exit_code == 0
+    assert asked == [("posterior", {"modes": ("precise",), "scenes": 7, "seed": 3})]
+
+
+def test_a_figure_that_misses_its_bound_is_exit_code_1_and_is_still_printed(asked, monkeypatch):
+    monkeypatch.setattr(mode_noise_free, "noise_free_chapter", lambda *_, **__: chapter("Missed", 0.6))
+    done = evaluate("--noise-free")
+    assert done.exit_code == 1
+    assert "fails" in done.output
+    assert "0.321" in done.output
+
+
+@pytest.mark.parametrize("mode", ["quick", "paper"])
+def test_a_mode_without_a_forward_model_is_refused(asked, mode):
+    done = evaluate("--noise-free", "--mode", mode)
+    assert isinstance(done.exception, InvalidQuantity)
+    assert f"mode is {mode}, but must be standard or precise" in str(done.exception)
+    assert asked == []
+
+
+def test_recordings_have_no_reference_and_are_refused(asked, tmp_path):
+    done = evaluate("--posterior", str(tmp_path))
+    assert "recordings is 1, but must be none" in str(done.exception)
+    assert asked == []
