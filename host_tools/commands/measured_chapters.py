@@ -51,14 +51,13 @@ def print_chapter(timed: Timed) -> int:
 
 
 def print_tables(chapter: Chapter) -> None:
-    """Print what a chapter claims, and the tables that `print_chapter` leaves to the documents."""
-    out = Console(width=140, highlight=False)
-    out.print(chapter.claim, markup=False)
-    for numbers in chapter.tables:
-        table = Table(*numbers.header, title=numbers.caption, title_justify="left")
-        for row in numbers.rows:
-            table.add_row(*map(escape, row))
-        out.print(table)
+    """Print the numbers of a chapter that `print_chapter` does not judge."""
+    console = Console(width=160, highlight=False)
+    for table in chapter.tables:
+        printed = Table(*map(escape, table.header), title=escape(table.caption), title_justify="left")
+        for row in table.rows:
+            printed.add_row(*map(escape, row))
+        console.print(printed)
 
 
 def shown(path: Path) -> str:

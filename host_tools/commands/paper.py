@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, print_tables, shown
 from host_tools.commands.output import note, note_left_out, require_writable
-
-if TYPE_CHECKING:
-    from host_tools.study.benchmark import Chapter
 
 DEFAULT_DATA = ROOT / "build" / "sweep.nc"
 DEFAULT_TABLE = ROOT / "models" / "simulated_probe"
@@ -44,7 +38,7 @@ def paper(
     failed = 0
     for timed in measured.values():
         failed += print_chapter(timed)
-        _print_tables(timed.chapter)
+        print_tables(timed.chapter)
     if out:
         from host_tools.study.document import write_document
         from host_tools.study.paper_verdict import cover
@@ -61,12 +55,3 @@ def _command(out: Path, data: Path, table: Path, seeds: int) -> str:
     flags += [f"--table {shown(table)}"] if table != DEFAULT_TABLE else []
     flags += [f"--seeds {seeds}"] if seeds != DEFAULT_SEEDS else []
     return " ".join(["host_tools paper", *flags, f"--out {shown(out)}"])
-
-
-def _print_tables(chapter: Chapter) -> None:
-    console = Console(width=160, highlight=False)
-    for table in chapter.tables:
-        printed = Table(*map(escape, table.header), title=escape(table.caption), title_justify="left")
-        for row in table.rows:
-            printed.add_row(*map(escape, row))
-        console.print(printed)

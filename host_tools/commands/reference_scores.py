@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+from rich.console import Console
 
 from device.measurement.mode import Mode
 from device.measurement.profile_model import RAMP_MODES, ProfileModel
@@ -41,9 +42,10 @@ def print_reference(
     if posterior:
         count = SCENES if scenes is None else scenes
         chapters["posterior"] = lambda: posterior_chapter(trained, modes=modes, scenes=count, seed=seed)
-    missed = 0
+    missed, out = 0, Console(width=160, highlight=False)
     for timed in measure_chapters(chapters).values():
         missed += print_chapter(timed)
+        out.print(timed.chapter.claim, markup=False)
         print_tables(timed.chapter)
     if missed:
         raise typer.Exit(1)
