@@ -27,12 +27,13 @@ def paper(
     Exit code 1 when a bound is missed. Some five minutes on one core for 100 seeds.
     """
     require_writable(out, (".md",))
-    from host_tools.data.dataset import training_rows
+    from host_tools.data.dataset import require_enough, training_rows
     from host_tools.study.paper_chapters import paper_chapters
     from host_tools.study.paper_study import PaperStudy
 
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
+    require_enough(rows, data)
     study = PaperStudy(rows, ProbeTables.load(table), seeds=seeds)
     measured = measure_chapters(paper_chapters(study))
     failed = 0

@@ -47,7 +47,7 @@ def train(
     command = _command({"--profile": profile, **given, "--out": out, "--seed": seed})
     folder = out or MODELS / profile
     if profile == "paper":
-        _paper(data or _swept(), folder, trials or TRIALS, seed, command)
+        _paper(data or _swept(), folder, TRIALS if trials is None else trials, seed, command)
     elif profile == "standard":
         _standard(table or TABLE, folder, seed, quick, command)
     else:
@@ -71,12 +71,15 @@ def _swept() -> Path:
 
 
 def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
-    from host_tools.data.dataset import training_rows
+    from host_tools.data.dataset import require_enough, training_rows
     from host_tools.inverse.export import export
+    from host_tools.inverse.train import require_trials
     from host_tools.inverse.train import train as run_training
 
+    require_trials(trials)
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
+    require_enough(rows, data)
     with progress("networks") as bar:
         task = bar.add_task("", total=trials)
         trained = run_training(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from device.measurement.inversion import FEATURE_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.plan import SCHEMA, SCHEMA_OF_LOADS
-from host_tools.inverse.train import TrainingRows
+from host_tools.inverse.train import MIN_TRAINING_ROWS, TrainingRows
 from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 FEATURES = tuple(FEATURE_UNITS)
@@ -70,6 +70,15 @@ def training_rows(path: Path) -> TrainingRows:
         scene_defaults=origin["scene_defaults"],
         excluded_rows=int(np.sum(~usable)),
     )
+
+
+def require_enough(rows: TrainingRows, path: Path) -> None:
+    """Raise `InvalidQuantity` for fewer usable rows of a file than training needs beside the nine phantoms."""
+    usable, needed = len(rows.features), MIN_TRAINING_ROWS + len(L9)
+    if usable < needed:
+        found = f"{usable} of {usable + rows.excluded_rows}"
+        bound = f"at least {needed}, {MIN_TRAINING_ROWS} that train and {len(L9)} phantoms that never do"
+        raise InvalidQuantity(f"usable rows of {path}", found, bound, "sweep more scenes")
 
 
 def _require_columns(dataset: xr.Dataset) -> None:

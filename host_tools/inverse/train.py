@@ -91,7 +91,7 @@ def train(
     than the paper's three, and any number that is not finite.
     """
     require_usable(rows)
-    require("trials", trials, Bound(2, 10_000, "networks"), "train at least two, for a spread")
+    require_trials(trials)
     features, truth = rows.features[rows.training_index], rows.truth[rows.training_index]
     scaling = Scaling.fit(features)
     inputs, targets = scaling.inputs(features), scaling.targets(truth)
@@ -176,6 +176,11 @@ class _KeepBest:
         if value < self.least:
             self.parameters, self.least, self.steps_since = parameters, value, 0
         return f"no better held-out loss in {self.patience} steps" if self.steps_since >= self.patience else ""
+
+
+def require_trials(trials: int) -> None:
+    """Raise `InvalidQuantity` for too few or too many networks."""
+    require("trials", trials, Bound(2, 10_000, "networks"), "train at least two, for a spread")
 
 
 def require_usable(rows: TrainingRows) -> None:

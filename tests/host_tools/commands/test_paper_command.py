@@ -30,7 +30,7 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
         table = Table("Errors", ("unknown", "error [%]"), (("size", "7"),))
         return {"one": lambda: Chapter("One", "", "", (at_most("case", "noise", study.seeds / 100, 1.0),), (table,))}
 
-    monkeypatch.setattr(dataset, "training_rows", lambda path: SimpleNamespace(excluded_rows=4))
+    monkeypatch.setattr(dataset, "training_rows", lambda path: SimpleNamespace(excluded_rows=4, features=range(80)))
     monkeypatch.setattr(ProbeTables, "load", lambda folder: None)
     monkeypatch.setattr(paper_study, "PaperStudy", lambda rows, tables, seeds: SimpleNamespace(seeds=seeds))
     monkeypatch.setattr(paper_chapters, "paper_chapters", chapters)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from device.measurement.inversion import FEATURE_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.__main__ import app
-from host_tools.data.dataset import training_rows
+from host_tools.data.dataset import require_enough, training_rows
 from host_tools.data.plan import SCHEMA
 from host_tools.inverse.train import train
 
@@ -92,3 +92,37 @@ def test_train_prints_how_many_rows_it_leaves_out(dataset: xr.Dataset, tmp_path:
     assert done.exit_code == 0
     assert f"3 scenes of {path}, failed or without a number, are left out." in done.output
     assert json.loads((tmp_path / "m" / "model.json").read_text())["excluded_rows"] == 3
+
+
+@pytest.mark.parametrize("verb", ["train", "paper"])
+@pytest.mark.parametrize(("lacking", "usable"), [(12, 68), (72, 8), (SCENES, 0)])
+def test_too_few_rows_are_refused_by_their_number_and_file_before_anything_begins(
+    dataset: xr.Dataset, tmp_path: Path, verb: str, lacking: int, usable: int
+) -> None:
+    dataset["youngs_modulus_kpa"][:lacking] = np.nan
+    path = written(dataset, tmp_path)
+    done = CliRunner().invoke(app, [verb, "--data", str(path)])
+    assert isinstance(done.exception, InvalidQuantity)
+    found = f"usable rows of {path} is {usable} of 80"
+    bound = "at least 69, 60 that train and 9 phantoms that never do"
+    assert str(done.exception) == f"{found}, but must be {bound}: sweep more scenes."
+    assert done.output.strip().splitlines() == [
+        f"{lacking} scenes of {path}, failed or without a number, are left out."
+    ]
+
+
+def test_just_enough_rows_suffice(dataset: xr.Dataset, tmp_path: Path) -> None:
+    dataset["youngs_modulus_kpa"][:11] = np.nan
+    path = written(dataset, tmp_path)
+    rows = training_rows(path)
+    require_enough(rows, path)
+    assert len(rows.training_index) == 60
+
+
+@pytest.mark.parametrize("trials", ["0", "1"])
+def test_too_few_networks_are_refused_before_the_first_is_trained(
+    dataset: xr.Dataset, tmp_path: Path, trials: str
+) -> None:
+    done = CliRunner().invoke(app, ["train", "--data", str(written(dataset, tmp_path)), "--trials", trials])
+    assert f"trials is {trials}, but must be at least 2" in str(done.exception)
+    assert done.output == ""
