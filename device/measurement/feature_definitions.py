@@ -45,12 +45,18 @@ RAMP_FEATURES: Mapping[str, Definition] = {
     ),
     "gaussian_sigma_mm": Definition("mm", "Standard deviation sigma of that Gaussian."),
     "gaussian_residual_ratio": Definition("1", "Root mean square that this Gaussian leaves of the profile, over A."),
+    "centroid_offset_mm": Definition(
+        "mm", "Shift s off the axis, along its direction over the ramp: the first harmonic is -s dC/dr (least squares)."
+    ),
+    "ellipticity": Definition(
+        "1", "(a - b) / (a + b) of the axes, along theirs: the second harmonic is -e r dC/dr (least squares)."
+    ),
 }
 """Of the press profile at each of its forces (`shape_features`)."""
 
 PRESS_FEATURES: Mapping[str, Definition] = {
-    "centroid_offset_mm": Definition("mm", "Shift s off the axis: the first harmonic is -s dC/dr (least squares)."),
-    "ellipticity": Definition("1", "(a - b) / (a + b) of the axes: the second harmonic is -e r dC/dr (least squares)."),
+    "mean_centroid_offset_mm": Definition("mm", "The same shift s of the profile's mean over the ramp."),
+    "mean_ellipticity": Definition("1", "The same ellipticity of the profile's mean over the ramp."),
     "peak_change_per_n": Definition("1/N", "Slope of the peak contrast over the force, over its mean on the ramp."),
     "total_change_per_n": Definition("1/N", "Slope of the total contrast over the force, over its mean on the ramp."),
     "width_change_mm_per_n": Definition("mm/N", "Slope of the full width at half maximum over the force."),

@@ -48,7 +48,9 @@ class PressProfile:
     contrast [K, J]: ring means of the tactile image. growth [K - 1, J]: ln of the lump-free light at each force over
     that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the forces,
     without the ring in the middle. elongation [J - 1]: the same of the second harmonic, along its own direction.
-    residual: root mean square, over rings and frames, of what the polynomial in the force leaves.
+    offset_at_force, elongation_at_force [K, J - 1]: both at each force, along the direction of their mean, so that
+    noise makes neither longer. residual: root mean square, over rings and frames, of what the polynomial in the force
+    leaves.
     """
 
     force_n: Array
@@ -56,6 +58,8 @@ class PressProfile:
     growth: Array
     offset: Array
     elongation: Array
+    offset_at_force: Array
+    elongation_at_force: Array
     residual: float
 
     def as_row(self) -> Array:
@@ -123,6 +127,8 @@ def profile_of_lights(reference: Lights, press: Lights) -> PressProfile:
         growth=np.log(bare[:-1] / bare[-1]),
         offset=harmonic(rings, 1),
         elongation=harmonic(rings, 2),
+        offset_at_force=harmonic_at_forces(rings, 1),
+        elongation_at_force=harmonic_at_forces(rings, 2),
         residual=residual,
     )
 
@@ -139,8 +145,29 @@ def harmonic(rings: RingMeans, order: int) -> Array:
 
     `rings` holds means [K, J] and harmonics [K, 2, J].
     """
-    cosine, sine = (part[:, order - 1, 1:].mean(axis=0) for part in (rings.cosine, rings.sine))
-    direction = np.arctan2(sine @ RING_RADII_MM[1:], cosine @ RING_RADII_MM[1:])
+    cosine, sine = (part.mean(axis=0) for part in _waves(rings, order))
+    return _along(cosine, sine, _direction(cosine, sine))
+
+
+def harmonic_at_forces(rings: RingMeans, order: int) -> Array:
+    """Return the harmonic of an order [K, J - 1] at each force, along the direction of `harmonic`.
+
+    Its mean over the forces is that; a spot that moves to the other side has a negative one there.
+    """
+    cosine, sine = _waves(rings, order)
+    return _along(cosine, sine, _direction(cosine.mean(axis=0), sine.mean(axis=0)))
+
+
+def _waves(rings: RingMeans, order: int) -> tuple[Array, Array]:
+    """Return cosine and sine [K, J - 1] of an order, without the ring in the middle, which has none."""
+    return rings.cosine[:, order - 1, 1:], rings.sine[:, order - 1, 1:]
+
+
+def _direction(cosine: Array, sine: Array) -> float:
+    return float(np.arctan2(sine @ RING_RADII_MM[1:], cosine @ RING_RADII_MM[1:]))
+
+
+def _along(cosine: Array, sine: Array, direction: float) -> Array:
     return np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
 
 

@@ -43,8 +43,10 @@ class ShapeFeatures:
     gaussian_peak: Array
     gaussian_sigma_mm: Array
     gaussian_residual_ratio: Array
-    centroid_offset_mm: float
-    ellipticity: float
+    centroid_offset_mm: Array
+    ellipticity: Array
+    mean_centroid_offset_mm: float
+    mean_ellipticity: float
     peak_change_per_n: float
     total_change_per_n: float
     width_change_mm_per_n: float
@@ -70,7 +72,8 @@ def shape_features(profile: PressProfile) -> ShapeFeatures:
     gaussian = np.array(
         [fit_gaussian(row) if seen else NO_GAUSSIAN for row, seen in zip(profile.contrast, lump, strict=True)]
     )
-    offset, ellipticity = _asymmetry(profile) if lump.all() else (np.nan, np.nan)
+    offset, ellipticity = _asymmetry(profile, lump)
+    mean_offset, mean_ellipticity = _mean_asymmetry(profile) if lump.all() else (np.nan, np.nan)
     slope = [_slope_per_n(profile.force_n, values) if lump.all() else np.nan for values in (peak, total, width)]
     return ShapeFeatures(
         force_n=profile.force_n,
@@ -84,6 +87,8 @@ def shape_features(profile: PressProfile) -> ShapeFeatures:
         gaussian_residual_ratio=gaussian[:, 3],
         centroid_offset_mm=offset,
         ellipticity=ellipticity,
+        mean_centroid_offset_mm=mean_offset,
+        mean_ellipticity=mean_ellipticity,
         peak_change_per_n=slope[0] / float(peak.mean()) if lump.all() else np.nan,
         total_change_per_n=slope[1] / float(total.mean()) if lump.all() else np.nan,
         width_change_mm_per_n=slope[2],
@@ -109,15 +114,28 @@ def _moments_mm(contrast: Array) -> Array:
     return np.array([weight @ RING_RADII_MM / total, np.sqrt(weight @ RING_RADII_MM**2 / total)])
 
 
-def _asymmetry(profile: PressProfile) -> tuple[float, float]:
-    """Return offset (mm) and ellipticity: a small shift s adds -s dC/dr cos(angle), an ellipse -e r dC/dr cos(2 angle).
+def _asymmetry(profile: PressProfile, lump: NDArray[np.bool_]) -> Array:
+    """Return offset (mm) and ellipticity [2, K] of the profile at each force; NaN where there is no lump [K]."""
+    rows = zip(profile.contrast, profile.offset_at_force, profile.elongation_at_force, strict=True)
+    return np.array(
+        [_shift_and_stretch(*row) if seen else (np.nan, np.nan) for row, seen in zip(rows, lump, strict=True)]
+    ).T
 
-    Both harmonics are means over the ramp, so dC/dr is that of the mean profile; rings count by their area.
+
+def _mean_asymmetry(profile: PressProfile) -> tuple[float, float]:
+    """Return offset (mm) and ellipticity of the ramp's mean profile, whose harmonics the means over the ramp are."""
+    return _shift_and_stretch(profile.contrast.mean(axis=0), profile.offset, profile.elongation)
+
+
+def _shift_and_stretch(contrast: Array, first: Array, second: Array) -> tuple[float, float]:
+    """Return shift s (mm) and ellipticity e of a profile [J] from its harmonics [J - 1].
+
+    A small shift adds -s dC/dr cos(angle), an ellipse -e r dC/dr cos(2 angle). Rings count by their area.
     """
-    r, slope = RING_RADII_MM[INNER], (_SLOPES @ profile.contrast.mean(axis=0))[INNER]
+    r, slope = RING_RADII_MM[INNER], (_SLOPES @ contrast)[INNER]
     return tuple(
         float(-(r * shape) @ harmonic[:-1] / ((r * shape) @ shape))
-        for shape, harmonic in ((slope, profile.offset), (r * slope, profile.elongation))
+        for shape, harmonic in ((slope, first), (r * slope, second))
     )  # type: ignore[return-value]
 
 

@@ -24,7 +24,7 @@ SHOWN = (
 """The features of the page's tables; those of the ramp at the force nearest to a held press's."""
 WORDS = dict(zip(UNKNOWNS, ("size", "depth", "Young's modulus"), strict=True))
 PEAK, TOTAL, SIGMA = "peak_contrast_0.40_n", "total_contrast_mm2_0.40_n", "gaussian_sigma_mm_0.40_n"
-SHIFT, WIDTH = "centroid_offset_mm", "full_width_half_maximum_mm_0.40_n"
+SHIFT, WIDTH = "mean_centroid_offset_mm", "full_width_half_maximum_mm_0.40_n"
 
 Move = Callable[[Sensitivity, str], float]
 """How far something moves a feature of a scene, in units of its scatter."""

@@ -1,20 +1,24 @@
 """A recording of two force ramps to contrast on rings: synthetic recordings whose contrast is known on paper."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from daemon_process import ROOT
 
 from device.measurement.press_profile import (
     LARGEST_STEP_N,
     MIN_RAMP_FRAMES,
     PROFILE_FORCES_N,
     ROW_NAMES,
+    harmonic,
+    harmonic_at_forces,
     press_profile,
 )
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import CameraSettings, Recording
-from device.measurement.ring_means import RING_MM, RING_RADII_MM
+from device.measurement.ring_means import RING_MM, RING_RADII_MM, RingMeans
 from device.measurement.tactile_image import Frame
 
 SIZE_PX, PITCH_MM, DARK = 192, 0.125, 1000
@@ -89,6 +93,40 @@ def test_the_harmonics_are_lengths_along_their_own_direction(towards):
     found = press_profile(recording(lambda _: 0.01 * np.cos(angle - towards) + 0.02 * np.cos(2 * angle - towards)))
     np.testing.assert_allclose(found.offset, 0.01, atol=5e-4)
     np.testing.assert_allclose(found.elongation, 0.02, atol=5e-4)
+
+
+def test_a_harmonic_is_known_at_each_force_too():
+    """(0.01 + 0.02 F) cos(angle - 2): the polynomials of the force hold a straight line."""
+    angle = np.arctan2(Y, X)
+    found = press_profile(recording(lambda force_n: (0.01 + 0.02 * force_n) * np.cos(angle - 2)))
+    expected = np.repeat(0.01 + 0.02 * PROFILE_FORCES_N[:, None], len(RING_RADII_MM) - 1, 1)
+    np.testing.assert_allclose(found.offset_at_force, expected, atol=5e-4)
+    np.testing.assert_allclose(found.elongation_at_force, 0.0, atol=5e-4)
+
+
+def random_rings(seed):
+    rng, forces, rings = np.random.default_rng(seed), len(PROFILE_FORCES_N), len(RING_RADII_MM)
+    return RingMeans(*(rng.normal(size=shape) for shape in ((forces, rings), *[(forces, 2, rings)] * 2)))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_mean_harmonic_is_to_the_bit_the_one_that_the_networks_have_learnt_from(order):
+    """Amplitudes averaged over the forces first, then turned: another order of sums would round otherwise."""
+    rings = random_rings(order)
+    cosine, sine = (part[:, order - 1, 1:].mean(axis=0) for part in (rings.cosine, rings.sine))
+    direction = np.arctan2(sine @ RING_RADII_MM[1:], cosine @ RING_RADII_MM[1:])
+    learnt = np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
+    assert harmonic(rings, order).tobytes() == learnt.tobytes()
+    np.testing.assert_allclose(harmonic_at_forces(rings, order).mean(axis=0), learnt, atol=1e-12)
+
+
+def test_the_row_of_the_networks_is_contrast_growth_and_mean_offset_and_nothing_else():
+    found = press_profile(recording(lambda force_n: cone(force_n) + 0.01 * X / (1 + R)))
+    row = np.concatenate([found.contrast.ravel(), found.growth.ravel(), found.offset])
+    assert found.as_row().tobytes() == row.tobytes()
+    card = json.loads((ROOT / "models" / "standard" / "model.json").read_text(encoding="utf-8"))
+    assert [feature["name"] for feature in card["features"]] == list(ROW_NAMES)
+    assert len(card["golden"]["features"][0]) == len(row)
 
 
 def test_a_row_has_a_name_for_every_number():

@@ -12,7 +12,7 @@ import pytest
 from device.measurement.feature_definitions import PAPER_FEATURES, PRESS_FEATURES, PROFILE_FEATURES, RAMP_FEATURES
 from device.measurement.features import FEATURE_NAMES
 from device.measurement.pixel_scale import PixelScale
-from device.measurement.press_profile import PROFILE_FORCES_N, ROW_NAMES, PressProfile, harmonic
+from device.measurement.press_profile import PROFILE_FORCES_N, ROW_NAMES, PressProfile, harmonic_at_forces
 from device.measurement.radial_gaussian import SIGMAS_MM, fit_gaussian
 from device.measurement.ring_means import RING_MM, RING_RADII_MM, RingMeans, ring_weights
 from device.measurement.shape_features import NOISE_MULTIPLE, shape_features
@@ -27,19 +27,21 @@ FWHM = 2 * math.sqrt(2 * math.log(2))
 def profile_of(contrast, offset=None, elongation=None, residual=0.0):
     zero = np.zeros(len(R) - 1)
     contrast = np.broadcast_to(contrast, (FORCES, len(R))).astype(float)
-    harmonics = [zero if h is None else h for h in (offset, elongation)]
-    return PressProfile(PROFILE_FORCES_N, contrast, np.zeros((FORCES - 1, len(R))), *harmonics, residual)
+    at_force = [np.broadcast_to(zero if h is None else h, (FORCES, len(zero))) for h in (offset, elongation)]
+    harmonics = [h.mean(axis=0) for h in at_force]
+    return PressProfile(PROFILE_FORCES_N, contrast, np.zeros((FORCES - 1, len(R))), *harmonics, *at_force, residual)
 
 
 def bell(sigma_mm, peak=0.3, constant=0.0):
     return profile_of(peak * np.exp(-(R**2) / (2 * sigma_mm**2)) + constant)
 
 
-def seen(image):
-    """Return the profile of one image, the same at all forces."""
-    one = ring_weights(SHAPE, SCALE).means(np.broadcast_to(image, SHAPE).astype(np.float32), np.ones(SHAPE, bool))
-    rings = RingMeans(*(np.repeat(part[None], FORCES, axis=0) for part in one))
-    return profile_of(rings.mean, harmonic(rings, 1), harmonic(rings, 2))
+def seen(*images):
+    """Return the profile of images at the forces, or of one image, the same at all of them."""
+    weights, valid = ring_weights(SHAPE, SCALE), np.ones(SHAPE, bool)
+    means = [weights.means(np.broadcast_to(image, SHAPE).astype(np.float32), valid) for image in images]
+    rings = RingMeans(*(np.array(part) for part in zip(*means * (FORCES // len(images)), strict=True)))
+    return profile_of(rings.mean, harmonic_at_forces(rings, 1), harmonic_at_forces(rings, 2))
 
 
 def spot(sigma_mm, x=X, y=Y):
@@ -99,14 +101,30 @@ def test_a_shifted_gaussian_is_off_by_its_shift(towards):
     for shift_mm, bound_mm in ((0.25, 0.01), (0.5, 0.025), (1.0, 0.12)):
         x, y = X - shift_mm * math.cos(towards), Y - shift_mm * math.sin(towards)
         found = shape_features(seen(spot(3.0, x, y)))
-        assert found.centroid_offset_mm == pytest.approx(shift_mm, abs=bound_mm)
-        assert abs(found.ellipticity) < shift_mm**2 / 9
+        np.testing.assert_allclose(found.centroid_offset_mm, shift_mm, atol=bound_mm)
+        assert found.mean_centroid_offset_mm == pytest.approx(shift_mm, abs=bound_mm)
+        assert (np.abs(found.ellipticity) < shift_mm**2 / 9).all()
 
 
 def test_the_offsets_error_falls_with_the_square_of_the_shift():
     """Halving the shift quarters the error relative to what an infinitely small shift gives."""
-    ratio = [shape_features(seen(spot(3.0, x=X - s))).centroid_offset_mm / s for s in (0.05, 0.5, 1.0)]
+    ratio = [shape_features(seen(spot(3.0, x=X - s))).mean_centroid_offset_mm / s for s in (0.05, 0.5, 1.0)]
     assert (ratio[0] - ratio[2]) / (ratio[0] - ratio[1]) == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_spot_that_moves_during_the_ramp_has_its_offset_at_each_force():
+    """Along one direction for the whole ramp: a spot on the other side of the axis has a negative offset."""
+    shifts_mm = np.array([-0.1, 0.1, 0.3, 0.5])
+    found = shape_features(seen(*(spot(3.0, x=X - s) for s in shifts_mm)))
+    np.testing.assert_allclose(found.centroid_offset_mm, shifts_mm, atol=0.025)
+    assert found.mean_centroid_offset_mm == pytest.approx(shifts_mm.mean(), abs=0.01)
+
+
+def test_a_spot_that_gets_oblong_has_its_ellipticity_at_each_force():
+    growing = np.array([0.0, 0.02, 0.05, 0.1])
+    found = shape_features(seen(*(spot(3.0, X / (1 + e), Y / (1 - e)) for e in growing)))
+    np.testing.assert_allclose(found.ellipticity, growing, rtol=0.04, atol=1e-3)
+    assert found.mean_ellipticity == pytest.approx(growing.mean(), rel=0.04)
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.6, -1.2])
@@ -115,8 +133,9 @@ def test_an_elliptical_gaussian_has_its_ellipticity_however_it_is_turned(turned,
     """Half axes s (1 + e) and s (1 - e): (a - b) / (a + b) = e."""
     u, v = X * math.cos(turned) + Y * math.sin(turned), Y * math.cos(turned) - X * math.sin(turned)
     found = shape_features(seen(spot(3.0, u / (1 + ellipticity), v / (1 - ellipticity))))
-    assert found.ellipticity == pytest.approx(ellipticity, rel=0.04)
-    assert abs(found.centroid_offset_mm) < 1e-3
+    np.testing.assert_allclose(found.ellipticity, ellipticity, rtol=0.04)
+    assert found.mean_ellipticity == pytest.approx(ellipticity, rel=0.04)
+    assert (np.abs(found.centroid_offset_mm) < 1e-3).all()
 
 
 def test_slopes_over_the_force_are_those_of_the_ramp():
@@ -156,7 +175,8 @@ def test_a_peak_within_the_noise_is_no_lump(share, is_lump):
     noise = 0.001
     found = shape_features(profile_of(share * NOISE_MULTIPLE * np.exp(-(R**2) / 8) * noise, residual=noise))
     assert np.isfinite(found.gaussian_sigma_mm).all() == is_lump
-    assert math.isfinite(found.centroid_offset_mm) == is_lump
+    assert np.isfinite(found.centroid_offset_mm).all() == is_lump
+    assert math.isfinite(found.mean_centroid_offset_mm) == is_lump
 
 
 def test_a_spot_wider_than_the_window_has_no_width_but_moments():
