@@ -18,6 +18,13 @@ class Definition:
     sentence: str
 
 
+LUMP_FIELD_FEATURES: Mapping[str, Definition] = {
+    "max_deformation_mm": Definition("mm", "O1: largest lump field in the central window, r < 0.9 of the face."),
+    "central_deformation_mm3": Definition("mm3", "O2: integral of the lump field over the central window."),
+    "deformation_area_mm2": Definition("mm2", "O3: area in the window where the lump field exceeds half of O1."),
+}
+"""Of the face's displacement, which the network of mode paper reads; a probe regresses them from `PAPER_FEATURES`."""
+
 PAPER_FEATURES: Mapping[str, Definition] = {
     "centroid_intensity": Definition("1", "Contrast, blurred by 0.5 mm, at the centroid of the bright area."),
     "total_intensity": Definition("mm2", "Integral of the contrast over the window of 9.9 mm."),
@@ -31,6 +38,12 @@ PROFILE_FEATURES: Mapping[str, Definition] = {
     "offset": Definition("1", "First harmonic of the contrast on a ring, towards the bright side; mean over the ramp."),
 }
 """What the names of a press profile's row begin with (`press_profile`)."""
+
+HELD_FEATURES: Mapping[str, Definition] = {
+    "contrast": Definition("1", "Mean contrast on a ring of the face, at the force of the hold."),
+    "force_n": Definition("N", "Mean force of the hold."),
+}
+"""What the names of a held press's row begin with (`held_profile`)."""
 
 RAMP_FEATURES: Mapping[str, Definition] = {
     "peak_contrast": Definition("1", "Largest contrast of the ring profile, a cubic spline between the rings."),
@@ -62,3 +75,11 @@ PRESS_FEATURES: Mapping[str, Definition] = {
     "width_change_mm_per_n": Definition("mm/N", "Slope of the full width at half maximum over the force."),
 }
 """Of the press as a whole (`shape_features`)."""
+
+
+def definition_of(name: str, group: Mapping[str, Definition]) -> Definition:
+    """Return the definition of a name of a group, or of one that goes on with a force or a radius; else `KeyError`."""
+    for stem, definition in group.items():
+        if name == stem or name.startswith(f"{stem}_"):
+            return definition
+    raise KeyError(name)

@@ -8,6 +8,7 @@ Source of the format: the model bundle of docs/contracts.md, schema `tsis.model/
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,17 +18,31 @@ import onnxruntime
 from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
 
+from device.measurement.feature_definitions import (
+    HELD_FEATURES,
+    LUMP_FIELD_FEATURES,
+    PROFILE_FEATURES,
+    Definition,
+    definition_of,
+)
 from device.measurement.held_profile import HELD_NAMES
 from device.measurement.model_card import CARD_FILE, MODEL_FILE, BundleRefused, ModelCard, read_bundle_file
 from device.measurement.press_profile import ROW_NAMES
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
-FEATURE_UNITS = {"max_deformation_mm": "mm", "central_deformation_mm3": "mm3", "deformation_area_mm2": "mm2"}
+
+def _units(names: Iterable[str], group: Mapping[str, Definition]) -> dict[str, str]:
+    return {name: definition_of(name, group).unit for name in names}
+
+
+FEATURE_UNITS = _units(LUMP_FIELD_FEATURES, LUMP_FIELD_FEATURES)
 """The features of the paper's network: O1, O2, O3, in this order."""
-PROFILE_UNITS = dict.fromkeys(ROW_NAMES, "")
+PROFILE_UNITS = _units(ROW_NAMES, PROFILE_FEATURES)
 """The features of a network that reads the press profile: its whole row, ratios all of them."""
-HELD_UNITS = {name: "N" if name == "force_n" else "" for name in HELD_NAMES}
+HELD_UNITS = _units(HELD_NAMES, HELD_FEATURES)
 """The features of a network that reads one held press."""
+RATIO = "1"
+"""The unit of a ratio (`Definition`); cards of earlier versions left it empty, and hold all the same."""
 
 GOLDEN_TOLERANCE = 1e-4
 """Relative. Rounding of float32 is 6e-8; processors differ far less than this, wrong weights far more."""
@@ -106,9 +121,10 @@ class ModelBundle:
         sentences = []
         for (name, (low, high)), value in zip(self.feature_range.items(), features, strict=True):
             if not low <= value <= high:
-                unit = (FEATURE_UNITS | HELD_UNITS).get(name, "")
+                unit = (FEATURE_UNITS | PROFILE_UNITS | HELD_UNITS)[name]
+                after = "" if unit == RATIO else f" {unit}"
                 spoken = name.rpartition("_")[0].replace("_", " ").capitalize()
-                sentences.append(f"{spoken} is {value:.4g} {unit}, outside the trained {low:.4g} to {high:.4g} {unit}.")
+                sentences.append(f"{spoken} is {value:.4g}{after}, outside the trained {low:.4g} to {high:.4g}{after}.")
         return sentences
 
     def _run(self, rows: NDArray[np.float32]) -> Raw:
@@ -142,10 +158,12 @@ def _verified_hash(fields: ModelCard, network: bytes) -> str:
 def _verified_names(fields: ModelCard) -> tuple[str, ...]:
     features = fields.of("features", list)
     for units in (FEATURE_UNITS, PROFILE_UNITS, HELD_UNITS):
-        if features == [{"name": name, "unit": unit} for name, unit in units.items()]:
+        named = [{"name": name, "unit": unit} for name, unit in units.items()]
+        earlier = [{"name": name, "unit": "" if unit == RATIO else unit} for name, unit in units.items()]
+        if features in (named, earlier):
             return tuple(units)
-    named = f"{', '.join(FEATURE_UNITS)}, each with its unit and in this order"
-    bound = f"{named}, or the columns of the press profile or of a held press"
+    paper = f"{', '.join(FEATURE_UNITS)}, each with its unit and in this order"
+    bound = f"{paper}, or the columns of the press profile or of a held press"
     fields.refuse("features", [entry.get("name") if isinstance(entry, dict) else entry for entry in features], bound)
 
 

@@ -7,17 +7,21 @@ from datetime import date
 
 from device import __version__
 from device.measurement.feature_definitions import (
+    HELD_FEATURES,
+    LUMP_FIELD_FEATURES,
     PAPER_FEATURES,
     PRESS_FEATURES,
     PROFILE_FEATURES,
     RAMP_FEATURES,
-    Definition,
+    definition_of,
 )
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from host_tools.study.feature_reading import SHOWN, SHOWN_AT, TEN_PERCENT, extremes, reading
 from host_tools.study.feature_sensitivity import DISTURBANCES, PAIRS, RAMP, SEEDS, STEP, TOLD_APART, Sensitivity
 
+MEASURED = {**PAPER_FEATURES, **PROFILE_FEATURES, **RAMP_FEATURES, **PRESS_FEATURES}
+"""What the tables of sensitivities are of."""
 OPENING = (
     "Every number that is taken from a press, defined, and what it was measured to know. The flat field of each is the",
     "lump-free press at the force of the frame, so the contrast of a place is how much brighter the lump makes it",
@@ -25,8 +29,10 @@ OPENING = (
     "light and skin, and promises no figure of a real one.",
 )
 GROUPS = (
+    ("Of the face's displacement, without the image (`host_tools simulate`)", LUMP_FIELD_FEATURES),
     ("Of one image (`device/measurement/features.py`), from Lee & Won (2013)", PAPER_FEATURES),
     ("Of the rings of the face (`device/measurement/press_profile.py`)", PROFILE_FEATURES),
+    ("Of the rings in one held press (`device/measurement/held_profile.py`)", HELD_FEATURES),
     ("Of the ring profile at each force of the ramp (`device/measurement/shape_features.py`)", RAMP_FEATURES),
     ("Of the press as a whole (`device/measurement/shape_features.py`)", PRESS_FEATURES),
 )
@@ -90,7 +96,7 @@ def _knows(one: Sensitivity, name: str) -> tuple[str, ...]:
         "-" if one.is_zero(name) else f"{round(one.slopes[unknown][name] / value, 2) + 0.0:+.2f}"
         for unknown in UNKNOWNS
     )
-    return f"`{name}`", _definition(name).unit, f"{value:.4g}", spread, *slopes
+    return f"`{name}`", definition_of(name, MEASURED).unit, f"{value:.4g}", spread, *slopes
 
 
 def _disturbed(one: Sensitivity, name: str) -> tuple[str, ...]:
@@ -117,11 +123,6 @@ def _row_over_ramp(one: Sensitivity, stem: str) -> tuple[str, ...]:
     names = [f"{stem}_{force:.2f}_n" for force in PROFILE_FORCES_N]
     values = (f"{one.value[name]:.4g}" for name in names)
     return f"`{stem}`", *values, *(f"{one.moved(UNKNOWNS[2], name):.1f}" for name in names)
-
-
-def _definition(name: str) -> Definition:
-    found = (item for _, group in GROUPS for item in group.items())
-    return next(definition for stem, definition in found if name == stem or name.startswith(f"{stem}_"))
 
 
 def _title(scene: Inclusion) -> str:

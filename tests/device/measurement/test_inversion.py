@@ -5,15 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 import pickle
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from daemon_process import ROOT
 from onnx import TensorProto, helper
 
-from device.measurement.inversion import FEATURE_UNITS, ModelBundle
+from device.measurement.feature_definitions import LUMP_FIELD_FEATURES
+from device.measurement.held_profile import HELD_NAMES
+from device.measurement.inversion import FEATURE_UNITS, HELD_UNITS, PROFILE_UNITS, ModelBundle
 from device.measurement.model_card import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from host_tools.inverse.export import export
@@ -116,6 +120,36 @@ def test_features_the_probe_cannot_measure_are_refused(folder: Path, features: l
     edit_card(folder, lambda card: card.update(features=features))
     with pytest.raises(BundleRefused, match=f"features is .*{found}"):
         ModelBundle.load(folder)
+
+
+@pytest.mark.parametrize("ratio", ["1", ""])
+def test_a_card_of_a_profile_may_leave_the_unit_of_a_ratio_empty_as_earlier_versions_did(tmp_path, ratio) -> None:
+    folder = Path(shutil.copytree(ROOT / "models" / "quick", tmp_path / "quick"))
+    edit_card(folder, lambda card: [f.update(unit=ratio) for f in card["features"] if f["name"] != "force_n"])
+    assert ModelBundle.load(folder).feature_names == HELD_NAMES
+
+
+def test_another_unit_of_a_ratio_is_refused(tmp_path) -> None:
+    folder = Path(shutil.copytree(ROOT / "models" / "quick", tmp_path / "quick"))
+    edit_card(folder, lambda card: card["features"][0].update(unit="mm"))
+    with pytest.raises(BundleRefused, match="features is"):
+        ModelBundle.load(folder)
+
+
+def test_units_are_those_of_the_definitions() -> None:
+    assert {name: definition.unit for name, definition in LUMP_FIELD_FEATURES.items()} == FEATURE_UNITS
+    assert set(PROFILE_UNITS.values()) == {"1"}
+    assert dict.fromkeys(HELD_NAMES, "1") | {"force_n": "N"} == HELD_UNITS
+
+
+def test_a_ratio_outside_the_training_range_is_named_without_a_unit() -> None:
+    bundle = ModelBundle.load(ROOT / "models" / "quick")
+    row = np.array([np.mean(bundle.feature_range[name]) for name in HELD_NAMES])
+    low, high = bundle.feature_range[HELD_NAMES[0]]
+    row[0], row[-1] = high + 1, 0.7
+    contrast, force = bundle.outside_training_range(row)
+    assert contrast == f"Contrast 0.0 is {high + 1:.4g}, outside the trained {low:.4g} to {high:.4g}."
+    assert force.startswith("Force is 0.7 N, outside the trained")
 
 
 @pytest.mark.parametrize("part", ["estimate", "spread"])

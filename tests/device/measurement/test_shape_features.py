@@ -9,7 +9,15 @@ import math
 import numpy as np
 import pytest
 
-from device.measurement.feature_definitions import PAPER_FEATURES, PRESS_FEATURES, PROFILE_FEATURES, RAMP_FEATURES
+from device.measurement.feature_definitions import (
+    HELD_FEATURES,
+    LUMP_FIELD_FEATURES,
+    PAPER_FEATURES,
+    PRESS_FEATURES,
+    PROFILE_FEATURES,
+    RAMP_FEATURES,
+    definition_of,
+)
 from device.measurement.features import FEATURE_NAMES
 from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_profile import PROFILE_FORCES_N, ROW_NAMES, PressProfile, harmonic_at_forces
@@ -196,6 +204,13 @@ def test_every_number_has_a_unit_and_a_sentence():
     assert names == [*expected, *PRESS_FEATURES]
     assert tuple(PAPER_FEATURES) == FEATURE_NAMES
     assert {name.split("_")[0] for name in ROW_NAMES} == set(PROFILE_FEATURES)
-    for name, definition in (PAPER_FEATURES | PROFILE_FEATURES | RAMP_FEATURES | PRESS_FEATURES).items():
+    groups = (LUMP_FIELD_FEATURES, PAPER_FEATURES, PROFILE_FEATURES, HELD_FEATURES, RAMP_FEATURES, PRESS_FEATURES)
+    for name, definition in (item for group in groups for item in group.items()):
         assert definition.sentence.endswith("."), name
-        assert definition.unit in {"1", "mm", "mm2", "1/N", "mm/N"}, name
+        assert definition.unit in {"1", "N", "mm", "mm2", "mm3", "1/N", "mm/N"}, name
+
+
+def test_a_name_without_a_definition_is_refused():
+    assert definition_of("contrast_0.40_n_0.9_mm", PROFILE_FEATURES).unit == "1"
+    with pytest.raises(KeyError, match="contrasts"):
+        definition_of("contrasts_0.40_n", PROFILE_FEATURES)
