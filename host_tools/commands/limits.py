@@ -118,10 +118,13 @@ def _write_map(out: Path | None, given: list[object]) -> None:
         raise InvalidQuantity("map", "asked for", "asked for with --out and no scene", "add --out docs/accuracy.md")
     require_writable(out, (".md",))
     from device.measurement.durable import write_durably
+    from device.measurement.profile_model import ProfileModel
     from host_tools.study.accuracy_figure import draw_map
     from host_tools.study.accuracy_map import lumps, mapped_scene
     from host_tools.study.accuracy_page import FIGURE, limits_markdown
+    from host_tools.study.beside_axis import beside_over_axis
 
+    beside = beside_over_axis(ProfileModel.load(ROOT / "models" / "standard").answers)
     chosen, mapped = lumps(), []
     with progress("scenes") as bar:
         task = bar.add_task("", total=len(chosen))
@@ -131,5 +134,5 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     figures = out.parent / "figures"
     figures.mkdir(exist_ok=True)
     draw_map(mapped, figures / FIGURE)
-    write_durably(out, limits_markdown(mapped, f"host_tools limits --map --out {shown(out)}").encode())
+    write_durably(out, limits_markdown(mapped, beside, f"host_tools limits --map --out {shown(out)}").encode())
     note.print(f"{out} written.")

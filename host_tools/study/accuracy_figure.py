@@ -15,7 +15,8 @@ from matplotlib.colors import LogNorm
 
 from host_tools.inverse.information import Array
 from host_tools.study.accuracy_map import DEPTHS_MM, MODULI_KPA, SIZES_MM, STANDARD, MappedScene, stds
-from host_tools.study.accuracy_page import NAMES, ROUGHLY, percent
+from host_tools.study.accuracy_page import ROUGHLY
+from host_tools.study.accuracy_tables import NAMES, percent
 
 
 def draw_map(scenes: list[MappedScene], path: Path) -> None:
