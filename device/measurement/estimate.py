@@ -34,13 +34,18 @@ SPOKEN = {"size_mm": "size", "depth_mm": "depth", "youngs_modulus_kpa": "Young's
 
 @dataclass(frozen=True)
 class Quantity:
-    """One unknown: estimate, 90 % interval, scatter over the frames, and whether the data determine it."""
+    """One unknown: estimate, 90 % interval, scatter over the frames, and whether the data determine it.
+
+    An interval that ends where the trained range does is open there: what lies beyond was never tried, and may be.
+    """
 
     value: float | None
     low: float | None
     high: float | None
     std: float | None
     identifiable: bool
+    low_is_open: bool = False
+    high_is_open: bool = False
 
 
 UNKNOWN_QUANTITY = Quantity(None, None, None, None, False)
@@ -119,11 +124,16 @@ def _answer(
     status, reason = _verdict(interval.identifiable)
     quantities: dict[str, Any] = {
         name: Quantity(
-            float(value[i]), float(interval.low[i]), float(interval.high[i]), float(std[i]),
+            float(value[i]),
+            float(interval.low[i]),
+            float(interval.high[i]),
+            float(std[i]),
             bool(interval.identifiable[i]),
+            low_is_open=bool(interval.low[i] <= calibration.held_out.box_low[i]),
+            high_is_open=bool(interval.high[i] >= calibration.held_out.box_high[i]),
         )
         for i, name in enumerate(UNKNOWNS)
-    }  # fmt: skip
+    }
     return Estimate(
         **quantities,
         status=status,

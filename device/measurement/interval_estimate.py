@@ -81,7 +81,13 @@ def _quantities(mean: Array, spread: Array, intervals: Sequence[Interval]) -> di
     below, above = (unknowns_from_unit(mean + sign * spread) for sign in (-1, 1))
     return {
         name: Quantity(
-            float(value[i]), float(low[i]), float(high[i]), float(above[i] - below[i]) / 2, one.is_identifiable
+            float(value[i]),
+            float(low[i]),
+            float(high[i]),
+            float(above[i] - below[i]) / 2,
+            one.is_identifiable,
+            low_is_open=one.low <= -1.0,
+            high_is_open=one.high >= 1.0,
         )
         for i, (name, one) in enumerate(zip(UNKNOWNS, intervals, strict=True))
     }

@@ -56,7 +56,10 @@ def probe_with_every_mode(page: Page, tmp_path: Path, monkeypatch: pytest.Monkey
     """The address of a simulated probe with the default hand, whose answer is the same in every mode."""
 
     def estimate(recording: Recording, mode: Mode) -> Estimate:
-        answer = [Quantity(value, 0.8 * value, 1.2 * value, 0.1, True) for value in (12.0, 6.0, 60.0)]
+        size_mm, depth_mm, modulus_kpa = (
+            Quantity(value, 0.8 * value, 1.2 * value, 0.1, True) for value in (12.0, 6.0, 60.0)
+        )
+        answer = size_mm, replace(depth_mm, low_is_open=True), replace(modulus_kpa, high_is_open=True)
         return Estimate(*answer, "ok", "", mode, "stand-in", "00", "c", True, {})
 
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
@@ -142,6 +145,9 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe_with_
     expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
     expect(page.locator("#image-title")).to_have_text("Measurement 1, standard")
     expect(page.locator("#modes input:checked")).to_have_value("standard")
+    expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
+    expect(page.locator("#depth-interval")).to_have_text("7.2 mm or less")
+    expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")
     _shoot(page, "result-standard")
     _require_fits(page)
 

@@ -35,12 +35,19 @@ function placed(className, from, width, end) {
   return node;
 }
 
+/** The interval in words. Where it ends with the trained range it is open: the truth may as well lie beyond. */
+function spokenInterval({ low, high, low_is_open: lowOpen, high_is_open: highOpen }, decimals, unit) {
+  if (lowOpen === highOpen) return `${low.toFixed(decimals)} – ${high.toFixed(decimals)} ${unit}`;
+  return lowOpen ? `${high.toFixed(decimals)} ${unit} or less` : `${low.toFixed(decimals)} ${unit} or more`;
+}
+
 /** The interval, the value and the truth on one axis from zero, so that a wide interval looks wide. */
 function drawStrip(strip, quantity, truth, determined) {
   const end = roundUp(Math.max(quantity.high, truth ?? 0));
-  const low = Math.max(quantity.low, 0);
+  const low = quantity.low_is_open ? 0 : Math.max(quantity.low, 0);
+  const high = quantity.high_is_open ? end : quantity.high;
   const axis = element("span", "strip-axis");
-  axis.append(placed("strip-interval", low, quantity.high - low, end));
+  axis.append(placed("strip-interval", low, high - low, end));
   if (determined) axis.append(placed("strip-value", quantity.value, 0, end));
   if (truth !== null) axis.append(placed("strip-truth", truth, 0, end));
   strip.replaceChildren(element("span", "", "0"), axis, element("span", "", String(end)));
@@ -57,8 +64,7 @@ function showTile({ name, key, unit }, measurement) {
   tile.dataset.determined = determined;
   if (determined) setQuantity(byId(`${name}-value`), quantity.value.toFixed(decimals), unit);
   else setText(byId(`${name}-value`), "not determined");
-  const interval = `${quantity.low?.toFixed(decimals)} – ${quantity.high?.toFixed(decimals)} ${unit}`;
-  setText(byId(`${name}-interval`), usable && bounded ? interval : "none");
+  setText(byId(`${name}-interval`), usable && bounded ? spokenInterval(quantity, decimals, unit) : "none");
   setText(byId(`truth-${name}`), truth === null ? "" : `${truth.toFixed(1)} ${unit}`);
   setText(tile.querySelector(".truth-label"), measurement.estimate.simulated ? "simulated truth" : "phantom truth");
   tile.querySelector(".truth").hidden = truth === null;

@@ -49,7 +49,9 @@ def test_the_json_has_the_contracts_fields_and_no_other(estimated, recording, bu
     assert set(record) == {
         *UNKNOWNS, "status", "reason", "mode", "model", "model_sha256", "calibration_id", "simulated"
     }  # fmt: skip
-    assert set(record["size_mm"]) == {"value", "low", "high", "std", "identifiable"}
+    assert set(record["size_mm"]) == {
+        "value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open"
+    }  # fmt: skip
     assert record["model"] == bundle.name
     assert record["model_sha256"] == bundle.sha256
     assert record["calibration_id"] == calibration.id
@@ -144,6 +146,15 @@ def test_a_value_never_leaves_its_interval_even_where_the_network_extrapolates(b
     shrunk = replace(calibration, held_out=replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
     size = estimate_recording(recording, bundle, shrunk).size_mm
     assert size.low <= size.value <= size.high <= 6.0
+
+
+def test_an_interval_that_ends_with_the_box_is_open_there(bundle, calibration, recording):
+    """12 mm in a box of at most 6 mm: no held-out scene says how large it is, only that it is not small."""
+    held_out = calibration.held_out
+    shrunk = replace(calibration, held_out=replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
+    size = estimate_recording(recording, bundle, shrunk).size_mm
+    assert size.high_is_open
+    assert size.low_is_open == (size.low <= held_out.box_low[0])
 
 
 def test_where_all_is_determined_the_status_is_ok(bundle, calibration, recording):
