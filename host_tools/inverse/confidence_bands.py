@@ -1,13 +1,15 @@
 """Simulated presses with noise to the bands behind every interval, one set for each unknown.
 
 Bounds are quantiles of (truth - mean) / spread over the presses nearest in truth and in the logarithm of the spread.
-Recordings hold what the forward model and its noise do not know of: where they are covered less often than chance
-explains, bands are widened by one factor. Source of the factor: split conformal prediction, Lei et al., JASA 113, 2018.
+Where they cover other presses more often than chance explains, bands are narrowed by one factor. Recordings hold what
+the forward model and its noise do not know of: where these are covered less often than chance explains, bands are
+widened by one factor. Source of both: split conformal prediction, Lei et al., JASA 113, 2018.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.confidence import COVERAGE, IDENTIFIABLE_RATIO, Array, Bands
 from device.measurement.press_parameters import EVEN_STD
@@ -18,10 +20,11 @@ TRUTH_LENGTH = 0.15
 """Presses this far apart in truth are as unlike as those one standard deviation of the log spread apart."""
 FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.06
 """Presses of which a bound is the quantile, and their share of all: 400 leave an error of 1.5 % of coverage."""
-
-
+FOLDS = 4
+"""Parts of the presses, each of which is covered by the bands of the others."""
 RAREST_RATIO = 0.05
 """An unknown that fewer presses than this share determine is left undetermined: its bands could not be judged."""
+NARROWEST = 1e-9
 WIDE_OPEN = 1e6
 """So many spreads hold all of the range."""
 
@@ -36,12 +39,22 @@ def confidence_bands(truth: Array, mean: Array, spread: Array) -> tuple[Bands, .
 
 
 def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
-    known = spread < IDENTIFIABLE_RATIO * EVEN_STD
+    known = _determined(spread)
     if known.mean() < RAREST_RATIO:
         return _wide_open()
     require("presses that determine an unknown", int(known.sum()), Bound(2 * FEWEST, np.inf, ""), "simulate more")
-    neighbours = int(np.clip(NEIGHBOUR_RATIO * known.sum(), FEWEST, MOST))
-    truth, unusual, log_spread = truth[known], ((truth - mean) / spread)[known], np.log(spread[known])
+    columns = truth[known], mean[known], spread[known]
+    return _scaled(_learned(*columns), min(1.0, _crossed_factor(*columns)))
+
+
+def _determined(spread: Array) -> NDArray[np.bool_]:
+    return np.asarray(spread < IDENTIFIABLE_RATIO * EVEN_STD)
+
+
+def _learned(truth: Array, mean: Array, spread: Array) -> Bands:
+    """Return the quantiles of presses that determine the unknown."""
+    neighbours = int(np.clip(NEIGHBOUR_RATIO * len(truth), FEWEST, MOST))
+    unusual, log_spread = (truth - mean) / spread, np.log(spread)
     truths = -np.cos(np.pi * np.arange(TRUTHS) / (TRUTHS - 1))  # closer to each other at the ends of the range
     spreads = np.quantile(log_spread, np.linspace(0.02, 0.98, SPREADS))
     tails = (1 - COVERAGE) / 2, (1 + COVERAGE) / 2
@@ -52,6 +65,22 @@ def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
             near = np.argpartition(distance, neighbours - 1)[:neighbours]
             table[i, j] = np.quantile(unusual[near], tails, method="weibull")  # covers the share, of few presses too
     return Bands(truths, spreads, table[..., 0], table[..., 1])
+
+
+def _crossed_factor(truth: Array, mean: Array, spread: Array) -> float:
+    """Return the factor with which bands of some presses cover the others at most by chance more than promised.
+
+    Quantiles of few presses that are not quite alike lie too far out. The presses take turns in being the others.
+    """
+    if len(truth) * (FOLDS - 1) / FOLDS < FEWEST:
+        return 1.0
+    fold = np.arange(len(truth)) % FOLDS
+    needed = [
+        _needed(_learned(*(column[fold != k] for column in (truth, mean, spread))), truth[fold == k], mean[fold == k],
+                spread[fold == k])
+        for k in range(FOLDS)
+    ]  # fmt: skip
+    return float(np.quantile(np.concatenate(needed), COVERAGE + _by_chance(len(truth))))
 
 
 def _wide_open() -> Bands:
@@ -68,16 +97,27 @@ def widened(bands: tuple[Bands, ...], truth: Array, mean: Array, spread: Array) 
 
 
 def _widened(bands: Bands, truth: Array, mean: Array, spread: Array) -> Bands:
-    known = spread < IDENTIFIABLE_RATIO * EVEN_STD
+    known = _determined(spread)
     if not known.any():
         return bands
+    needed = _needed(bands, truth[known], mean[known], spread[known])
+    return _scaled(bands, max(1.0, float(np.quantile(needed, max(COVERAGE - _by_chance(len(needed)), 0.0)))))
+
+
+def _needed(bands: Bands, truth: Array, mean: Array, spread: Array) -> Array:
+    """Return by which factor [n] the bands must be widened to hold each press."""
     ends = np.array([
-        np.ravel(bands.bounds(np.array([at]), float(width)))
-        for at, width in zip(truth[known], spread[known], strict=True)
+        np.ravel(bands.bounds(np.array([at]), float(width))) for at, width in zip(truth, spread, strict=True)
     ])  # fmt: skip
     middle, half = ends.mean(axis=1), np.diff(ends, axis=1)[:, 0] / 2
-    needed = np.abs((truth - mean)[known] / spread[known] - middle) / half
-    by_chance = np.sqrt(COVERAGE * (1 - COVERAGE) / len(needed))
-    factor = max(1.0, float(np.quantile(needed, max(COVERAGE - by_chance, 0.0))))
+    return np.asarray(np.abs((truth - mean) / spread - middle) / np.maximum(half, NARROWEST))
+
+
+def _by_chance(presses: int) -> float:
+    """Return the standard error of a coverage that is counted on so many presses."""
+    return float(np.sqrt(COVERAGE * (1 - COVERAGE) / presses))
+
+
+def _scaled(bands: Bands, factor: float) -> Bands:
     middles, halves = (bands.low + bands.high) / 2, (bands.high - bands.low) / 2
     return Bands(bands.truth, bands.log_spread, middles - factor * halves, middles + factor * halves)

@@ -5,6 +5,7 @@ import pytest
 
 from device.measurement.confidence import Bands
 from device.measurement.quantities import InvalidQuantity
+from host_tools.inverse import confidence_bands as module
 from host_tools.inverse.confidence_bands import confidence_bands, widened
 
 
@@ -29,6 +30,17 @@ def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
     octile = np.minimum(((truth + 1) * 4).astype(int), 7)
     assert inside.mean() == pytest.approx(0.9, abs=0.02)
     assert min(inside[octile == k].mean() for k in range(8)) > 0.85
+
+
+def test_bands_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
+    """Quantiles twice too far out: the factor is a half, but for what chance does not let be told."""
+    columns = [column[:, None] for column in shrunk_answers(4000, 3)]
+    [right] = confidence_bands(*columns)
+    learned = module._learned
+    monkeypatch.setattr(module, "_learned", lambda *presses: module._scaled(learned(*presses), 2.0))
+    [narrowed] = confidence_bands(*columns)
+    np.testing.assert_allclose(narrowed.high, right.high, rtol=0.05, atol=0.05)
+    np.testing.assert_allclose(narrowed.low, right.low, rtol=0.05, atol=0.05)
 
 
 def test_too_few_presses_that_determine_an_unknown_are_refused():
