@@ -27,7 +27,7 @@ def modes(
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
     only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
 ) -> None:
-    """Measure error, time, coverage and refusals of the modes against bounds; a quarter of an hour on two cores.
+    """Measure error, time, coverage and refusals of the modes against bounds; half an hour on two cores.
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
@@ -36,10 +36,12 @@ def modes(
     from host_tools.study.mode_breast_imager import breast_imager_chapter
     from host_tools.study.mode_coverage import coverage_chapter
     from host_tools.study.mode_dial import dial_chapter
+    from host_tools.study.mode_just_outside import just_outside_chapter
     from host_tools.study.mode_noise_free import noise_free_chapter
     from host_tools.study.mode_outside import outside_chapter
     from host_tools.study.mode_page import MODES_PAGE
     from host_tools.study.mode_posterior import posterior_chapter
+    from host_tools.study.mode_span import span_chapter
     from host_tools.study.outside_presses import kinds
 
     if out:
@@ -54,9 +56,11 @@ def modes(
         ),
         "posterior": lambda: posterior_chapter(trained),
         "noise-free": lambda: noise_free_chapter(trained.answers, tables),
+        "span": lambda: span_chapter(trained.answers, tables),
         "outside": lambda: outside_chapter(
             partial(models.estimate, calibration=calibration), kinds(tables, derived_seed(1, "outside"))
         ),
+        "just-outside": lambda: just_outside_chapter(trained, calibration, tables),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip
     measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})

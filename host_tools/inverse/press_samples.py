@@ -26,6 +26,7 @@ from device.simulation.lens import Lens
 from device.simulation.pressed_face import Placement, PressedFace
 from device.simulation.skin import Skin
 from device.simulation.slab import Slab
+from device.simulation.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
 
 Array = NDArray[np.float64]
@@ -92,17 +93,24 @@ def sample_presses(
     return PressSamples(parameters, np.concatenate(rows))
 
 
-def profile_rows(tables: ProbeTables, parameters: Array) -> Array:
-    """Return the profile rows [n, P] of presses without noise, for parameters [n, 9]."""
-    scene = _Scene(tables)
+def profile_rows(
+    tables: ProbeTables, parameters: Array, *, ramps: PressRamps | None = None, span_ratio: float = 1.0
+) -> Array:
+    """Return the profile rows [n, P] of presses without noise, for parameters [n, 9].
+
+    `ramps` are those of a lump that the tables do not hold, on the axis. `span_ratio`: true force over what the cell
+    says.
+    """
+    scene = _Scene(tables, ramps, span_ratio)
     return np.array([scene.row(dict(zip(PARAMETERS, map(float, values), strict=True))) for values in parameters])
 
 
 class _Scene:
     """Presses lumps on one tissue and skin after the other; remembers the lump-free press of the last."""
 
-    def __init__(self, tables: ProbeTables) -> None:
-        self._tables, self._weights = tables, ring_weights(SHAPE, SCALE)
+    def __init__(self, tables: ProbeTables, ramps: PressRamps | None, span_ratio: float) -> None:
+        self._tables, self._ramps, self._weights = tables, ramps, ring_weights(SHAPE, SCALE)
+        self._forces_n = span_ratio * PROFILE_FORCES_N
         self._valid = np.ones(SHAPE, dtype=bool)
         self._skin: Skin | None = None
         self._slab: Slab | None = None
@@ -124,9 +132,9 @@ class _Scene:
 
     def _lights(self, inclusion: Inclusion, place: Placement) -> list[Image]:
         assert self._slab is not None  # row has set it
-        ramps = self._tables.centred.ramps(inclusion, self._slab)
+        ramps = self._ramps or self._tables.centred.ramps(inclusion, self._slab)
         face = PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, self._slab)
-        return [self._image.intensity(*face.at(float(force), place), LIT) for force in PROFILE_FORCES_N]
+        return [self._image.intensity(*face.at(float(force), place), LIT) for force in self._forces_n]
 
     def _means(self, image: Image) -> RingMeans:
         return self._weights.means(image, self._valid)

@@ -1,0 +1,73 @@
+"""How like a lump inside the ranges one outside looks: against the normal law, and a press whose twin is itself."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
+from device.measurement.fit_press import PressPosterior
+from device.measurement.profile_model import ProfileModel
+from device.measurement.quantities import Inclusion
+from host_tools.inverse.press_samples import profile_rows
+from host_tools.study.just_outside import LUMPS, Twin, at_nominal, holds, lump_ramps, nearest_twin
+from host_tools.study.mode_just_outside import _judged, _row
+
+MODELS = Path(__file__).parents[3] / "models"
+INSIDE = Inclusion(9.0, 5.0, 60.0)
+
+
+@pytest.mark.parametrize(("deviations", "share"), [(0.0, 0.05), (1.6449, 0.5), (3.2897, 0.95)])
+def test_the_best_test_flags_as_the_normal_law_says(deviations, share):
+    assert Twin(INSIDE, deviations).most_flagged == pytest.approx(share, abs=1e-4)
+
+
+def test_a_lump_inside_is_its_own_twin(tables):
+    answers = ProfileModel.load(MODELS / "standard").answers
+    row = profile_rows(tables, at_nominal(INSIDE)[None])[0]
+    twin = nearest_twin(PressPosterior(row, answers.surrogate, answers.noise["standard"]), seed=0)
+    assert twin.deviations < 1.5
+    assert (twin.inclusion.size_mm, twin.inclusion.depth_mm) == pytest.approx((9.0, 5.0), rel=0.02)
+
+
+def test_the_ramp_of_a_lump_inside_is_the_tables_own(tables):
+    ours, own = lump_ramps(tables, INSIDE), tables.centred.ramps(INSIDE)
+    assert np.array_equal(ours.lump.fields_per_n, own.lump.fields_per_n)
+
+
+def test_every_lump_is_outside_in_just_one_unknown():
+    low, high = np.array([2.0, 4.0, 10.0]), np.array([15.0, 12.0, 160.0])
+    values = np.array([lump.as_tuple() for lump in LUMPS])
+    assert ((values < low) | (values > high)).sum(axis=1).tolist() == [1] * len(LUMPS)
+
+
+def quantity(low, high, *, low_is_open=False, high_is_open=False):
+    return Quantity((low + high) / 2, low, high, 1.0, True, low_is_open, high_is_open)
+
+
+def estimate(*answers):
+    return Estimate(*answers, "ok", "", "standard", "m", "0", "c", True, features={})
+
+
+@pytest.mark.parametrize(
+    ("answer", "truth", "held"),
+    [
+        (quantity(10.0, 12.0), 13.0, False),
+        (quantity(10.0, 12.0, high_is_open=True), 13.0, True),
+        (quantity(10.0, 12.0, high_is_open=True), 9.0, False),
+        (quantity(4.0, 5.0, low_is_open=True), 3.6, True),
+    ],
+)
+def test_an_open_end_holds_all_beyond_it(answer, truth, held):
+    assert holds(answer, truth) is held
+
+
+def test_a_refusal_is_asked_for_only_where_a_test_could_tell():
+    """16 mm, 6 mm deep, 60 kPa: one answer holds size and modulus and misses the depth, the other is a refusal."""
+    large = quantity(14.0, 15.0, high_is_open=True)
+    found = [estimate(large, quantity(6.5, 8.0), quantity(20.0, 90.0)), estimate(*[UNKNOWN_QUANTITY] * 3)]
+    assert _judged("standard", LUMPS[0], Twin(INSIDE, 3.0), found) == []
+    [benchmark] = _judged("standard", LUMPS[0], Twin(INSIDE, 4.0), found)
+    assert benchmark.measured == 0.5
+    assert not benchmark.passed
+    assert _row("standard", LUMPS[0], Twin(INSIDE, 4.0), found)[8:] == ("99%", "50%", "100%", "0%", "100%")
