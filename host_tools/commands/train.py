@@ -16,6 +16,7 @@ from host_tools.commands.output import note, note_left_out, progress
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 TABLE = MODELS / "simulated_probe"
+CERTIFICATE = "calibration.json"
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
 TRIALS = 100
@@ -95,32 +96,47 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
 
 
 def _standard(table: Path, out: Path, seed: int, quick: bool, command: str) -> None:
-    from device.measurement.profile_model import ProfileModel
+    from device.measurement.calibration import read_calibration
+    from device.measurement.profile_estimate import estimate_profile
+    from device.measurement.profile_model import RAMP_MODES, ProfileModel
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.inverse.export_profile import export_profile
     from host_tools.inverse.profile_training import QUICK_EFFORT, Effort, train_profile
+    from host_tools.study.publish_dial import publish_dial
 
+    tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
     effort = QUICK_EFFORT if quick else Effort()
-    trained = train_profile(ProbeTables.load(table), effort=effort, seed=seed, say=note.print)
+    trained = train_profile(tables, effort=effort, seed=seed, say=note.print)
     with _refusals():
         export_profile(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
         )
+    note.print("speed and accuracy of modes standard and precise")
+    model = ProfileModel.load(out)
+    publish_dial(
+        out,
+        RAMP_MODES,
+        lambda recording, mode: estimate_profile(recording, mode, model, calibration),
+        tables,
+    )
     _print_modes(out, ProfileModel.load(out).bundle)
 
 
 def _quick(table: Path, out: Path, seed: int, command: str) -> None:
-    from device.measurement.held_estimate import HeldModel
+    from device.measurement.calibration import read_calibration
+    from device.measurement.held_estimate import HeldModel, estimate_held
     from device.measurement.profile_model import ProfileModel
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.inverse.export_profile import export_quick
     from host_tools.inverse.quick_training import train_quick
+    from host_tools.study.publish_dial import publish_dial
 
+    tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
     standard = ProfileModel.load(MODELS / "standard")
     ramps = standard.answers
-    trained = train_quick(ProbeTables.load(table), ramps.surrogate, ramps.noise["standard"], seed=seed, say=note.print)
+    trained = train_quick(tables, ramps.surrogate, ramps.noise["standard"], seed=seed, say=note.print)
     with _refusals():
         export_quick(
             trained,
@@ -130,6 +146,9 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
             software_version=__version__,
             training_command=command,
         )
+    note.print("speed and accuracy of mode quick")
+    model = HeldModel.load(out)
+    publish_dial(out, ("quick",), lambda recording, _: estimate_held(recording, model, calibration), tables)
     _print_modes(out, HeldModel.load(out).bundle)
 
 

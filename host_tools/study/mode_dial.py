@@ -6,19 +6,23 @@ machine.
 
 from __future__ import annotations
 
+import os
+import platform
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from device.measurement.calibration import Calibration
-from device.measurement.estimate import SPOKEN, Estimate
+from device.measurement.estimate import SPOKEN, Estimate, Quantity
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.mode_models import ModeModels
 from device.measurement.press_noise import ErrorLevels
+from device.measurement.press_parameters import EVEN_STD, HIGH, LOW
+from device.measurement.press_surrogate import TISSUE
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.recording import Recording
 from device.simulation.virtual_probe import ProbeTables
@@ -29,12 +33,15 @@ from host_tools.study.benchmark import Chapter, Table, at_most
 
 PRESSES = 48
 CALLS, LONGEST_CALL_S = 200, 0.5e-3
+GAUSSIAN_90 = 1.645
+"""Nine in ten of a Gaussian's values lie within so many standard deviations."""
 
 
 class Timed(NamedTuple):
-    """One press's truth, answer, and the time (s) that the answer took."""
+    """One press's truth, modulus of its tissue, answer, and the time (s) that the answer took."""
 
     truth: Inclusion
+    tissue_kpa: float
     estimate: Estimate
     seconds: float
 
@@ -45,7 +52,7 @@ def dial_chapter(
     """Return error and time of each mode on the same inclusions, and the time of the ensemble `network` alone."""
 
     answer = partial(models.estimate, calibration=calibration)
-    seen = {mode: timed_presses(answer, mode, tables, derived_seed(seed, "dial")) for mode in models.modes}
+    seen = {mode: timed_presses(answer, mode, tables, seed=seed) for mode in models.modes}
     header = ("mode", "frames a press", "compute (ms)", "answered", *_columns("error"), *_columns("determined"))
     return Chapter(
         title="Speed and accuracy",
@@ -56,22 +63,54 @@ def dial_chapter(
         ),
         source="host_tools/study/mode_dial.py; seconds of a press: `GET /api/v1/device`",
         benchmarks=(at_most("ensemble of one press", "median time of one call (ms)", *_network_ms(network)),),
-        tables=(Table("The dial", header, (*(_row(mode, found) for mode, found in seen.items()), _guess(seen))),),
+        tables=(
+            Table("The dial", header, (*(_row(mode, found) for mode, found in seen.items()), _guess(seen))),
+            Table(
+                "The patient's tissue, which the press beside the lesion tells mode precise",
+                ("answered", "RMS error (kPa)", "stated spread (kPa)", "spread of the range (kPa)", "truth in 90 %"),
+                (_tissue_row(seen["precise"]),),
+            ),
+        ),
     )
 
 
 def timed_presses(
-    answer: Callable[[Recording, Mode], Estimate], mode: Mode, tables: ProbeTables, seed: int
+    answer: Callable[[Recording, Mode], Estimate], mode: Mode, tables: ProbeTables, *, seed: int = 1
 ) -> list[Timed]:
-    """Return the answers of a mode to recordings of random presses, one after the other."""
-    parameters = draw_parameters(PRESSES, np.random.default_rng(seed))
+    """Return the answers of a mode to recordings of random presses, one after the other; alike for every mode."""
+    of_presses = derived_seed(seed, "dial")
+    parameters = draw_parameters(PRESSES, np.random.default_rng(of_presses))
     timed = []
     for number, at in enumerate(parameters):
-        recording = recorded_press(tables, at, mode, press_seed(seed, number), levels=ErrorLevels())
+        recording = recorded_press(tables, at, mode, press_seed(of_presses, number), levels=ErrorLevels())
         began = time.perf_counter()
         estimate = answer(recording, mode)
-        timed.append(Timed(Inclusion(*map(float, at[:3])), estimate, time.perf_counter() - began))
+        seconds = time.perf_counter() - began
+        timed.append(Timed(Inclusion(*map(float, at[:TISSUE])), float(at[TISSUE]), estimate, seconds))
     return timed
+
+
+def dial_entry(mode: Mode, found: Sequence[Timed]) -> dict[str, Any]:
+    """Return what a mode's model card says of the dial: frames, compute time, and median errors of what is answered."""
+    answered = [one for one in found if one.estimate.size_mm.value is not None]
+    pairs = {name: [(getattr(one.truth, name), getattr(one.estimate, name)) for one in answered] for name in UNKNOWNS}
+    return {
+        "presses": len(found),
+        "answered": len(answered),
+        "frames": FRAMES[mode].count,
+        "compute_ms": round(1e3 * float(np.median([one.seconds for one in found])), 1),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+        "median_percent": {name: _median_percent(of_unknown) for name, of_unknown in pairs.items()},
+        "determined": {
+            name: round(float(np.mean([quantity.identifiable for _, quantity in of_unknown])), 4)
+            for name, of_unknown in pairs.items()
+        },
+    }
+
+
+def _median_percent(pairs: Sequence[tuple[float, Quantity]]) -> float:
+    """Return the median error of pairs of truth and answer."""
+    return round(float(np.median([100 * abs((quantity.value or 0.0) / truth - 1) for truth, quantity in pairs])), 2)
 
 
 def _network_ms(bundle: ModelBundle) -> tuple[float, float]:
@@ -90,14 +129,26 @@ def _columns(what: str) -> tuple[str, ...]:
 
 
 def _row(mode: Mode, found: Sequence[Timed]) -> tuple[str, ...]:
-    answered = [one for one in found if one.estimate.size_mm.value is not None]
-    errors, known = [], []
-    for name in UNKNOWNS:
-        pairs = [(getattr(one.truth, name), getattr(one.estimate, name)) for one in answered]
-        errors.append(f"{np.median([100 * abs(quantity.value / truth - 1) for truth, quantity in pairs]):.1f} %")
-        known.append(f"{np.mean([quantity.identifiable for _, quantity in pairs]):.0%}")
-    milliseconds = f"{1e3 * np.median([one.seconds for one in found]):.0f}"
-    return mode, f"{FRAMES[mode].count}", milliseconds, f"{len(answered)} of {len(found)}", *errors, *known
+    entry = dial_entry(mode, found)
+    errors = (f"{percent:.1f} %" for percent in entry["median_percent"].values())
+    known = (f"{share:.0%}" for share in entry["determined"].values())
+    answered = f"{entry['answered']} of {entry['presses']}"
+    return mode, f"{entry['frames']}", f"{entry['compute_ms']:.0f}", answered, *errors, *known
+
+
+def _tissue_row(found: Sequence[Timed]) -> tuple[str, ...]:
+    """Return how well the tissue's modulus is told; its 90 % interval is that of a Gaussian of the stated spread."""
+    told = np.array([
+        (one.estimate.features["tissue_modulus_kpa"] - one.tissue_kpa, one.estimate.features["tissue_modulus_std_kpa"])
+        for one in found
+        if "tissue_modulus_kpa" in one.estimate.features
+    ])  # fmt: skip
+    error, spread = told.T
+    inside = np.mean(np.abs(error) < GAUSSIAN_90 * spread)
+    of_range = (HIGH[TISSUE] - LOW[TISSUE]) / 2 * EVEN_STD
+    stated = float(np.sqrt(np.mean(spread**2)))
+    rms = float(np.sqrt(np.mean(error**2)))
+    return f"{len(told)}", f"{rms:.2f}", f"{stated:.2f}", f"{of_range:.2f}", f"{inside:.0%}"
 
 
 def _guess(seen: dict[Mode, list[Timed]]) -> tuple[str, ...]:
