@@ -23,8 +23,6 @@ from device.measurement.roundness import doubt_about_roundness, elongation_ratio
 
 VISIBLE_DEVIATIONS = 4.0
 """A lump stands out when its contrast lies so many standard deviations above none."""
-BEYOND_DEVIATIONS = 3.0
-"""A size or depth that would lie this far outside its range, were it free to, is outside."""
 
 
 def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, calibration: Calibration) -> Estimate:
@@ -75,6 +73,6 @@ def doubts_about(profile: PressProfile, answer: Answer, limits: ModeLimits) -> l
             f"above the usual {limits.misfit_ratio:.2f}."
         )
     found += doubt_about_roundness(elongation_ratio(profile.elongation, profile.offset), limits.elongation_ratio)
-    if answer.beyond_deviations > BEYOND_DEVIATIONS:
-        found.append("Size or depth lies outside the trained range.")
+    if answer.beyond_deviations > limits.beyond_deviations:
+        found.append("Size or depth would rather lie outside the trained range.")
     return found

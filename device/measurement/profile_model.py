@@ -57,6 +57,7 @@ class ModeLimits:
     bands: tuple[Bands, ...]
     misfit_ratio: float
     elongation_ratio: float
+    beyond_deviations: float
 
 
 class ProfileAnswers:
@@ -126,4 +127,5 @@ def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
 
 
 def _limits(entry: Mapping[str, Any]) -> ModeLimits:
-    return ModeLimits(bands_of(entry), float(entry["misfit_ratio"]), float(entry["elongation_ratio"]))
+    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_ratio", "beyond_deviations"))
+    return ModeLimits(bands_of(entry), *doubts)

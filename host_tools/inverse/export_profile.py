@@ -58,6 +58,7 @@ def export_profile(
             mode: {
                 "misfit_ratio": outcome.misfit_ratio,
                 "elongation_ratio": outcome.elongation_ratio,
+                "beyond_deviations": outcome.beyond_deviations,
                 **_answers(outcome),
             }
             for mode, outcome in trained.outcomes.items()

@@ -1,6 +1,6 @@
 """What a mode makes of presses nobody has learned from: answers, bands of its intervals, coverage, and usual doubts.
 
-Bands come from one half of the simulated presses and are counted on the other. What is usual of misfit and elongation
+Bands come from one half of the simulated presses and are counted on the other. What is usual of each doubt
 comes from recordings, because only they hold all that a recording does to a profile; so does a factor that widens the
 bands where recordings need it, from one half of them; coverage is counted on the other.
 """
@@ -24,7 +24,8 @@ from host_tools.inverse.recorded_presses import RecordedPresses, in_parallel
 from host_tools.inverse.train_ensemble import DenseEnsemble
 
 USUAL_RATIO = 0.985
-"""Share of recorded presses inside the trained ranges whose misfit, and whose elongation, count as usual."""
+"""Share of recorded presses inside the trained ranges whose misfit counts as usual; likewise the elongation, and how
+far size or depth would rather lie outside."""
 THREE = len(UNKNOWNS)
 Networks = Callable[[Array], tuple[Array, Array]]
 
@@ -58,6 +59,7 @@ class ModeOutcome:
     bands: tuple[Bands, ...]
     misfit_ratio: float
     elongation_ratio: float
+    beyond_deviations: float
     simulated: Answered
     recorded: Answered
 
@@ -94,11 +96,13 @@ def outcome_of(
         np.array([answer.spread for answer in found]),
     )
     seen = answered.part(usual)
-    misfit = np.array([answer.misfit_ratio for answer in found])
+    misfit = [answer.misfit_ratio for answer in found]
+    beyond = [answer.beyond_deviations for answer in found]
     return ModeOutcome(
         widened(bands, seen.truth, seen.mean, seen.spread),
         float(np.quantile(misfit, USUAL_RATIO)),
         float(np.quantile(recorded.elongation, USUAL_RATIO)),
+        float(np.quantile(beyond, USUAL_RATIO)),
         simulated,
         answered.part(slice(usual.stop, None)),
     )

@@ -29,7 +29,7 @@ from host_tools.inverse.train_ensemble import DenseEnsemble, train_ensemble
 
 @dataclass(frozen=True)
 class Effort:
-    """How many presses go into each step; the defaults take some forty minutes on two cores."""
+    """How many presses go into each step; the defaults take some seventy minutes on two cores."""
 
     presses: int = 10_000
     held_out: int = 600
@@ -38,8 +38,8 @@ class Effort:
     members: int = 4
     steps: int = 9_000
     judged: int = 30_000
-    fitted: int = 4_000
-    test_recordings: int = 800
+    fitted: int = 14_000
+    test_recordings: int = 1_200
 
 
 QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40)

@@ -54,8 +54,19 @@ def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, profile
     modulus = estimate.youngs_modulus_kpa
     assert (modulus.low, modulus.high) == (10.0, 160.0)  # exactly: the truth may be one of them
     assert not modulus.identifiable
+    assert modulus.low_is_open
+    assert modulus.high_is_open
     assert estimate.status == "not_identifiable"
     assert "Young's modulus" in estimate.reason
+
+
+def test_an_interval_is_open_only_where_the_trained_range_ends(ramp, profile_model, calibration):
+    """12 mm of at most 15, 6 mm deep of 4-12: both are told from the ends."""
+    estimate = estimate_profile(ramp, "standard", profile_model, calibration)
+    for quantity, (lowest, highest) in ((estimate.size_mm, (2.0, 15.0)), (estimate.depth_mm, (4.0, 12.0))):
+        assert quantity.low_is_open == (quantity.low <= lowest)
+        assert quantity.high_is_open == (quantity.high >= highest)
+    assert not estimate.size_mm.low_is_open
 
 
 def test_nothing_under_the_skin_gets_no_numbers(pressed, profile_model, calibration):
@@ -81,10 +92,10 @@ def test_every_doubt_is_said_in_its_own_sentence(ramp, profile_model):
     profile, limits = press_profile(ramp), profile_model.limits["standard"]
     assert doubts_about(profile, NO_DOUBT, limits) == []
     misfit = doubts_about(profile, NO_DOUBT._replace(misfit_ratio=2 * limits.misfit_ratio), limits)
-    beyond = doubts_about(profile, NO_DOUBT._replace(beyond_deviations=3.1), limits)
+    beyond = doubts_about(profile, NO_DOUBT._replace(beyond_deviations=2 * limits.beyond_deviations), limits)
     oblong = replace(profile, elongation=np.full_like(profile.elongation, 0.1))
     assert "misfit" in misfit[0]
-    assert beyond == ["Size or depth lies outside the trained range."]
+    assert beyond == ["Size or depth would rather lie outside the trained range."]
     assert "not round" in doubts_about(oblong, NO_DOUBT, limits)[0]
 
 

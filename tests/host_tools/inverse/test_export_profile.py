@@ -47,7 +47,7 @@ def made_outcome(misfit_ratio: float) -> ModeOutcome:
     bands = tuple(Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
     seen = Answered(truth, truth + 0.05, np.full((64, 3), 0.1))
-    return ModeOutcome(bands, misfit_ratio, 0.8, seen, seen)
+    return ModeOutcome(bands, misfit_ratio, 0.8, 0.3, seen, seen)
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +133,7 @@ def test_the_device_gets_back_surrogate_and_noise(trained: TrainedProfile, model
 
 def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedProfile, model: ProfileModel) -> None:
     assert (model.limits["standard"].misfit_ratio, model.limits["precise"].misfit_ratio) == (1.3, 1.2)
+    assert (model.limits["standard"].elongation_ratio, model.limits["standard"].beyond_deviations) == (0.8, 0.3)
     for limits in model.limits.values():
         assert limits.elongation_ratio == 0.8
         assert [bands.high[0, 0] for bands in limits.bands] == [1.5, 1.6, 1.7]
