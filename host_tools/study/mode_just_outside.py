@@ -27,7 +27,7 @@ from host_tools.study.benchmark import Benchmark, Chapter, Table, at_least
 from host_tools.study.just_outside import LUMPS, Twin, at_nominal, holds, lump_ramps, nearest_twin, spoken
 from host_tools.study.mode_outside import REFUSED_AT_LEAST, SHARE
 
-PRESSES = 20
+PRESSES = 10
 HEADER = ("mode", "size (mm)", "depth (mm)", "modulus (kPa)", "looks like: size", "depth", "modulus",
           "deviations apart", "most that any test can flag", "refused", "of the others: size holds", "depth holds",
           "modulus holds")  # fmt: skip
