@@ -72,8 +72,6 @@ def _crossed_factor(truth: Array, mean: Array, spread: Array) -> float:
 
     Quantiles of few presses that are not quite alike lie too far out. The presses take turns in being the others.
     """
-    if len(truth) * (FOLDS - 1) / FOLDS < FEWEST:
-        return 1.0
     fold = np.arange(len(truth)) % FOLDS
     needed = [
         _needed(_learned(*(column[fold != k] for column in (truth, mean, spread))), truth[fold == k], mean[fold == k],

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from device.measurement.press_parameters import EVEN_STD, NOMINAL, PARAMETERS, to_unit
+from device.measurement.press_surrogate import MODULUS
 from device.measurement.profile_model import ProfileAnswers
-from device.measurement.quantities import UNKNOWNS
-from host_tools.inverse.information import Array, cramer_rao
+from device.measurement.quantities import Inclusion
+from host_tools.inverse.information import Array
+from host_tools.inverse.press_bound import least_errors
 from host_tools.study.accuracy_map import MODULI_KPA, Triple, lumps
 
 OFFSETS_MM = (0.5, 1.0, 1.5, 2.0)
-MODULUS = PARAMETERS.index("youngs_modulus_kpa")
 
 
 def spread_of_modulus(answers: ProfileAnswers, lump: Triple, offset_mm: float) -> float:
@@ -25,11 +25,7 @@ def spread_of_modulus(answers: ProfileAnswers, lump: Triple, offset_mm: float) -
 
     Tissue and skin are nominal; they, the place and the lump are known to lie in their ranges, each a Gaussian.
     """
-    values = NOMINAL | dict(zip(UNKNOWNS, lump, strict=True)) | {"offset_mm": offset_mm}
-    unit = to_unit(np.array([values[name] for name in PARAMETERS]))
-    row, jacobian = answers.surrogate.rows_and_jacobian(unit)
-    bound = cramer_rao(jacobian, answers.noise["standard"].covariance(row), np.full(len(PARAMETERS), EVEN_STD))
-    return float(bound.std[MODULUS])
+    return float(least_errors(answers, "standard", Inclusion(*lump), {"offset_mm": offset_mm})[MODULUS])
 
 
 def beside_over_axis(answers: ProfileAnswers) -> Array:
