@@ -50,7 +50,7 @@ def cosine_modes(field: Array) -> Array:
     return np.asarray(series[:MODES])
 
 
-def _lumps_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, contrasts: Array) -> Array:
+def lumps_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, contrasts: Array) -> Array:
     """Return the modes [M, 2, K, R] of one geometry at all contrasts, over these too, on one mesh."""
     moduli_kpa = [NOMINAL.modulus_kpa(float(contrast)) for contrast in contrasts]
     scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm)
@@ -89,7 +89,7 @@ def build_off_axis_table(
     grid = list(product(range(points[0]), range(points[1]), range(points[3])))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     solved = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_lumps_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.contrast) for i, j, m in grid
+        delayed(lumps_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.contrast) for i, j, m in grid
     )
     for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
         lump[i, j, :, m] = modes

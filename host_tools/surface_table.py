@@ -133,7 +133,7 @@ def _bare_per_n(scene_of: SceneOf, slab: Slab) -> Array:
     return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BARE)[0]
 
 
-def _lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, contrast: float) -> Array:
+def lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, contrast: float) -> Array:
     """Return what a lump adds [2, F, R] over force, size cubed and contrast, at forces that indent alike."""
     scene = scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(contrast)))
     return _ramps_per_n(scene, FORCES_N * slab.stiffness_ratio)[1] / size_mm**3 / contrast
@@ -160,7 +160,7 @@ def build_surface_table(
     places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid)]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     bare = Parallel(n_jobs=jobs)(delayed(_bare_per_n)(*one) for one in SOLVED)
-    solving = Parallel(n_jobs=jobs, return_as="generator")(delayed(_lump_per_n_mm3)(*place) for place in places)
+    solving = Parallel(n_jobs=jobs, return_as="generator")(delayed(lump_per_n_mm3)(*place) for place in places)
     lump = []
     for field in solving:
         lump.append(field)

@@ -1,8 +1,8 @@
 """A profile row to its best fit: the forward model is turned round until it explains the press.
 
 Gauss-Newton from the network's estimate over everything that nobody tells the probe - tissue, slab, skin, offset -
-within their ranges. How badly the best fit explains the press, and whether it presses against the end of a range, tell
-whether the press is one that the ranges hold. Source: the iterated loop asked for by Lee & Won 2013, section V.
+within their ranges. How badly the best fit explains the press tells whether it is of one round inclusion.
+Source: the iterated loop asked for by Lee & Won 2013, section V.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from device.measurement.press_surrogate import OFFSET, PressSurrogate
 
 Array = NDArray[np.float64]
 
-AT_BOUND = 0.995
-SIZE_AND_DEPTH = slice(0, 2)
 EVENLY_HELD = np.eye(len(PARAMETERS)) / EVEN_STD
 """Rows of a least-squares problem that hold each coordinate weakly to the middle of its range."""
 
@@ -65,16 +63,3 @@ def best_fit(posterior: PressPosterior, start: Array) -> Array:
         ftol=1e-6,
     )
     return np.asarray(found.x)
-
-
-def beyond_range(posterior: PressPosterior, best: Array) -> float:
-    """Return by how many standard deviations size or depth would rather lie outside their ranges; 0 if neither would.
-
-    The score test of a fit that stops at a bound: the slope of the misfit there, over the root of the information.
-    """
-    slope = posterior.jacobian(best)
-    precision = slope.T @ slope + np.eye(len(best)) / EVEN_STD**2
-    outward = -np.sign(best) * (slope.T @ posterior.residuals(best) + best / EVEN_STD**2)
-    deviations = outward * np.sqrt(np.diag(np.linalg.inv(precision)))
-    at_bound = np.abs(best[SIZE_AND_DEPTH]) > AT_BOUND
-    return float(np.max(deviations[SIZE_AND_DEPTH], where=at_bound, initial=0.0))

@@ -47,7 +47,7 @@ RATIO = "1"
 GOLDEN_TOLERANCE = 1e-4
 """Relative. Rounding of float32 is 6e-8; processors differ far less than this, wrong weights far more."""
 
-_RUNTIME_ERRORS = (
+RUNTIME_ERRORS = (
     runtime_errors.Fail,
     runtime_errors.InvalidArgument,
     runtime_errors.InvalidGraph,
@@ -170,7 +170,7 @@ def _verified_names(fields: ModelCard) -> tuple[str, ...]:
 def _open_session(fields: ModelCard, network: bytes) -> onnxruntime.InferenceSession:
     try:
         return open_session(network)
-    except _RUNTIME_ERRORS as error:
+    except RUNTIME_ERRORS as error:
         raise BundleRefused(
             fields.folder, MODEL_FILE, f"unusable ({error})", "a network onnxruntime can run"
         ) from error

@@ -44,6 +44,8 @@ class ModeModels(NamedTuple):
         for model in (self.held, self.profile):
             if model:
                 model.bundle.prove()
+        if self.profile:
+            self.profile.ranges.prove()
         self.paper.prove()
 
     def estimate(self, recording: Recording, mode: Mode, calibration: Calibration) -> Estimate:

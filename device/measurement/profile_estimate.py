@@ -1,8 +1,8 @@
 """A recording of a force ramp to its estimate: size, depth and modulus with 90 % intervals, or why there are none.
 
 Numbers are given for one round inclusion inside the trained ranges only. That a press is not one shows in what the
-best fit leaves, in how far the bright spot is from round, and in a size or depth that would rather lie beyond its
-range. Source: docs/accuracy.md on what can be known; docs/modes.md on how often each doubt is right.
+best fit leaves, in how far the bright spot is from round, and in the odds of networks that know lumps around the ranges
+too. Source: docs/accuracy.md on what can be known; docs/modes.md on how often each doubt is right.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from device.measurement.interval_estimate import origin_of, saturation, with_num
 from device.measurement.mode import Mode
 from device.measurement.press_noise import PressNoise
 from device.measurement.press_profile import PROFILE_FORCES_N, PressProfile, press_profile
-from device.measurement.profile_model import RAMP_MODES, Answer, ModeLimits, ProfileModel
+from device.measurement.profile_model import RAMP_MODES, ModeLimits, ProfileModel
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording
-from device.measurement.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS
+from device.measurement.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS, Array
 from device.measurement.roundness import doubt_about_roundness, elongation_ratio
 
 VISIBLE_DEVIATIONS = 4.0
@@ -37,14 +37,16 @@ def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, cali
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin)
     profile = press_profile(recording)
-    if not stands_out(profile, model.answers.noise[mode]):
+    row, limits = profile.as_row(), model.limits[mode]
+    if not stands_out(row, model.answers.noise[mode]):
         return without_numbers("not_identifiable", "No inclusion stands out.", origin)
-    answer, limits = model.answer(profile.as_row(), mode), model.limits[mode]
-    doubts = doubts_about(profile, answer, limits)
+    answer, log_odds = model.answer(row, mode), float(model.ranges.log_odds(row[None], mode)[0])
+    doubts = doubts_about(profile, answer.misfit_ratio, log_odds, limits)
     if doubts:
         return without_numbers("outside_range", " ".join(doubts), origin)
     features = {
         "misfit_ratio": answer.misfit_ratio,
+        "outside_log_odds": log_odds,
         "elongation_ratio": elongation_ratio(profile.elongation, profile.offset),
         "residual": profile.residual,
     }
@@ -53,9 +55,12 @@ def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, cali
     return with_numbers(answer.mean, answer.spread, limits.bands, features, origin)
 
 
-def stands_out(profile: PressProfile, noise: PressNoise) -> bool:
-    """Return whether the middle, mean over the forces, is brighter than noise: by itself, or against the rim."""
-    row, forces = profile.as_row(), len(PROFILE_FORCES_N)
+def stands_out(row: Array, noise: PressNoise) -> bool:
+    """Return whether the middle of a profile row [P], mean over the forces, is brighter than noise.
+
+    By itself, or against the rim.
+    """
+    forces = len(PROFILE_FORCES_N)
     bare = np.concatenate([np.zeros(forces * RINGS), row[forces * RINGS :]])
     covariance = noise.covariance(bare)[: forces * RINGS, : forces * RINGS]
     return any(
@@ -64,15 +69,15 @@ def stands_out(profile: PressProfile, noise: PressNoise) -> bool:
     )
 
 
-def doubts_about(profile: PressProfile, answer: Answer, limits: ModeLimits) -> list[str]:
+def doubts_about(profile: PressProfile, misfit_ratio: float, outside_log_odds: float, limits: ModeLimits) -> list[str]:
     """Return a sentence for every reason why this is not one round inclusion inside the trained ranges; [] is good."""
     found = []
-    if answer.misfit_ratio > limits.misfit_ratio:
+    if misfit_ratio > limits.misfit_ratio:
         found.append(
-            f"No single round inclusion explains this press: misfit {answer.misfit_ratio:.2f}, "
+            f"No single round inclusion explains this press: misfit {misfit_ratio:.2f}, "
             f"above the usual {limits.misfit_ratio:.2f}."
         )
     found += doubt_about_roundness(elongation_ratio(profile.elongation, profile.offset), limits.elongation_ratio)
-    if answer.beyond_deviations > limits.beyond_deviations:
+    if outside_log_odds > limits.outside_log_odds:
         found.append("Size or depth would rather lie outside the trained range.")
     return found

@@ -2,7 +2,7 @@
 
 Either way the best fit of the forward model is sought, because how badly it fits is what tells that a press is not of
 one round inclusion in the trained ranges. The bundle is a folder: `model.onnx` and `model.json` as every bundle,
-`surrogate.npz` beside them. Source of the format: docs/contracts.md.
+`surrogate.npz` and `range.onnx` beside them. Source of the format: docs/contracts.md.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.confidence import Bands
-from device.measurement.fit_press import PressPosterior, best_fit, beyond_range
+from device.measurement.fit_press import PressPosterior, best_fit
 from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.model_card import BundleRefused
@@ -25,6 +25,7 @@ from device.measurement.press_noise import PressNoise
 from device.measurement.press_parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
 from device.measurement.press_surrogate import TISSUE, PressSurrogate, load_surrogate
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from device.measurement.range_test import RangeTest
 from device.measurement.sample_press import sample_press
 
 Array = NDArray[np.float64]
@@ -39,14 +40,12 @@ class Answer(NamedTuple):
     """Mean and spread [3] of the unknowns' coordinates, and how well one inclusion explains the press.
 
     `misfit_ratio`: squared residuals of the best fit, each over its standard deviation, over their number.
-    `beyond_deviations`: by how many standard deviations size or depth would rather lie outside their ranges.
     `tissue_kpa`: mean and spread of the tissue's modulus, which the press beside the lesion tells; precise only.
     """
 
     mean: Array
     spread: Array
     misfit_ratio: float
-    beyond_deviations: float
     tissue_kpa: tuple[float, float] | None = None
 
 
@@ -57,7 +56,7 @@ class ModeLimits:
     bands: tuple[Bands, ...]
     misfit_ratio: float
     elongation_ratio: float
-    beyond_deviations: float
+    outside_log_odds: float
 
 
 class ProfileAnswers:
@@ -81,15 +80,15 @@ class ProfileAnswers:
 
 def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) -> Answer:
     residuals = posterior.residuals(best)
-    return Answer(mean, spread, float(np.mean(residuals**2)), beyond_range(posterior, best))
+    return Answer(mean, spread, float(np.mean(residuals**2)))
 
 
 class ProfileModel:
-    """A verified bundle: networks, what fits the forward model, and the limits of each mode."""
+    """A verified bundle: networks, what fits the forward model, what tells the ranges, and the limits of each mode."""
 
-    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers) -> None:
+    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers, ranges: RangeTest) -> None:
         """Use `load` for what is installed. Raises `BundleRefused` when the card lacks the limits of a mode."""
-        self.bundle, self.answers = bundle, answers
+        self.bundle, self.answers, self.ranges = bundle, answers, ranges
         try:
             self.limits = {mode: _limits(bundle.card["modes"][mode]) for mode in RAMP_MODES}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
@@ -105,7 +104,8 @@ class ProfileModel:
             raise BundleRefused(folder, SURROGATE_FILE, found, f"{stated} as model.json states")
         with np.load(path) as file:
             noise = {mode: PressNoise(np.asarray(file[f"camera_{mode}"], np.float64)) for mode in RAMP_MODES}
-        return cls(bundle, ProfileAnswers(load_surrogate(path), noise))
+        ranges = RangeTest.load(folder, bundle.card)
+        return cls(bundle, ProfileAnswers(load_surrogate(path), noise), ranges)
 
     def answer(self, row: Array, mode: Mode) -> Answer:
         """Return what mode standard or precise makes of a profile row [P]."""
@@ -127,5 +127,5 @@ def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
 
 
 def _limits(entry: Mapping[str, Any]) -> ModeLimits:
-    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_ratio", "beyond_deviations"))
+    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_ratio", "outside_log_odds"))
     return ModeLimits(bands_of(entry), *doubts)

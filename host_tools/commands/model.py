@@ -24,26 +24,30 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 
 def table(
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = MODELS / "simulated_probe",
-    part: Annotated[str, typer.Option(help="centred, off-axis or all.")] = "all",
+    part: Annotated[str, typer.Option(help="centred, off-axis or all, which are both; or wide.")] = "all",
 ) -> None:
     """Build the virtual probe's tables of the pressed face: force ramps of centred lumps, and lumps off the axis.
 
     The first hold tissue of 4-6.25 kPa and 27-36 mm, the second is carried over to it. Half an hour on two cores.
+    Part wide, another half an hour, is of lumps around the trained ranges: `train --profile standard` needs it.
     """
     from host_tools.off_axis_table import build_off_axis_table, write_off_axis_table
     from host_tools.surface_table import build_surface_table, write_surface_table
+    from host_tools.wide_table import build_wide_table
 
-    if part not in ("centred", "off-axis", "all"):
-        raise InvalidQuantity("part", part, "centred, off-axis or all", "name one of them")
+    if part not in ("centred", "off-axis", "all", "wide"):
+        raise InvalidQuantity("part", part, "centred, off-axis, all or wide", "name one of them")
     with progress("solves") as bar:
         task = bar.add_task("")
 
         def on_point(done: int, n: int) -> None:
             bar.update(task, completed=done, total=n)
 
-        if part != "off-axis":
+        if part == "wide":
+            build_wide_table(on_point=on_point).save(out)
+        if part in ("centred", "all"):
             write_surface_table(build_surface_table(on_point=on_point), out)
-        if part != "centred":
+        if part in ("off-axis", "all"):
             write_off_axis_table(build_off_axis_table(on_point=on_point), out)
 
 

@@ -17,10 +17,10 @@ from host_tools.commands.output import note, note_left_out, progress
 MODELS = Path(__file__).resolve().parents[2] / "models"
 TABLE = MODELS / "simulated_probe"
 CERTIFICATE = "calibration.json"
-SWEPT = Path("build/sweep.nc")
+SWEPT, WIDE = Path("build/sweep.nc"), Path("build/wide_table")
 PAPER_SCENES = 134
 TRIALS = 100
-OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--quick"), "quick": ("--table",)}
+OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--wide", "--quick"), "quick": ("--table",)}
 """Options of each profile beside --out and --seed."""
 
 
@@ -30,6 +30,9 @@ def train(
     out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/PROFILE unless given.")] = None,
     trials: Annotated[int | None, typer.Option(help="Of paper: networks that are averaged; 100 unless given.")] = None,
     table: Annotated[Path | None, typer.Option(help="Of the others: folder of the probe's tables.")] = None,
+    wide: Annotated[
+        Path | None, typer.Option(help="Of standard: folder of the table around the ranges; made unless given.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of weights, splits, presses and noise.")] = 1,
     quick: Annotated[
         bool, typer.Option("--quick", help="Of standard: a tenth of the presses, to try the chain, not to use.")
@@ -39,7 +42,7 @@ def train(
 
     Example: host_tools train --profile standard --out models/standard
     """
-    given = {"--data": data, "--trials": trials, "--table": table, "--quick": quick or None}
+    given = {"--data": data, "--trials": trials, "--table": table, "--wide": wide, "--quick": quick or None}
     if profile not in OWN_OPTIONS:
         raise InvalidQuantity("profile", repr(profile), f"one of {', '.join(OWN_OPTIONS)}", "choose one of them")
     for option, value in given.items():
@@ -50,7 +53,7 @@ def train(
     if profile == "paper":
         _paper(data or _swept(), folder, TRIALS if trials is None else trials, seed, command)
     elif profile == "standard":
-        _standard(table or TABLE, folder, seed, quick, command)
+        _standard(table or TABLE, wide, folder, seed, quick, command)
     else:
         _quick(table or TABLE, folder, seed, command)
 
@@ -69,6 +72,17 @@ def _swept() -> Path:
         note.print(f"{SWEPT} is missing: sweeping {PAPER_SCENES} scenes.")
         sweep(out=SWEPT, scenes=PAPER_SCENES, seed=1)
     return SWEPT
+
+
+def _wide() -> Path:
+    """Return the folder of the table around the trained ranges, made anew when it is not there."""
+    from host_tools.commands.model import table
+    from host_tools.wide_table import NAME
+
+    if not (WIDE / f"{NAME}.npz").exists():
+        note.print(f"{WIDE} is missing: solving lumps around the trained ranges.")
+        table(out=WIDE, part="wide")
+    return WIDE
 
 
 def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
@@ -95,7 +109,7 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
             print(f"{unknown:20} " + "  ".join(f"{name} {value:6.2f} %" for name, value in errors.items()))
 
 
-def _standard(table: Path, out: Path, seed: int, quick: bool, command: str) -> None:
+def _standard(table: Path, wide: Path | None, out: Path, seed: int, quick: bool, command: str) -> None:
     from device.measurement.calibration import read_calibration
     from device.measurement.profile_estimate import estimate_profile
     from device.measurement.profile_model import RAMP_MODES, ProfileModel
@@ -104,10 +118,11 @@ def _standard(table: Path, out: Path, seed: int, quick: bool, command: str) -> N
     from host_tools.inverse.export_profile import export_profile
     from host_tools.inverse.profile_training import QUICK_EFFORT, Effort, train_profile
     from host_tools.study.publish_dial import publish_dial
+    from host_tools.wide_table import load_wide_table
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
     effort = QUICK_EFFORT if quick else Effort()
-    trained = train_profile(tables, effort=effort, seed=seed, say=note.print)
+    trained = train_profile(tables, load_wide_table(wide or _wide()), effort=effort, seed=seed, say=note.print)
     with _refusals():
         export_profile(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command

@@ -65,9 +65,9 @@ class Prediction(NamedTuple):
     log_variance: Single
 
 
-def initial_layers(inputs: int, rng: np.random.Generator) -> list[Layer]:
-    """Return layers of random weights (Glorot & Bengio 2010) for so many inputs."""
-    widths = (inputs, HIDDEN, HIDDEN, 2 * len(UNKNOWNS))
+def initial_layers(inputs: int, rng: np.random.Generator, outputs: int = 2 * len(UNKNOWNS)) -> list[Layer]:
+    """Return layers of random weights (Glorot & Bengio 2010) for so many inputs and outputs."""
+    widths = (inputs, HIDDEN, HIDDEN, outputs)
     layers = []
     for fan_in, fan_out in pairwise(widths):
         spread = np.sqrt(2 / (fan_in + fan_out))
@@ -78,7 +78,7 @@ def initial_layers(inputs: int, rng: np.random.Generator) -> list[Layer]:
 
 def predict(layers: list[Layer], inputs: Single) -> Prediction:
     """Return the prediction for inputs [n, 2 K]."""
-    return _split(_activations(layers, inputs)[-1])
+    return _split(activations_of(layers, inputs)[-1])
 
 
 def loss_and_gradient(layers: list[Layer], inputs: Single, target: Single) -> tuple[float, list[Layer]]:
@@ -87,7 +87,7 @@ def loss_and_gradient(layers: list[Layer], inputs: Single, target: Single) -> tu
     Half the squared error, plus the Gaussian's negative log likelihood in which only the variance learns: mean and
     variance do not spoil each other where the noise is large.
     """
-    activations = _activations(layers, inputs)
+    activations = activations_of(layers, inputs)
     mean, log_variance = _split(activations[-1])
     error, inverse = mean - target, np.exp(-log_variance)
     square = error * error
@@ -95,7 +95,7 @@ def loss_and_gradient(layers: list[Layer], inputs: Single, target: Single) -> tu
     by_output = np.hstack([error, 0.5 * (1 - square * inverse)]) / np.float32(error.size)
     inside = activations[-1][:, mean.shape[1] :] < LARGEST_LOG_VARIANCE
     by_output[:, mean.shape[1] :] *= inside
-    return loss, _backward(layers, activations, by_output.astype(np.float32))
+    return loss, backward(layers, activations, by_output.astype(np.float32))
 
 
 def _split(output: Single) -> Prediction:
@@ -103,7 +103,8 @@ def _split(output: Single) -> Prediction:
     return Prediction(output[:, :half], np.minimum(output[:, half:], np.float32(LARGEST_LOG_VARIANCE)))
 
 
-def _activations(layers: list[Layer], inputs: Single) -> list[Single]:
+def activations_of(layers: list[Layer], inputs: Single) -> list[Single]:
+    """Return the inputs [n, 2 K], what each hidden layer makes of them, and the outputs, which are linear."""
     values = [inputs]
     for number, (weights, biases) in enumerate(layers):
         signal = values[-1] @ weights + biases
@@ -111,7 +112,8 @@ def _activations(layers: list[Layer], inputs: Single) -> list[Single]:
     return values
 
 
-def _backward(layers: list[Layer], activations: list[Single], by_output: Single) -> list[Layer]:
+def backward(layers: list[Layer], activations: list[Single], by_output: Single) -> list[Layer]:
+    """Return the gradient by weights and biases, of a loss whose derivatives by the outputs are `by_output`."""
     gradient, delta = [], by_output
     for (weights, _), before in zip(reversed(layers), reversed(activations[:-1]), strict=True):
         gradient.append(Layer(before.T @ delta, delta.sum(axis=0)))

@@ -6,12 +6,14 @@ bands of a card are. Operators: the ONNX standard, opset 17.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from device.measurement.inversion import open_session
 from device.measurement.press_parameters import BY_RATIO, HIGH, LOW, unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS
-from host_tools.inverse.dense_network import LARGEST_LOG_VARIANCE, Array
+from host_tools.inverse.dense_network import LARGEST_LOG_VARIANCE, Array, InputScaling, Layer
 from host_tools.inverse.export import AGREEMENT, ExportRefused, OnnxGraph
 from host_tools.inverse.train_ensemble import DenseEnsemble
 
@@ -19,17 +21,7 @@ from host_tools.inverse.train_ensemble import DenseEnsemble
 def build_network(ensemble: DenseEnsemble) -> bytes:
     """Return the ensemble as serialised ONNX: features float32 [n, P] -> estimate, spread float32 [n, 3]."""
     graph = OnnxGraph()
-    scaling = ensemble.scaling
-    plain = graph.add("MatMul", graph.add("Sub", "features", scaling.mean), scaling.projection)
-    area_sine = graph.add("Div", graph.add("Asinh", plain), scaling.area_sine_spread)
-    signal = graph.add("Concat", graph.add("Div", plain, scaling.plain_spread), area_sine, axis=1)
-    *hidden, last = (
-        [np.stack([getattr(layers[i], part) for layers in ensemble.members]) for part in ("weights", "biases")]
-        for i in range(len(ensemble.members[0]))
-    )
-    for weights, biases in hidden:
-        signal = graph.add("Tanh", graph.add("Add", graph.add("MatMul", signal, weights), biases[:, None]))
-    outputs = graph.add("Add", graph.add("MatMul", signal, last[0]), last[1][:, None])  # [members, n, 6]
+    outputs = add_members(graph, ensemble.scaling, ensemble.members)  # [members, n, 6]
     select = np.eye(2 * len(UNKNOWNS), dtype=np.float32)
     means = graph.add("MatMul", outputs, select[:, : len(UNKNOWNS)])
     log_variances = graph.add(
@@ -41,7 +33,21 @@ def build_network(ensemble: DenseEnsemble) -> bytes:
     between = graph.add("ReduceMean", graph.add("Mul", away, away), axes=[0], keepdims=0)
     graph.add("Sqrt", graph.add("Add", within, between), output="spread")
     _add_physical(graph, mean)
-    return graph.serialise(len(scaling.mean))
+    return graph.serialise(len(ensemble.scaling.mean))
+
+
+def add_members(graph: OnnxGraph, scaling: InputScaling, members: Sequence[list[Layer]]) -> str:
+    """Add networks that share their inputs; return the name of their outputs [members, n, ...]."""
+    plain = graph.add("MatMul", graph.add("Sub", "features", scaling.mean), scaling.projection)
+    area_sine = graph.add("Div", graph.add("Asinh", plain), scaling.area_sine_spread)
+    signal = graph.add("Concat", graph.add("Div", plain, scaling.plain_spread), area_sine, axis=1)
+    *hidden, last = (
+        [np.stack([getattr(layers[i], part) for layers in members]) for part in ("weights", "biases")]
+        for i in range(len(members[0]))
+    )
+    for weights, biases in hidden:
+        signal = graph.add("Tanh", graph.add("Add", graph.add("MatMul", signal, weights), biases[:, None]))
+    return graph.add("Add", graph.add("MatMul", signal, last[0]), last[1][:, None])
 
 
 def _add_physical(graph: OnnxGraph, mean: str) -> None:

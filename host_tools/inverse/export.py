@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,9 @@ def build_network(ensemble: Ensemble) -> bytes:
     return graph.serialise()
 
 
+ESTIMATE_AND_SPREAD = {"estimate": len(UNKNOWNS), "spread": len(UNKNOWNS)}
+
+
 class OnnxGraph:
     """Collects ONNX nodes; arrays given as inputs become constants, of single precision where they are."""
 
@@ -104,14 +108,14 @@ class OnnxGraph:
         self.constants.append(numpy_helper.from_array(np.ascontiguousarray(kept), name))
         return name
 
-    def serialise(self, features: int = LAYERS[0]) -> bytes:
-        """Return the checked model from so many features to estimate and spread."""
+    def serialise(self, features: int = LAYERS[0], outputs: Mapping[str, int] = ESTIMATE_AND_SPREAD) -> bytes:
+        """Return the checked model from so many features to outputs of so many columns."""
 
         def port(name: str, columns: int) -> Any:
             return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", columns])
 
-        outputs = [port(name, len(UNKNOWNS)) for name in ("estimate", "spread")]
-        graph = helper.make_graph(self.nodes, "inverse", [port("features", features)], outputs, self.constants)
+        ports = [port(name, columns) for name, columns in outputs.items()]
+        graph = helper.make_graph(self.nodes, "inverse", [port("features", features)], ports, self.constants)
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
         onnx.checker.check_model(model, full_check=True)
         return bytes(model.SerializeToString(deterministic=True))

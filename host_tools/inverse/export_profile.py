@@ -1,4 +1,4 @@
-"""Turns the trained modes into model bundles: model.onnx, model.json, and for the ramps surrogate.npz.
+"""Turns the trained modes into model bundles: model.onnx, model.json, and for the ramps surrogate.npz and range.onnx.
 
 The same parts give the same bytes. Source of the format: the model bundle of docs/contracts.md.
 """
@@ -9,6 +9,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,11 @@ from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
 from device.measurement.press_parameters import NUISANCES, RANGES
 from device.measurement.profile_model import SURROGATE_FILE
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.range_test import ENTRY, RANGE_FILE
 from host_tools.inverse.dense_network import Array, Single
 from host_tools.inverse.ensemble_network import build_network, golden_vectors
 from host_tools.inverse.export import write_folder
+from host_tools.inverse.export_range import build_range_networks, range_entry
 from host_tools.inverse.mode_outcome import ModeOutcome
 from host_tools.inverse.mode_statistics import statistics
 from host_tools.inverse.profile_training import TrainedProfile
@@ -41,13 +44,13 @@ def export_profile(
     rows = trained.samples.rows[:: len(trained.samples.rows) // GOLDEN_ROWS][:GOLDEN_ROWS].astype(np.float32)
     network = build_network(trained.ensemble)
     golden = golden_vectors(trained.ensemble, network, rows.astype(np.float64))
-    surrogate = _surrogate_file(trained)
+    surrogate, ranges = _surrogate_file(trained), build_range_networks(trained.ranges.networks)
     card = {
         **_card(folder, network, serials, software_version, training_command),
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
-        "effort": vars(trained.effort),
+        "effort": asdict(trained.effort),
         "features": [{"name": name, "unit": unit} for name, unit in PROFILE_UNITS.items()],
         "training_range": _training_range(dict(zip(PROFILE_UNITS, trained.samples.rows.T, strict=True))),
         "surrogate_error": {
@@ -58,14 +61,16 @@ def export_profile(
             mode: {
                 "misfit_ratio": outcome.misfit_ratio,
                 "elongation_ratio": outcome.elongation_ratio,
-                "beyond_deviations": outcome.beyond_deviations,
+                "outside_log_odds": outcome.outside_log_odds,
                 **_answers(outcome),
             }
             for mode, outcome in trained.outcomes.items()
         },
+        ENTRY: range_entry(trained.ranges, ranges, np.array(golden["features"])),
         "golden": golden,
     }
-    write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card), SURROGATE_FILE: surrogate})
+    files = {MODEL_FILE: network, CARD_FILE: _text(card), SURROGATE_FILE: surrogate, RANGE_FILE: ranges}
+    write_folder(folder, files)
 
 
 def export_quick(

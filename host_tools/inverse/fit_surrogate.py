@@ -49,7 +49,18 @@ PRESSES_A_TERM = 3.0
 
 def fit_surrogate(samples: PressSamples) -> PressSurrogate:
     """Return the surrogate of random presses; raises `InvalidQuantity` when they are too few or not finite."""
-    lump_degrees, bare_degrees = degrees(LUMP_REACH, LUMP_HIGHEST), degrees(BARE_REACH, {})
+    at = polynomial_coordinates(to_unit(samples.parameters), samples.parameters)
+    return PressSurrogate(*fit_polynomials(samples, at))
+
+
+def fit_polynomials(
+    samples: PressSamples,
+    at: Array,
+    reach: dict[str, float] = LUMP_REACH,
+    highest: dict[str, int] = LUMP_HIGHEST,
+) -> tuple[LegendreSum, LegendreSum]:
+    """Return the polynomials of the lump and of the lump-free light in coordinates [n, 9], as `fit_surrogate`."""
+    lump_degrees, bare_degrees = degrees(reach, highest), degrees(BARE_REACH, {})
     bound = Bound(PRESSES_A_TERM * len(lump_degrees), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
     require(
@@ -58,14 +69,12 @@ def fit_surrogate(samples: PressSamples) -> PressSurrogate:
         Bound(0, 0, ""),
         "leave them out",
     )
-    at = polynomial_coordinates(to_unit(samples.parameters), samples.parameters)
     contrast, growth, offset = np.split(samples.rows, [CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS], axis=1)
     factor, design = lump_factor(samples.parameters), terms(lump_degrees, at)
     strength, placed = factor[:, 0], factor[:, -1]
     lump = [_weighted(design, strength, contrast), _weighted(design, placed, offset)]
     bare, *_ = np.linalg.lstsq(terms(bare_degrees, at), growth, rcond=None)
-    fitted = LegendreSum(lump_degrees, np.hstack(lump)), LegendreSum(bare_degrees, np.asarray(bare, np.float64))
-    return PressSurrogate(*fitted)
+    return LegendreSum(lump_degrees, np.hstack(lump)), LegendreSum(bare_degrees, np.asarray(bare, np.float64))
 
 
 def degrees(reach: dict[str, float], highest: dict[str, int]) -> NDArray[np.uint8]:

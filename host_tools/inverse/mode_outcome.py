@@ -14,18 +14,21 @@ import numpy as np
 
 from device.measurement.confidence import Bands
 from device.measurement.mode import Mode
+from device.measurement.press_noise import PressNoise
 from device.measurement.press_parameters import to_unit
+from device.measurement.profile_estimate import stands_out
 from device.measurement.profile_model import Answer, ProfileAnswers
-from device.measurement.quantities import UNKNOWNS
+from device.measurement.quantities import UNKNOWNS, Bound, require
 from host_tools.inverse.confidence_bands import confidence_bands, widened
 from host_tools.inverse.noisy_presses import Pool
 from host_tools.inverse.press_samples import Array
+from host_tools.inverse.range_network import RangeNetwork
 from host_tools.inverse.recorded_presses import RecordedPresses, in_parallel
 from host_tools.inverse.train_ensemble import DenseEnsemble
 
 USUAL_RATIO = 0.985
-"""Share of recorded presses inside the trained ranges whose misfit counts as usual; likewise the elongation, and how
-far size or depth would rather lie outside."""
+"""Share of recorded presses inside the trained ranges whose misfit counts as usual; likewise the elongation, and the
+odds that size or depth lies outside, of those in which a lump stands out."""
 THREE = len(UNKNOWNS)
 Networks = Callable[[Array], tuple[Array, Array]]
 
@@ -59,7 +62,7 @@ class ModeOutcome:
     bands: tuple[Bands, ...]
     misfit_ratio: float
     elongation_ratio: float
-    beyond_deviations: float
+    outside_log_odds: float
     simulated: Answered
     recorded: Answered
 
@@ -71,10 +74,11 @@ def judged_mode(
     pool: Pool,
     recorded: RecordedPresses,
     *,
+    outside_log_odds: float,
     seed: int,
     jobs: int = -1,
 ) -> ModeOutcome:
-    """Return the outcome of a mode on a pool's presses with noise and on recorded ones."""
+    """Return the outcome of a mode on a pool's presses with noise and on recorded ones, with its usual log odds."""
     rows = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([seed, 1])).astype(np.float64)
     truth = pool.unit[:, :THREE].astype(np.float64)
     simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
@@ -82,11 +86,25 @@ def judged_mode(
     seen = simulated.part(slice(half))
     bands = confidence_bands(seen.truth, seen.mean, seen.spread)
     found = answers_to(mode, ensemble.estimate, answers, recorded.rows, jobs)
-    return outcome_of(bands, simulated.part(slice(half, None)), recorded, found)
+    return outcome_of(bands, simulated.part(slice(half, None)), recorded, found, outside_log_odds)
+
+
+def usual_log_odds(ranges: RangeNetwork, rows: Array, noise: PressNoise) -> float:
+    """Return the largest usual log odds of recorded presses, rows [n, P], in which a lump stands out.
+
+    Raises `InvalidQuantity` where it stands out in none.
+    """
+    seen = rows[[stands_out(row, noise) for row in rows]]
+    require("presses in which a lump stands out", len(seen), Bound(1, np.inf, "presses"), "record more presses")
+    return float(np.quantile(ranges.log_odds(seen), USUAL_RATIO))
 
 
 def outcome_of(
-    bands: tuple[Bands, ...], simulated: Answered, recorded: RecordedPresses, found: Sequence[Answer]
+    bands: tuple[Bands, ...],
+    simulated: Answered,
+    recorded: RecordedPresses,
+    found: Sequence[Answer],
+    outside_log_odds: float,
 ) -> ModeOutcome:
     """Return the outcome of a mode: bands of simulated presses, and the answers to recorded ones."""
     usual = slice(len(found) // 2)
@@ -97,12 +115,11 @@ def outcome_of(
     )
     seen = answered.part(usual)
     misfit = [answer.misfit_ratio for answer in found]
-    beyond = [answer.beyond_deviations for answer in found]
     return ModeOutcome(
         widened(bands, seen.truth, seen.mean, seen.spread),
         float(np.quantile(misfit, USUAL_RATIO)),
         float(np.quantile(recorded.elongation, USUAL_RATIO)),
-        float(np.quantile(beyond, USUAL_RATIO)),
+        outside_log_odds,
         simulated,
         answered.part(slice(usual.stop, None)),
     )

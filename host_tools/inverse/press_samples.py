@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -40,6 +41,13 @@ LUMPS_A_SKIN = 3
 CHUNK = 24
 NEAREST_MM = 1.0
 """A lump ends at least this far above the slab's base."""
+
+
+class Draw(Protocol):
+    """How parameters [count, 9] are drawn, consecutive ones on one tissue and skin."""
+
+    def __call__(self, count: int, rng: np.random.Generator, *, lumps_a_skin: int = 1) -> Array:
+        """Return them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +87,12 @@ def sample_presses(
     count: int,
     *,
     seed: int,
+    draw: Draw = draw_parameters,
     jobs: int = -1,
     on_done: Callable[[int], None] = lambda done: None,
 ) -> PressSamples:
     """Return `count` random presses; the same seed gives the same ones whatever `jobs` (-1: all cores)."""
-    parameters = draw_parameters(count, np.random.default_rng(seed), lumps_a_skin=LUMPS_A_SKIN)
+    parameters = draw(count, np.random.default_rng(seed), lumps_a_skin=LUMPS_A_SKIN)
     parts = np.split(parameters, range(CHUNK * LUMPS_A_SKIN, count, CHUNK * LUMPS_A_SKIN))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     rows = []

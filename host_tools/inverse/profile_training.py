@@ -1,14 +1,15 @@
 """Everything behind the standard and the precise mode, from the virtual probe's tables to what the bundle holds.
 
 Random presses make the surrogate; recordings of random presses the camera's noise; surrogate and noise endless
-training presses for the networks. Presses that nobody has learned from give the bands of every interval; recordings
-with every drift give what misfit and elongation are usual, and the errors that the card states.
+training presses for the networks. Lumps around the trained ranges make the networks that tell what lies outside.
+Presses that nobody has learned from give the bands of every interval; recordings with every drift give what misfit,
+elongation and odds are usual, and the errors that the card states.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,17 +20,19 @@ from device.measurement.profile_model import RAMP_MODES, ProfileAnswers
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.camera_noise import camera_covariance
 from host_tools.inverse.fit_surrogate import fit_surrogate, held_out_error
-from host_tools.inverse.mode_outcome import ModeOutcome, judged_mode
+from host_tools.inverse.mode_outcome import ModeOutcome, judged_mode, usual_log_odds
 from host_tools.inverse.noisy_presses import random_pool
 from host_tools.inverse.press_samples import Array, PressSamples, draw_parameters, sample_presses
 from host_tools.inverse.recorded_presses import record_presses
 from host_tools.inverse.seeds import derived_seed
 from host_tools.inverse.train_ensemble import DenseEnsemble, train_ensemble
+from host_tools.inverse.train_range import RangeEffort, TrainedRange, train_range
+from host_tools.wide_table import WideTable
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How many presses go into each step; the defaults take some seventy minutes on two cores."""
+    """How many presses go into each step; the defaults take some ninety minutes on two cores."""
 
     presses: int = 10_000
     held_out: int = 600
@@ -40,9 +43,10 @@ class Effort:
     judged: int = 30_000
     fitted: int = 14_000
     test_recordings: int = 1_200
+    ranges: RangeEffort = field(default_factory=RangeEffort)
 
 
-QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40)
+QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40, RangeEffort(4_600, 100, 20_000, 1, 900))
 """Enough to try the chain; the model is a poor one."""
 
 
@@ -54,6 +58,7 @@ class TrainedProfile:
     surrogate_error: Array
     noise: dict[Mode, PressNoise]
     ensemble: DenseEnsemble
+    ranges: TrainedRange
     outcomes: dict[Mode, ModeOutcome]
     samples: PressSamples
     effort: Effort
@@ -62,13 +67,17 @@ class TrainedProfile:
 
 def train_profile(
     tables: ProbeTables,
+    wide: WideTable,
     *,
     effort: Effort | None = None,
     seed: int = 1,
     jobs: int = -1,
     say: Callable[[str], None] = lambda step: None,
 ) -> TrainedProfile:
-    """Return the trained parts; `say` hears what begins. The same seed gives the same ones whatever `jobs`."""
+    """Return the trained parts; `wide` are faces around the trained ranges, `say` hears what begins.
+
+    The same seed gives the same parts whatever `jobs`.
+    """
     asked = effort or Effort()
     say(f"{asked.presses} random presses")
     samples = sample_presses(tables, asked.presses + asked.held_out, seed=derived_seed(seed, "surrogate"), jobs=jobs)
@@ -86,14 +95,18 @@ def train_profile(
     say(f"{asked.members} networks")
     pool = random_pool(surrogate, noise["standard"], asked.pool, derived_seed(seed, "training presses"))
     ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
-    outcomes = judged(tables, ensemble, ProfileAnswers(surrogate, noise), asked, seed=seed, jobs=jobs, say=say)
-    return TrainedProfile(surrogate, held_out_error(surrogate, kept), noise, ensemble, outcomes, samples, asked, seed)
+    ranges = train_range(tables, wide, noise, effort=asked.ranges, seed=seed, jobs=jobs, say=say)
+    answers = ProfileAnswers(surrogate, noise)
+    outcomes = judged(tables, ensemble, answers, ranges, asked, seed=seed, jobs=jobs, say=say)
+    error = held_out_error(surrogate, kept)
+    return TrainedProfile(surrogate, error, noise, ensemble, ranges, outcomes, samples, asked, seed)
 
 
 def judged(
     tables: ProbeTables,
     ensemble: DenseEnsemble,
     answers: ProfileAnswers,
+    ranges: TrainedRange,
     effort: Effort,
     *,
     seed: int,
@@ -108,5 +121,8 @@ def judged(
         say(f"{simulated} presses and {len(parameters)} recordings for the limits of mode {mode}")
         pool = random_pool(answers.surrogate, answers.noise[mode], simulated, simulating)
         recorded = record_presses(tables, parameters, mode, seed=recording, levels=ErrorLevels(), jobs=jobs)
-        outcomes[mode] = judged_mode(mode, ensemble, answers, pool, recorded, seed=simulating, jobs=jobs)
+        usual = usual_log_odds(ranges.networks[mode], recorded.rows, answers.noise[mode])
+        outcomes[mode] = judged_mode(
+            mode, ensemble, answers, pool, recorded, outside_log_odds=usual, seed=simulating, jobs=jobs
+        )
     return outcomes

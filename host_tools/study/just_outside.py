@@ -21,11 +21,13 @@ from device.measurement.press_parameters import HIGH, LOW, NOMINAL, PARAMETERS, 
 from device.measurement.quantities import Inclusion
 from device.simulation.surface_table import PressRamps, Ramp
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.inverse.mode_outcome import USUAL_RATIO
 from host_tools.inverse.press_samples import Array
 from host_tools.scene import Scene
 from host_tools.surface_table import press_ramps
 
-FALSE_FLAGS = 0.05
+FALSE_FLAGS = 1 - USUAL_RATIO
+"""Share of presses inside that this doubt may flag: misfit and elongation flag as many each, all three at most 5 %."""
 STARTS = 6
 """Fits from as many places, of which the best one counts."""
 
@@ -53,10 +55,9 @@ class Twin:
     inclusion: Inclusion
     deviations: float
 
-    @property
-    def most_flagged(self) -> float:
-        """Largest share that any test can flag of the one, when it flags 5 % of the other."""
-        return float(norm.cdf(self.deviations - norm.isf(FALSE_FLAGS)))
+    def most_flagged(self, false_flags: float = FALSE_FLAGS) -> float:
+        """Return the largest share that any test can flag of the one, when it flags `false_flags` of the other."""
+        return float(norm.cdf(self.deviations - norm.isf(false_flags)))
 
 
 def at_nominal(inclusion: Inclusion) -> Array:

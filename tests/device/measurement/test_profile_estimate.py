@@ -7,12 +7,13 @@ import pytest
 
 from device.measurement.press_profile import press_profile
 from device.measurement.profile_estimate import doubts_about, estimate_profile
-from device.measurement.profile_model import RAMP_MODES, Answer
+from device.measurement.profile_model import RAMP_MODES
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 
-NO_DOUBT = Answer(np.zeros(3), np.ones(3), 0.0, 0.0)
+NO_DOUBT = 0.0, -10.0
+"""A misfit, and log odds of lying outside."""
 
 
 @pytest.fixture(scope="module")
@@ -90,13 +91,13 @@ def test_gel_on_the_face_gets_no_numbers(pressed, profile_model, calibration):
 
 def test_every_doubt_is_said_in_its_own_sentence(ramp, profile_model):
     profile, limits = press_profile(ramp), profile_model.limits["standard"]
-    assert doubts_about(profile, NO_DOUBT, limits) == []
-    misfit = doubts_about(profile, NO_DOUBT._replace(misfit_ratio=2 * limits.misfit_ratio), limits)
-    beyond = doubts_about(profile, NO_DOUBT._replace(beyond_deviations=2 * limits.beyond_deviations), limits)
+    assert doubts_about(profile, *NO_DOUBT, limits) == []
+    misfit = doubts_about(profile, 2 * limits.misfit_ratio, NO_DOUBT[1], limits)
+    beyond = doubts_about(profile, NO_DOUBT[0], limits.outside_log_odds + 0.1, limits)
     oblong = replace(profile, elongation=np.full_like(profile.elongation, 0.1))
     assert "misfit" in misfit[0]
     assert beyond == ["Size or depth would rather lie outside the trained range."]
-    assert "not round" in doubts_about(oblong, NO_DOUBT, limits)[0]
+    assert "not round" in doubts_about(oblong, *NO_DOUBT, limits)[0]
 
 
 def test_a_lump_beside_the_axis_is_not_called_oblong(pressed, profile_model):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
@@ -10,7 +12,13 @@ from host_tools.commands import train as command
 
 @pytest.mark.parametrize(
     ("profile", "options"),
-    [("quick", {"quick": True}), ("standard", {"trials": 3}), ("paper", {"quick": True}), ("quick", {"trials": 3})],
+    [
+        ("quick", {"quick": True}),
+        ("standard", {"trials": 3}),
+        ("paper", {"quick": True}),
+        ("quick", {"trials": 3}),
+        ("quick", {"wide": Path("build")}),
+    ],
 )
 def test_an_option_of_another_profile_is_refused_before_anything_is_trained(profile, options):
     with pytest.raises(InvalidQuantity, match=f"one of profile {profile}"):
@@ -24,7 +32,12 @@ def test_an_unknown_profile_is_refused_with_the_known_ones():
 
 def test_the_card_keeps_every_option_that_was_given(monkeypatch, tmp_path):
     kept = {}
-    monkeypatch.setattr(command, "_standard", lambda table, out, seed, quick, line: kept.update(line=line, out=out))
-    command.train(profile="standard", out=tmp_path, quick=True, seed=4)
-    assert kept["line"] == f"host_tools train --profile standard --quick --out {tmp_path} --seed 4"
-    assert kept["out"] == tmp_path
+
+    def keep(table, wide, out, seed, quick, line):
+        kept.update(line=line, out=out, wide=wide)
+
+    monkeypatch.setattr(command, "_standard", keep)
+    wide = tmp_path / "wide"
+    command.train(profile="standard", out=tmp_path, wide=wide, quick=True, seed=4)
+    assert kept["line"] == f"host_tools train --profile standard --wide {wide} --quick --out {tmp_path} --seed 4"
+    assert (kept["out"], kept["wide"]) == (tmp_path, wide)

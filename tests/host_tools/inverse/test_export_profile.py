@@ -16,17 +16,22 @@ from device.measurement.confidence import Bands
 from device.measurement.model_card import BundleRefused
 from device.measurement.press_parameters import NUISANCES, PARAMETERS, RANGES
 from device.measurement.press_profile import ROW_NAMES
-from device.measurement.profile_model import SURROGATE_FILE, ProfileModel
+from device.measurement.profile_model import RAMP_MODES, SURROGATE_FILE, ProfileModel
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.range_test import RANGE_FILE
 from host_tools.inverse import export_profile as exporting
 from host_tools.inverse.dense_network import LARGEST_LOG_VARIANCE, InputScaling, Layer, initial_layers
 from host_tools.inverse.ensemble_network import build_network, physical_estimate
 from host_tools.inverse.export import ExportRefused
 from host_tools.inverse.export_profile import GOLDEN_ROWS, export_profile
+from host_tools.inverse.export_range import build_range_networks
 from host_tools.inverse.mode_outcome import Answered, ModeOutcome
 from host_tools.inverse.press_samples import PressSamples, draw_parameters
 from host_tools.inverse.profile_training import QUICK_EFFORT, TrainedProfile
+from host_tools.inverse.range_network import RangeNetwork
 from host_tools.inverse.train_ensemble import DenseEnsemble
+from host_tools.inverse.train_range import TrainedRange
+from host_tools.inverse.wide_presses import DEPTHS, SIZES
 
 SERIALS = ("SIM-0001", "SIM-0002")
 PRESSES = 40
@@ -50,6 +55,17 @@ def made_outcome(misfit_ratio: float) -> ModeOutcome:
     return ModeOutcome(bands, misfit_ratio, 0.8, 0.3, seen, seen)
 
 
+def made_ranges(rows: np.ndarray) -> TrainedRange:
+    scaling, rng = InputScaling.fit(rows, np.eye(COLUMNS)), np.random.default_rng(3)
+    networks = {
+        mode: RangeNetwork(
+            scaling, tuple(initial_layers(2 * scaling.projection.shape[1], rng, outputs=1) for _ in "ab")
+        )
+        for mode in RAMP_MODES
+    }
+    return TrainedRange(networks, np.array([2e-4, 4e-4]), QUICK_EFFORT.ranges)
+
+
 @pytest.fixture(scope="module")
 def trained() -> TrainedProfile:
     rng = np.random.default_rng(5)
@@ -60,6 +76,7 @@ def trained() -> TrainedProfile:
         surrogate_error=np.array([1e-4, 3e-4]),
         noise={"standard": white_noise(2e-3), "precise": white_noise(1e-3)},
         ensemble=made_ensemble(rows),
+        ranges=made_ranges(rows),
         outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
         samples=PressSamples(draw_parameters(PRESSES, rng), rows),
         effort=QUICK_EFFORT,
@@ -131,9 +148,37 @@ def test_the_device_gets_back_surrogate_and_noise(trained: TrainedProfile, model
         np.testing.assert_array_equal(model.answers.noise[mode].camera, noise.camera)
 
 
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_the_device_gets_back_the_log_odds_of_each_mode(trained: TrainedProfile, model: ProfileModel, mode) -> None:
+    rows = np.random.default_rng(8).normal(0, 0.3, (50, COLUMNS)).astype(np.float32).astype(float)
+    found, expected = model.ranges.log_odds(rows, mode), trained.ranges.networks[mode].log_odds(rows)
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+    assert np.std(expected) > 0.01
+
+
+def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, folder, model) -> None:
+    entry = model.bundle.card["range"]
+    assert entry["sha256"] == hashlib.sha256((folder / RANGE_FILE).read_bytes()).hexdigest()
+    assert (entry["size_mm"], entry["depth_mm"]) == (list(SIZES), list(DEPTHS))
+    assert entry["effort"] == vars(QUICK_EFFORT.ranges)
+    assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
+    for mode in RAMP_MODES:
+        expected = trained.ranges.networks[mode].log_odds(np.array(model.bundle.card["golden"]["features"]))
+        np.testing.assert_allclose(entry["golden"][mode], expected, atol=2e-5)
+
+
+def test_networks_of_the_ranges_that_differ_from_numpy_are_refused(trained, tmp_path, monkeypatch) -> None:
+    other = made_ranges(trained.samples.rows * 1.01).networks
+    wrong = build_range_networks(other)
+    monkeypatch.setattr(exporting, "build_range_networks", lambda networks: wrong)
+    with pytest.raises(ExportRefused, match="ranges in mode standard differs from NumPy"):
+        write(trained, tmp_path / "demo")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedProfile, model: ProfileModel) -> None:
     assert (model.limits["standard"].misfit_ratio, model.limits["precise"].misfit_ratio) == (1.3, 1.2)
-    assert (model.limits["standard"].elongation_ratio, model.limits["standard"].beyond_deviations) == (0.8, 0.3)
+    assert (model.limits["standard"].elongation_ratio, model.limits["standard"].outside_log_odds) == (0.8, 0.3)
     for limits in model.limits.values():
         assert limits.elongation_ratio == 0.8
         assert [bands.high[0, 0] for bands in limits.bands] == [1.5, 1.6, 1.7]
@@ -183,7 +228,7 @@ def test_the_same_parts_give_the_same_bytes(trained: TrainedProfile, folder: Pat
     twice = folder, write(trained, tmp_path / "demo")
     first, again = ({path.name: path.read_bytes() for path in at.iterdir()} for at in twice)
     assert first == again
-    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE}
+    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE, RANGE_FILE}
 
 
 def changed(trained: TrainedProfile, tmp_path: Path, file: str) -> Path:
@@ -195,7 +240,12 @@ def changed(trained: TrainedProfile, tmp_path: Path, file: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("file", "named"), [(SURROGATE_FILE, "surrogate.npz is [0-9a-f]{64}"), ("model.onnx", "sha256")]
+    ("file", "named"),
+    [
+        (SURROGATE_FILE, "surrogate.npz is [0-9a-f]{64}"),
+        (RANGE_FILE, "range.onnx is [0-9a-f]{64}"),
+        ("model.onnx", "sha256"),
+    ],
 )
 def test_a_changed_bit_is_refused_by_the_device(trained, tmp_path, file, named) -> None:
     with pytest.raises(BundleRefused, match=named):

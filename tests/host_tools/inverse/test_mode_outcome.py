@@ -10,8 +10,16 @@ from device.measurement.confidence import Bands
 from device.measurement.press_parameters import EVEN_STD, PARAMETERS, from_unit
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
 from device.measurement.profile_model import ProfileAnswers
+from device.measurement.quantities import InvalidQuantity
 from host_tools.inverse.confidence_bands import confidence_bands
-from host_tools.inverse.mode_outcome import USUAL_RATIO, Answered, ModeOutcome, answers_to, judged_mode
+from host_tools.inverse.mode_outcome import (
+    USUAL_RATIO,
+    Answered,
+    ModeOutcome,
+    answers_to,
+    judged_mode,
+    usual_log_odds,
+)
 from host_tools.inverse.noisy_presses import NoiseSampler, Pool
 from host_tools.inverse.recorded_presses import RecordedPresses
 
@@ -30,6 +38,13 @@ class FirstColumns:
 
 def even(count: int, columns: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1, 1, (count, columns))
+
+
+class FirstColumn:
+    """In place of a range network: the first column is the log odds."""
+
+    def log_odds(self, rows: np.ndarray) -> np.ndarray:
+        return rows[:, 0]
 
 
 def gaussian(count: int, seed: int) -> Answered:
@@ -80,7 +95,7 @@ def recorded(answers) -> RecordedPresses:
 
 @pytest.fixture(scope="module")
 def outcome(answers, pool, recorded) -> ModeOutcome:
-    return judged_mode("standard", FirstColumns(), answers, pool, recorded, seed=4, jobs=1)
+    return judged_mode("standard", FirstColumns(), answers, pool, recorded, outside_log_odds=0.3, seed=4, jobs=1)
 
 
 def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
@@ -128,7 +143,7 @@ def test_bands_come_from_the_first_halves_alone(outcome, answers, pool, recorded
     unit = pool.unit.copy()
     unit[COUNT // 2 :] *= -1
     turned = Pool(unit, pool.rows, pool.sampler)
-    other = judged_mode("standard", FirstColumns(), answers, turned, elsewhere, seed=4, jobs=1)
+    other = judged_mode("standard", FirstColumns(), answers, turned, elsewhere, outside_log_odds=0.3, seed=4, jobs=1)
     for one, again in zip(outcome.bands, other.bands, strict=True):
         np.testing.assert_array_equal(one.low, again.low)
         np.testing.assert_array_equal(one.high, again.high)
@@ -154,13 +169,31 @@ def test_a_usual_misfit_is_a_high_quantile_of_chi_square(outcome):
     assert outcome.misfit_ratio == pytest.approx(expected, rel=0.15)
 
 
+def test_usual_log_odds_are_those_of_presses_in_which_a_lump_stands_out():
+    """Of two hundred rows the last half is dark in the middle, and has the larger odds: it does not count."""
+    rows = np.zeros((200, COLUMNS))
+    rows[:100, :CONTRAST_COLUMNS] = np.linspace(40, 60, 100)[:, None]
+    rows[100:, 0], rows[100:, 1:4] = 100.0, -50.0
+    assert usual_log_odds(FirstColumn(), rows, NOISE) == pytest.approx(np.quantile(rows[:100, 0], USUAL_RATIO))
+
+
+def test_where_no_lump_stands_out_nothing_is_usual():
+    with pytest.raises(InvalidQuantity, match="presses in which a lump stands out is 0"):
+        usual_log_odds(FirstColumn(), np.zeros((5, COLUMNS)), NOISE)
+
+
+def test_the_log_odds_are_kept_as_they_are_told(outcome):
+    assert outcome.outside_log_odds == 0.3
+
+
 def test_the_same_seed_gives_the_same_answers_and_another_one_other_noise(outcome, answers, pool, recorded):
     few = some(recorded, 2)
     again, other = (
-        judged_mode("standard", FirstColumns(), answers, pool, few, seed=seed, jobs=1).simulated.mean for seed in (4, 5)
+        judged_mode("standard", FirstColumns(), answers, pool, few, outside_log_odds=0.3, seed=seed, jobs=1)
+        for seed in (4, 5)
     )
-    np.testing.assert_array_equal(again, outcome.simulated.mean)
-    assert (other != again).mean() > 0.99
+    np.testing.assert_array_equal(again.simulated.mean, outcome.simulated.mean)
+    assert (other.simulated.mean != again.simulated.mean).mean() > 0.99
 
 
 def test_mode_precise_answers_by_the_fit_and_not_by_the_networks(answers, slopes):

@@ -1,0 +1,200 @@
+"""Faces under lumps around the trained ranges: what the network that tells them from lumps within learns from.
+
+Larger, smaller, shallower and deeper lumps than the virtual probe's tables hold, in the nominal slab, as far down as
+the slab reaches. They carry the probe's own tables on: at the nearest lump that these hold both agree, and what another
+slab changes is what it changes there. Good for telling lumps apart (docs/modes.md), not for making pictures of them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from device.measurement.press_parameters import RANGES
+from device.measurement.quantities import Bound, Inclusion, require
+from device.simulation.chebyshev import Array, interpolated, points_with_ends
+from device.simulation.off_axis_table import OffAxisTable
+from device.simulation.slab import NOMINAL, Slab
+from device.simulation.surface_table import Ramp, SurfaceTable
+from device.simulation.table_file import load_table, save_table
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.off_axis_table import lumps_per_n_mm3
+from host_tools.scene import Press, Scene
+from host_tools.surface_table import CONTRASTS, lump_per_n_mm3, scene_in
+
+NAME, SCHEMA = "wide_table", "tsis.wide_table/1"
+ACTION = "run `host_tools table --part wide` to make it again"
+SIZES_MM, SHALLOWEST_MM = (1.2, 18.0), 3.0
+POINTS, ASIDE_POINTS = (8, 9, 3), (6, 6, 2)
+"""Points in size, depth and contrast, on the axis and beside it."""
+SMALLEST_ASIDE_MM = 1.8
+ASIDE_MM = RANGES["offset_mm"].high
+DEEPEST_MM, BEND_MM, BENT_OVER_MM = 17.9, 11.5, 1 / 0.7
+
+
+class WideAxes(NamedTuple):
+    """Ascending points in size, in the share of the way from the shallowest to the deepest lump, and in contrast."""
+
+    size_mm: Array
+    depth_share: Array
+    contrast: Array
+
+    def lump_per_n(self, fields: Array, inclusion: Inclusion, slab: Slab) -> Array:
+        """Return a lump's field per newton from fields [2, S, D, M, ...] over force, strength and contrast."""
+        size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
+        share = (depth_mm - SHALLOWEST_MM) / (deepest_mm(size_mm) - SHALLOWEST_MM)
+        require("size_mm", size_mm, Bound(0.0, SIZES_MM[1], "mm"), ACTION)
+        require("depth_mm", depth_mm, Bound(SHALLOWEST_MM, deepest_mm(size_mm), "mm"), ACTION)
+        contrast = slab.contrast(modulus_kpa)
+        place = max(size_mm, float(self.size_mm[0])), share, contrast
+        return strength(size_mm, depth_mm) * contrast * interpolated(fields, self, place)
+
+    def carried_on(self, own: Array, fields: Array, inclusion: Inclusion, near: Inclusion, slab: Slab) -> Array:
+        """Return a lump's field per newton where that of the nearest lump inside is `own`, as strong as far away.
+
+        What the wide fields miss there is taken off: a lump inside has the probe's own field, and nothing jumps.
+        """
+        ratio = strength(inclusion.size_mm, inclusion.depth_mm) / strength(near.size_mm, near.depth_mm)
+        beyond, at_end = (self.lump_per_n(fields, lump, slab) for lump in (inclusion, near))
+        return ratio * own + (beyond - ratio * at_end)
+
+
+def deepest_mm(size_mm: float) -> float:
+    """Return how deep a lump may lie: 17.9 mm, or where it all but touches the nominal slab's base; smooth."""
+    return float(DEEPEST_MM - BENT_OVER_MM * np.log1p(np.exp((size_mm - BEND_MM) / BENT_OVER_MM)))
+
+
+def strength(size_mm: float, depth_mm: float) -> float:
+    """Return size^3 / distance^3: how strong a small sphere's field is far away."""
+    return (size_mm / (depth_mm + size_mm / 2)) ** 3
+
+
+@dataclass(frozen=True)
+class WideSurfaceTable(SurfaceTable):
+    """The probe's own table, carried on by `wide` [2, S, D, M, F, R] over `wide_axes`."""
+
+    wide_axes: WideAxes
+    wide: Array
+
+    def lump(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
+        """Return what an inclusion adds to the ramp in a slab; refuses one that is not among the wide ones."""
+        near = nearest(inclusion, self)
+        own = super().lump(near, slab)
+        return Ramp(own.force_n, self.wide_axes.carried_on(own.fields_per_n, self.wide, inclusion, near, slab))
+
+
+@dataclass(frozen=True)
+class WideOffAxisTable(OffAxisTable):
+    """The probe's own table, carried on by `wide` [2, S, D, M, K, R], which is of lumps `ASIDE_MM` beside the axis."""
+
+    wide_axes: WideAxes
+    wide: Array
+
+    def _modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
+        require("offset_mm", offset_mm, Bound(0.0, ASIDE_MM, "mm"), "press nearer to the lump")
+        near = nearest(inclusion, self)
+        own = super()._modes(near, offset_mm)
+        return self.wide_axes.carried_on(own, self.wide, inclusion, near, NOMINAL)
+
+
+def nearest(inclusion: Inclusion, table: SurfaceTable | OffAxisTable) -> Inclusion:
+    """Return the lump of the probe's own table that is nearest in size and depth."""
+    size_mm, depth_mm, _ = inclusion.as_tuple()
+    return replace(
+        inclusion,
+        size_mm=float(np.clip(size_mm, table.size_mm[0], table.size_mm[-1])),
+        depth_mm=float(np.clip(depth_mm, table.depth_mm[0], table.depth_mm[-1])),
+    )
+
+
+@dataclass(frozen=True)
+class WideTable:
+    """`centred` [2, S, D, M, F, R] and `aside` [2, S', D', M', K, R'] over force, strength and contrast; w, then p."""
+
+    centred: Array
+    aside: Array
+
+    def around(self, tables: ProbeTables) -> ProbeTables:
+        """Return the probe's tables, carried on around the trained ranges."""
+        centred = {name: getattr(tables.centred, name) for name in SurfaceTable.__dataclass_fields__}
+        aside = {name: getattr(tables.off_axis, name) for name in OffAxisTable.__dataclass_fields__}
+        return replace(
+            tables,
+            centred=WideSurfaceTable(**centred, wide_axes=axes(POINTS, SIZES_MM[0]), wide=self.centred),
+            off_axis=WideOffAxisTable(**aside, wide_axes=axes(ASIDE_POINTS, SMALLEST_ASIDE_MM), wide=self.aside),
+        )
+
+    def save(self, folder: Path) -> None:
+        """Write wide_table.npz and its description with the hash."""
+        arrays = {name: getattr(self, name).astype(np.float32) for name in ARRAYS}
+        origin = {"scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(), "strain": "finite, small beside"}
+        save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table --part wide", **origin})
+
+
+ARRAYS = tuple(WideTable.__dataclass_fields__)
+
+
+def load_wide_table(folder: Path) -> WideTable:
+    """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
+    arrays, _ = load_table(folder, NAME, SCHEMA, ARRAYS, ACTION)
+    return WideTable(**{name: values.astype(np.float64) for name, values in arrays.items()})
+
+
+def axes(points: tuple[int, int, int], smallest_size_mm: float) -> WideAxes:
+    """Return Chebyshev points over the wide sizes and depths and over the contrasts of the probe's own table."""
+    return WideAxes(
+        points_with_ends(smallest_size_mm, SIZES_MM[1], points[0]),
+        points_with_ends(0.0, 1.0, points[1]),
+        points_with_ends(*CONTRASTS, points[2]),
+    )
+
+
+def build_wide_table(
+    *,
+    points: tuple[int, int, int] = POINTS,
+    aside_points: tuple[int, int, int] = ASIDE_POINTS,
+    jobs: int = -1,
+    on_point: Callable[[int, int], None] = lambda done, n: None,
+) -> WideTable:
+    """Solve every point of the table (half an hour on two cores); `on_point` hears done and total."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    centred, aside = axes(points, SIZES_MM[0]), axes(aside_points, SMALLEST_ASIDE_MM)
+    work = [delayed(_centred)(*place) for place in product(*centred)]
+    work += [delayed(_aside)(*place, aside.contrast) for place in product(*aside[:2])]
+    fields = []
+    for field in Parallel(n_jobs=jobs, return_as="generator")(work):
+        fields.append(field)
+        on_point(len(fields), len(work))
+    first, second = np.array(fields[: np.prod(points)]), np.array(fields[np.prod(points) :])
+    return WideTable(
+        np.moveaxis(first.reshape(*points, *first.shape[1:]), 3, 0),
+        np.moveaxis(second.reshape(*aside_points, *second.shape[2:]), 3, 0),
+    )
+
+
+def _centred(size_mm: float, share: float, contrast: float) -> Array:
+    """Return what a lump adds [2, F, R] over force, strength and contrast."""
+    place = float(size_mm), depth_at(size_mm, share)
+    return lump_per_n_mm3(scene_in, NOMINAL, *place, float(contrast)) * _volume_over_strength(*place)
+
+
+def _aside(size_mm: float, share: float, contrasts: Array) -> Array:
+    """Return the modes [M, 2, K, R] of lumps `ASIDE_MM` beside the axis, over strength and contrast."""
+    place = float(size_mm), depth_at(size_mm, share)
+    return lumps_per_n_mm3(*place, ASIDE_MM, contrasts) * _volume_over_strength(*place)
+
+
+def depth_at(size_mm: float, share: float) -> float:
+    """Return the depth at a share of the way from the shallowest to the deepest lump."""
+    return SHALLOWEST_MM + float(share) * (deepest_mm(size_mm) - SHALLOWEST_MM)
+
+
+def _volume_over_strength(size_mm: float, depth_mm: float) -> float:
+    return size_mm**3 / strength(size_mm, depth_mm)
