@@ -68,7 +68,7 @@ train: sweep ## regenerate everything in models/ from nothing
 	$(HOST_TOOLS) calibrate build/phantoms/physical/* --operator "make train" --out models/simulated_probe/calibration.json
 	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
 	$(HOST_TOOLS) calibrate build/phantoms/linear/* --operator "make train" --out models/simulated_probe/calibration_linear.json
-	$(HOST_TOOLS) table --part wide --out build/wide_table
+	$(HOST_TOOLS) table --part wide
 	$(HOST_TOOLS) train --profile standard --out models/standard
 	$(HOST_TOOLS) train --profile quick --out models/quick
 

@@ -1,31 +1,33 @@
 """Faces under lumps around the trained ranges: what the network that tells them from lumps within learns from.
 
-Larger, smaller, shallower and deeper lumps than the virtual probe's tables hold, in the nominal slab, as far down as
+Larger, shallower and deeper lumps than the virtual probe's tables hold, in the nominal slab, as far down as
 the slab reaches. They carry the probe's own tables on: at the nearest lump that these hold both agree, and what another
 slab changes is what it changes there. Good for telling lumps apart (docs/modes.md), not for making pictures of them.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
 
-from device.measurement.press_parameters import RANGES
-from device.measurement.quantities import Bound, Inclusion, require
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.simulation.chebyshev import Array, interpolated, points_with_ends
+from device.simulation.lump_axes import ACTION as CHOOSE
 from device.simulation.off_axis_table import OffAxisTable
 from device.simulation.slab import NOMINAL, Slab
 from device.simulation.surface_table import Ramp, SurfaceTable
 from device.simulation.table_file import load_table, save_table
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.off_axis_table import lumps_per_n_mm3
+from host_tools.off_axis_table import OFFSETS_MM, lumps_per_n_mm3
 from host_tools.scene import Press, Scene
 from host_tools.surface_table import CONTRASTS, lump_per_n_mm3, scene_in
 
@@ -35,7 +37,8 @@ SIZES_MM, SHALLOWEST_MM = (1.2, 18.0), 3.0
 POINTS, ASIDE_POINTS = (8, 9, 3), (6, 6, 2)
 """Points in size, depth and contrast, on the axis and beside it."""
 SMALLEST_ASIDE_MM = 1.8
-ASIDE_MM = RANGES["offset_mm"].high
+ASIDE_MM = OFFSETS_MM[0]
+"""The first offset of the probe's own table: nearer the axis a lump's field fades into the centred one's."""
 DEEPEST_MM, BEND_MM, BENT_OVER_MM = 17.9, 11.5, 1 / 0.7
 
 
@@ -47,11 +50,14 @@ class WideAxes(NamedTuple):
     contrast: Array
 
     def lump_per_n(self, fields: Array, inclusion: Inclusion, slab: Slab) -> Array:
-        """Return a lump's field per newton from fields [2, S, D, M, ...] over force, strength and contrast."""
+        """Return a lump's field per newton from fields [2, S, D, M, ...] over force, strength and contrast.
+
+        Raises `InvalidQuantity` for a size or depth outside the wide ranges.
+        """
         size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
+        require("size_mm", size_mm, Bound(0.0, SIZES_MM[1], "mm"), CHOOSE)
+        require("depth_mm", depth_mm, Bound(SHALLOWEST_MM, deepest_mm(size_mm), "mm"), CHOOSE)
         share = (depth_mm - SHALLOWEST_MM) / (deepest_mm(size_mm) - SHALLOWEST_MM)
-        require("size_mm", size_mm, Bound(0.0, SIZES_MM[1], "mm"), ACTION)
-        require("depth_mm", depth_mm, Bound(SHALLOWEST_MM, deepest_mm(size_mm), "mm"), ACTION)
         contrast = slab.contrast(modulus_kpa)
         place = max(size_mm, float(self.size_mm[0])), share, contrast
         return strength(size_mm, depth_mm) * contrast * interpolated(fields, self, place)
@@ -134,16 +140,33 @@ class WideTable:
     def save(self, folder: Path) -> None:
         """Write wide_table.npz and its description with the hash."""
         arrays = {name: getattr(self, name).astype(np.float32) for name in ARRAYS}
-        origin = {"scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(), "strain": "finite, small beside"}
-        save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table --part wide", **origin})
+        save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table --part wide", **made_for()})
 
 
 ARRAYS = tuple(WideTable.__dataclass_fields__)
 
 
+def made_for() -> dict[str, Any]:
+    """Return for which lumps and surroundings a table is made: one for others is refused."""
+    lumps = [
+        [*place, depth_at(*place[:2]), contrast]
+        for points, smallest_mm in ((POINTS, SIZES_MM[0]), (ASIDE_POINTS, SMALLEST_ASIDE_MM))
+        for *place, contrast in product(*(map(float, one) for one in axes(points, smallest_mm)))
+    ]
+    return {
+        "lumps_sha256": hashlib.sha256(np.round(lumps, 6).tobytes()).hexdigest(),
+        "aside_mm": ASIDE_MM,
+        "scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(),
+        "strain": "finite, small beside",
+    }
+
+
 def load_wide_table(folder: Path) -> WideTable:
-    """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
-    arrays, _ = load_table(folder, NAME, SCHEMA, ARRAYS, ACTION)
+    """Read a table; raise `InvalidQuantity` when it is missing, not what it says, or made for other lumps or scenes."""
+    arrays, record = load_table(folder, NAME, SCHEMA, ARRAYS, ACTION)
+    for name, wanted in json.loads(json.dumps(made_for())).items():
+        if record.get(name) != wanted:
+            raise InvalidQuantity(f"wide table's {name}", record.get(name), str(wanted), ACTION)
     return WideTable(**{name: values.astype(np.float64) for name, values in arrays.items()})
 
 

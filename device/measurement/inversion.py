@@ -185,14 +185,24 @@ def open_session(network: bytes) -> onnxruntime.InferenceSession:
 
 
 def _verify_contract(fields: ModelCard, session: onnxruntime.InferenceSession, feature_count: int) -> None:
+    outputs = {"estimate": len(UNKNOWNS), "spread": len(UNKNOWNS)}
+    verify_ports(fields.folder, MODEL_FILE, session, feature_count, outputs)
+
+
+def verify_ports(
+    folder: Path, file: str, session: onnxruntime.InferenceSession, features: int, outputs: Mapping[str, int]
+) -> None:
+    """Raise `BundleRefused` unless a network takes any number of rows of `features`, and gives just these outputs.
+
+    All single precision; `outputs` are their names and columns, in their order.
+    """
     expected = {
-        "inputs": [("features", "tensor(float)", feature_count)],
-        "outputs": [("estimate", "tensor(float)", len(UNKNOWNS)), ("spread", "tensor(float)", len(UNKNOWNS))],
+        "inputs": [("features", "tensor(float)", features)],
+        "outputs": [(name, "tensor(float)", columns) for name, columns in outputs.items()],
     }
     for side, ports in (("inputs", session.get_inputs()), ("outputs", session.get_outputs())):
         found = [(port.name, port.type, port.shape[-1]) for port in ports if len(port.shape) == 2]
         if found != expected[side] or any(isinstance(port.shape[0], int) for port in ports):
             shapes = [(port.name, port.type, port.shape) for port in ports]
-            fields.refuse(
-                f"{side} of {MODEL_FILE}", shapes, f"{expected[side]} (name, type, columns) with any row count"
-            )
+            bound = f"{expected[side]} (name, type, columns) with any row count"
+            raise BundleRefused(folder, f"{side} of {file}", shapes, bound)

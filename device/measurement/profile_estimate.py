@@ -78,6 +78,9 @@ def doubts_about(profile: PressProfile, misfit_ratio: float, outside_log_odds: f
             f"above the usual {limits.misfit_ratio:.2f}."
         )
     found += doubt_about_roundness(elongation_ratio(profile.elongation, profile.offset), limits.elongation_ratio)
-    if outside_log_odds > limits.outside_log_odds:
-        found.append("Size or depth would rather lie outside the trained range.")
+    if not outside_log_odds <= limits.outside_log_odds:
+        found.append(
+            f"Size or depth rather lies outside its trained range: log odds {outside_log_odds:.1f}, "
+            f"above the usual {limits.outside_log_odds:.1f}."
+        )
     return found

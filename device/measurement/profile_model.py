@@ -1,8 +1,9 @@
 """A press profile to mean and spread of the unknowns: standard by networks, precise by fitting the forward model.
 
 Either way the best fit of the forward model is sought, because how badly it fits is what tells that a press is not of
-one round inclusion in the trained ranges. The bundle is a folder: `model.onnx` and `model.json` as every bundle,
-`surrogate.npz` and `range.onnx` beside them. Source of the format: docs/contracts.md.
+one round inclusion; whether that lies in the trained ranges, networks of their own tell. The bundle is a folder:
+`model.onnx` and `model.json` as every bundle, `surrogate.npz` and `range.onnx` beside them.
+Source of the format: docs/contracts.md.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ class ProfileModel:
             raise BundleRefused(folder, SURROGATE_FILE, found, f"{stated} as model.json states")
         with np.load(path) as file:
             noise = {mode: PressNoise(np.asarray(file[f"camera_{mode}"], np.float64)) for mode in RAMP_MODES}
-        ranges = RangeTest.load(folder, bundle.card)
+        ranges = RangeTest.load(folder, bundle.card, RAMP_MODES)
         return cls(bundle, ProfileAnswers(load_surrogate(path), noise), ranges)
 
     def answer(self, row: Array, mode: Mode) -> Answer:

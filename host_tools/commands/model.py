@@ -19,11 +19,14 @@ from host_tools.commands.output import note, progress
 if TYPE_CHECKING:
     from host_tools.phantom_sets import Phantom
 
-MODELS = Path(__file__).resolve().parents[2] / "models"
+MODELS, WIDE = Path(__file__).resolve().parents[2] / "models", Path("build/wide_table")
 
 
 def table(
-    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = MODELS / "simulated_probe",
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the tables: models/simulated_probe, or build/wide_table of part wide."),
+    ] = None,
     part: Annotated[str, typer.Option(help="centred, off-axis or all, which are both; or wide.")] = "all",
 ) -> None:
     """Build the virtual probe's tables of the pressed face: force ramps of centred lumps, and lumps off the axis.
@@ -37,6 +40,7 @@ def table(
 
     if part not in ("centred", "off-axis", "all", "wide"):
         raise InvalidQuantity("part", part, "centred, off-axis, all or wide", "name one of them")
+    out = out or (WIDE if part == "wide" else MODELS / "simulated_probe")
     with progress("solves") as bar:
         task = bar.add_task("")
 

@@ -17,7 +17,7 @@ from host_tools.commands.output import note, note_left_out, progress
 MODELS = Path(__file__).resolve().parents[2] / "models"
 TABLE = MODELS / "simulated_probe"
 CERTIFICATE = "calibration.json"
-SWEPT, WIDE = Path("build/sweep.nc"), Path("build/wide_table")
+SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
 TRIALS = 100
 OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--wide", "--quick"), "quick": ("--table",)}
@@ -76,12 +76,12 @@ def _swept() -> Path:
 
 def _wide() -> Path:
     """Return the folder of the table around the trained ranges, made anew when it is not there."""
-    from host_tools.commands.model import table
+    from host_tools.commands.model import WIDE, table
     from host_tools.wide_table import NAME
 
     if not (WIDE / f"{NAME}.npz").exists():
         note.print(f"{WIDE} is missing: solving lumps around the trained ranges.")
-        table(out=WIDE, part="wide")
+        table(part="wide")
     return WIDE
 
 

@@ -39,6 +39,7 @@ def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str,
         "sha256": hashlib.sha256(network).hexdigest(),
         "size_mm": list(SIZES),
         "depth_mm": list(DEPTHS),
+        "dataset_sha256": trained.dataset_sha256,
         "effort": vars(trained.effort),
         "surrogate_error": {
             "largest": float(trained.surrogate_error.max()),

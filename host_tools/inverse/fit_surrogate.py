@@ -50,16 +50,16 @@ PRESSES_A_TERM = 3.0
 def fit_surrogate(samples: PressSamples) -> PressSurrogate:
     """Return the surrogate of random presses; raises `InvalidQuantity` when they are too few or not finite."""
     at = polynomial_coordinates(to_unit(samples.parameters), samples.parameters)
-    return PressSurrogate(*fit_polynomials(samples, at))
+    return PressSurrogate(*fit_polynomials(samples, at, LUMP_REACH, LUMP_HIGHEST))
 
 
 def fit_polynomials(
-    samples: PressSamples,
-    at: Array,
-    reach: dict[str, float] = LUMP_REACH,
-    highest: dict[str, int] = LUMP_HIGHEST,
+    samples: PressSamples, at: Array, reach: dict[str, float], highest: dict[str, int]
 ) -> tuple[LegendreSum, LegendreSum]:
-    """Return the polynomials of the lump and of the lump-free light in coordinates [n, 9], as `fit_surrogate`."""
+    """Return the polynomials of the lump, in terms of that reach, and of the lump-free light in coordinates [n, 9].
+
+    Raises as `fit_surrogate`.
+    """
     lump_degrees, bare_degrees = degrees(reach, highest), degrees(BARE_REACH, {})
     bound = Bound(PRESSES_A_TERM * len(lump_degrees), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")

@@ -1,8 +1,8 @@
 """The network that tells lumps outside the trained ranges from those within: a profile row to log odds.
 
 As `dense_network`, with one output and the logistic loss, which makes it the logarithm of the odds that size or depth
-lies outside, when lumps are drawn as the training presses are. By Neyman and Pearson no other number of a row tells
-more of the ones at as many false flags of the others.
+lies outside, when lumps are drawn as the training presses are. By Neyman and Pearson no number of a row tells more of
+the ones, at as many false flags of the others, than the exact odds, which these networks approach.
 Source: Bishop, Pattern Recognition and Machine Learning, 2006, section 4.3.4, on the loss.
 """
 

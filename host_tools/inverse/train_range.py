@@ -6,6 +6,7 @@ presses with the noise of each mode, as for the networks of the unknowns.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -45,10 +46,14 @@ class RangeEffort:
 
 @dataclass(frozen=True, eq=False)
 class TrainedRange:
-    """A network of each mode, and the root mean square error [P] of the polynomials on presses kept apart."""
+    """A network of each mode, and the root mean square error [P] of the polynomials on presses kept apart.
+
+    `dataset_sha256`: of the rows of all presses in and around the ranges.
+    """
 
     networks: dict[Mode, RangeNetwork]
     surrogate_error: Array
+    dataset_sha256: str
     effort: RangeEffort
 
 
@@ -80,7 +85,7 @@ def train_range(
         for mode, of_mode in noise.items()
     }
     error = np.sqrt(np.mean((surrogate.rows(kept.parameters) - kept.rows) ** 2, axis=0))
-    return TrainedRange(networks, error, asked)
+    return TrainedRange(networks, error, hashlib.sha256(samples.rows.tobytes()).hexdigest(), asked)
 
 
 def wide_surrogate(samples: PressSamples) -> WideSurrogate:

@@ -19,6 +19,7 @@ from host_tools.wide_table import (
     axes,
     build_wide_table,
     deepest_mm,
+    depth_at,
     load_wide_table,
     nearest,
     strength,
@@ -29,8 +30,9 @@ LARGE_AND_DEEP = Inclusion(14.0, 14.5, 60.0)
 
 
 def of_place(size_mm: float, depth_mm: float, contrast: float) -> float:
-    """A field over force, strength and contrast that is linear in everything."""
-    return 1.0 + 0.1 * size_mm + contrast
+    """A field over force, strength and contrast that is linear in size, contrast and the share of the depth."""
+    share = (depth_mm - SHALLOWEST_MM) / (deepest_mm(size_mm) - SHALLOWEST_MM)
+    return 1.0 + 0.1 * size_mm + contrast + 0.4 * share
 
 
 def over_volume(size_mm: float, depth_mm: float, contrast: float) -> float:
@@ -91,7 +93,14 @@ OUTSIDE = (LARGE_AND_DEEP, Inclusion(0.5, 3.2, 20.0), Inclusion(17.0, 6.0, 150.0
 def on_paper(lump: Inclusion, slab: Slab = NOMINAL) -> float:
     size_mm, depth_mm, modulus_kpa = lump.as_tuple()
     contrast = slab.contrast(modulus_kpa)
-    return of_place(max(size_mm, SIZES_MM[0]), depth_mm, contrast) * strength(size_mm, depth_mm) * contrast
+    return of_smallest(lump, SIZES_MM[0], contrast) * strength(size_mm, depth_mm) * contrast
+
+
+def of_smallest(lump: Inclusion, smallest_mm: float, contrast: float) -> float:
+    """A smaller lump than the smallest has its field at the same share of its own depths."""
+    share = (lump.depth_mm - SHALLOWEST_MM) / (deepest_mm(lump.size_mm) - SHALLOWEST_MM)
+    size_mm = max(lump.size_mm, smallest_mm)
+    return of_place(size_mm, depth_at(size_mm, share), contrast)
 
 
 @pytest.mark.parametrize("slab", [NOMINAL, Slab(5.5, 28.0)])
@@ -121,7 +130,7 @@ def test_a_lump_beside_the_axis_is_carried_on_likewise(built, tables, lump):
     near = nearest(lump, tables.off_axis)
     ratio = strength(lump.size_mm, lump.depth_mm) / strength(near.size_mm, near.depth_mm)
     scaled = [
-        of_place(max(one.size_mm, SMALLEST_ASIDE_MM), one.depth_mm, NOMINAL.contrast(one.youngs_modulus_kpa))
+        of_smallest(one, SMALLEST_ASIDE_MM, NOMINAL.contrast(one.youngs_modulus_kpa))
         * strength(one.size_mm, one.depth_mm)
         * NOMINAL.contrast(one.youngs_modulus_kpa)
         for one in (lump, near)
@@ -177,8 +186,25 @@ def test_a_file_gives_it_back_and_a_changed_one_is_refused(built, tmp_path):
     again = load_wide_table(tmp_path)
     np.testing.assert_allclose(again.centred, built.centred, rtol=1e-6)
     np.testing.assert_allclose(again.aside, built.aside, rtol=1e-6)
+    assert RANGES["offset_mm"].high <= ASIDE_MM
     content = bytearray((tmp_path / "wide_table.npz").read_bytes())
     content[len(content) // 2] ^= 1
     (tmp_path / "wide_table.npz").write_bytes(content)
     with pytest.raises(InvalidQuantity, match="hash"):
+        load_wide_table(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("SIZES_MM", (1.2, 19.0), "wide table's lumps_sha256"),
+        ("DEEPEST_MM", 18.0, "wide table's lumps_sha256"),
+        ("POINTS", (3, 5, 2), "wide table's lumps_sha256"),
+        ("ASIDE_MM", 3.0, "wide table's aside_mm is 2.0, but must be 3.0"),
+    ],
+)
+def test_a_table_that_was_made_for_other_lumps_is_refused(built, tmp_path, monkeypatch, name, value, words):
+    built.save(tmp_path)
+    monkeypatch.setattr(wide_table, name, value)
+    with pytest.raises(InvalidQuantity, match=words):
         load_wide_table(tmp_path)

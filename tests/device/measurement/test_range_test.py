@@ -1,5 +1,6 @@
 """The committed networks of the ranges: what they say of presses, and that a damaged file is refused."""
 
+import hashlib
 import json
 import pickle
 import shutil
@@ -7,11 +8,13 @@ import shutil
 import numpy as np
 import pytest
 from daemon_process import ROOT
+from onnx import TensorProto, helper, numpy_helper
 
+from device.measurement.mode_models import ModeModels
 from device.measurement.model_card import BundleRefused
 from device.measurement.press_parameters import PARAMETERS
 from device.measurement.profile_model import RAMP_MODES, ProfileModel
-from device.measurement.range_test import RANGE_FILE, RangeTest
+from device.measurement.range_test import RANGE_FILE
 
 
 @pytest.fixture
@@ -71,16 +74,52 @@ def test_a_card_without_the_entry_is_refused(folder):
         ProfileModel.load(folder)
 
 
-@pytest.mark.parametrize("golden", [{"standard": [0.0] * 8}, {"quick": [0.0] * 8}, {"standard": "none"}, {}, []])
-def test_golden_log_odds_that_it_does_not_give_are_refused(folder, golden):
+@pytest.mark.parametrize(
+    ("golden", "words"),
+    [
+        ({"standard": [0.0] * 8, "precise": [0.0] * 8}, "off, but must be at most 0.0001 from the golden log odds"),
+        ({"standard": [0.0] * 3, "precise": [0.0] * 3}, "inf off"),
+        ({"standard": [0.0] * 8}, "unusable .*precise"),
+        ({"standard": "none", "precise": "none"}, "unusable"),
+        ([], "unusable"),
+    ],
+)
+def test_golden_log_odds_that_it_does_not_give_are_refused(folder, golden, words):
     card = card_of(folder)
     card["range"]["golden"] = golden
     write_card(folder, card)
-    with pytest.raises(BundleRefused, match=r"range\.onnx"):
+    with pytest.raises(BundleRefused, match=rf"range\.onnx is .*{words}"):
         ProfileModel.load(folder)
 
 
-def test_it_is_proved_again_with_the_other_models(folder):
-    ranges = ProfileModel.load(folder).ranges
-    ranges.prove()
-    assert isinstance(ranges, RangeTest)
+def network(modes: tuple[str, ...], *, rows: str | int = "n", columns: int = 1) -> bytes:
+    """Return a network whose log odds are the first of its 87 features."""
+    first = numpy_helper.from_array(np.eye(87, columns, dtype=np.float32), "first")
+    nodes = [helper.make_node("MatMul", ["features", "first"], [mode]) for mode in modes]
+    ports = [helper.make_tensor_value_info(mode, TensorProto.FLOAT, [rows, columns]) for mode in modes]
+    taken = helper.make_tensor_value_info("features", TensorProto.FLOAT, [rows, 87])
+    graph = helper.make_graph(nodes, "ranges", [taken], ports, [first])
+    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8).SerializeToString()
+
+
+@pytest.mark.parametrize(
+    "other", [network(("standard",)), network(RAMP_MODES, rows=8), network(RAMP_MODES, columns=3), network(("a", "b"))]
+)
+def test_a_network_of_other_outputs_or_of_so_many_rows_is_refused(folder, other):
+    """Hash and golden log odds are right: what is wrong would show with the first press."""
+    card = card_of(folder)
+    first = [row[0] for row in card["golden"]["features"]]
+    card["range"] |= {"sha256": hashlib.sha256(other).hexdigest(), "golden": dict.fromkeys(RAMP_MODES, first)}
+    (folder / RANGE_FILE).write_bytes(other)
+    write_card(folder, card)
+    with pytest.raises(BundleRefused, match=r"(in|out)puts of range\.onnx"):
+        ProfileModel.load(folder)
+
+
+def test_it_is_proved_again_with_the_other_models(folder, bundle):
+    profile = ProfileModel.load(folder)
+    models = ModeModels(bundle, profile=profile)
+    models.prove()
+    profile.ranges._golden = dict.fromkeys(RAMP_MODES, np.zeros(8))
+    with pytest.raises(BundleRefused, match="golden log odds"):
+        models.prove()

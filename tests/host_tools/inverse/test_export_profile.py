@@ -63,7 +63,7 @@ def made_ranges(rows: np.ndarray) -> TrainedRange:
         )
         for mode in RAMP_MODES
     }
-    return TrainedRange(networks, np.array([2e-4, 4e-4]), QUICK_EFFORT.ranges)
+    return TrainedRange(networks, np.array([2e-4, 4e-4]), "0123", QUICK_EFFORT.ranges)
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +160,7 @@ def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, f
     entry = model.bundle.card["range"]
     assert entry["sha256"] == hashlib.sha256((folder / RANGE_FILE).read_bytes()).hexdigest()
     assert (entry["size_mm"], entry["depth_mm"]) == (list(SIZES), list(DEPTHS))
-    assert entry["effort"] == vars(QUICK_EFFORT.ranges)
+    assert (entry["dataset_sha256"], entry["effort"]) == ("0123", vars(QUICK_EFFORT.ranges))
     assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
     for mode in RAMP_MODES:
         expected = trained.ranges.networks[mode].log_odds(np.array(model.bundle.card["golden"]["features"]))
