@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
+from device.measurement.press_surrogate import far_field_strength
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.simulation.chebyshev import Array, interpolated, points_with_ends
 from device.simulation.lump_axes import ACTION as CHOOSE
@@ -60,14 +61,16 @@ class WideAxes(NamedTuple):
         share = (depth_mm - SHALLOWEST_MM) / (deepest_mm(size_mm) - SHALLOWEST_MM)
         contrast = slab.contrast(modulus_kpa)
         place = max(size_mm, float(self.size_mm[0])), share, contrast
-        return strength(size_mm, depth_mm) * contrast * interpolated(fields, self, place)
+        return far_field_strength(size_mm, depth_mm) * contrast * interpolated(fields, self, place)
 
     def carried_on(self, own: Array, fields: Array, inclusion: Inclusion, near: Inclusion, slab: Slab) -> Array:
         """Return a lump's field per newton where that of the nearest lump inside is `own`, as strong as far away.
 
         What the wide fields miss there is taken off: a lump inside has the probe's own field, and nothing jumps.
         """
-        ratio = strength(inclusion.size_mm, inclusion.depth_mm) / strength(near.size_mm, near.depth_mm)
+        ratio = far_field_strength(inclusion.size_mm, inclusion.depth_mm) / far_field_strength(
+            near.size_mm, near.depth_mm
+        )
         beyond, at_end = (self.lump_per_n(fields, lump, slab) for lump in (inclusion, near))
         return ratio * own + (beyond - ratio * at_end)
 
@@ -75,11 +78,6 @@ class WideAxes(NamedTuple):
 def deepest_mm(size_mm: float) -> float:
     """Return how deep a lump may lie: 17.9 mm, or where it all but touches the nominal slab's base; smooth."""
     return float(DEEPEST_MM - BENT_OVER_MM * np.log1p(np.exp((size_mm - BEND_MM) / BENT_OVER_MM)))
-
-
-def strength(size_mm: float, depth_mm: float) -> float:
-    """Return size^3 / distance^3: how strong a small sphere's field is far away."""
-    return (size_mm / (depth_mm + size_mm / 2)) ** 3
 
 
 @dataclass(frozen=True)
@@ -220,4 +218,4 @@ def depth_at(size_mm: float, share: float) -> float:
 
 
 def _volume_over_strength(size_mm: float, depth_mm: float) -> float:
-    return size_mm**3 / strength(size_mm, depth_mm)
+    return size_mm**3 / far_field_strength(size_mm, depth_mm)

@@ -52,6 +52,10 @@ class HeldModel:
         """Return the model of a folder; raises `BundleRefused` when anything does not hold."""
         return cls(ModelBundle.load(folder))
 
+    def prove(self) -> None:
+        """Run the golden vectors; raises `BundleRefused` when one does not hold."""
+        self.bundle.prove()
+
     def sees(self, contrast: Array) -> bool:
         """Return whether a lump stands out in the contrast [J] of the rings."""
         return any(

@@ -43,9 +43,7 @@ class ModeModels(NamedTuple):
         """Run the golden vectors of every model; raise `BundleRefused` when one of them does not hold any more."""
         for model in (self.held, self.profile):
             if model:
-                model.bundle.prove()
-        if self.profile:
-            self.profile.ranges.prove()
+                model.prove()
         self.paper.prove()
 
     def estimate(self, recording: Recording, mode: Mode, calibration: Calibration) -> Estimate:

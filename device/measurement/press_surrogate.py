@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
@@ -27,6 +27,7 @@ SIZE, DEPTH, MODULUS, TISSUE, OFFSET = (
 CONTRAST_COLUMNS = len(PROFILE_FORCES_N) * RINGS
 GROWTH_COLUMNS = (len(PROFILE_FORCES_N) - 1) * RINGS
 OFFSET_COLUMNS = RINGS - 1
+Number = TypeVar("Number", float, Array)
 ARRAYS = ("lump_degrees", "lump_coefficients", "bare_degrees", "bare_coefficients")
 UNREADABLE = (OSError, EOFError, KeyError, ValueError, BadZipFile)
 
@@ -88,6 +89,11 @@ def load_surrogate(path: Path) -> PressSurrogate:
     return PressSurrogate(lump, bare)
 
 
+def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
+    """Return size^3 / distance^3 of a lump's middle: how strong a small sphere's field is far away."""
+    return (size_mm / (depth_mm + size_mm / 2)) ** 3
+
+
 def polynomial_coordinates(unit: Array, parameters: Array) -> Array:
     """Return coordinates [n, 9] in which presses are polynomials: the modulus' one is the contrast of stiffness."""
     low, high = CONTRAST_RANGE
@@ -111,8 +117,7 @@ def assemble(lump: Array, bare: Array) -> Array:
 
 
 def _strength(parameters: Array) -> Array:
-    size, centre = parameters[:, SIZE], parameters[:, DEPTH] + parameters[:, SIZE] / 2
-    return np.asarray((size / centre) ** 3)
+    return np.asarray(far_field_strength(parameters[:, SIZE], parameters[:, DEPTH]))
 
 
 def _factor_slope(at: Array) -> Array:

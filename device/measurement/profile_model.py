@@ -108,6 +108,11 @@ class ProfileModel:
         ranges = RangeTest.load(folder, bundle.card, RAMP_MODES)
         return cls(bundle, ProfileAnswers(load_surrogate(path), noise), ranges)
 
+    def prove(self) -> None:
+        """Run the golden vectors of all its networks; raises `BundleRefused` when one does not hold."""
+        self.bundle.prove()
+        self.ranges.prove()
+
     def answer(self, row: Array, mode: Mode) -> Answer:
         """Return what mode standard or precise makes of a profile row [P]."""
         mean, spread = self.networks(row[None])

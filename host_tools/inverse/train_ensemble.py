@@ -6,7 +6,9 @@ variances plus the variance of their means. Source: Lakshminarayanan et al., Neu
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed, parallel_config
@@ -28,6 +30,14 @@ BATCH, RATE = 1024, 3e-3
 SCALED_ON = 20_000
 """Rows of which the scaling of the inputs is taken."""
 FEWEST_PRESSES = 1000
+
+
+class Lesson(NamedTuple):
+    """What networks are to learn of a pool's presses: `target` [n, ...], by a loss of so many outputs."""
+
+    outputs: int
+    target: Single
+    loss_and_gradient: Callable[[list[Layer], Single, Single], tuple[float, list[Layer]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +69,23 @@ def train_ensemble(
 
     The same seed gives the same ensemble whatever `jobs` (-1: all cores). Raises `InvalidQuantity` for too few presses.
     """
+    lesson = Lesson(2 * len(UNKNOWNS), pool.unit[:, : len(UNKNOWNS)], loss_and_gradient)
+    return DenseEnsemble(
+        *train_members(pool, lesson, seed=seed, members=members, steps=steps, columns=columns, jobs=jobs)
+    )
+
+
+def train_members(
+    pool: Presses,
+    lesson: Lesson,
+    *,
+    seed: int,
+    members: int,
+    steps: int,
+    columns: slice = slice(None),
+    jobs: int = -1,
+) -> tuple[InputScaling, tuple[list[Layer], ...]]:
+    """Return the scaling that networks share and the layers of each, trained on a lesson; as `train_ensemble`."""
     require("presses", len(pool.rows), Bound(FEWEST_PRESSES, np.inf, "presses"), "draw more random presses")
     require("members", members, Bound(1, 100, "networks"), "train at least one")
     rng = np.random.default_rng([seed, 0])
@@ -67,21 +94,20 @@ def train_ensemble(
     scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical)
     with parallel_config(backend="loky", inner_max_num_threads=1):
         trained = Parallel(n_jobs=jobs)(
-            delayed(train_member)(pool, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
+            delayed(_member)(pool, lesson, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
             for member in range(members)
         )
-    return DenseEnsemble(scaling, tuple(trained))
+    return scaling, tuple(trained)
 
 
-def train_member(
-    pool: Presses, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
+def _member(
+    pool: Presses, lesson: Lesson, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
 ) -> list[Layer]:
     """Return the layers of one network after `steps` batches of fresh noise."""
-    layers = initial_layers(2 * scaling.projection.shape[1], rng)
+    layers = initial_layers(2 * scaling.projection.shape[1], rng, lesson.outputs)
     adam = Adam(layers, rate=RATE, steps=steps)
-    target: Single = pool.unit[:, : len(UNKNOWNS)]
     for _ in range(steps):
         index = rng.integers(len(pool.rows), size=BATCH)
         inputs = scaling.inputs(pool.noisy(index, rng)[:, columns])
-        adam.step(loss_and_gradient(layers, inputs, target[index])[1])
+        adam.step(lesson.loss_and_gradient(layers, inputs, lesson.target[index])[1])
     return layers

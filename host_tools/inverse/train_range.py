@@ -8,23 +8,20 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
 
 from device.measurement.mode import Mode
 from device.measurement.press_noise import PressNoise
 from device.measurement.press_parameters import to_unit
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.inverse.adam import Adam
-from host_tools.inverse.dense_network import InputScaling, Layer, initial_layers
 from host_tools.inverse.fit_surrogate import LUMP_REACH, fit_polynomials
 from host_tools.inverse.noisy_presses import BLOCK, NoiseSampler, Pool
 from host_tools.inverse.press_samples import Array, PressSamples, sample_presses
 from host_tools.inverse.range_network import RangeNetwork, logistic_loss_and_gradient
 from host_tools.inverse.seeds import derived_seed
-from host_tools.inverse.train_ensemble import BATCH, RATE, SCALED_ON
+from host_tools.inverse.train_ensemble import Lesson, train_members
 from host_tools.inverse.wide_presses import WideSurrogate, draw_wide_parameters, is_outside, wide_coordinates
 from host_tools.wide_table import WideTable
 
@@ -80,8 +77,9 @@ def train_range(
     learned, kept = samples.split(asked.presses)
     surrogate = wide_surrogate(learned)
     say(f"{asked.members} networks for the ranges of each mode")
+    presses = wide_pool(surrogate, noise["standard"], asked.pool, seed)
     networks = {
-        mode: train_network(wide_pool(surrogate, of_mode, asked.pool, seed), seed, asked, jobs)
+        mode: train_network(replace(presses, sampler=NoiseSampler(of_mode)), seed, asked, jobs)
         for mode, of_mode in noise.items()
     }
     error = np.sqrt(np.mean((surrogate.rows(kept.parameters) - kept.rows) ** 2, axis=0))
@@ -102,24 +100,6 @@ def wide_pool(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int
 
 
 def train_network(pool: Pool, seed: int, effort: RangeEffort, jobs: int) -> RangeNetwork:
-    """Return the networks trained on a pool's rows."""
-    rng = np.random.default_rng([seed, 0])
-    some = pool.noisy(rng.integers(len(pool.rows), size=min(SCALED_ON, len(pool.rows))), rng)
-    scaling = InputScaling.fit(some.astype(np.float64), pool.typical_noise())
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        members = Parallel(n_jobs=jobs)(
-            delayed(_member)(pool, scaling, np.random.default_rng([seed, 1 + member]), effort.steps)
-            for member in range(effort.members)
-        )
-    return RangeNetwork(scaling, tuple(members))
-
-
-def _member(pool: Pool, scaling: InputScaling, rng: np.random.Generator, steps: int) -> list[Layer]:
-    layers = initial_layers(2 * scaling.projection.shape[1], rng, outputs=1)
-    adam = Adam(layers, rate=RATE, steps=steps)
-    target = is_outside(pool.unit).astype(np.float32)
-    for _ in range(steps):
-        index = rng.integers(len(pool.rows), size=BATCH)
-        inputs = scaling.inputs(pool.noisy(index, rng))
-        adam.step(logistic_loss_and_gradient(layers, inputs, target[index])[1])
-    return layers
+    """Return the networks trained on a pool's rows; raises as `train_members`."""
+    lesson = Lesson(1, is_outside(pool.unit).astype(np.float32), logistic_loss_and_gradient)
+    return RangeNetwork(*train_members(pool, lesson, seed=seed, members=effort.members, steps=effort.steps, jobs=jobs))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from device.measurement.press_parameters import RANGES
+from device.measurement.press_surrogate import far_field_strength
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.slab import NOMINAL, Slab
 from host_tools import wide_table
@@ -22,7 +23,6 @@ from host_tools.wide_table import (
     depth_at,
     load_wide_table,
     nearest,
-    strength,
 )
 
 FEW, FEW_ASIDE = (3, 4, 2), (2, 3, 2)
@@ -36,7 +36,7 @@ def of_place(size_mm: float, depth_mm: float, contrast: float) -> float:
 
 
 def over_volume(size_mm: float, depth_mm: float, contrast: float) -> float:
-    return of_place(size_mm, depth_mm, contrast) * strength(size_mm, depth_mm) / size_mm**3
+    return of_place(size_mm, depth_mm, contrast) * far_field_strength(size_mm, depth_mm) / size_mm**3
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ OUTSIDE = (LARGE_AND_DEEP, Inclusion(0.5, 3.2, 20.0), Inclusion(17.0, 6.0, 150.0
 def on_paper(lump: Inclusion, slab: Slab = NOMINAL) -> float:
     size_mm, depth_mm, modulus_kpa = lump.as_tuple()
     contrast = slab.contrast(modulus_kpa)
-    return of_smallest(lump, SIZES_MM[0], contrast) * strength(size_mm, depth_mm) * contrast
+    return of_smallest(lump, SIZES_MM[0], contrast) * far_field_strength(size_mm, depth_mm) * contrast
 
 
 def of_smallest(lump: Inclusion, smallest_mm: float, contrast: float) -> float:
@@ -117,7 +117,7 @@ def test_a_lump_inside_is_the_probes_own(built, tables, slab):
 def test_beyond_the_probes_own_table_the_wide_fields_carry_it_on(built, tables, lump, slab):
     """From the nearest lump inside, as strong as far away; pressure is twice the deformation on paper."""
     near = nearest(lump, tables.centred)
-    ratio = strength(lump.size_mm, lump.depth_mm) / strength(near.size_mm, near.depth_mm)
+    ratio = far_field_strength(lump.size_mm, lump.depth_mm) / far_field_strength(near.size_mm, near.depth_mm)
     gained = on_paper(lump, slab) - ratio * on_paper(near, slab)
     expected = ratio * tables.centred.lump(near, slab).fields_per_n + gained * np.array([1.0, 2.0])[:, None, None]
     found = built.around(tables).centred.lump(lump, slab)
@@ -128,10 +128,10 @@ def test_beyond_the_probes_own_table_the_wide_fields_carry_it_on(built, tables, 
 @pytest.mark.parametrize("lump", OUTSIDE)
 def test_a_lump_beside_the_axis_is_carried_on_likewise(built, tables, lump):
     near = nearest(lump, tables.off_axis)
-    ratio = strength(lump.size_mm, lump.depth_mm) / strength(near.size_mm, near.depth_mm)
+    ratio = far_field_strength(lump.size_mm, lump.depth_mm) / far_field_strength(near.size_mm, near.depth_mm)
     scaled = [
         of_smallest(one, SMALLEST_ASIDE_MM, NOMINAL.contrast(one.youngs_modulus_kpa))
-        * strength(one.size_mm, one.depth_mm)
+        * far_field_strength(one.size_mm, one.depth_mm)
         * NOMINAL.contrast(one.youngs_modulus_kpa)
         for one in (lump, near)
     ]
