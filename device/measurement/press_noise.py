@@ -115,8 +115,18 @@ def smooth_errors(levels: ErrorLevels) -> Array:
     return covariance
 
 
+@lru_cache(maxsize=4)
+def smooth_second_harmonics(levels: ErrorLevels) -> Array:
+    """Return the covariance [Q, Q] of smooth errors in the second harmonics of all loads, for a light ratio of 1.
+
+    Without the ring in the middle, which has none, and the outermost one, as in the profile.
+    """
+    flat, model = smooth_ring_errors(levels, harmonic=2)
+    return np.kron(np.ones((LOADS, LOADS)), flat[1:-1, 1:-1]) + np.kron(np.eye(LOADS), model[1:-1, 1:-1])
+
+
 def smooth_ring_errors(levels: ErrorLevels, *, harmonic: int) -> tuple[Array, Array]:
-    """Return the covariances [J, J] of ring means (0) or first harmonics (1) of one load: flat field, and model."""
+    """Return the covariances [J, J] of ring means (0) or of a harmonic (1, 2) of one load: flat field, and model."""
     return (
         levels.flat_field_ratio**2 * ring_correlation(levels.flat_field_mm, harmonic=harmonic),
         levels.model_ratio**2 * ring_correlation(levels.model_mm, harmonic=harmonic),
@@ -124,7 +134,7 @@ def smooth_ring_errors(levels: ErrorLevels, *, harmonic: int) -> tuple[Array, Ar
 
 
 def ring_correlation(length_mm: float, *, harmonic: int) -> Array:
-    """Return the covariance [J, J] of soft rings' means (0) or first harmonics (1) of a smooth field of variance 1.
+    """Return the covariance [J, J] of soft rings' means (0) or of a harmonic (1, 2) of a smooth field of variance 1.
 
     The field's correlation is exp(-distance^2 / (2 length^2)). A ring averages circles by their length and its weight:
     neighbours differ by less than circles of their radii would, the innermost ones by more.

@@ -49,8 +49,9 @@ class PressProfile:
     that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the forces,
     without the ring in the middle. elongation [J - 1]: the same of the second harmonic, along its own direction.
     offset_at_force, elongation_at_force [K, J - 1]: both at each force, along the direction of their mean, so that
-    noise makes neither longer. residual: root mean square, over rings and frames, of what the polynomial in the force
-    leaves.
+    noise makes neither longer. second_harmonic [2, K, J - 2]: the second harmonic at each force, along and across the
+    direction of the bright side, also without the outermost ring. residual: root mean square, over rings and frames, of
+    what the polynomial in the force leaves.
     """
 
     force_n: Array
@@ -60,6 +61,7 @@ class PressProfile:
     elongation: Array
     offset_at_force: Array
     elongation_at_force: Array
+    second_harmonic: Array
     residual: float
 
     def as_row(self) -> Array:
@@ -129,6 +131,7 @@ def profile_of_lights(reference: Lights, press: Lights) -> PressProfile:
         elongation=harmonic(rings, 2),
         offset_at_force=harmonic_at_forces(rings, 1),
         elongation_at_force=harmonic_at_forces(rings, 2),
+        second_harmonic=second_harmonic(rings),
         residual=residual,
     )
 
@@ -156,6 +159,18 @@ def harmonic_at_forces(rings: RingMeans, order: int) -> Array:
     """
     cosine, sine = _waves(rings, order)
     return _along(cosine, sine, _direction(cosine.mean(axis=0), sine.mean(axis=0)))
+
+
+def second_harmonic(rings: RingMeans) -> Array:
+    """Return the second harmonic [2, K, J - 2] at each force, along and across the direction of the bright side.
+
+    That direction is the first harmonic's of the whole window, mean over the forces. A round lump has none across. The
+    frame cuts the outermost ring at top and bottom: what is left there has a second harmonic of its own.
+    """
+    cosine, sine = (part[:, :-1] for part in _waves(rings, 2))
+    turned = 2 * _direction(*(part.mean(axis=0) for part in _waves(rings, 1)))
+    across = sine * np.cos(turned) - cosine * np.sin(turned)
+    return np.stack([_along(cosine, sine, turned), across])
 
 
 def _waves(rings: RingMeans, order: int) -> tuple[Array, Array]:

@@ -14,12 +14,11 @@ from device.measurement.estimate import Estimate
 from device.measurement.interval_estimate import origin_of, saturation, with_numbers, without_numbers
 from device.measurement.mode import Mode
 from device.measurement.press_noise import PressNoise
-from device.measurement.press_profile import PROFILE_FORCES_N, PressProfile, press_profile
+from device.measurement.press_profile import PROFILE_FORCES_N, press_profile
 from device.measurement.profile_model import RAMP_MODES, ModeLimits, ProfileModel
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording import Recording
 from device.measurement.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS, Array
-from device.measurement.roundness import doubt_about_roundness, elongation_ratio
 
 VISIBLE_DEVIATIONS = 4.0
 """A lump stands out when its contrast lies so many standard deviations above none."""
@@ -41,13 +40,14 @@ def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, cali
     if not stands_out(row, model.answers.noise[mode]):
         return without_numbers("not_identifiable", "No inclusion stands out.", origin)
     answer, log_odds = model.answer(row, mode), float(model.ranges.log_odds(row[None], mode)[0])
-    doubts = doubts_about(profile, answer.misfit_ratio, log_odds, limits)
+    elongation = model.round_spot.elongation_deviations(profile.second_harmonic, answer.best, mode)
+    doubts = doubts_about(answer.misfit_ratio, elongation, log_odds, limits)
     if doubts:
         return without_numbers("outside_range", " ".join(doubts), origin)
     features = {
         "misfit_ratio": answer.misfit_ratio,
         "outside_log_odds": log_odds,
-        "elongation_ratio": elongation_ratio(profile.elongation, profile.offset),
+        "elongation_deviations": elongation,
         "residual": profile.residual,
     }
     if answer.tissue_kpa:
@@ -69,15 +69,21 @@ def stands_out(row: Array, noise: PressNoise) -> bool:
     )
 
 
-def doubts_about(profile: PressProfile, misfit_ratio: float, outside_log_odds: float, limits: ModeLimits) -> list[str]:
+def doubts_about(
+    misfit_ratio: float, elongation_deviations: float, outside_log_odds: float, limits: ModeLimits
+) -> list[str]:
     """Return a sentence for every reason why this is not one round inclusion inside the trained ranges; [] is good."""
     found = []
-    if misfit_ratio > limits.misfit_ratio:
+    if not misfit_ratio <= limits.misfit_ratio:
         found.append(
             f"No single round inclusion explains this press: misfit {misfit_ratio:.2f}, "
             f"above the usual {limits.misfit_ratio:.2f}."
         )
-    found += doubt_about_roundness(elongation_ratio(profile.elongation, profile.offset), limits.elongation_ratio)
+    if not elongation_deviations <= limits.elongation_deviations:
+        found.append(
+            f"The lump is not round: its elongation is {elongation_deviations:.1f} standard deviations from a round "
+            f"one's, above the usual {limits.elongation_deviations:.1f}."
+        )
     if not outside_log_odds <= limits.outside_log_odds:
         found.append(
             f"Size or depth rather lies outside its trained range: log odds {outside_log_odds:.1f}, "

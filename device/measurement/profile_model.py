@@ -1,8 +1,9 @@
 """A press profile to mean and spread of the unknowns: standard by networks, precise by fitting the forward model.
 
 Either way the best fit of the forward model is sought, because how badly it fits is what tells that a press is not of
-one round inclusion; whether that lies in the trained ranges, networks of their own tell. The bundle is a folder:
-`model.onnx` and `model.json` as every bundle, `surrogate.npz` and `range.onnx` beside them.
+one round inclusion, and whose second harmonic a round one has; whether it lies in the trained ranges, networks of
+their own tell. The bundle is a folder:
+`model.onnx` and `model.json` as every bundle, `surrogate.npz`, `range.onnx` and `round.npz` beside them.
 Source of the format: docs/contracts.md.
 """
 
@@ -27,6 +28,7 @@ from device.measurement.press_parameters import NUISANCES, from_unit, slope_of_u
 from device.measurement.press_surrogate import TISSUE, PressSurrogate, load_surrogate
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.range_test import RangeTest
+from device.measurement.round_spot import ROUND_FILE, RoundSpot, load_round_spot
 from device.measurement.sample_press import sample_press
 
 Array = NDArray[np.float64]
@@ -41,12 +43,14 @@ class Answer(NamedTuple):
     """Mean and spread [3] of the unknowns' coordinates, and how well one inclusion explains the press.
 
     `misfit_ratio`: squared residuals of the best fit, each over its standard deviation, over their number.
+    `best`: coordinates [9] of the best fit.
     `tissue_kpa`: mean and spread of the tissue's modulus, which the press beside the lesion tells; precise only.
     """
 
     mean: Array
     spread: Array
     misfit_ratio: float
+    best: Array
     tissue_kpa: tuple[float, float] | None = None
 
 
@@ -56,7 +60,7 @@ class ModeLimits:
 
     bands: tuple[Bands, ...]
     misfit_ratio: float
-    elongation_ratio: float
+    elongation_deviations: float
     outside_log_odds: float
 
 
@@ -81,15 +85,15 @@ class ProfileAnswers:
 
 def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) -> Answer:
     residuals = posterior.residuals(best)
-    return Answer(mean, spread, float(np.mean(residuals**2)))
+    return Answer(mean, spread, float(np.mean(residuals**2)), best)
 
 
 class ProfileModel:
-    """A verified bundle: networks, what fits the forward model, what tells the ranges, and the limits of each mode."""
+    """A verified bundle: networks, forward model, what tells the ranges and what is round, and each mode's limits."""
 
-    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers, ranges: RangeTest) -> None:
+    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers, ranges: RangeTest, round_spot: RoundSpot) -> None:
         """Use `load` for what is installed. Raises `BundleRefused` when the card lacks the limits of a mode."""
-        self.bundle, self.answers, self.ranges = bundle, answers, ranges
+        self.bundle, self.answers, self.ranges, self.round_spot = bundle, answers, ranges, round_spot
         try:
             self.limits = {mode: _limits(bundle.card["modes"][mode]) for mode in RAMP_MODES}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
@@ -99,14 +103,13 @@ class ProfileModel:
     def load(cls, folder: Path) -> ProfileModel:
         """Return the model of a folder; raises `BundleRefused` or `InvalidQuantity` when anything does not hold."""
         bundle = ModelBundle.load(folder)
-        stated, path = bundle.card.get("surrogate_sha256"), folder / SURROGATE_FILE
-        found = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
-        if found != stated:
-            raise BundleRefused(folder, SURROGATE_FILE, found, f"{stated} as model.json states")
+        path = _verified(folder, SURROGATE_FILE, bundle.card.get("surrogate_sha256"))
         with np.load(path) as file:
             noise = {mode: PressNoise(np.asarray(file[f"camera_{mode}"], np.float64)) for mode in RAMP_MODES}
+        surrogate = load_surrogate(path)
         ranges = RangeTest.load(folder, bundle.card, RAMP_MODES)
-        return cls(bundle, ProfileAnswers(load_surrogate(path), noise), ranges)
+        round_path = _verified(folder, ROUND_FILE, bundle.card.get("round_sha256"))
+        return cls(bundle, ProfileAnswers(surrogate, noise), ranges, load_round_spot(round_path, surrogate, RAMP_MODES))
 
     def prove(self) -> None:
         """Run the golden vectors of all its networks; raises `BundleRefused` when one does not hold."""
@@ -124,6 +127,15 @@ class ProfileModel:
         return unknowns_to_unit(raw.estimate), raw.spread
 
 
+def _verified(folder: Path, name: str, stated: str | None) -> Path:
+    """Return the path of a bundle's file whose hash is the one stated; raises `BundleRefused`."""
+    path = folder / name
+    found = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
+    if found != stated:
+        raise BundleRefused(folder, name, found, f"{stated} as model.json states")
+    return path
+
+
 def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
     """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
     parts = ("truth", "log_spread", "low", "high")
@@ -133,5 +145,5 @@ def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
 
 
 def _limits(entry: Mapping[str, Any]) -> ModeLimits:
-    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_ratio", "outside_log_odds"))
+    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"))
     return ModeLimits(bands_of(entry), *doubts)

@@ -38,6 +38,7 @@ def modes(
     from host_tools.study.mode_dial import dial_chapter
     from host_tools.study.mode_just_outside import just_outside_chapter
     from host_tools.study.mode_noise_free import noise_free_chapter
+    from host_tools.study.mode_oblong import oblong_chapter
     from host_tools.study.mode_outside import outside_chapter
     from host_tools.study.mode_page import MODES_PAGE
     from host_tools.study.mode_posterior import posterior_chapter
@@ -60,6 +61,7 @@ def modes(
         "outside": lambda: outside_chapter(
             partial(models.estimate, calibration=calibration), kinds(tables, derived_seed(1, "outside"))
         ),
+        "oblong": lambda: oblong_chapter(partial(models.estimate, calibration=calibration), trained, tables),
         "just-outside": lambda: just_outside_chapter(trained, calibration, tables),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip

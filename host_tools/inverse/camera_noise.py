@@ -1,4 +1,4 @@
-"""Recordings of random presses to the camera's part of the noise: how profile rows scatter about the exact ones.
+"""Recordings of random presses to the camera's part of the noise: how what is read scatters about the exact values.
 
 Camera, cell and the hand's tremor are in it; drift of light and cell and smooth errors are not, they have levels of
 their own. Fewer recordings than squares of columns leave a covariance that is partly chance: correlations are shrunk.
@@ -7,21 +7,41 @@ Source of the shrinkage: Schaefer & Strimmer, Stat. Appl. Genet. Mol. Biol. 4 (2
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from device.measurement.mode import Mode
-from device.measurement.press_noise import light_ratio
+from device.measurement.press_noise import LOADS, light_ratio
+from device.measurement.press_surrogate import CONTRAST_COLUMNS
+from device.measurement.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.inverse.press_samples import Array, draw_parameters, profile_rows
+from host_tools.inverse.press_samples import Array, draw_parameters, exact_presses
 from host_tools.inverse.recorded_presses import in_parallel, record_presses
 
 
-def camera_covariance(tables: ProbeTables, mode: Mode, count: int, *, seed: int, jobs: int = -1) -> Array:
-    """Return the covariance [P, P] of `count` random presses' rows about the exact ones, over the light ratio there."""
+class CameraNoise(NamedTuple):
+    """Covariances of a mode over the light ratio: of profile rows [P, P], and of second harmonics [Q, Q]."""
+
+    rows: Array
+    second_harmonics: Array
+
+
+def camera_noise(tables: ProbeTables, mode: Mode, count: int, *, seed: int, jobs: int = -1) -> CameraNoise:
+    """Return the covariances of `count` random presses about the exact ones.
+
+    What lies across the offset, where a round lump has no second harmonic, counts as much as what lies along it.
+    """
     parameters = draw_parameters(count, np.random.default_rng(seed))
-    recorded = record_presses(tables, parameters, mode, seed=seed, jobs=jobs).rows
-    exact = np.array(in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], count, jobs))
-    return shrunk_covariance((recorded - exact) / light_ratio(exact))
+    recorded = record_presses(tables, parameters, mode, seed=seed, jobs=jobs)
+    exact = in_parallel(lambda i: exact_presses(tables, parameters[i : i + 1]), count, jobs)
+    rows, along = (np.concatenate(part) for part in zip(*exact, strict=True))
+    second = recorded.second_harmonics.reshape(count, 2, -1) - np.stack([along, np.zeros_like(along)], axis=1)
+    light = 1 + rows[:, :CONTRAST_COLUMNS].reshape(count, LOADS, RINGS)[:, :, 1:-1].reshape(count, 1, -1)
+    return CameraNoise(
+        shrunk_covariance((recorded.rows - rows) / light_ratio(rows)),
+        shrunk_covariance((second / light).reshape(2 * count, -1)),
+    )
 
 
 def shrunk_covariance(errors: Array) -> Array:

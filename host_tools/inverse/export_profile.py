@@ -1,4 +1,4 @@
-"""Turns the trained modes into model bundles: model.onnx, model.json, and for the ramps surrogate.npz and range.onnx.
+"""Turns the trained modes into model bundles: model.onnx and model.json, for the ramps surrogate, range and round spot.
 
 The same parts give the same bytes. Source of the format: the model bundle of docs/contracts.md.
 """
@@ -21,6 +21,7 @@ from device.measurement.press_parameters import NUISANCES, RANGES
 from device.measurement.profile_model import SURROGATE_FILE
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.range_test import ENTRY, RANGE_FILE
+from device.measurement.round_spot import COEFFICIENTS, DEGREES, ROUND_FILE, RoundSpot
 from host_tools.inverse.dense_network import Array, Single
 from host_tools.inverse.ensemble_network import build_network, golden_vectors
 from host_tools.inverse.export import write_folder
@@ -45,22 +46,22 @@ def export_profile(
     network = build_network(trained.ensemble)
     golden = golden_vectors(trained.ensemble, network, rows.astype(np.float64))
     surrogate, ranges = _surrogate_file(trained), build_range_networks(trained.ranges.networks)
+    round_spot = round_file(trained.round_spot)
     card = {
         **_card(folder, network, serials, software_version, training_command),
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
+        "round_sha256": hashlib.sha256(round_spot).hexdigest(),
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
         "effort": asdict(trained.effort),
         "features": [{"name": name, "unit": unit} for name, unit in PROFILE_UNITS.items()],
         "training_range": _training_range(dict(zip(PROFILE_UNITS, trained.samples.rows.T, strict=True))),
-        "surrogate_error": {
-            "largest": float(trained.surrogate_error.max()),
-            "mean": float(trained.surrogate_error.mean()),
-        },
+        "surrogate_error": _error(trained.surrogate_error),
+        "round_error": _error(trained.round_error),
         "modes": {
             mode: {
                 "misfit_ratio": outcome.misfit_ratio,
-                "elongation_ratio": outcome.elongation_ratio,
+                "elongation_deviations": outcome.elongation_deviations,
                 "outside_log_odds": outcome.outside_log_odds,
                 **_answers(outcome),
             }
@@ -69,8 +70,8 @@ def export_profile(
         ENTRY: range_entry(trained.ranges, ranges, np.array(golden["features"])),
         "golden": golden,
     }
-    files = {MODEL_FILE: network, CARD_FILE: _text(card), SURROGATE_FILE: surrogate, RANGE_FILE: ranges}
-    write_folder(folder, files)
+    files = {SURROGATE_FILE: surrogate, RANGE_FILE: ranges, ROUND_FILE: round_spot}
+    write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card), **files})
 
 
 def export_quick(
@@ -143,10 +144,24 @@ def _text(card: dict[str, Any]) -> bytes:
 
 def _surrogate_file(trained: TrainedProfile) -> bytes:
     arrays: dict[str, Any] = trained.surrogate.arrays()
-    arrays |= {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()}
+    return _archive(arrays | {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()})
+
+
+def round_file(round_spot: RoundSpot) -> bytes:
+    """Return the content of `round.npz`: polynomials in single precision, and the camera's covariance of each mode."""
+    second = round_spot.second
+    arrays = {DEGREES: second.degrees.astype(np.uint8), COEFFICIENTS: second.coefficients.astype(np.float32)}
+    return _archive(arrays | {f"camera_{mode}": camera for mode, camera in round_spot.camera.items()})
+
+
+def _archive(arrays: dict[str, Any]) -> bytes:
     content = io.BytesIO()
     np.savez(content, **arrays)
     return content.getvalue()
+
+
+def _error(of_columns: Array) -> dict[str, float]:
+    return {"largest": float(of_columns.max()), "mean": float(of_columns.mean())}
 
 
 def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from device.measurement.pixel_scale import PixelScale
 from device.measurement.press_parameters import NUISANCES, PARAMETERS, from_unit
-from device.measurement.press_profile import PROFILE_FORCES_N, harmonic
+from device.measurement.press_profile import PROFILE_FORCES_N, harmonic, second_harmonic
 from device.measurement.quantities import Inclusion
 from device.measurement.ring_means import RingMeans, ring_weights
 from device.measurement.tactile_image import Image
@@ -52,18 +52,21 @@ class Draw(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PressSamples:
-    """Parameters [n, 9] in the order of `PARAMETERS` and rows [n, P] in that of `press_profile.ROW_NAMES`."""
+    """Parameters [n, 9] in the order of `PARAMETERS`, rows [n, P] in that of `press_profile.ROW_NAMES`.
+
+    `second_harmonics` [n, Q]: of the contrast, along the offset, of all forces and all rings but the two at the ends.
+    """
 
     parameters: Array
     rows: Array
+    second_harmonics: Array
 
     def split(self, count: int) -> tuple[PressSamples, PressSamples]:
         """Return the first `count` presses and the others."""
-        first, second = slice(0, count), slice(count, None)
-        return (
-            PressSamples(self.parameters[first], self.rows[first]),
-            PressSamples(self.parameters[second], self.rows[second]),
-        )
+        return self._part(slice(0, count)), self._part(slice(count, None))
+
+    def _part(self, of: slice) -> PressSamples:
+        return PressSamples(self.parameters[of], self.rows[of], self.second_harmonics[of])
 
 
 def draw_parameters(count: int, rng: np.random.Generator, *, lumps_a_skin: int = 1) -> Array:
@@ -95,11 +98,12 @@ def sample_presses(
     parameters = draw(count, np.random.default_rng(seed), lumps_a_skin=LUMPS_A_SKIN)
     parts = np.split(parameters, range(CHUNK * LUMPS_A_SKIN, count, CHUNK * LUMPS_A_SKIN))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    rows = []
-    for part in Parallel(n_jobs=jobs, return_as="generator")(delayed(profile_rows)(tables, p) for p in parts):
-        rows.append(part)
-        on_done(len(part))
-    return PressSamples(parameters, np.concatenate(rows))
+    pressed = []
+    for part in Parallel(n_jobs=jobs, return_as="generator")(delayed(exact_presses)(tables, p) for p in parts):
+        pressed.append(part)
+        on_done(len(part[0]))
+    rows, second_harmonics = zip(*pressed, strict=True)
+    return PressSamples(parameters, np.concatenate(rows), np.concatenate(second_harmonics))
 
 
 def profile_rows(
@@ -110,8 +114,17 @@ def profile_rows(
     `ramps` are those of a lump that the tables do not hold, on the axis. `span_ratio`: true force over what the cell
     says.
     """
+    return exact_presses(tables, parameters, ramps=ramps, span_ratio=span_ratio)[0]
+
+
+def exact_presses(
+    tables: ProbeTables, parameters: Array, *, ramps: PressRamps | None = None, span_ratio: float = 1.0
+) -> tuple[Array, Array]:
+    """Return profile rows [n, P] and second harmonics [n, Q] along the offset; as `profile_rows`."""
     scene = _Scene(tables, ramps, span_ratio)
-    return np.array([scene.row(dict(zip(PARAMETERS, map(float, values), strict=True))) for values in parameters])
+    pressed = [scene.press(dict(zip(PARAMETERS, map(float, values), strict=True))) for values in parameters]
+    rows, second_harmonics = zip(*pressed, strict=True)
+    return np.array(rows), np.array(second_harmonics)
 
 
 class _Scene:
@@ -124,7 +137,7 @@ class _Scene:
         self._skin: Skin | None = None
         self._slab: Slab | None = None
 
-    def row(self, at: dict[str, float]) -> Array:
+    def press(self, at: dict[str, float]) -> tuple[Array, Array]:
         skin = Skin(albedo=at["albedo"], spread_mm=at["spread_mm"], contact_pressure_kpa=at["contact_pressure_kpa"])
         slab = Slab(at["tissue_modulus_kpa"], at["slab_thickness_mm"])
         inclusion = Inclusion(at["size_mm"], at["depth_mm"], at["youngs_modulus_kpa"])
@@ -137,10 +150,11 @@ class _Scene:
         lights = self._lights(inclusion, Placement(x_mm=at["offset_mm"]))
         rings = [self._means(light / bare - np.float32(1)) for light, bare in zip(lights, self._bare, strict=True)]
         stacked = RingMeans(*(np.array(part) for part in zip(*rings, strict=True)))
-        return np.concatenate([stacked.mean.ravel(), self._growth.ravel(), harmonic(stacked, 1)])
+        row = np.concatenate([stacked.mean.ravel(), self._growth.ravel(), harmonic(stacked, 1)])
+        return row, second_harmonic(stacked)[0].ravel()
 
     def _lights(self, inclusion: Inclusion, place: Placement) -> list[Image]:
-        assert self._slab is not None  # row has set it
+        assert self._slab is not None  # press has set it
         ramps = self._ramps or self._tables.centred.ramps(inclusion, self._slab)
         face = PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, self._slab)
         return [self._image.intensity(*face.at(float(force), place), LIT) for force in self._forces_n]

@@ -1,9 +1,9 @@
 """Everything behind the standard and the precise mode, from the virtual probe's tables to what the bundle holds.
 
-Random presses make the surrogate; recordings of random presses the camera's noise; surrogate and noise endless
-training presses for the networks. Lumps around the trained ranges make the networks that tell what lies outside.
-Presses that nobody has learned from give the bands of every interval; recordings with every drift give what misfit,
-elongation and odds are usual, and the errors that the card states.
+Random presses make the surrogate, and the second harmonics of round lumps; recordings of random presses the camera's
+noise; surrogate and noise endless training presses for the networks. Lumps around the trained ranges make the networks
+that tell what lies outside. Presses that nobody has learned from give the bands of every interval; recordings with
+every drift give what misfit, elongation and odds are usual, and the errors that the card states.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from device.measurement.mode import Mode
 from device.measurement.press_noise import ErrorLevels, PressNoise
 from device.measurement.press_surrogate import PressSurrogate
 from device.measurement.profile_model import RAMP_MODES, ProfileAnswers
+from device.measurement.round_spot import RoundSpot
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.inverse.camera_noise import camera_covariance
+from host_tools.inverse.camera_noise import camera_noise
+from host_tools.inverse.fit_round_spot import fit_second_harmonics, held_out_second_harmonics
 from host_tools.inverse.fit_surrogate import fit_surrogate, held_out_error
 from host_tools.inverse.mode_outcome import ModeOutcome, judged_mode, usual_log_odds
 from host_tools.inverse.noisy_presses import random_pool
@@ -56,9 +58,11 @@ class TrainedProfile:
 
     surrogate: PressSurrogate
     surrogate_error: Array
+    round_error: Array
     noise: dict[Mode, PressNoise]
     ensemble: DenseEnsemble
     ranges: TrainedRange
+    round_spot: RoundSpot
     outcomes: dict[Mode, ModeOutcome]
     samples: PressSamples
     effort: Effort
@@ -84,22 +88,26 @@ def train_profile(
     learned, kept = samples.split(asked.presses)
     surrogate = fit_surrogate(learned)
     say(f"{asked.noise_recordings} recordings for the noise of each mode")
-    noise = {
-        mode: PressNoise(
-            camera_covariance(
-                tables, mode, asked.noise_recordings, seed=derived_seed(seed, f"camera of {mode}"), jobs=jobs
-            )
+    camera = {
+        mode: camera_noise(
+            tables, mode, asked.noise_recordings, seed=derived_seed(seed, f"camera of {mode}"), jobs=jobs
         )
         for mode in RAMP_MODES
     }
+    noise = {mode: PressNoise(of_mode.rows) for mode, of_mode in camera.items()}
+    round_spot = RoundSpot(
+        surrogate,
+        fit_second_harmonics(learned),
+        {mode: of_mode.second_harmonics for mode, of_mode in camera.items()},
+    )
     say(f"{asked.members} networks")
     pool = random_pool(surrogate, noise["standard"], asked.pool, derived_seed(seed, "training presses"))
     ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     ranges = train_range(tables, wide, noise, effort=asked.ranges, seed=seed, jobs=jobs, say=say)
     answers = ProfileAnswers(surrogate, noise)
-    outcomes = judged(tables, ensemble, answers, ranges, asked, seed=seed, jobs=jobs, say=say)
-    error = held_out_error(surrogate, kept)
-    return TrainedProfile(surrogate, error, noise, ensemble, ranges, outcomes, samples, asked, seed)
+    outcomes = judged(tables, ensemble, answers, ranges, round_spot, asked, seed=seed, jobs=jobs, say=say)
+    errors = held_out_error(surrogate, kept), held_out_second_harmonics(round_spot, kept)
+    return TrainedProfile(surrogate, *errors, noise, ensemble, ranges, round_spot, outcomes, samples, asked, seed)
 
 
 def judged(
@@ -107,6 +115,7 @@ def judged(
     ensemble: DenseEnsemble,
     answers: ProfileAnswers,
     ranges: TrainedRange,
+    round_spot: RoundSpot,
     effort: Effort,
     *,
     seed: int,
@@ -123,6 +132,6 @@ def judged(
         recorded = record_presses(tables, parameters, mode, seed=recording, levels=ErrorLevels(), jobs=jobs)
         usual = usual_log_odds(ranges.networks[mode], recorded.rows, answers.noise[mode])
         outcomes[mode] = judged_mode(
-            mode, ensemble, answers, pool, recorded, outside_log_odds=usual, seed=simulating, jobs=jobs
+            mode, ensemble, answers, pool, recorded, round_spot, outside_log_odds=usual, seed=simulating, jobs=jobs
         )
     return outcomes

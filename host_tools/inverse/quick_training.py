@@ -23,12 +23,16 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.camera_noise import shrunk_covariance
 from host_tools.inverse.confidence_bands import confidence_bands, widened
 from host_tools.inverse.held_presses import HeldPool, held_pool, held_rows
-from host_tools.inverse.mode_outcome import USUAL_RATIO, Answered
+from host_tools.inverse.mode_outcome import Answered
 from host_tools.inverse.noisy_presses import random_pool
 from host_tools.inverse.press_samples import Array, draw_parameters, profile_rows
 from host_tools.inverse.recorded_presses import EXACT, in_parallel, recorded_press
 from host_tools.inverse.seeds import derived_seed, press_seed
 from host_tools.inverse.train_ensemble import DenseEnsemble, train_ensemble
+
+USUAL_RATIO = 0.985
+"""Share of recorded presses inside the trained ranges whose elongation counts as usual: the only doubt of its kind in
+mode quick, which has neither a best fit nor networks of the ranges."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from device.measurement.press_parameters import PARAMETERS
 from device.measurement.press_profile import press_profile
 from device.measurement.quantities import Inclusion
 from device.measurement.recording import Recording
-from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 from device.simulation.pressed_face import Placement
 from device.simulation.scenario import Scenario
@@ -41,11 +40,11 @@ EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_rati
 
 @dataclass(frozen=True, eq=False)
 class RecordedPresses:
-    """Parameters [n, 9], profile rows [n, P] and elongation [n] of recorded presses."""
+    """Parameters [n, 9], profile rows [n, P] and second harmonics [n, 2, K, J - 2] of recorded presses."""
 
     parameters: Array
     rows: Array
-    elongation: Array
+    second_harmonics: Array
 
 
 def scenario_of(parameters: Array, neighbour: Neighbour | None = None, wet_ratio: float = 0.0) -> Scenario:
@@ -101,15 +100,15 @@ def recorded_press(
 def record_presses(
     tables: ProbeTables, parameters: Array, mode: Mode, *, seed: int, levels: ErrorLevels = EXACT, jobs: int = -1
 ) -> RecordedPresses:
-    """Return rows and elongation of presses with parameters [n, 9] in a ramp mode; the same whatever `jobs`."""
+    """Return rows and second harmonics of presses with parameters [n, 9] in a ramp mode; the same whatever `jobs`."""
 
-    def read(number: int) -> tuple[Array, float]:
+    def read(number: int) -> tuple[Array, Array]:
         recording = recorded_press(tables, parameters[number], mode, press_seed(seed, number), levels=levels)
         profile = press_profile(recording)
-        return profile.as_row(), elongation_ratio(profile.elongation, profile.offset)
+        return profile.as_row(), profile.second_harmonic
 
-    rows, elongation = zip(*in_parallel(read, len(parameters), jobs), strict=True)
-    return RecordedPresses(parameters, np.array(rows), np.array(elongation))
+    rows, second_harmonics = zip(*in_parallel(read, len(parameters), jobs), strict=True)
+    return RecordedPresses(parameters, np.array(rows), np.array(second_harmonics))
 
 
 def in_parallel(work: Callable[[int], Result], count: int, jobs: int) -> list[Result]:

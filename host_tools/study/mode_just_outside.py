@@ -32,7 +32,7 @@ CLAIM = (
     f"{PRESSES} recordings of each lump, nominal tissue and skin, with every drift. A press is as far from its nearest "
     "twin inside the ranges, whatever tissue and skin that one has, as it says: standard deviations of all that noise "
     f"and drift leave unknown. Three doubts - misfit, elongation and this one - share the {FALSE_AT_MOST:.0%} of false "
-    f"flags that a mode may have, so each may flag {FALSE_FLAGS:.1%} of the presses inside. The best test that flags "
+    f"flags that a mode may have, so each may flag {FALSE_FLAGS:.2%} of the presses inside. The best test that flags "
     "as many of the twin's presses flags at most the share beside it: no refusal is asked for where that is below "
     f"{REFUSED_AT_LEAST:.0%}. Beside that stands what it could flag if all {FALSE_AT_MOST:.0%} were its own. (Where "
     "more is refused, the twin lies at the very end of a range and is refused more often than others, too.) What is "

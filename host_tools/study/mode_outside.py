@@ -49,8 +49,8 @@ def outside_chapter(answer: Answer, kinds: Sequence[Kind], *, jobs: int = -1) ->
         claim=(
             "Each press is refused for its misfit, its elongation, the odds of a size or depth outside its range, or "
             "because nothing stands out. Ordinary presses are those of the trained ranges; those in which "
-            "nothing stands out are not counted among them. Mode quick sees one force: it tells what is oblong, and "
-            "cannot tell gel, whose light does not grow with the force, from a lump. On the probe such a press ends "
+            "nothing stands out are not counted among them. Mode quick sees one force: it cannot "
+            "tell gel, whose light does not grow with the force, from a lump. On the probe such a press ends "
             "with fault E501 in every mode, because the way to the hold is seen there; a recording alone does not "
             "hold it."
         ),

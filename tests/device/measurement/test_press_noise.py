@@ -13,6 +13,7 @@ from device.measurement.press_noise import (
     light_ratio,
     ring_correlation,
     smooth_errors,
+    smooth_second_harmonics,
 )
 from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
@@ -43,11 +44,11 @@ def test_without_drift_and_smooth_errors_only_the_camera_is_left(row):
 
 
 @pytest.mark.parametrize("length_mm", [1.0, 2.5, 6.0])
-@pytest.mark.parametrize("harmonic", [0, 1])
+@pytest.mark.parametrize("harmonic", [0, 1, 2])
 def test_the_correlation_of_circles_is_the_fields_averaged_over_both_angles(length_mm, harmonic):
-    """They are a(r) = mean of 2 f(r, angle) cos(angle), or without the 2 cos; trapezia are exact on a circle."""
+    """They are a(r) = mean of 2 f(r, angle) cos(k angle), or without the 2 cos; trapezia are exact on a circle."""
     angle = 2 * np.pi * np.arange(256) / 256
-    basis = np.ones_like(angle) if harmonic == 0 else 2 * np.cos(angle)
+    basis = np.ones_like(angle) if harmonic == 0 else 2 * np.cos(harmonic * angle)
     x, y = np.multiply.outer(RING_RADII_MM, (np.cos(angle), np.sin(angle))).transpose(1, 0, 2)
     expected = np.empty((RINGS, RINGS))
     for i in range(RINGS):
@@ -59,7 +60,7 @@ def test_the_correlation_of_circles_is_the_fields_averaged_over_both_angles(leng
 
 
 @pytest.mark.parametrize("length_mm", [2.0, 3.0])
-@pytest.mark.parametrize("harmonic", [0, 1])
+@pytest.mark.parametrize("harmonic", [0, 1, 2])
 def test_the_correlation_of_rings_is_that_of_what_the_profile_reads_of_a_smooth_field(length_mm, harmonic):
     """The profile's own rings of every pixel's picture, times the field's correlation between any two pixels."""
     scale = PixelScale(0.3, 0.3)
@@ -67,7 +68,7 @@ def test_the_correlation_of_rings_is_that_of_what_the_profile_reads_of_a_smooth_
     x, y = (part.ravel() for part in np.broadcast_arrays(*scale.coordinates_mm(shape)))
     rings, everywhere = ring_weights(shape, scale), np.ones(shape, bool)
     pixels = [rings.means(one.reshape(shape), everywhere) for one in np.eye(x.size, dtype=np.float32)]
-    read = np.array([one.mean if harmonic == 0 else one.cosine[0] for one in pixels]).T
+    read = np.array([one.mean if harmonic == 0 else one.cosine[harmonic - 1] for one in pixels]).T
     seen = np.hypot(x, y) < RINGS * RING_MM
     distance2 = np.subtract.outer(x[seen], x[seen]) ** 2 + np.subtract.outer(y[seen], y[seen]) ** 2
     expected = read[:, seen] @ np.exp(-distance2 / (2 * length_mm**2)) @ read[:, seen].T
@@ -76,7 +77,8 @@ def test_the_correlation_of_rings_is_that_of_what_the_profile_reads_of_a_smooth_
 
 def test_a_field_that_is_the_same_everywhere_moves_all_rings_and_no_harmonic():
     np.testing.assert_allclose(ring_correlation(1e5, harmonic=0), 1.0, atol=1e-7)
-    np.testing.assert_allclose(ring_correlation(1e5, harmonic=1), 0.0, atol=1e-7)
+    for harmonic in (1, 2):
+        np.testing.assert_allclose(ring_correlation(1e5, harmonic=harmonic), 0.0, atol=1e-7)
 
 
 def test_a_short_field_averages_out_along_a_circle_but_not_in_the_middle():
@@ -136,6 +138,24 @@ def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones
     assert flat[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().flat_field_mm, harmonic=0)[0, 0])
     np.testing.assert_array_equal(model[first, second], 0.0)
     assert model[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0])
+
+
+def test_in_second_harmonics_too_the_flat_field_is_common_and_the_models_error_each_loads_own():
+    """Without the ring in the middle, which has none, and the outermost one: nine rings of four loads are left."""
+    flat = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))
+    model = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.02))
+    of_flat, of_model = (
+        ratio**2 * ring_correlation(length_mm, harmonic=2)[1:-1, 1:-1]
+        for ratio, length_mm in ((0.01, ErrorLevels().flat_field_mm), (0.02, ErrorLevels().model_mm))
+    )
+    assert flat.shape == model.shape == (36, 36)
+    for load in range(4):
+        for other in range(4):
+            block = np.s_[9 * load : 9 * load + 9, 9 * other : 9 * other + 9]
+            np.testing.assert_allclose(flat[block], of_flat, rtol=1e-14)
+            np.testing.assert_allclose(model[block], of_model if other == load else 0.0, rtol=1e-14)
+    both = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.02))
+    np.testing.assert_allclose(both, flat + model, rtol=1e-14)
 
 
 def test_growth_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():

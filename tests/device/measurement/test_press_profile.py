@@ -82,7 +82,7 @@ def test_growth_is_the_logarithm_of_the_lump_free_light_over_that_at_the_largest
 
 def test_a_press_that_looks_like_the_reference_has_no_contrast_and_no_harmonics():
     found = press_profile(recording(lambda force_n: 0.0))
-    for values in (found.contrast, found.offset, found.elongation):
+    for values in (found.contrast, found.offset, found.elongation, found.second_harmonic):
         np.testing.assert_allclose(values, 0.0, atol=1e-4)
 
 
@@ -102,6 +102,34 @@ def test_a_harmonic_is_known_at_each_force_too():
     expected = np.repeat(0.01 + 0.02 * PROFILE_FORCES_N[:, None], len(RING_RADII_MM) - 1, 1)
     np.testing.assert_allclose(found.offset_at_force, expected, atol=5e-4)
     np.testing.assert_allclose(found.elongation_at_force, 0.0, atol=5e-4)
+
+
+@pytest.mark.parametrize("bright", [0.0, 0.7, -2.5])
+@pytest.mark.parametrize("stretched", [0.0, 0.7, 1.4])
+def test_the_second_harmonic_is_told_along_and_across_the_bright_side(bright, stretched):
+    """0.02 cos(2 (angle - s)) has 0.02 cos(2 (s - t)) along t and 0.02 sin(2 (s - t)) across, at every force."""
+    angle = np.arctan2(Y, X)
+    found = press_profile(
+        recording(lambda _: 0.01 * np.cos(angle - bright) + 0.02 * np.cos(2 * (angle - stretched)))
+    ).second_harmonic
+    assert found.shape == (2, len(PROFILE_FORCES_N), len(RING_RADII_MM) - 2)
+    np.testing.assert_allclose(found[0], 0.02 * np.cos(2 * (stretched - bright)), atol=5e-4)
+    np.testing.assert_allclose(found[1], 0.02 * np.sin(2 * (stretched - bright)), atol=5e-4)
+
+
+def test_the_second_harmonic_is_known_at_each_force_and_ring():
+    """A line in the force times one in the radius; the bright side turns, and along is that of the forces' mean."""
+    angle = np.arctan2(Y, X)
+
+    def contrast(force_n):
+        turning = np.cos(angle) + 3 * (force_n - PROFILE_FORCES_N.mean()) * np.sin(angle)
+        return 0.02 * turning + (0.01 + 0.02 * force_n) * (1 - R / 20) * np.cos(2 * angle)
+
+    found = press_profile(recording(contrast)).second_harmonic
+    radius = RING_RADII_MM[1:-1] + RING_MM**2 / (6 * RING_RADII_MM[1:-1])
+    expected = (0.01 + 0.02 * PROFILE_FORCES_N[:, None]) * (1 - radius / 20)
+    np.testing.assert_allclose(found[0], expected, atol=5e-4)
+    np.testing.assert_allclose(found[1], 0.0, atol=5e-4)
 
 
 def random_rings(seed):

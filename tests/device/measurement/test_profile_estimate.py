@@ -7,13 +7,11 @@ import pytest
 
 from device.measurement.press_profile import press_profile
 from device.measurement.profile_estimate import doubts_about, estimate_profile
-from device.measurement.profile_model import RAMP_MODES
+from device.measurement.profile_model import RAMP_MODES, ModeLimits
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 
-NO_DOUBT = 0.0, -10.0
-"""A misfit, and log odds of lying outside."""
+LIMITS = ModeLimits(bands=(), misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
 
 
 @pytest.fixture(scope="module")
@@ -89,23 +87,84 @@ def test_gel_on_the_face_gets_no_numbers(pressed, profile_model, calibration):
     assert estimate_profile(wet, "standard", profile_model, calibration).size_mm.value is None
 
 
-def test_every_doubt_is_said_in_its_own_sentence(ramp, profile_model):
-    profile, limits = press_profile(ramp), profile_model.limits["standard"]
-    assert doubts_about(profile, *NO_DOUBT, limits) == []
-    misfit = doubts_about(profile, 2 * limits.misfit_ratio, NO_DOUBT[1], limits)
-    beyond = doubts_about(profile, NO_DOUBT[0], limits.outside_log_odds + 0.1, limits)
-    oblong = replace(profile, elongation=np.full_like(profile.elongation, 0.1))
-    assert "misfit" in misfit[0]
-    assert "Size or depth rather lies outside its trained range" in beyond[0]
-    assert doubts_about(profile, NO_DOUBT[0], float("nan"), limits) != []
-    assert "not round" in doubts_about(oblong, *NO_DOUBT, limits)[0]
+def test_what_is_at_its_limit_is_usual():
+    assert doubts_about(1.2, 3.0, 0.5, LIMITS) == []
+
+
+@pytest.mark.parametrize(
+    ("doubtful", "sentence"),
+    [
+        ((1.31, 3.0, 0.5), "No single round inclusion explains this press: misfit 1.31, above the usual 1.20."),
+        (
+            (1.2, 4.26, 0.5),
+            "The lump is not round: its elongation is 4.3 standard deviations from a round one's, above the usual 3.0.",
+        ),
+        ((1.2, 3.0, 0.6), "Size or depth rather lies outside its trained range: log odds 0.6, above the usual 0.5."),
+    ],
+)
+def test_every_doubt_is_said_in_its_own_sentence(doubtful, sentence):
+    assert doubts_about(*doubtful, LIMITS) == [sentence]
+
+
+def test_all_doubts_are_said_and_what_is_no_number_is_doubted_too():
+    for everything in ((2.0, 9.0, 1.0), (float("nan"),) * 3):
+        found = doubts_about(*everything, LIMITS)
+        assert [sentence.split(":")[0] for sentence in found] == [
+            "No single round inclusion explains this press",
+            "The lump is not round",
+            "Size or depth rather lies outside its trained range",
+        ]
+
+
+def stretched_spot(recording, contrast):
+    """Return the recording with the second harmonic of a Gaussian spot of 3 mm that is stretched along the x-axis.
+
+    `contrast` is the largest of that harmonic, where r^2 = 2 s^2. Counts are whole numbers again by chance, so that
+    their means are what they would be without.
+    """
+    rng = np.random.default_rng(1)
+    x, y = recording.camera.scale.coordinates_mm(recording.frames[0].counts.shape)
+    r2 = (x**2 + y**2) / (2 * 3.0**2)
+    share = 1 + contrast * r2 * np.exp(1 - r2) * np.cos(2 * np.arctan2(y, x))
+    return replace(
+        recording,
+        frames=tuple(
+            replace(f, counts=np.floor(f.counts * share + rng.random(share.shape)).astype(np.uint8))
+            if f.role == "press"
+            else f
+            for f in recording.frames
+        ),
+    )
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_an_oblong_spot_gets_no_numbers_and_a_reason(pressed, profile_model, calibration, mode):
+    """2 % of the light, ten times what flat field and model leave open; the rings' means stay as they were."""
+    oblong = stretched_spot(pressed(mode), 0.02)
+    rings, as_before = (press_profile(recording).contrast for recording in (oblong, pressed(mode)))
+    np.testing.assert_allclose(rings, as_before, atol=2e-3)
+    estimate = estimate_profile(oblong, mode, profile_model, calibration)
+    assert estimate.status == "outside_range"
+    assert "The lump is not round" in estimate.reason
+    assert estimate.size_mm.value is None
+
+
+def test_a_round_lumps_elongation_is_told_beside_the_other_features(ramp, profile_model, calibration):
+    features = estimate_profile(ramp, "standard", profile_model, calibration).features
+    assert 0 < features["elongation_deviations"] < profile_model.limits["standard"].elongation_deviations
+    assert "elongation_ratio" not in features
 
 
 def test_a_lump_beside_the_axis_is_not_called_oblong(pressed, profile_model):
-    """2 mm aside the second harmonic of a sphere is far above noise; its first explains it."""
+    """2 mm aside the second harmonic of a sphere is far above noise; its best fit's is as large."""
     aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
-    assert np.abs(aside.elongation).max() > 0.005
-    assert elongation_ratio(aside.elongation, aside.offset) < profile_model.limits["precise"].elongation_ratio
+    best, spot = profile_model.answer(aside.as_row(), "precise").best, profile_model.round_spot
+    assert np.abs(aside.second_harmonic).max() > 0.005
+    limit = profile_model.limits["precise"].elongation_deviations
+    assert spot.elongation_deviations(aside.second_harmonic, best, "precise") < limit
+    on_axis = best.copy()
+    on_axis[-1] = -1.0
+    assert spot.elongation_deviations(aside.second_harmonic, on_axis, "precise") > limit
 
 
 def test_full_scale_pixels_are_refused(ramp, profile_model, calibration):

@@ -37,7 +37,8 @@ def profile_of(contrast, offset=None, elongation=None, residual=0.0):
     contrast = np.broadcast_to(contrast, (FORCES, len(R))).astype(float)
     at_force = [np.broadcast_to(zero if h is None else h, (FORCES, len(zero))) for h in (offset, elongation)]
     harmonics = [h.mean(axis=0) for h in at_force]
-    return PressProfile(PROFILE_FORCES_N, contrast, np.zeros((FORCES - 1, len(R))), *harmonics, *at_force, residual)
+    growth, second = np.zeros((FORCES - 1, len(R))), np.zeros((2, FORCES, len(zero) - 1))
+    return PressProfile(PROFILE_FORCES_N, contrast, growth, *harmonics, *at_force, second, residual)
 
 
 def bell(sigma_mm, peak=0.3, constant=0.0):

@@ -5,9 +5,11 @@ import pytest
 
 from device.measurement.press_noise import light_ratio
 from device.measurement.press_parameters import NOMINAL
-from host_tools.inverse import camera_noise
-from host_tools.inverse.camera_noise import camera_covariance, shrinkage, shrunk_covariance
-from host_tools.inverse.press_samples import profile_rows
+from device.measurement.press_profile import PROFILE_FORCES_N
+from device.measurement.ring_means import RINGS
+from host_tools.inverse import camera_noise as module
+from host_tools.inverse.camera_noise import camera_noise, shrinkage, shrunk_covariance
+from host_tools.inverse.press_samples import exact_presses
 from host_tools.inverse.recorded_presses import RecordedPresses
 
 
@@ -43,20 +45,29 @@ def test_fewer_recordings_than_columns_still_leave_a_covariance_that_can_be_inve
     assert np.linalg.eigvalsh(shrunk_covariance(errors)).min() > 0.1
 
 
-def test_the_covariance_is_that_of_recorded_rows_about_the_exact_ones(tables, monkeypatch):
-    """Recordings that are the exact rows plus known errors, as large as the light, give back the errors' covariance."""
-    drawn = np.array([[12.0, 6.0, 60.0, *NOMINAL.values()], [9.0, 5.0, 120.0, *NOMINAL.values()]])
-    exact = profile_rows(tables, drawn)
-    errors = np.random.default_rng(2).normal(0, 1e-3, exact.shape)
+def test_the_covariances_are_those_of_what_is_recorded_about_the_exact_values(tables, monkeypatch):
+    """Recordings that are the exact rows and second harmonics plus known errors, as large as the light, give back the
+    errors' covariance; those of second harmonics along and across the offset count as twice as many."""
+    aside = (NOMINAL | {"offset_mm": 1.5}).values()
+    drawn = np.array([[12.0, 6.0, 60.0, *aside], [9.0, 5.0, 120.0, *aside]])
+    exact, along = exact_presses(tables, drawn)
+    rng, forces = np.random.default_rng(2), len(PROFILE_FORCES_N)
+    errors = rng.normal(0, 1e-3, exact.shape)
+    of_second = rng.normal(0, 1e-3, (2, 2, forces, RINGS - 2))
+    light = 1 + exact[:, : forces * RINGS].reshape(2, 1, forces, RINGS)[..., 1:-1]
+    second = light * of_second
+    second[:, 0] += along.reshape(2, forces, RINGS - 2)
     asked = {}
 
     def record(tables, parameters, mode, *, seed, jobs):
         asked.update(mode=mode, seed=seed, jobs=jobs)
-        return RecordedPresses(parameters, exact + light_ratio(exact) * errors, np.zeros(2))
+        return RecordedPresses(parameters, exact + light_ratio(exact) * errors, second)
 
-    monkeypatch.setattr(camera_noise, "draw_parameters", lambda count, rng: drawn[:count])
-    monkeypatch.setattr(camera_noise, "record_presses", record)
-    found = camera_covariance(tables, "precise", 2, seed=9, jobs=1)
-    np.testing.assert_allclose(found, shrunk_covariance(errors), atol=1e-12)
+    monkeypatch.setattr(module, "draw_parameters", lambda count, rng: drawn[:count])
+    monkeypatch.setattr(module, "record_presses", record)
+    found = camera_noise(tables, "precise", 2, seed=9, jobs=1)
     assert asked == {"mode": "precise", "seed": 9, "jobs": 1}
-    assert np.diag(found) == pytest.approx(np.mean(errors**2, axis=0))
+    np.testing.assert_allclose(found.rows, shrunk_covariance(errors), atol=1e-12)
+    assert np.diag(found.rows) == pytest.approx(np.mean(errors**2, axis=0))
+    np.testing.assert_allclose(found.second_harmonics, shrunk_covariance(of_second.reshape(4, -1)), atol=1e-12)
+    assert np.diag(found.second_harmonics) == pytest.approx(np.mean(of_second**2, axis=(0, 1)).ravel())

@@ -1,4 +1,4 @@
-"""The bundle of the ramp modes: the network NumPy has, the surrogate it was trained with, limits of both modes."""
+"""The bundle of the ramp modes: the network NumPy has, surrogate and round spot of its training, both modes' limits."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ import pytest
 from small_surrogate import COLUMNS, random_surrogate, white_noise
 
 from device.measurement.confidence import Bands
+from device.measurement.legendre import LegendreSum
 from device.measurement.model_card import BundleRefused
 from device.measurement.press_parameters import NUISANCES, PARAMETERS, RANGES
-from device.measurement.press_profile import ROW_NAMES
+from device.measurement.press_profile import PROFILE_FORCES_N, ROW_NAMES
+from device.measurement.press_surrogate import PressSurrogate
 from device.measurement.profile_model import RAMP_MODES, SURROGATE_FILE, ProfileModel
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.range_test import RANGE_FILE
+from device.measurement.ring_means import RINGS
+from device.measurement.round_spot import ROUND_FILE, SECOND_COLUMNS, RoundSpot
 from host_tools.inverse import export_profile as exporting
 from host_tools.inverse.dense_network import LARGEST_LOG_VARIANCE, InputScaling, Layer, initial_layers
 from host_tools.inverse.ensemble_network import build_network, physical_estimate
@@ -52,7 +56,16 @@ def made_outcome(misfit_ratio: float) -> ModeOutcome:
     bands = tuple(Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
     seen = Answered(truth, truth + 0.05, np.full((64, 3), 0.1))
-    return ModeOutcome(bands, misfit_ratio, 0.8, 0.3, seen, seen)
+    return ModeOutcome(bands, misfit_ratio, 2.0 + misfit_ratio, 0.3, seen, seen)
+
+
+def made_round_spot(surrogate: PressSurrogate) -> RoundSpot:
+    rng = np.random.default_rng(12)
+    second = LegendreSum(
+        rng.integers(0, 4, (6, len(PARAMETERS))).astype(np.uint8), rng.normal(size=(6, SECOND_COLUMNS))
+    )
+    factors = {mode: rng.normal(0, 1e-3, (SECOND_COLUMNS, SECOND_COLUMNS)) for mode in RAMP_MODES}
+    return RoundSpot(surrogate, second, {mode: factor @ factor.T for mode, factor in factors.items()})
 
 
 def made_ranges(rows: np.ndarray) -> TrainedRange:
@@ -74,11 +87,13 @@ def trained() -> TrainedProfile:
     return TrainedProfile(
         surrogate=surrogate,
         surrogate_error=np.array([1e-4, 3e-4]),
+        round_error=np.array([2e-4, 5e-4]),
         noise={"standard": white_noise(2e-3), "precise": white_noise(1e-3)},
         ensemble=made_ensemble(rows),
         ranges=made_ranges(rows),
+        round_spot=made_round_spot(surrogate),
         outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
-        samples=PressSamples(draw_parameters(PRESSES, rng), rows),
+        samples=PressSamples(draw_parameters(PRESSES, rng), rows, np.zeros((PRESSES, SECOND_COLUMNS))),
         effort=QUICK_EFFORT,
         seed=11,
     )
@@ -148,6 +163,27 @@ def test_the_device_gets_back_surrogate_and_noise(trained: TrainedProfile, model
         np.testing.assert_array_equal(model.answers.noise[mode].camera, noise.camera)
 
 
+def test_the_device_gets_back_what_is_round(trained: TrainedProfile, model: ProfileModel) -> None:
+    """Second harmonics to single precision, the camera's covariances exactly."""
+    unit = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
+    expected = trained.round_spot.second_harmonics(unit)
+    found = model.round_spot.second_harmonics(unit)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    assert set(model.round_spot.camera) == set(RAMP_MODES)
+    for mode, camera in trained.round_spot.camera.items():
+        np.testing.assert_array_equal(model.round_spot.camera[mode], camera)
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_the_device_tells_as_many_deviations_from_round_as_the_training(trained, model, mode) -> None:
+    """To single precision of surrogate and second harmonics."""
+    second = np.random.default_rng(10).normal(0, 0.1, (2, len(PROFILE_FORCES_N), RINGS - 2))
+    best = np.random.default_rng(11).uniform(-0.5, 0.5, len(PARAMETERS))
+    found, expected = (one.round_spot.elongation_deviations(second, best, mode) for one in (model, trained))
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert expected > 1
+
+
 @pytest.mark.parametrize("mode", RAMP_MODES)
 def test_the_device_gets_back_the_log_odds_of_each_mode(trained: TrainedProfile, model: ProfileModel, mode) -> None:
     rows = np.random.default_rng(8).normal(0, 0.3, (50, COLUMNS)).astype(np.float32).astype(float)
@@ -178,9 +214,9 @@ def test_networks_of_the_ranges_that_differ_from_numpy_are_refused(trained, tmp_
 
 def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedProfile, model: ProfileModel) -> None:
     assert (model.limits["standard"].misfit_ratio, model.limits["precise"].misfit_ratio) == (1.3, 1.2)
-    assert (model.limits["standard"].elongation_ratio, model.limits["standard"].outside_log_odds) == (0.8, 0.3)
+    assert (model.limits["standard"].elongation_deviations, model.limits["precise"].elongation_deviations) == (3.3, 3.2)
     for limits in model.limits.values():
-        assert limits.elongation_ratio == 0.8
+        assert limits.outside_log_odds == 0.3
         assert [bands.high[0, 0] for bands in limits.bands] == [1.5, 1.6, 1.7]
         assert [bands.low[1, 1] for bands in limits.bands] == [-1.5, -1.6, -1.7]
     assert model.limits["standard"].bands[0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
@@ -196,6 +232,8 @@ def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trai
     assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
     assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()
     assert (card["surrogate_error"]["largest"], card["surrogate_error"]["mean"]) == pytest.approx((3e-4, 2e-4))
+    assert card["round_sha256"] == hashlib.sha256((folder / ROUND_FILE).read_bytes()).hexdigest()
+    assert (card["round_error"]["largest"], card["round_error"]["mean"]) == pytest.approx((5e-4, 3.5e-4))
     ranges = card["training_range"]
     assert {name: tuple(ends) for name, ends in (ranges["unknowns"] | ranges["nuisances"]).items()} == {
         name: (RANGES[name].low, RANGES[name].high) for name in (*UNKNOWNS, *NUISANCES)
@@ -228,7 +266,7 @@ def test_the_same_parts_give_the_same_bytes(trained: TrainedProfile, folder: Pat
     twice = folder, write(trained, tmp_path / "demo")
     first, again = ({path.name: path.read_bytes() for path in at.iterdir()} for at in twice)
     assert first == again
-    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE, RANGE_FILE}
+    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE, RANGE_FILE, ROUND_FILE}
 
 
 def changed(trained: TrainedProfile, tmp_path: Path, file: str) -> Path:
@@ -244,6 +282,7 @@ def changed(trained: TrainedProfile, tmp_path: Path, file: str) -> Path:
     [
         (SURROGATE_FILE, "surrogate.npz is [0-9a-f]{64}"),
         (RANGE_FILE, "range.onnx is [0-9a-f]{64}"),
+        (ROUND_FILE, "round.npz is [0-9a-f]{64}"),
         ("model.onnx", "sha256"),
     ],
 )
@@ -252,10 +291,30 @@ def test_a_changed_bit_is_refused_by_the_device(trained, tmp_path, file, named) 
         ProfileModel.load(changed(trained, tmp_path, file))
 
 
-def test_a_missing_surrogate_is_refused_by_the_device(trained: TrainedProfile, tmp_path: Path) -> None:
+@pytest.mark.parametrize("file", [SURROGATE_FILE, ROUND_FILE])
+def test_a_missing_file_is_refused_by_the_device(trained: TrainedProfile, tmp_path: Path, file: str) -> None:
     folder = write(trained, tmp_path / "demo")
-    (folder / SURROGATE_FILE).unlink()
-    with pytest.raises(BundleRefused, match=r"surrogate.npz is missing, but must be [0-9a-f]{64}"):
+    (folder / file).unlink()
+    with pytest.raises(BundleRefused, match=f"{file} is missing, but must be [0-9a-f]{{64}}"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_that_states_no_hash_of_the_round_spot_is_refused_by_the_device(trained, tmp_path) -> None:
+    """As one of before there was a round spot."""
+    folder = write(trained, tmp_path / "demo")
+    card = json.loads((folder / "model.json").read_text())
+    del card["round_sha256"]
+    (folder / "model.json").write_text(json.dumps(card))
+    with pytest.raises(BundleRefused, match=r"round.npz is [0-9a-f]{64}, but must be None as model.json states"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_without_a_modes_usual_elongation_is_refused_by_the_device(trained, tmp_path) -> None:
+    folder = write(trained, tmp_path / "demo")
+    card = json.loads((folder / "model.json").read_text())
+    del card["modes"]["precise"]["elongation_deviations"]
+    (folder / "model.json").write_text(json.dumps(card))
+    with pytest.raises(BundleRefused, match="elongation_deviations"):
         ProfileModel.load(folder)
 
 

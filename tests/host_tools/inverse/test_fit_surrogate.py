@@ -1,6 +1,7 @@
 """Polynomials are recovered from their own rows, and which terms they have is counted on paper."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from device.measurement.legendre import LegendreSum
 from device.measurement.press_parameters import PARAMETERS, to_unit
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS, PressSurrogate
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.round_spot import SECOND_COLUMNS
 from host_tools.inverse import fit_surrogate as module
 from host_tools.inverse.fit_surrogate import degrees, fit_surrogate, held_out_error
 from host_tools.inverse.press_samples import PressSamples, draw_parameters
@@ -36,7 +38,7 @@ def truth() -> PressSurrogate:
 
 def samples_of(surrogate: PressSurrogate, count: int, seed: int) -> PressSamples:
     parameters = draw_parameters(count, np.random.default_rng(seed))
-    return PressSamples(parameters, surrogate.rows(to_unit(parameters)))
+    return PressSamples(parameters, surrogate.rows(to_unit(parameters)), np.zeros((count, SECOND_COLUMNS)))
 
 
 def test_a_polynomial_surrogate_is_recovered_from_its_own_rows(truth):
@@ -56,7 +58,7 @@ def test_the_error_on_presses_kept_apart_is_that_of_the_rows(truth):
 
 def test_noise_in_rows_is_averaged_over_presses_and_not_followed(truth):
     samples, std = samples_of(truth, 600, seed=2), 1e-3
-    noisy = PressSamples(samples.parameters, samples.rows + np.random.default_rng(4).normal(0, std, samples.rows.shape))
+    noisy = replace(samples, rows=samples.rows + np.random.default_rng(4).normal(0, std, samples.rows.shape))
     error = held_out_error(fit_surrogate(noisy), samples)
     expected = std * np.sqrt(len(truth.lump.degrees) / 600)
     assert np.mean(error[:CONTRAST_COLUMNS]) == pytest.approx(expected, rel=0.1)

@@ -8,15 +8,18 @@ from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
 from device.measurement.confidence import Bands
 from device.measurement.press_parameters import EVEN_STD, PARAMETERS, from_unit
+from device.measurement.press_profile import PROFILE_FORCES_N
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
-from device.measurement.profile_model import ProfileAnswers
+from device.measurement.profile_model import Answer, ProfileAnswers
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.ring_means import RINGS
 from host_tools.inverse.confidence_bands import confidence_bands
 from host_tools.inverse.mode_outcome import (
     USUAL_RATIO,
     Answered,
     ModeOutcome,
     answers_to,
+    elongations,
     judged_mode,
     usual_log_odds,
 )
@@ -47,6 +50,20 @@ class FirstColumn:
         return rows[:, 0]
 
 
+class FirstHarmonic:
+    """In place of a round spot: the first of the second harmonics is the deviations."""
+
+    def elongation_deviations(self, second: np.ndarray, best: np.ndarray, mode: str) -> float:
+        return float(second[0, 0, 0])
+
+
+def harmonics(deviations: np.ndarray) -> np.ndarray:
+    """Return second harmonics [n, 2, K, J - 2] of which that toy tells deviations [n]."""
+    found = np.zeros((len(deviations), 2, len(PROFILE_FORCES_N), RINGS - 2))
+    found[:, 0, 0, 0] = deviations
+    return found
+
+
 def gaussian(count: int, seed: int) -> Answered:
     truth = even(count, 3, seed)
     return Answered(
@@ -61,7 +78,12 @@ def exact_bands(bound: float) -> tuple[Bands, ...]:
 
 
 def some(recorded: RecordedPresses, count: int) -> RecordedPresses:
-    return RecordedPresses(recorded.parameters[:count], recorded.rows[:count], recorded.elongation[:count])
+    return RecordedPresses(recorded.parameters[:count], recorded.rows[:count], recorded.second_harmonics[:count])
+
+
+def judged(answers: ProfileAnswers, pool: Pool, recorded: RecordedPresses, seed: int = 4) -> ModeOutcome:
+    toys = FirstColumns(), answers, pool, recorded, FirstHarmonic()
+    return judged_mode("standard", *toys, outside_log_odds=0.3, seed=seed, jobs=1)
 
 
 @pytest.fixture(scope="module")
@@ -90,12 +112,12 @@ def recorded(answers) -> RecordedPresses:
     unit = even(RECORDED, len(PARAMETERS), 2) * 0.8
     unit[:, :3] = 0.0
     rows = answers.surrogate.rows(unit) + np.random.default_rng(3).normal(0, STD, (RECORDED, COLUMNS))
-    return RecordedPresses(from_unit(unit), rows, np.arange(1.0, RECORDED + 1))
+    return RecordedPresses(from_unit(unit), rows, harmonics(np.arange(1.0, RECORDED + 1)))
 
 
 @pytest.fixture(scope="module")
 def outcome(answers, pool, recorded) -> ModeOutcome:
-    return judged_mode("standard", FirstColumns(), answers, pool, recorded, outside_log_odds=0.3, seed=4, jobs=1)
+    return judged(answers, pool, recorded)
 
 
 def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
@@ -139,11 +161,11 @@ def test_bands_come_from_the_first_halves_alone(outcome, answers, pool, recorded
     """Truths that lie elsewhere in the second half, simulated or recorded, leave the bands what they were."""
     parameters = recorded.parameters.copy()
     parameters[RECORDED // 2 :, :3] = from_unit(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
-    elsewhere = RecordedPresses(parameters, recorded.rows, recorded.elongation)
+    elsewhere = RecordedPresses(parameters, recorded.rows, recorded.second_harmonics)
     unit = pool.unit.copy()
     unit[COUNT // 2 :] *= -1
     turned = Pool(unit, pool.rows, pool.sampler)
-    other = judged_mode("standard", FirstColumns(), answers, turned, elsewhere, outside_log_odds=0.3, seed=4, jobs=1)
+    other = judged(answers, turned, elsewhere)
     for one, again in zip(outcome.bands, other.bands, strict=True):
         np.testing.assert_array_equal(one.low, again.low)
         np.testing.assert_array_equal(one.high, again.high)
@@ -157,15 +179,26 @@ def test_recorded_answers_keep_their_truth_and_the_networks_mean(outcome, record
 
 
 def test_a_usual_elongation_is_one_that_few_recordings_pass(outcome, recorded):
-    """Elongations of 1, 2 ... 150: the quantile 0.985 lies at 1 + 0.985 x 149."""
-    assert outcome.elongation_ratio == pytest.approx(1 + USUAL_RATIO * (RECORDED - 1))
+    """Elongations of 1, 2 ... 150: the quantile 0.9875 lies at 1 + 0.9875 x 149."""
+    assert outcome.elongation_deviations == pytest.approx(1 + USUAL_RATIO * (RECORDED - 1))
+
+
+def test_an_elongation_is_that_of_a_press_about_its_own_best_fit_in_its_mode(recorded):
+    class Told:
+        def elongation_deviations(self, second, best, mode):
+            return second[0, 0, 0] + 1000 * best[0] + len(mode)
+
+    none = np.zeros(3)
+    found = [Answer(none, none, 1.0, best=np.full(len(PARAMETERS), number)) for number in (0.0, 1.0)]
+    told = elongations(Told(), some(recorded, 2), found, "precise")
+    np.testing.assert_array_equal(told, [1 + 7, 2 + 1000 + 7])
 
 
 def test_a_usual_misfit_is_a_high_quantile_of_chi_square(outcome):
-    """Less the eight parameters that fit: COLUMNS - 8 degrees of freedom, whose 0.985 quantile is 2.17 deviations
-    above their number (and 0.6 for its skewness); of 150 draws it strays by a twentieth."""
+    """Less the eight parameters that fit: COLUMNS - 8 degrees of freedom, whose 0.9875 quantile is 2.24
+    deviations above their number (and a little for its skewness); of 150 draws it strays by a twentieth."""
     freedom = COLUMNS - TOLD.sum()
-    expected = (freedom + 2.17 * np.sqrt(2 * freedom) + 2 / 3 * (2.17**2 - 1)) / COLUMNS
+    expected = (freedom + 2.24 * np.sqrt(2 * freedom) + 2 / 3 * (2.24**2 - 1)) / COLUMNS
     assert outcome.misfit_ratio == pytest.approx(expected, rel=0.15)
 
 
@@ -188,10 +221,7 @@ def test_the_log_odds_are_kept_as_they_are_told(outcome):
 
 def test_the_same_seed_gives_the_same_answers_and_another_one_other_noise(outcome, answers, pool, recorded):
     few = some(recorded, 2)
-    again, other = (
-        judged_mode("standard", FirstColumns(), answers, pool, few, outside_log_odds=0.3, seed=seed, jobs=1)
-        for seed in (4, 5)
-    )
+    again, other = (judged(answers, pool, few, seed) for seed in (4, 5))
     np.testing.assert_array_equal(again.simulated.mean, outcome.simulated.mean)
     assert (other.simulated.mean != again.simulated.mean).mean() > 0.99
 

@@ -1,4 +1,4 @@
-"""Random presses are drawn as the priors say, and their rows are what a recording of the same press gives."""
+"""Random presses are drawn as the priors say; rows and second harmonics are what a recording of the press gives."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,16 @@ from device.measurement.press_parameters import HIGH, LOW, NOMINAL, NUISANCES, P
 from device.measurement.press_profile import RAMP_HIGH_N, press_profile
 from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET
 from device.measurement.quantities import Inclusion
-from host_tools.inverse.press_samples import NEAREST_MM, draw_parameters, profile_rows, sample_presses
+from device.measurement.ring_means import RINGS
+from device.simulation.pressed_face import Placement
+from host_tools.inverse.press_samples import (
+    NEAREST_MM,
+    PressSamples,
+    draw_parameters,
+    exact_presses,
+    profile_rows,
+    sample_presses,
+)
 from host_tools.phantom import Protocol, phantom_recording
 
 COUNT = 20_000
@@ -98,10 +107,55 @@ def test_a_lump_beside_the_axis_shows_in_the_offset(tables):
     assert beside[CONTRAST_COLUMNS + GROWTH_COLUMNS :].max() > 5e-3
 
 
+OFFSETS_MM = (0.0, 1.0, 2.0)
+
+
+@pytest.fixture(scope="module")
+def second(tables) -> np.ndarray:
+    """Second harmonics [3, K, J - 2] of a lump at each offset."""
+    found = exact_presses(tables, np.array([at(LUMP, offset_mm=offset_mm) for offset_mm in OFFSETS_MM]))[1]
+    return found.reshape(len(OFFSETS_MM), -1, RINGS - 2)
+
+
+def test_a_lump_on_the_axis_has_no_second_harmonic_and_one_beside_it_has(second):
+    """Bright towards both sides where the spot falls off, and across them nearer to its middle."""
+    np.testing.assert_allclose(second[0], 0.0, atol=1e-6)
+    assert second[2].max() > 1e-2
+    assert second[2].min() < -5e-3
+
+
+def test_the_second_harmonic_is_one_of_the_square_of_the_offset(second):
+    """Half the offset, a quarter as much; the tables' own steps and the next order leave 2e-4 where it is 1e-2."""
+    np.testing.assert_allclose(second[1], second[2] / 4, atol=2e-4)
+
+
+def test_second_harmonics_are_those_of_a_recording_of_the_same_press(tables):
+    """Whichever side the lump lies on, they are told along it, and nothing is left across."""
+    side, offset_mm = 0.8, 1.5
+    place = Placement(offset_mm * np.cos(side), offset_mm * np.sin(side))
+    ramp = Protocol(tuple(np.linspace(0.09, RAMP_HIGH_N + 0.08, 24)), frames=1, place=place)
+    recorded = press_profile(phantom_recording(LUMP, tables, seed=1, protocol=ramp)).second_harmonic
+    rows, second = exact_presses(tables, at(LUMP, offset_mm=offset_mm)[None])
+    along = second.reshape(1, -1, RINGS - 2)[0]
+    np.testing.assert_array_equal(rows, profile_rows(tables, at(LUMP, offset_mm=offset_mm)[None]))
+    assert along.max() > 5e-3
+    np.testing.assert_allclose(recorded[0], along, atol=1e-3)
+    np.testing.assert_allclose(recorded[1], 0.0, atol=1e-3)
+
+
+def test_presses_are_split_with_all_that_belongs_to_them():
+    samples = PressSamples(*(np.random.default_rng(6).normal(size=(5, columns)) for columns in (9, 87, 36)))
+    for part, chosen in zip(samples.split(2), (slice(0, 2), slice(2, 5)), strict=True):
+        for name in ("parameters", "rows", "second_harmonics"):
+            np.testing.assert_array_equal(getattr(part, name), getattr(samples, name)[chosen])
+
+
 def test_the_same_seed_gives_the_same_presses(tables):
     """Seed 13 draws two lumps near 95 kPa."""
     done: list[int] = []
     first = sample_presses(tables, 2, seed=13, jobs=1, on_done=done.append)
-    np.testing.assert_array_equal(first.rows, profile_rows(tables, first.parameters))
+    rows, second_harmonics = exact_presses(tables, first.parameters)
+    np.testing.assert_array_equal(first.rows, rows)
+    np.testing.assert_array_equal(first.second_harmonics, second_harmonics)
     np.testing.assert_array_equal(first.parameters, draw_parameters(2, np.random.default_rng(13), lumps_a_skin=3))
     assert sum(done) == len(first.rows) == 2

@@ -10,8 +10,8 @@ from device.measurement.press_noise import ErrorLevels
 from device.measurement.press_parameters import PARAMETERS, from_unit
 from device.measurement.ring_means import RINGS
 from host_tools.inverse import quick_training
-from host_tools.inverse.mode_outcome import USUAL_RATIO, Answered
-from host_tools.inverse.quick_training import RecordedHolds, recorded_holds
+from host_tools.inverse.mode_outcome import Answered
+from host_tools.inverse.quick_training import USUAL_RATIO, RecordedHolds, recorded_holds
 from host_tools.inverse.recorded_presses import EXACT, recorded_press
 from host_tools.inverse.seeds import press_seed
 

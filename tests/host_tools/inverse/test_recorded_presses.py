@@ -9,7 +9,6 @@ from device.measurement.press_parameters import NOMINAL, PARAMETERS
 from device.measurement.press_profile import press_profile
 from device.measurement.quantities import Inclusion
 from device.measurement.recording import Recording
-from device.measurement.roundness import elongation_ratio
 from device.simulation.neighbour import Neighbour
 from device.simulation.skin import Skin
 from host_tools.inverse.press_samples import draw_parameters
@@ -93,14 +92,14 @@ def test_drift_of_light_and_cell_is_in_the_press_frames_alone(tables, recording)
     assert all((found.counts != frame.counts).any() for frame, found in pairs)
 
 
-def test_rows_are_those_of_each_press_alone_with_its_own_seed(tables):
+def test_rows_and_second_harmonics_are_those_of_each_press_alone_with_its_own_seed(tables):
     """So they are the same whoever takes which of them."""
     parameters = np.array([LUMP, [8.0, 5.0, 120.0, *NOMINAL.values()]])
     found = record_presses(tables, parameters, "standard", seed=3, jobs=1)
     for number, one in enumerate(parameters):
         profile = press_profile(recorded_press(tables, one, "standard", 300_000 + number))
         np.testing.assert_array_equal(found.rows[number], profile.as_row())
-        assert found.elongation[number] == elongation_ratio(profile.elongation, profile.offset)
+        np.testing.assert_array_equal(found.second_harmonics[number], profile.second_harmonic)
     assert found.parameters is parameters
 
 

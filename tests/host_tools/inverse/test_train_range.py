@@ -7,6 +7,7 @@ from scipy.stats import norm
 from small_surrogate import COLUMNS, white_noise
 
 from device.measurement.press_parameters import to_unit
+from device.measurement.round_spot import SECOND_COLUMNS
 from host_tools.inverse import train_range
 from host_tools.inverse.fit_surrogate import LUMP_HIGHEST, LUMP_REACH
 from host_tools.inverse.noisy_presses import NoiseSampler, Pool
@@ -77,7 +78,7 @@ def surrogate() -> WideSurrogate:
     with pytest.MonkeyPatch.context() as patch:  # terms of the probe's own surrogate are half as many, and enough here
         patch.setattr(train_range, "REACH", LUMP_REACH)
         patch.setattr(train_range, "HIGHEST", LUMP_HIGHEST)
-        return wide_surrogate(PressSamples(parameters, far_rows(parameters)))
+        return wide_surrogate(PressSamples(parameters, far_rows(parameters), np.zeros((3200, SECOND_COLUMNS))))
 
 
 def far_rows(parameters: np.ndarray) -> np.ndarray:

@@ -24,9 +24,9 @@ def test_the_best_test_flags_as_the_normal_law_says(deviations, share):
 
 
 def test_one_of_three_doubts_has_less_than_a_third_of_the_false_flags():
-    """1.5 % of the presses inside: a test that flags half of what is 2.17 deviations apart."""
+    """1.25 % of the presses inside: a test that flags half of what is 2.24 deviations apart."""
     assert 3 * FALSE_FLAGS < FALSE_AT_MOST
-    assert Twin(INSIDE, 2.1701).most_flagged() == pytest.approx(0.5, abs=1e-4)
+    assert Twin(INSIDE, 2.2414).most_flagged() == pytest.approx(0.5, abs=1e-4)
 
 
 def test_a_lump_inside_is_its_own_twin(tables):
@@ -79,7 +79,7 @@ def test_a_refusal_is_asked_for_only_where_a_test_could_tell():
     assert benchmark.measured == 0.5
     assert not benchmark.passed
     assert _row("standard", LUMPS[0], Twin(INSIDE, 4.0), found)[8:] == (
-        "97%",
+        "96%",
         "99%",
         "50%",
         "100%",

@@ -30,7 +30,13 @@ def test_installed_models_pass_with_their_deviation_and_a_missing_one_is_not_tes
 
 @pytest.mark.parametrize(
     ("name", "file"),
-    [("paper", "model.onnx"), ("paper", "model.json"), ("standard", "surrogate.npz"), ("standard", "range.onnx")],
+    [
+        ("paper", "model.onnx"),
+        ("paper", "model.json"),
+        ("standard", "surrogate.npz"),
+        ("standard", "round.npz"),
+        ("standard", "range.onnx"),
+    ],
 )
 def test_a_model_with_a_changed_file_fails_and_the_others_do_not(config, tmp_path, name, file):
     with (tmp_path / name / file).open("ab") as changed:

@@ -1,0 +1,99 @@
+"""Ellipsoids longer than wide, in the middle and beside it: what any test can tell of them from a lump that is round.
+
+Each is solved by finite elements on its own, its long axis along or across its offset. How far it lies from its
+nearest round twin inside the ranges - in the profile and in the second harmonics at once, whatever tissue and skin the
+twin has - bounds any test, as in `just_outside`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares
+
+from device.measurement.fit_press import PressPosterior
+from device.measurement.mode import Mode
+from device.measurement.press_parameters import HIGH, PARAMETERS, from_unit
+from device.measurement.press_surrogate import OFFSET
+from device.measurement.profile_model import ProfileModel
+from device.measurement.quantities import Inclusion
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.inverse.press_samples import Array, exact_presses
+from host_tools.scene import Placement, Scene
+from host_tools.solved_lump import solved_lump
+from host_tools.study.just_outside import STARTS, Twin, at_nominal
+from host_tools.study.outside_presses import clear_lumps
+
+WIDTH_RATIO = (1.6, 2.4)
+
+
+@dataclass(frozen=True)
+class Oblong:
+    """An ellipsoid `width_ratio` times as long as wide and high, `offset_mm` off the axis; 1 is a sphere."""
+
+    inclusion: Inclusion
+    width_ratio: float
+    offset_mm: float
+    is_across: bool
+
+    def scene(self) -> Scene:
+        """Return the scene to be solved."""
+        x, y = (1.0, self.width_ratio) if self.is_across else (self.width_ratio, 1.0)
+        return Scene(self.inclusion, placement=Placement(offset_x_mm=self.offset_mm, width_ratio_x=x, width_ratio_y=y))
+
+    def on(self, tables: ProbeTables) -> ProbeTables:
+        """Return tables that hold this lump instead of the probe's own off the axis; some seconds."""
+        return replace(tables, off_axis=solved_lump(self.scene(), tables.off_axis))
+
+
+def draw_oblong(count: int, spheres: int, rng: np.random.Generator) -> list[Oblong]:
+    """Return so many ellipsoids, and so many spheres after them; offsets are even over the trained disk."""
+    whole = count + spheres
+    lumps, ratios = clear_lumps(whole, rng), rng.uniform(*WIDTH_RATIO, whole)
+    ratios[count:] = 1.0
+    offsets_mm, across = HIGH[OFFSET] * np.sqrt(rng.uniform(0, 1, whole)), rng.random(whole) < 0.5
+    return [
+        Oblong(Inclusion(*map(float, lump)), float(ratio), float(offset), bool(is_across))
+        for lump, ratio, offset, is_across in zip(lumps, ratios, offsets_mm, across, strict=True)
+    ]
+
+
+def nearest_round_twin(lump: Oblong, solved: ProbeTables, model: ProfileModel, mode: Mode, seed: int) -> Twin:
+    """Return the round lump that looks most like a solved ellipsoid, on nominal tissue and without noise."""
+    rows, second = exact_presses(solved, at_nominal(lump.inclusion)[None])
+    posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise[mode])
+    twin = twin_of(posterior, np.stack([second[0], np.zeros_like(second[0])]), model, mode, seed)
+    return Twin(Inclusion(*map(float, from_unit(twin[0])[:3])), twin[1])
+
+
+def twin_of(
+    posterior: PressPosterior, second: Array, model: ProfileModel, mode: Mode, seed: int
+) -> tuple[Array, float]:
+    """Return coordinates [9] and distance in standard deviations of the round lump nearest to row and harmonics."""
+    starts = np.random.default_rng(seed).uniform(-0.9, 0.9, (STARTS, len(PARAMETERS)))
+    plain = (_fit(posterior.residuals, start) for start in starts)
+    start, _ = min(plain, key=lambda found: found[1])
+    factor = np.linalg.cholesky(model.round_spot.covariance(start, mode))
+
+    def residuals(unit: Array) -> Array:
+        of_second = solve_triangular(factor, model.round_spot.left(second, unit).T, lower=True, check_finite=False)
+        return np.concatenate([posterior.residuals(unit), of_second.ravel()])
+
+    return _fit(residuals, start)
+
+
+def _fit(residuals: Callable[[Array], Array], start: Array) -> tuple[Array, float]:
+    found = least_squares(residuals, start, bounds=(-1.0, 1.0), xtol=1e-7, ftol=1e-7)
+    return np.asarray(found.x), float(np.sqrt(2 * found.cost))
+
+
+def spoken(lump: Oblong) -> Sequence[str]:
+    """Return size, depth, modulus, ratio, offset and direction as table cells."""
+    size_mm, depth_mm, modulus_kpa = lump.inclusion.as_tuple()
+    return (
+        f"{size_mm:.1f}", f"{depth_mm:.1f}", f"{modulus_kpa:.0f}", f"{lump.width_ratio:.2f}", f"{lump.offset_mm:.1f}",
+        "across" if lump.is_across else "along",
+    )  # fmt: skip
