@@ -130,6 +130,8 @@ class ProfileModel:
 def _verified(folder: Path, name: str, stated: str | None) -> Path:
     """Return the path of a bundle's file whose hash is the one stated; raises `BundleRefused`."""
     path = folder / name
+    if stated is None:
+        raise BundleRefused(folder, f"the hash of {name}", "missing", "in the card: use a bundle of this version")
     found = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
     if found != stated:
         raise BundleRefused(folder, name, found, f"{stated} as model.json states")

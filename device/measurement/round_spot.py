@@ -3,9 +3,10 @@
 A round lump beside the axis shows a second harmonic, too; polynomials tell it, as the surrogate's tell the profile.
 What is left is searched for a spot that is stretched in some direction: the contrast f(r) becomes
 f(r) + e r df/dr cos(2 (angle - a)), whose second harmonic is r df/dr times e. How far e lies from 0, in standard
-deviations of all that camera, flat field and model leave open, is Rayleigh's for a round lump.
+deviations of all that camera, flat field and model leave open, is about Rayleigh's for a round lump; what the best fit
+itself does not know adds a little, so what is usual is measured on recordings.
 Source: Kay, Fundamentals of Statistical Signal Processing II (1998), 13.4.3, a known pattern of unknown amplitude and
-phase; docs/modes.md counts how often oblong lumps and pairs of lumps are told by it.
+phase; docs/modes.md counts how often lumps that are not round, and pairs of lumps, are refused.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How far from round the bright spot is: the second harmonic of the contrast, against the most a round lump shows.
 
 A round lump off the axis has a second harmonic too, so it is compared with the first. Source of the share: random
-presses up to 2 mm off the axis; docs/modes.md counts how often oblong lumps and pairs of lumps are told by it.
+presses up to 2 mm off the axis; docs/modes.md counts how often lumps that are not round, and pairs, are refused.
 """
 
 from __future__ import annotations

@@ -28,9 +28,9 @@ from host_tools.inverse.recorded_presses import RecordedPresses, in_parallel
 from host_tools.inverse.train_ensemble import DenseEnsemble
 
 USUAL_RATIO = 0.9875
-"""Share of recorded presses inside the trained ranges whose misfit counts as usual; likewise the elongation, and the
-odds that size or depth lies outside, of those in which a lump stands out. What is left of the 5 % of false flags is for
-chance: with so many recordings their share is known to half a per cent."""
+"""Share of all recorded presses inside the trained ranges whose misfit counts as usual, and likewise the elongation; of
+the nine in ten in which a lump stands out, share of those whose odds of a size or depth outside do. What is left of the
+5 % of false flags is for chance: with so many recordings their share is known to half a per cent."""
 THREE = len(UNKNOWNS)
 Networks = Callable[[Array], tuple[Array, Array]]
 

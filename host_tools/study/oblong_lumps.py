@@ -1,8 +1,10 @@
 """Ellipsoids longer than wide, in the middle and beside it: what any test can tell of them from a lump that is round.
 
-Each is solved by finite elements on its own, its long axis along or across its offset. How far it lies from its
-nearest round twin inside the ranges - in the profile and in the second harmonics at once, whatever tissue and skin the
-twin has - bounds any test, as in `just_outside`.
+Each is solved by finite elements on its own, its long axis along or across its offset. How far a press of it lies from
+its nearest round twin inside the ranges - in the profile and in the second harmonics at once, whatever tissue and skin
+the twin has - bounds any test that, as the probe, does not know which way a lump is longer.
+Source: Lehmann & Romano, Testing Statistical Hypotheses (2005), 6.3: of tests that treat all directions alike the best
+one rejects by the length, whose square is a noncentral chi-square of two degrees of freedom.
 """
 
 from __future__ import annotations
@@ -13,10 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
+from scipy.stats import ncx2
 
 from device.measurement.fit_press import PressPosterior
 from device.measurement.mode import Mode
-from device.measurement.press_parameters import HIGH, PARAMETERS, from_unit
+from device.measurement.press_parameters import HIGH, PARAMETERS
 from device.measurement.press_surrogate import OFFSET
 from device.measurement.profile_model import ProfileModel
 from device.measurement.quantities import Inclusion
@@ -24,7 +27,7 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.inverse.press_samples import Array, exact_presses
 from host_tools.scene import Placement, Scene
 from host_tools.solved_lump import solved_lump
-from host_tools.study.just_outside import STARTS, Twin, at_nominal
+from host_tools.study.just_outside import STARTS
 from host_tools.study.outside_presses import clear_lumps
 
 WIDTH_RATIO = (1.6, 2.4)
@@ -61,12 +64,17 @@ def draw_oblong(count: int, spheres: int, rng: np.random.Generator) -> list[Oblo
     ]
 
 
-def nearest_round_twin(lump: Oblong, solved: ProbeTables, model: ProfileModel, mode: Mode, seed: int) -> Twin:
-    """Return the round lump that looks most like a solved ellipsoid, on nominal tissue and without noise."""
-    rows, second = exact_presses(solved, at_nominal(lump.inclusion)[None])
+def round_deviations(solved: ProbeTables, parameters: Array, model: ProfileModel, mode: Mode, seed: int) -> float:
+    """Return how many standard deviations a press [9] of a solved lump, without noise, lies from any round one."""
+    rows, second = exact_presses(solved, parameters[None])
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise[mode])
-    twin = twin_of(posterior, np.stack([second[0], np.zeros_like(second[0])]), model, mode, seed)
-    return Twin(Inclusion(*map(float, from_unit(twin[0])[:3])), twin[1])
+    return twin_of(posterior, np.stack([second[0], np.zeros_like(second[0])]), model, mode, seed)[1]
+
+
+def most_flagged(deviations: Array, false_flags: float) -> Array:
+    """Return the largest shares that a test can flag of presses so far from round, when it flags `false_flags` of round
+    ones and treats all directions alike."""
+    return np.asarray(ncx2.sf(-2 * np.log(false_flags), 2, np.square(deviations)))
 
 
 def twin_of(

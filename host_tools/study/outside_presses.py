@@ -27,7 +27,7 @@ from host_tools.surface_table import press_ramps
 ORDINARY, PRESSES, SOLVED = 600, 40, 5
 """So many ordinary ones tell a share of 4 % to 0.8 %."""
 SKINS_A_SOLUTION = 5
-"""Presses of each solved lump, on other skins and tilted otherwise."""
+"""Presses of each solved lump, on other skins."""
 CLEAR_SIZE_MM, CLEAR_DEPTH_MM, CLEAR_KPA = (5.0, 10.0), (4.0, 7.0), (30.0, 150.0)
 """Lumps that show well, so that it is their company or shape that must be noticed."""
 GAP_MM, WET_RATIO = (0.5, 4.0), (0.1, 0.6)

@@ -1,4 +1,4 @@
-"""Which ellipsoids are judged, how the shares are counted, and that each press is of its own lump."""
+"""Which presses are judged, how the shares are counted, and that each press is of its own lump."""
 
 from dataclasses import replace
 
@@ -6,23 +6,33 @@ import numpy as np
 import pytest
 
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
+from device.measurement.press_noise import ErrorLevels
+from host_tools.inverse.recorded_presses import protocol_of, recorded_press
 from host_tools.study import mode_oblong
-from host_tools.study.just_outside import Twin
-from host_tools.study.mode_oblong import ELLIPSOIDS, SKINS, SPHERES, _judged, oblong_chapter, skins
-from host_tools.study.oblong_lumps import draw_oblong
+from host_tools.study.mode_oblong import ELLIPSOIDS, JUST_ASIDE_MM, SKINS, SPHERES, _judged, oblong_chapter, skins
+from host_tools.study.mode_outside import FALSE_AT_MOST
+from host_tools.study.oblong_lumps import draw_oblong, most_flagged
 
-LUMPS = ELLIPSOIDS + SPHERES
+LUMPS, OBLONG = ELLIPSOIDS + SPHERES, SKINS * ELLIPSOIDS
 
 
-def test_only_ellipsoids_that_a_test_could_tell_are_judged():
-    """Two of three could be: one is refused always, one in nine of ten presses."""
-    could, refused = np.array([0.3, 0.95, 1.0]), np.array([0.0, 1.0, 0.9, 0.5])
-    benchmark = _judged("standard", could, refused)
-    assert benchmark.measured == pytest.approx(0.95)
+def test_only_presses_of_ellipsoids_that_a_test_could_tell_are_judged():
+    """Of forty far from round two are answered; nearer ones and spheres do not count."""
+    apart = np.where(np.arange(SKINS * LUMPS) < 40, 6.0, 2.0)
+    apart[OBLONG:] = 6.0
+    refused = (apart > 2) & (np.arange(SKINS * LUMPS) < OBLONG)
+    refused[[3, 7]] = False
+    benchmark = _judged("standard", apart, refused)
+    assert benchmark.measured == pytest.approx(38 / 40)
     assert benchmark.passed
-    assert f"({2 * SKINS})" in benchmark.case
-    assert not _judged("standard", could, refused - 0.01).passed
-    assert not _judged("standard", 0.5 * could, refused).passed  # none is left to be judged
+    assert "(40 presses)" in benchmark.case
+    refused[11] = False
+    assert not _judged("standard", apart, refused).passed
+    assert not _judged("standard", np.full(len(apart), 2.0), refused).passed  # none is left to be judged
+
+
+def test_four_deviations_are_what_a_test_tells_nearly_always():
+    assert most_flagged(3.8, FALSE_AT_MOST) < 0.95 < most_flagged(4.1, FALSE_AT_MOST)
 
 
 def test_presses_of_a_lump_are_on_skins_of_their_own_and_at_its_own_place():
@@ -30,8 +40,26 @@ def test_presses_of_a_lump_are_on_skins_of_their_own_and_at_its_own_place():
     parameters = skins(lumps, np.random.default_rng(3))
     assert len(parameters) == SKINS * LUMPS
     np.testing.assert_array_equal(parameters[SKINS, :3], lumps[1].inclusion.as_tuple())
-    assert (parameters[:, -1] == 0).all()
+    assert (parameters[:, -1] == JUST_ASIDE_MM).all()
     assert len(np.unique(parameters[:SKINS, 3])) == SKINS
+
+
+def test_each_press_turns_its_lump_to_another_side(tables, monkeypatch):
+    """By the place that the press is told of, which moves nothing."""
+    sides = []
+
+    def recorded(inclusion, tables, *, seed, protocol, **_):
+        sides.append(np.arctan2(protocol.place.y_mm, protocol.place.x_mm))
+        assert np.hypot(protocol.place.x_mm, protocol.place.y_mm) == pytest.approx(JUST_ASIDE_MM)
+        raise StopIteration
+
+    monkeypatch.setattr("host_tools.inverse.recorded_presses.phantom_recording", recorded)
+    parameters = skins(draw_oblong(ELLIPSOIDS, SPHERES, np.random.default_rng(2)), np.random.default_rng(3))
+    for number in range(8):
+        with pytest.raises(StopIteration):
+            recorded_press(tables, parameters[number], "standard", number, levels=ErrorLevels())
+    assert np.ptp(sides) > np.pi / 2
+    assert protocol_of("standard", 0.0, 1.0).place.x_mm == 0
 
 
 def test_the_chapter_counts_ellipsoids_and_spheres_apart(monkeypatch, tables):
@@ -39,7 +67,7 @@ def test_the_chapter_counts_ellipsoids_and_spheres_apart(monkeypatch, tables):
     monkeypatch.setattr(mode_oblong, "in_parallel", lambda work, count, jobs: [work(i) for i in range(count)])
     monkeypatch.setattr(mode_oblong.Oblong, "on", lambda lump, tables: lump)
     monkeypatch.setattr(mode_oblong, "recorded_press", lambda lump, *_, **__: lump)
-    monkeypatch.setattr(mode_oblong, "nearest_round_twin", lambda lump, *_, **__: Twin(lump.inclusion, 9.0))
+    monkeypatch.setattr(mode_oblong, "round_deviations", lambda lump, *_, **__: 9.0 * (lump.width_ratio > 1) + 1)
     value = Quantity(10.0, 9.0, 11.0, 1.0, True)
     answered = Estimate(value, value, value, "ok", "", "standard", "m", "0", "c", True, {})
 
@@ -51,9 +79,9 @@ def test_the_chapter_counts_ellipsoids_and_spheres_apart(monkeypatch, tables):
     assert [(one.measured, one.passed) for one in chapter.benchmarks] == [(1.0, True), (0.0, False)]
     shares, each = chapter.tables
     assert shares.rows == (
-        ("standard", "100.0%", "100.0%", "0.0%"),
-        ("precise", "0.0%", "100.0%", "0.0%"),
-        ("quick", "0.0%", "-", "0.0%"),
+        ("standard", "100.0%", "100.0%", "0.0%", "1.0", "1.0"),
+        ("precise", "0.0%", "100.0%", "0.0%", "1.0", "1.0"),
+        ("quick", "0.0%", "-", "0.0%", "-", "-"),
     )
     assert len(each.rows) == 2 * ELLIPSOIDS
-    assert each.rows[0][-3:] == ("9.0", "100%", "100%")
+    assert each.rows[0][-3:] == ("10.0", "100%", "100%")

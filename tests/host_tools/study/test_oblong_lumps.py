@@ -16,7 +16,15 @@ from device.measurement.round_spot import stretched
 from host_tools.inverse.press_samples import exact_presses
 from host_tools.study import oblong_lumps
 from host_tools.study.just_outside import at_nominal
-from host_tools.study.oblong_lumps import WIDTH_RATIO, Oblong, draw_oblong, nearest_round_twin, spoken, twin_of
+from host_tools.study.oblong_lumps import (
+    WIDTH_RATIO,
+    Oblong,
+    draw_oblong,
+    most_flagged,
+    round_deviations,
+    spoken,
+    twin_of,
+)
 
 LUMP = Oblong(Inclusion(8.0, 5.0, 80.0), 2.0, 1.5, is_across=True)
 
@@ -56,24 +64,49 @@ def test_tables_of_an_ellipsoid_hold_it_off_the_axis_and_are_the_probes_own_othe
     assert asked == [(LUMP.scene(), tables.off_axis)]
 
 
-def test_a_round_lump_is_its_own_twin_and_is_flagged_as_seldom_as_any(tables, model):
-    """The tables' own lump under the middle, in place of a solved one: what is left is the polynomials' error."""
-    sphere = Oblong(Inclusion(9.0, 5.0, 60.0), 1.0, 0.0, is_across=False)
-    twin = nearest_round_twin(sphere, tables, model, "standard", seed=0)
-    assert twin.deviations < 1.5
-    assert (twin.inclusion.size_mm, twin.inclusion.depth_mm) == pytest.approx((9.0, 5.0), rel=0.02)
+@pytest.mark.parametrize("offset_mm", [0.0, 1.5, 2.0])
+def test_a_round_lump_is_its_own_twin_beside_the_axis_too(tables, model, offset_mm):
+    """The tables' own lump in place of a solved one: what is left is the polynomials' error."""
+    assert round_deviations(tables, press_at(offset_mm), model, "standard", seed=0) < 1.5
 
 
-def test_a_stretched_spot_lies_as_far_from_round_as_its_stretch_weighs(tables, model):
-    """On the axis no round lump has a second harmonic: the distance is that of the stretch alone, 0.1 of r df/dr."""
-    rows, second = exact_presses(tables, at_nominal(Inclusion(9.0, 5.0, 60.0))[None])
+def press_at(offset_mm):
+    parameters = at_nominal(Inclusion(9.0, 5.0, 60.0))
+    parameters[-1] = offset_mm
+    return parameters
+
+
+def distance(tables, model, offset_mm, along, across):
+    """Return how far a press lies from round, a pattern added along and across; and the length of the pattern."""
+    rows, second = exact_presses(tables, press_at(offset_mm)[None])
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise["standard"])
     pattern = 0.1 * stretched(rows[0, :CONTRAST_COLUMNS].reshape(-1, RINGS))
-    across = np.stack([np.zeros_like(second[0]), pattern])
-    (best, round_deviations), (_, found) = (
-        twin_of(posterior, harmonics, model, "standard", seed=0)
-        for harmonics in (np.stack([second[0], np.zeros_like(second[0])]), across)
-    )
+    harmonics = np.stack([second[0] + along * pattern, across * pattern])
+    best, found = twin_of(posterior, harmonics, model, "standard", seed=0)
     weight = np.linalg.solve(model.round_spot.covariance(best, "standard"), pattern)
+    return found, float(np.sqrt(weight @ pattern))
+
+
+def test_a_spot_stretched_across_the_offset_lies_as_far_from_round_as_its_stretch_weighs(tables, model):
+    """No round lump has a second harmonic there: 0.1 of r df/dr, with what the polynomials miss."""
+    round_deviations, _ = distance(tables, model, 0.0, along=0.0, across=0.0)
+    found, length = distance(tables, model, 0.0, along=0.0, across=1.0)
     assert found > 4
-    assert found == pytest.approx(np.hypot(round_deviations, np.sqrt(weight @ pattern)), rel=0.03)
+    assert found == pytest.approx(np.hypot(round_deviations, length), rel=0.03)
+
+
+def test_a_spot_stretched_along_the_offset_has_a_round_twin_that_is_nearer_than_its_stretch(tables, model):
+    """Another place, depth or skin makes a part of it."""
+    found, length = distance(tables, model, 1.5, along=1.0, across=0.0)
+    assert 0.5 * length < found < 0.97 * length
+
+
+@pytest.mark.parametrize("false_flags", [0.0125, 0.05])
+def test_a_test_flags_as_many_as_the_length_of_two_gaussians_passes_what_is_usual(false_flags):
+    """The length of two of deviation one is Rayleigh's; one of them shifted by four, by drawing them."""
+    limit = np.sqrt(-2 * np.log(false_flags))
+    drawn = np.random.default_rng(2).normal(0, 1, (2, 200_000))
+    assert np.mean(np.hypot(*drawn) > limit) == pytest.approx(false_flags, rel=0.05)
+    found = most_flagged(np.array([0.0, 4.0]), false_flags)
+    assert found[0] == pytest.approx(false_flags)
+    assert found[1] == pytest.approx(np.mean(np.hypot(drawn[0] + 4.0, drawn[1]) > limit), abs=0.003)
