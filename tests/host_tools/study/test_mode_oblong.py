@@ -7,20 +7,19 @@ import pytest
 
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
 from device.measurement.press_noise import ErrorLevels
-from host_tools.inverse.recorded_presses import protocol_of, recorded_press
+from host_tools.inverse.recorded_presses import recorded_press
 from host_tools.study import mode_oblong
-from host_tools.study.mode_oblong import ELLIPSOIDS, JUST_ASIDE_MM, SKINS, SPHERES, _judged, oblong_chapter, skins
+from host_tools.study.mode_oblong import ELLIPSOIDS, SKINS, _judged, oblong_chapter, skins
 from host_tools.study.mode_outside import FALSE_AT_MOST
 from host_tools.study.oblong_lumps import draw_oblong, most_flagged
 
-LUMPS, OBLONG = ELLIPSOIDS + SPHERES, SKINS * ELLIPSOIDS
+PRESSES = SKINS * ELLIPSOIDS
 
 
-def test_only_presses_of_ellipsoids_that_a_test_could_tell_are_judged():
-    """Of forty far from round two are answered; nearer ones and spheres do not count."""
-    apart = np.where(np.arange(SKINS * LUMPS) < 40, 6.0, 2.0)
-    apart[OBLONG:] = 6.0
-    refused = (apart > 2) & (np.arange(SKINS * LUMPS) < OBLONG)
+def test_only_presses_that_a_test_could_tell_are_judged():
+    """Of forty far from round two are answered; nearer ones do not count."""
+    apart = np.where(np.arange(PRESSES) < 40, 6.0, 2.0)
+    refused = apart > 2
     refused[[3, 7]] = False
     benchmark = _judged("standard", apart, refused)
     assert benchmark.measured == pytest.approx(38 / 40)
@@ -35,53 +34,48 @@ def test_four_deviations_are_what_a_test_tells_nearly_always():
     assert most_flagged(3.8, FALSE_AT_MOST) < 0.95 < most_flagged(4.1, FALSE_AT_MOST)
 
 
+def made_presses():
+    lumps = draw_oblong(ELLIPSOIDS, np.random.default_rng(2))
+    return lumps, skins(lumps, np.random.default_rng(3))
+
+
 def test_presses_of_a_lump_are_on_skins_of_their_own_and_at_its_own_place():
-    lumps = draw_oblong(ELLIPSOIDS, SPHERES, np.random.default_rng(2))
-    parameters = skins(lumps, np.random.default_rng(3))
-    assert len(parameters) == SKINS * LUMPS
+    lumps, parameters = made_presses()
+    assert len(parameters) == PRESSES
     np.testing.assert_array_equal(parameters[SKINS, :3], lumps[1].inclusion.as_tuple())
-    assert (parameters[:, -1] == JUST_ASIDE_MM).all()
+    assert (parameters[SKINS : 2 * SKINS, -1] == lumps[1].offset_mm).all()
     assert len(np.unique(parameters[:SKINS, 3])) == SKINS
 
 
 def test_each_press_turns_its_lump_to_another_side(tables, monkeypatch):
-    """By the place that the press is told of, which moves nothing."""
     sides = []
 
     def recorded(inclusion, tables, *, seed, protocol, **_):
         sides.append(np.arctan2(protocol.place.y_mm, protocol.place.x_mm))
-        assert np.hypot(protocol.place.x_mm, protocol.place.y_mm) == pytest.approx(JUST_ASIDE_MM)
         raise StopIteration
 
     monkeypatch.setattr("host_tools.inverse.recorded_presses.phantom_recording", recorded)
-    parameters = skins(draw_oblong(ELLIPSOIDS, SPHERES, np.random.default_rng(2)), np.random.default_rng(3))
-    for number in range(8):
+    for number, one in enumerate(made_presses()[1][:8]):
         with pytest.raises(StopIteration):
-            recorded_press(tables, parameters[number], "standard", number, levels=ErrorLevels())
+            recorded_press(tables, one, "standard", number, levels=ErrorLevels())
     assert np.ptp(sides) > np.pi / 2
-    assert protocol_of("standard", 0.0, 1.0).place.x_mm == 0
 
 
-def test_the_chapter_counts_ellipsoids_and_spheres_apart(monkeypatch, tables):
-    """Ellipsoids are refused in standard, nothing in precise; solves and recordings are words."""
+def test_the_chapter_counts_what_each_mode_refuses(monkeypatch, tables):
+    """Everything is refused in standard, nothing in precise; solves and recordings are words."""
     monkeypatch.setattr(mode_oblong, "in_parallel", lambda work, count, jobs: [work(i) for i in range(count)])
     monkeypatch.setattr(mode_oblong.Oblong, "on", lambda lump, tables: lump)
     monkeypatch.setattr(mode_oblong, "recorded_press", lambda lump, *_, **__: lump)
-    monkeypatch.setattr(mode_oblong, "round_deviations", lambda lump, *_, **__: 9.0 * (lump.width_ratio > 1) + 1)
+    monkeypatch.setattr(mode_oblong, "round_deviations", lambda *_: 10.0)
     value = Quantity(10.0, 9.0, 11.0, 1.0, True)
     answered = Estimate(value, value, value, "ok", "", "standard", "m", "0", "c", True, {})
 
     def answer(lump, mode):
-        oblong = mode == "standard" and lump.width_ratio > 1
-        return replace(answered, size_mm=UNKNOWN_QUANTITY) if oblong else answered
+        return replace(answered, size_mm=UNKNOWN_QUANTITY) if mode == "standard" else answered
 
     chapter = oblong_chapter(answer, None, tables)
     assert [(one.measured, one.passed) for one in chapter.benchmarks] == [(1.0, True), (0.0, False)]
     shares, each = chapter.tables
-    assert shares.rows == (
-        ("standard", "100.0%", "100.0%", "0.0%", "1.0", "1.0"),
-        ("precise", "0.0%", "100.0%", "0.0%", "1.0", "1.0"),
-        ("quick", "0.0%", "-", "0.0%", "-", "-"),
-    )
+    assert shares.rows == (("standard", "100.0%", "100.0%"), ("precise", "0.0%", "100.0%"), ("quick", "0.0%", "-"))
     assert len(each.rows) == 2 * ELLIPSOIDS
     assert each.rows[0][-3:] == ("10.0", "100%", "100%")
