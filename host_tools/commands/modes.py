@@ -27,7 +27,7 @@ def modes(
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
     only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
 ) -> None:
-    """Measure error, time, coverage and refusals of the modes against bounds; half an hour on two cores.
+    """Measure error, time, coverage and refusals of the modes against bounds; about an hour on two cores.
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
