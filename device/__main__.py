@@ -18,29 +18,28 @@ from pathlib import Path
 
 import uvicorn
 
-from device.answers import Answers, answers_for
-from device.assembly import open_probe, open_simulated_probe
-from device.calibration_command import add_calibration_command, run_calibration_command
+from device.assembly.answers import Answers, answers_for
+from device.assembly.opened_parts import StartFailed
+from device.assembly.probe import open_phantom_press, open_probe, open_simulated_probe
+from device.commands.calibration import add_calibration_command, run_calibration_command
+from device.commands.config import add_config_command, run_config_command
+from device.commands.faults import add_faults_command, run_faults_command
+from device.commands.led_off import led_off
+from device.commands.record import add_record_command, run_record_command
+from device.commands.self_test import add_self_test_command, run_self_test_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
-from device.faults.listing import add_faults_command, run_faults_command
-from device.instrument.calibration_watch import CalibrationWatch
-from device.instrument.phantom_press import PhantomPress
+from device.files.recording_file import read_recording
+from device.instrument.press.phantom_press import PhantomPress
 from device.instrument.procedure import Procedure
-from device.instrument.restart_note import RestartNote
-from device.instrument.watchdog import Watchdog
-from device.led_off import led_off
-from device.measurement.inversion import ModelBundle
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.instrument.watch.restart_note import RestartNote
+from device.instrument.watch.watchdog import Watchdog
 from device.measurement.mode import mode_named, mode_of
 from device.measurement.model_card import BundleRefused
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.recording_file import read_recording
-from device.opened_parts import StartFailed
-from device.phantom_assembly import open_phantom_press
-from device.record_command import add_record_command, run_record_command
 from device.records.calibrations import Calibrations
-from device.self_test_command import add_self_test_command, run_self_test_command
-from device.settings.command import add_config_command, run_config_command
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, read_config, read_layers
 from device.settings.override import overridden

@@ -21,7 +21,7 @@ from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
-from host_tools.forward.errors import PressFailed
+from host_tools.forward.press_model import PressFailed
 
 app = typer.Typer(
     no_args_is_help=True,

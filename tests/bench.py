@@ -21,16 +21,16 @@ from camera_works import Handover, sustained_hz
 
 from device.measurement.calibration import read_calibration
 from device.measurement.estimate import estimate_recording
-from device.measurement.features import extract_features
-from device.measurement.inversion import ModelBundle
+from device.measurement.paper_mode.features import extract_features
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
-from device.measurement.tactile_image import reference, tactile_image
-from device.simulation.pressed_face import Placement
+from device.measurement.recording.tactile_image import reference, tactile_image
+from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
+from host_tools.calibration.phantom import CAMERA, LIT, phantom_recording
 from host_tools.forward.solve import solve
-from host_tools.phantom import CAMERA, LIT, phantom_recording
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 REPEATS = 15
@@ -56,7 +56,7 @@ def _next_frame(light: str, tables: ProbeTables) -> Callable[[], object]:
     def render() -> object:
         return probe.frame_counts(
             force_n=float(next(forces_n)),
-            place=Placement(),
+            place=ProbePlacement(),
             led_ratio=LIT,
             exposure_us=CAMERA.exposure_us,
             gain=CAMERA.gain,

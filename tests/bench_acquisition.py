@@ -20,22 +20,22 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from device.camera_assembly import emulated_camera
-from device.cell_assembly import commissioned, emulated_amplifier, open_cell, tared
+from device.assembly.camera import emulated_camera
+from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared
 from device.config import Config, simulated_config
-from device.instrument.bench import Bench
-from device.instrument.capture import Capture
-from device.instrument.force_recorder import ForceRecorder
-from device.instrument.frame_check import TearWatch
-from device.instrument.press_machine import Press, PressRules
+from device.instrument.acquisition.bench import Bench
+from device.instrument.acquisition.force_recorder import ForceRecorder
+from device.instrument.acquisition.frame_check import TearWatch
+from device.instrument.press.capture import Capture
+from device.instrument.press.machine import PressRules, PressUnderWay
 from device.instrument.status import StatusBoard
-from device.measurement.tactile_image import Frame
+from device.measurement.recording.tactile_image import Frame
 from device.settings.camera_section import CameraSection
-from device.simulation.camera_server import CameraServer
+from device.simulation.chips.camera_server import CameraServer
+from device.simulation.chips.virtual_camera import VirtualPicamera2
 from device.simulation.faults import NO_FAULTS
 from device.simulation.hand import HandSettings, VirtualHand
 from device.simulation.scenario import CellSettings
-from device.simulation.virtual_camera import VirtualPicamera2
 
 SECONDS, FRAMES_A_SECOND = 10.0, 60.0
 HAND = HandSettings(tremor_n=0.003)
@@ -104,7 +104,7 @@ def _run(capture: Capture, hand: VirtualHand, seconds: float) -> Run:
     rules = PressRules.of(capture.press, capture.press.band_n, is_ramp=False)
     bench.light(LIT)
     before = bench.take("press")
-    machine = Press().begin("press", before.t_s)
+    machine = PressUnderWay().begin("press", before.t_s)
     run = Run(seconds, [], [], [])
     until_s = before.t_s + seconds
     while before.t_s < until_s:

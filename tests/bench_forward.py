@@ -20,18 +20,18 @@ from joblib import Parallel, delayed
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.face_state import Rays
-from host_tools.forward.linear_press import LinearPress
 from host_tools.forward.materials import with_inclusion
 from host_tools.forward.plan import model_plan
 from host_tools.forward.reduced_basis import ReducedBasis
 from host_tools.forward.sampling import FaceSampler
+from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.solve import solve
 from host_tools.forward.tiers import build
-from host_tools.peer.calculix import ccx_available, solve_with_calculix
-from host_tools.peer.revolved_mesh import QUARTER
-from host_tools.peer.section import Sizes
-from host_tools.scene import Scene
-from host_tools.study.tables import finest_plan
+from host_tools.scenes.scene import Scene
+from host_tools.verification.level_tables import finest_plan
+from host_tools.verification.peer.calculix import ccx_available, solve_with_calculix
+from host_tools.verification.peer.revolved_mesh import QUARTER
+from host_tools.verification.peer.section import Sizes
 
 SCENE = Scene(Inclusion(10.0, 6.0, 80.0))
 CALCULIX_SIZES = Sizes(bulk_mm=6.0, rim_mm=0.07, growth=0.6, per_quarter_circle=8.0)
@@ -76,7 +76,7 @@ def _reduced_basis() -> None:
     direct_s = median_seconds(lambda: solve(SCENE).force_n)
     for what, online in (
         ("face and force", lambda: basis.solution(80.0).force_n),
-        ("and O1-O3", lambda: basis.solution(80.0).lump),
+        ("and O1-O3", lambda: basis.solution(80.0).inclusion_field),
     ):
         online_s = median_seconds(online, repeats=50)
         name = f"direct solve over reduced basis, {what}"

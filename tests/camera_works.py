@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from device.camera_assembly import emulated_camera
+from device.assembly.camera import emulated_camera
 from device.hardware.camera_process import CameraProcess
 from device.hardware.interfaces import CameraFrame
 from device.hardware.restart_limit import RestartLimit
 from device.settings.camera_section import CameraSection
-from device.simulation.camera_server import CameraServer
-from device.simulation.virtual_camera import VirtualPicamera2
+from device.simulation.chips.camera_server import CameraServer
+from device.simulation.chips.virtual_camera import VirtualPicamera2
 
 CAMERA = CameraSection()
 SHAPE = CAMERA.height_px, CAMERA.width_px

@@ -11,12 +11,12 @@ from schedule import OneHand
 from xdist.remote import Producer
 
 from device.measurement.calibration import Calibration, read_calibration
-from device.measurement.inversion import ModelBundle
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
-from device.measurement.recording import Recording
-from device.simulation.surface_table import SurfaceTable
+from device.measurement.recording.recording import Recording
+from device.simulation.physics.surface_table import SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.phantom import Protocol, phantom_recording
+from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 
 MODELS = ROOT / "models"
 
@@ -54,7 +54,7 @@ def calibration() -> Calibration:
 @pytest.fixture(scope="session")
 def recording(tables: ProbeTables) -> Recording:
     """One phantom of 12 mm, 6 mm deep, 60 kPa, three press frames."""
-    return phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=3, protocol=Protocol(frames=3))
+    return phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=3, protocol=PhantomProtocol(frames=3))
 
 
 @pytest.fixture(scope="session")

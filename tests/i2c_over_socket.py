@@ -22,7 +22,7 @@ from typing import Any
 import smbus2.smbus2
 from smbus2 import i2c_msg
 
-from device.simulation.i2c_bus import I2C_M_RD, EmulatedI2cBus
+from device.simulation.chips.i2c_bus import I2C_M_RD, EmulatedI2cBus
 
 I2C_FUNCS, I2C_RDWR = 0x0705, 0x0707
 """Requests of linux/i2c-dev.h."""

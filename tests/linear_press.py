@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
-from device.measurement.press_parameters import PARAMETERS
-from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
+from device.measurement.parameters import PARAMETERS
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
 
 STD = 0.05
 NOISE = white_noise(STD)

@@ -12,8 +12,8 @@ from typing import Any
 from i2c_over_socket import stand_in_for_the_kernel
 from smbus2 import SMBus, i2c_msg
 
-from device import assembly
-from device.simulation.i2c_bus import I2C_M_RD, EmulatedI2cBus, I2cMessage
+from device.assembly import probe
+from device.simulation.chips.i2c_bus import I2C_M_RD, EmulatedI2cBus, I2cMessage
 
 
 class MirroredBus(EmulatedI2cBus):
@@ -36,6 +36,6 @@ class MirroredBus(EmulatedI2cBus):
 
 if __name__ == "__main__":
     stand_in_for_the_kernel(sys.argv[1])
-    assembly.EmulatedI2cBus = MirroredBus
+    probe.EmulatedI2cBus = MirroredBus
     sys.argv = ["device", *sys.argv[2:]]
     runpy.run_module("device", run_name="__main__", alter_sys=True)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from device.config import Config
-from device.instrument.press_machine import MAX_LIFTS, STEADY_WINDOW_S, PressRules
+from device.instrument.press.machine import MAX_LIFTS, STEADY_WINDOW_S, PressRules
 from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.simulation.hand import HandSettings
 

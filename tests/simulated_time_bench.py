@@ -1,7 +1,7 @@
 """A bench on which a hand presses in simulated time: no waiting, tiny frames, the daemon's own capture above it.
 
 Camera, LED chip and load cell are one object with one clock that moves from frame to frame. A face of 64 x 44 pixels
-shows light that grows with the force, and the lump as a Gaussian where the hand has put the probe.
+shows light that grows with the force, and the inclusion as a Gaussian where the hand has put the probe.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import pytest
 from device.config import Config
 from device.errors import DeviceError
 from device.hardware.interfaces import CameraFrame
-from device.instrument import bench as bench_module
-from device.instrument import capture as capture_module
-from device.instrument.bench import DARK, Bench
-from device.instrument.capture import Capture, PressEnded
-from device.instrument.force_recorder import force_range_n
-from device.instrument.light_budget import LightBudget
+from device.instrument.acquisition import bench as bench_module
+from device.instrument.acquisition.bench import DARK, Bench
+from device.instrument.acquisition.force_recorder import force_range_n
+from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.press import capture as capture_module
+from device.instrument.press.capture import Capture, PressEnded
 from device.instrument.status import StatusBoard
 from device.measurement.mode import Mode
-from device.measurement.pixel_scale import PixelScale
-from device.measurement.tactile_image import Frame
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.tactile_image import Frame
 from device.settings.camera_section import CameraSection
 from device.simulation.hand import HandSettings, VirtualHand
 
@@ -32,7 +32,7 @@ SHAPE, SCALE = (44, 64), PixelScale(0.35, 0.36)
 CAMERA = CameraSection(mm_per_px_x=SCALE.mm_per_px_x, mm_per_px_y=SCALE.mm_per_px_y)
 X_MM, Y_MM = SCALE.coordinates_mm(SHAPE)
 BLACK_COUNTS, COUNTS_AT_1_N, EXPONENT = 8.0, 170.0, 0.7
-LUMP_CONTRAST, LUMP_MM = 0.2, 3.0
+INCLUSION_CONTRAST, INCLUSION_MM = 0.2, 3.0
 NOISES = np.random.default_rng(1).normal(BLACK_COUNTS + 0.5, 1.0, (8, *SHAPE)).astype(np.float32)
 CELL_HZ, CELL_NOISE_N = 80.0, 4e-4
 CELL_NOISES_N = np.random.default_rng(2).normal(0.0, CELL_NOISE_N, 512)
@@ -73,11 +73,11 @@ class SimulatedTimeProbe:
         return counts.astype(np.uint8)  # between 0 and 255 at any force that is no overload
 
     def _face(self, place):
-        """Return the face's brightness; the lump lies where the probe has been moved away from."""
+        """Return the face's brightness; the inclusion lies where the probe has been moved away from."""
         at = place.x_mm, place.y_mm
         if at not in self._faces:
             r2 = (X_MM + at[0]) ** 2 + (Y_MM + at[1]) ** 2
-            self._faces[at] = (1 + LUMP_CONTRAST * np.exp(-r2 / (2 * LUMP_MM**2))).astype(np.float32)
+            self._faces[at] = (1 + INCLUSION_CONTRAST * np.exp(-r2 / (2 * INCLUSION_MM**2))).astype(np.float32)
         return self._faces[at]
 
     def _sample(self, number):

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from device.measurement.calibration import Calibration, Regression, certificate_id
-from device.measurement.features import FeatureSettings
-from device.measurement.intervals import HeldOut
-from device.measurement.recording import CameraSettings, RecordedCell
-from device.measurement.untouched_face import UntouchedFace
-from device.measurement.validity import Validity
+from device.measurement.calibration import Calibration, Regression, Validity, certificate_id
+from device.measurement.paper_mode.features import FeatureSettings
+from device.measurement.paper_mode.intervals import HeldOut
+from device.measurement.recording.recording import CameraSettings, RecordedCell
+from device.measurement.recording.untouched_face import UntouchedFace
 
 
 def small_certificate(**changes: Any) -> Calibration:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from device.measurement.legendre import LegendreSum
-from device.measurement.press_noise import ErrorLevels, PressNoise
-from device.measurement.press_parameters import PARAMETERS
-from device.measurement.press_surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS, PressSurrogate
+from device.measurement.parameters import PARAMETERS
+from device.measurement.ramp_modes.legendre import LegendreSum
+from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS, PressSurrogate
 
-LUMP_COLUMNS = CONTRAST_COLUMNS + OFFSET_COLUMNS
-COLUMNS = LUMP_COLUMNS + GROWTH_COLUMNS
+INCLUSION_COLUMNS = CONTRAST_COLUMNS + OFFSET_COLUMNS
+COLUMNS = INCLUSION_COLUMNS + GROWTH_COLUMNS
 EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
 
 
@@ -18,16 +18,16 @@ def random_surrogate(seed: int = 3) -> PressSurrogate:
     """Return a surrogate whose terms mix all parameters, of random coefficients."""
     rng = np.random.default_rng(seed)
     degrees = rng.integers(0, 4, (12, len(PARAMETERS))).astype(np.uint8)
-    lump = LegendreSum(degrees, rng.normal(size=(12, LUMP_COLUMNS)))
-    return PressSurrogate(lump, LegendreSum(degrees[:5], rng.normal(size=(5, GROWTH_COLUMNS))))
+    inclusion = LegendreSum(degrees, rng.normal(size=(12, INCLUSION_COLUMNS)))
+    return PressSurrogate(inclusion, LegendreSum(degrees[:5], rng.normal(size=(5, GROWTH_COLUMNS))))
 
 
 def linear_surrogate(slopes: np.ndarray) -> PressSurrogate:
-    """Return a surrogate whose growth is coordinates @ slopes [9, growth columns], and whose lumps do not show.
+    """Return a surrogate whose growth is coordinates @ slopes [9, growth columns], and whose inclusions do not show.
 
     The modulus' slope is by its polynomial coordinate and not by its own: keep it 0 for an exactly linear row.
     """
-    none = LegendreSum(np.zeros((1, len(PARAMETERS)), np.uint8), np.zeros((1, LUMP_COLUMNS)))
+    none = LegendreSum(np.zeros((1, len(PARAMETERS)), np.uint8), np.zeros((1, INCLUSION_COLUMNS)))
     return PressSurrogate(none, LegendreSum(np.eye(len(PARAMETERS), dtype=np.uint8), slopes))
 
 

@@ -19,8 +19,8 @@ from cpu_time import ended_cpu_s
 from daemon_process import ROOT, Daemon
 from i2c_over_socket import served
 
-from device.simulation.i2c_bus import EmulatedI2cBus
-from device.simulation.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 
 START_S = 60.0
 DARK_WITHIN_S = 1.0
@@ -70,7 +70,7 @@ class Supervisor:
     def stop_post(self) -> tuple[int, float]:
         """Run what darkens the LEDs after the daemon's end, however that came; return exit code and CPU time (s)."""
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
-        program = [str(ROOT / "tests" / "i2c_over_socket.py"), str(self._folder / "i2c"), "device.led_off"]
+        program = [str(ROOT / "tests" / "i2c_over_socket.py"), str(self._folder / "i2c"), "device.commands.led_off"]
         environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
         process = subprocess.Popen([sys.executable, *program], cwd=self._folder, env=environment)
         cpu_s = ended_cpu_s(process)

@@ -11,9 +11,9 @@ from daemon_process import ROOT
 from typer.testing import CliRunner
 
 from device.__main__ import _parser
-from device.measurement.toml_record import from_table
+from device.files.toml_record import from_table
 from host_tools.__main__ import app
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 FORWARD_MODEL = (ROOT / "docs" / "forward_model.md").read_text(encoding="utf-8")
 MEASUREMENT = (ROOT / "docs" / "measurement.md").read_text(encoding="utf-8")
@@ -44,9 +44,9 @@ def test_the_press_that_the_page_of_the_measurement_quotes_is_that_of_its_comman
     done = CliRunner().invoke(app, shlex.split(command))
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
-    lump_mm3, whole_mm3 = found["total_deformation_mm3"], found["raw"]["total_deformation_mm3"]
-    assert f"changes it by {lump_mm3:.2f} of {whole_mm3:.1f} mm3" in MEASUREMENT
-    assert f"a lump field of {found['max_deformation_mm']:.4f} mm in the middle" in MEASUREMENT
+    inclusion_mm3, whole_mm3 = found["total_deformation_mm3"], found["raw"]["total_deformation_mm3"]
+    assert f"changes it by {inclusion_mm3:.2f} of {whole_mm3:.1f} mm3" in MEASUREMENT
+    assert f"an inclusion field of {found['max_deformation_mm']:.4f} mm in the middle" in MEASUREMENT
     assert f"from {found['w_mm'][0]:.2f} mm there to {found['w_mm'][-1]:.2f} mm at the rim" in MEASUREMENT
 
 
@@ -57,5 +57,5 @@ def test_the_daemons_commands_to_calibrate_a_new_probe_are_commands():
 
 
 def test_every_file_that_the_forward_model_names_exists():
-    for path in re.findall(r"`(forward/[a-z_]+\.py)`", FORWARD_MODEL):
+    for path in re.findall(r"`(forward/[a-z_/]+\.py)`", FORWARD_MODEL):
         assert (ROOT / "host_tools" / path).is_file(), path

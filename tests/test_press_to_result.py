@@ -13,13 +13,13 @@ from dataclasses import replace
 import pytest
 from daemon_process import QUICK_HAND, Daemon
 
-from device.answers import answers_for
-from device.assembly import open_simulated_probe
+from device.assembly.answers import answers_for
+from device.assembly.opened_parts import StartFailed
+from device.assembly.probe import open_simulated_probe
 from device.config import simulated_config
 from device.errors import StorageError
+from device.files.recording_file import read_recording
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
-from device.measurement.recording_file import read_recording
-from device.opened_parts import StartFailed
 from device.records.store import Store
 from device.settings.press_section import PressSection
 from device.simulation.scenario import Scenario
@@ -170,13 +170,13 @@ def test_a_kill_loses_no_measurement(tmp_path):
     assert kept == [(job["measurement_id"],)]
 
 
-def test_a_lump_that_cannot_be_seen_gets_no_number(tmp_path):
+def test_an_inclusion_that_cannot_be_seen_gets_no_number(tmp_path):
     """0.5 mm, 10 mm deep: its contrast is a thousandth of the camera's noise."""
     daemon = Daemon(tmp_path, "[inclusion]\nsize_mm = 0.5\ndepth_mm = 10.0\nyoungs_modulus_kpa = 80.0\n" + QUICK_HAND)
     job = daemon.press()
     estimate = daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json["estimate"]
     daemon.stop()
-    # No contrast, or, when the two presses differ by a hundredth of the force, a contrast that no lump has.
+    # No contrast, or, when the two presses differ by a hundredth of the force, a contrast that no inclusion has.
     assert estimate["status"] in ("not_identifiable", "outside_range")
     assert estimate["size_mm"]["value"] is None
 

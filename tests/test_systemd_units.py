@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
-from device.instrument.watchdog import WITHOUT_SYSTEMD_S
+from device.instrument.watch.watchdog import WITHOUT_SYSTEMD_S
 from device.settings.catalogue import SETTINGS
 
 UNIT = ROOT / "systemd" / "tsis.service"
@@ -85,7 +85,7 @@ def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_en
     assert service["Type"] == "notify"
     assert float(service["WatchdogSec"]) == WITHOUT_SYSTEMD_S
     assert service["ExecStart"] == f"{PYTHON} -m device"
-    assert service["ExecStopPost"] == f"-{PYTHON} -m device.led_off"
+    assert service["ExecStopPost"] == f"-{PYTHON} -m device.commands.led_off"
     assert service["Restart"] == "on-failure"
 
 

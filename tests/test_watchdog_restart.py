@@ -17,7 +17,7 @@ import pytest
 from daemon_process import QUICK_HAND
 from supervisor import DARK_WITHIN_S, Supervisor, codes, faults
 
-from device.instrument.progress import PARTS
+from device.instrument.watch.progress import PARTS
 
 WATCHDOG_S = 6.0
 FAULTS = {
@@ -102,7 +102,7 @@ def test_after_the_restart_of_a_frozen_loop_it_is_dark(stories, part):
     """A loop that froze in the LED chip, in the inference or in the disk cannot darken the press it was in."""
     story = stories[part].result()
     assert story.light_after == DARK
-    assert story.darkening_cpu_s < DARK_WITHIN_S  # why not the time on the wall: tests/device/test_led_off.py
+    assert story.darkening_cpu_s < DARK_WITHIN_S  # why not the time on the wall: tests/device/commands/test_led_off.py
     if part in ("light", "inference", "storage"):
         assert min(story.light_at_the_kill) > 0.5, story.log
 

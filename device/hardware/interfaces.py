@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NewType, Protocol
 
-from device.measurement.led_sides import SIDES, LedRatio
+from device.measurement.recording.led_sides import SIDES, LedRatio
 
-if TYPE_CHECKING:  # what darkens the LEDs has to be quick (device/led_off.py)
+if TYPE_CHECKING:  # what darkens the LEDs has to be quick (device/commands/led_off.py)
     import numpy as np
     from numpy.typing import NDArray
 

@@ -14,10 +14,10 @@ from device.errors import LightError
 from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
 from device.hardware.interfaces import LED_COUNT
 from device.hardware.pwm_clock import STEPS, PwmClock
-from device.measurement.led_sides import LedRatio
+from device.measurement.recording.led_sides import LedRatio
 
 
-class Register(IntEnum):
+class Pca9685Register(IntEnum):
     """Addresses of the registers used here (datasheet 7.3, table 4)."""
 
     MODE1 = 0x00  # 7.3.1
@@ -56,16 +56,16 @@ class Pca9685:
 
     def _set_up(self) -> None:
         # Dark first, which also is the orderly stop that sleeping asks for (7.3.1.1).
-        self._chip.write(Register.ALL_LED_OFF_H, [FULL])
-        self._chip.write(Register.MODE1, [AUTO_INCREMENT | SLEEP])
-        self._chip.write(Register.PRE_SCALE, [self._clock.prescale])
-        self._chip.write(Register.MODE2, [TOTEM_POLE])
-        self._chip.write(Register.MODE1, [AUTO_INCREMENT])
+        self._chip.write(Pca9685Register.ALL_LED_OFF_H, [FULL])
+        self._chip.write(Pca9685Register.MODE1, [AUTO_INCREMENT | SLEEP])
+        self._chip.write(Pca9685Register.PRE_SCALE, [self._clock.prescale])
+        self._chip.write(Pca9685Register.MODE2, [TOTEM_POLE])
+        self._chip.write(Pca9685Register.MODE1, [AUTO_INCREMENT])
         time.sleep(OSCILLATOR_START_S)
-        self._chip.require_identity("PCA9685", Register.SUBADR1, IDENTITY)
-        mode1, mode2 = self._chip.read(Register.MODE1, 2)
+        self._chip.require_identity("PCA9685", Pca9685Register.SUBADR1, IDENTITY)
+        mode1, mode2 = self._chip.read(Pca9685Register.MODE1, 2)
         modes = [AUTO_INCREMENT, TOTEM_POLE, self._clock.prescale]
-        held = [mode1 & ~RESTART, mode2, *self._chip.read(Register.PRE_SCALE, 1)]
+        held = [mode1 & ~RESTART, mode2, *self._chip.read(Pca9685Register.PRE_SCALE, 1)]
         self._chip.require_held("modes and prescaler", modes, held)
 
     def set_ratio(self, ratio: LedRatio) -> float:
@@ -77,15 +77,15 @@ class Pca9685:
         `LightBusError` when the bus is stuck.
         """
         outputs = [value for counts in brightness_counts(ratio, STEPS) for value in _output_registers(counts)]
-        self._chip.write(Register.LED0_ON_L, outputs)
+        self._chip.write(Pca9685Register.LED0_ON_L, outputs)
         acknowledged_s = time.monotonic()
-        count = Register.LED0_ON_L + REGISTERS_PER_OUTPUT * LED_COUNT
-        mode1, *rest = self._chip.read(Register.MODE1, count)
+        count = Pca9685Register.LED0_ON_L + REGISTERS_PER_OUTPUT * LED_COUNT
+        mode1, *rest = self._chip.read(Pca9685Register.MODE1, count)
         if mode1 & SLEEP:
             self._set_up()
             cause = f"LED chip {self._chip.address:#04x} had lost its set-up: its supply has dipped."
             raise LightError(cause, REMEDY)
-        self._chip.require_held("brightness", outputs, rest[Register.LED0_ON_L - 1 :])
+        self._chip.require_held("brightness", outputs, rest[Pca9685Register.LED0_ON_L - 1 :])
         return acknowledged_s + 1e-6 * self._clock.period_us
 
     def check_outputs(self) -> None:
@@ -94,8 +94,8 @@ class Pca9685:
     def close(self) -> None:
         """Darken all outputs and release the bus, also when darkening fails (`LightError`)."""
         try:
-            self._chip.write(Register.ALL_LED_OFF_H, [FULL])
-            self._chip.require_held("an output that is off", [FULL], self._chip.read(Register.LED0_OFF_H, 1))
+            self._chip.write(Pca9685Register.ALL_LED_OFF_H, [FULL])
+            self._chip.require_held("an output that is off", [FULL], self._chip.read(Pca9685Register.LED0_OFF_H, 1))
         finally:
             self._chip.close()
 

@@ -1,7 +1,7 @@
 """A mode of the sensor as picamera2 names it, and the part of it that a frame shows.
 
 A frame has 8 bits whatever the sensor has. Sizes only, without NumPy: the settings name a mode, too; what is made of
-its rows is in device/hardware/raw_rows.py.
+its rows is in device/hardware/camera.py.
 Source: libcamera formats R8, R10, R12, R16; picamera2 0.3.38 (`helpers.make_array`).
 """
 

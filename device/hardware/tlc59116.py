@@ -14,10 +14,10 @@ from enum import IntEnum
 from device.errors import HotLedDriverError, LightError, OpenLedError
 from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
 from device.hardware.interfaces import LED_COUNT
-from device.measurement.led_sides import SIDES, LedRatio
+from device.measurement.recording.led_sides import SIDES, LedRatio
 
 
-class Register(IntEnum):
+class Tlc59116Register(IntEnum):
     """Addresses of the registers used here (datasheet 9.5.1-9.5.3, 9.5.6, 9.5.7, 9.5.10)."""
 
     MODE1 = 0x00
@@ -59,14 +59,14 @@ class Tlc59116:
         self._set_up()
 
     def _set_up(self) -> None:
-        self._chip.write(Register.MODE1, [0])
+        self._chip.write(Tlc59116Register.MODE1, [0])
         time.sleep(OSCILLATOR_START_S)
         # Brightness before output mode: whatever the registers held, no side flashes.
-        self._chip.write(AUTO_INCREMENT_PWM | Register.PWM0, [0] * PWM_CHANNELS)
-        self._chip.write(AUTO_INCREMENT_ALL | Register.LEDOUT0, SIDES_IN_PWM_MODE)
+        self._chip.write(AUTO_INCREMENT_PWM | Tlc59116Register.PWM0, [0] * PWM_CHANNELS)
+        self._chip.write(AUTO_INCREMENT_ALL | Tlc59116Register.LEDOUT0, SIDES_IN_PWM_MODE)
         self._obeys_brightness = True
-        self._chip.require_identity("TLC59116", AUTO_INCREMENT_ALL | Register.SUBADR1, IDENTITY)
-        held = self._chip.read(AUTO_INCREMENT_ALL | Register.LEDOUT0, len(SIDES_IN_PWM_MODE))
+        self._chip.require_identity("TLC59116", AUTO_INCREMENT_ALL | Tlc59116Register.SUBADR1, IDENTITY)
+        held = self._chip.read(AUTO_INCREMENT_ALL | Tlc59116Register.LEDOUT0, len(SIDES_IN_PWM_MODE))
         self._chip.require_held("output modes", SIDES_IN_PWM_MODE, held)
 
     def set_ratio(self, ratio: LedRatio) -> float:
@@ -77,10 +77,12 @@ class Tlc59116:
         `LightBusError` when the bus is stuck.
         """
         pwm = brightness_counts(ratio, FULL_SCALE)
-        self._chip.write(AUTO_INCREMENT_PWM | Register.PWM0, pwm)
+        self._chip.write(AUTO_INCREMENT_PWM | Tlc59116Register.PWM0, pwm)
         self._obey_brightness()
         acknowledged_s = time.monotonic()
-        mode1, _mode2, *held = self._chip.read(AUTO_INCREMENT_ALL | Register.MODE1, Register.PWM0 + LED_COUNT)
+        mode1, _mode2, *held = self._chip.read(
+            AUTO_INCREMENT_ALL | Tlc59116Register.MODE1, Tlc59116Register.PWM0 + LED_COUNT
+        )
         if mode1 & OSCILLATOR_OFF:
             self._set_up()
             cause = f"LED chip {self._chip.address:#04x} had lost its set-up: its supply has dipped."
@@ -98,8 +100,8 @@ class Tlc59116:
         before = self._sides_without_current()
         if not before:
             return
-        self._chip.write(Register.MODE2, [CLEAR_ERRORS])
-        self._chip.write(Register.MODE2, [0])
+        self._chip.write(Tlc59116Register.MODE2, [CLEAR_ERRORS])
+        self._chip.write(Tlc59116Register.MODE2, [0])
         still = self._sides_without_current()
         if len(still) in (0, LED_COUNT):
             cause = f"LED chip {self._chip.address:#04x} had switched off {' and '.join(before)}: it is too hot"
@@ -110,10 +112,10 @@ class Tlc59116:
 
     def _sides_without_current(self) -> list[str]:
         self._obeys_brightness = False
-        self._chip.write(Register.LEDOUT0, [SIDES_FULLY_ON])
+        self._chip.write(Tlc59116Register.LEDOUT0, [SIDES_FULLY_ON])
         try:
             time.sleep(FLAGS_SETTLE_S)
-            [flags] = self._chip.read(Register.EFLAG1, 1)
+            [flags] = self._chip.read(Tlc59116Register.EFLAG1, 1)
         finally:
             self._obey_brightness()
         return [side for number, side in enumerate(SIDES) if not flags >> number & 1]
@@ -121,7 +123,7 @@ class Tlc59116:
     def _obey_brightness(self) -> None:
         """Leave full brightness, also that of a check whose last write was not acknowledged."""
         if not self._obeys_brightness:
-            self._chip.write(Register.LEDOUT0, SIDES_IN_PWM_MODE[:1])
+            self._chip.write(Tlc59116Register.LEDOUT0, SIDES_IN_PWM_MODE[:1])
             self._obeys_brightness = True
 
     def close(self) -> None:

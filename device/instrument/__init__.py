@@ -1,1 +1,7 @@
-"""The procedure: from a press that begins to a measurement that is kept."""
+"""Leads a press, from a touch to a measurement that is kept: `procedure` is the loop, `status` is what it tells.
+
+Modules in reading order: `procedure`, `status`.
+
+Rooms: `acquisition` (one frame under known light and force), `press` (which frames, which states), `watch` (does all
+go on), `self_test`. No hardware library and no simulation: the bench is handed in.
+"""

@@ -16,25 +16,23 @@ from pathlib import Path
 from device.config import Config
 from device.errors import DeviceError, LightError, NoContrastError
 from device.hardware.interfaces import Newtons
-from device.instrument.bench import DARK, Bench
-from device.instrument.brightness_loop import BrightnessLoop
-from device.instrument.calibration_watch import CalibrationWatch
-from device.instrument.capture import CANCELLED, POLL_S, CalledAway, Capture, PressEnded
-from device.instrument.clock_watch import ClockWatch
-from device.instrument.guidance import Guidance, before_contact
-from device.instrument.light_check import DimmingWatch
-from device.instrument.press_answers import Estimator, PressAnswers
-from device.instrument.press_book import SAVE_LIGHT_EVERY_S, PressBook
-from device.instrument.press_requests import PressRequests
-from device.instrument.press_state import PressState
-from device.instrument.progress import ProgressBoard
-from device.instrument.self_test.job import SelfTestJob
+from device.instrument.acquisition.bench import DARK, Bench
+from device.instrument.acquisition.brightness_loop import BrightnessLoop
+from device.instrument.acquisition.light_check import DimmingWatch
+from device.instrument.press.capture import CANCELLED, POLL_S, CalledAway, Capture, PressEnded
+from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Estimator, PressAnswers, PressBook
+from device.instrument.press.requests import PressRequests
+from device.instrument.press.states import Guidance, PressState, before_contact
+from device.instrument.self_test.report import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
-from device.instrument.self_test.run import SelfTest
+from device.instrument.self_test.run import SelfTestRun
 from device.instrument.status import PressJob, StatusBoard
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.tactile_image import Frame
+from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
 
 log = logging.getLogger(__name__)
@@ -84,7 +82,7 @@ class Procedure:
         )
         self._book = PressBook(self.board, store, bench.budget)
         self.progress.exercise("storage", self._look_at_disk)
-        test = SelfTest(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
+        test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
 

@@ -8,9 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 from device.errors import DeviceError
-from device.instrument.guidance import Guidance
-from device.instrument.press_state import PressState
-from device.instrument.self_test.job import SelfTestJob
+from device.instrument.press.states import Guidance, PressState
+from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
 
 Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "self_test", "fault"]
@@ -41,7 +40,7 @@ class PressJob:
 
 
 @dataclass(frozen=True)
-class Status:
+class ProcedureStatus:
     """One moment of the procedure.
 
     `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
@@ -71,11 +70,11 @@ class StatusBoard:
     """Holds the present status; tells listeners when the guidance changes."""
 
     def __init__(self) -> None:
-        self._status, self._lock = Status(), threading.Lock()
+        self._status, self._lock = ProcedureStatus(), threading.Lock()
         self._listeners: list[Callable[[Guidance], None]] = []
 
     @property
-    def now(self) -> Status:
+    def now(self) -> ProcedureStatus:
         """Return the present status."""
         with self._lock:
             return self._status
@@ -84,7 +83,7 @@ class StatusBoard:
         """Call `listener` with each new guidance, from the procedure's thread."""
         self._listeners.append(listener)
 
-    def update(self, **changes: Any) -> Status:
+    def update(self, **changes: Any) -> ProcedureStatus:
         """Replace fields of the status."""
         with self._lock:
             before, self._status = self._status, replace(self._status, **changes)

@@ -14,20 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.calibration import Calibration
-from device.measurement.features import FEATURE_NAMES, FeatureSettings, extract_features
-from device.measurement.inversion import ModelBundle
+from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings, extract_features
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.recording import Recording
-from device.measurement.tactile_image import saturated_ratio
+from device.measurement.recording.recording import Recording
+from device.measurement.recording.tactile_image import saturated_ratio
 
-Status = Literal["ok", "outside_range", "no_contact", "saturated", "not_identifiable", "rejected"]
+EstimateStatus = Literal["ok", "outside_range", "no_contact", "saturated", "not_identifiable", "rejected"]
 
 CONTACT_N = 0.05
 """Below this mean force the probe touches nothing."""
 SATURATED_RATIO = 0.001
 """More pixels than this at full scale, and the sum and the peak are no longer the light."""
 VISIBLE_CONTRAST = 0.002
-"""A lump whose peak is fainter than this is not told from the residue of light, force and camera."""
+"""An inclusion whose peak is fainter than this is not told from the residue of light, force and camera."""
 
 SPOKEN = {"size_mm": "size", "depth_mm": "depth", "youngs_modulus_kpa": "Young's modulus"}
 
@@ -58,7 +58,7 @@ class Estimate:
     size_mm: Quantity
     depth_mm: Quantity
     youngs_modulus_kpa: Quantity
-    status: Status
+    status: EstimateStatus
     reason: str
     mode: str
     model: str
@@ -153,7 +153,7 @@ def _scatter(estimates: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(estimates.std(axis=0, ddof=1) if len(estimates) > 1 else np.zeros(estimates.shape[1]))
 
 
-def _verdict(identifiable: NDArray[np.bool_]) -> tuple[Status, str]:
+def _verdict(identifiable: NDArray[np.bool_]) -> tuple[EstimateStatus, str]:
     open_ones = [SPOKEN[name] for name, known in zip(UNKNOWNS, identifiable, strict=True) if not known]
     if open_ones:
         return "not_identifiable", f"This press does not determine {' and '.join(open_ones)}."
@@ -161,7 +161,7 @@ def _verdict(identifiable: NDArray[np.bool_]) -> tuple[Status, str]:
 
 
 def _without_answer(
-    status: Status, reason: str, recording: Recording, bundle: ModelBundle, calibration: Calibration
+    status: EstimateStatus, reason: str, recording: Recording, bundle: ModelBundle, calibration: Calibration
 ) -> Estimate:
     unknown: dict[str, Any] = dict.fromkeys(UNKNOWNS, UNKNOWN_QUANTITY)
     origin = _origin(recording, bundle, calibration)

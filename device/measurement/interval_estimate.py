@@ -9,19 +9,18 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from device.measurement.calibration import Calibration
-from device.measurement.confidence import Bands, Interval
-from device.measurement.estimate import SATURATED_RATIO, SPOKEN, UNKNOWN_QUANTITY, Estimate, Quantity, Status
-from device.measurement.inversion import ModelBundle
+from device.measurement.confidence_belt import Bands, Interval
+from device.measurement.estimate import SATURATED_RATIO, SPOKEN, UNKNOWN_QUANTITY, Estimate, EstimateStatus, Quantity
 from device.measurement.mode import Mode
-from device.measurement.press_parameters import unknowns_from_unit
+from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.parameters import unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.recording import Recording
-from device.measurement.tactile_image import saturated_ratio
+from device.measurement.recording.recording import Recording
+from device.measurement.recording.tactile_image import saturated_ratio
 
-Array = NDArray[np.float64]
 Origin = dict[str, Any]
 
 
@@ -64,12 +63,12 @@ def with_numbers(
     intervals = [band.interval(float(at), float(width)) for band, at, width in zip(bands, mean, spread, strict=True)]
     unknown = [SPOKEN[name] for name, one in zip(UNKNOWNS, intervals, strict=True) if not one.is_identifiable]
     reason = f"This press does not determine {' and '.join(unknown)}." if unknown else ""
-    status: Status = "not_identifiable" if unknown else "ok"
+    status: EstimateStatus = "not_identifiable" if unknown else "ok"
     quantities = _quantities(mean, spread, intervals)
     return Estimate(**quantities, status=status, reason=reason, features=features, **origin)
 
 
-def without_numbers(status: Status, reason: str, origin: Origin) -> Estimate:
+def without_numbers(status: EstimateStatus, reason: str, origin: Origin) -> Estimate:
     """Return an estimate that says why there are no numbers."""
     unknown: dict[str, Any] = dict.fromkeys(UNKNOWNS, UNKNOWN_QUANTITY)
     return Estimate(**unknown, status=status, reason=reason, features={}, **origin)

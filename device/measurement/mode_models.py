@@ -11,13 +11,13 @@ from typing import NamedTuple, TypeVar
 
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate, estimate_recording
-from device.measurement.held_estimate import HeldModel, estimate_held
-from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode
-from device.measurement.profile_estimate import estimate_profile
-from device.measurement.profile_model import RAMP_MODES, ProfileModel
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.recording import Recording
+from device.measurement.quick_mode.model import HeldModel, estimate_held
+from device.measurement.ramp_modes.estimate import estimate_profile
+from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.recording.recording import Recording
 
 Model = TypeVar("Model", HeldModel, ProfileModel)
 

@@ -62,7 +62,7 @@ def require(quantity: str, value: object, bound: Bound, action: str) -> float:
 
 @dataclass(frozen=True)
 class Inclusion:
-    """One stiff sphere below the surface: the truth of a phantom, or a simulated scene's lump."""
+    """One stiff sphere below the surface: the truth of a phantom, or a simulated scene's inclusion."""
 
     size_mm: float
     depth_mm: float

@@ -9,11 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from device.measurement.ring_means import RING_AREAS_MM2, RING_RADII_MM
-
-Array = NDArray[np.float64]
+from device.measurement.arrays import Array
+from device.measurement.recording.ring_means import RING_AREAS_MM2, RING_RADII_MM
 
 SIGMAS_MM: Array = np.geomspace(0.5, 9.0, 160)
 """The standard deviations tried; between them a parabola finds the best."""

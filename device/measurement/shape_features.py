@@ -1,7 +1,7 @@
 """A press profile to the named numbers of the bright spot's shape, at each force of the ramp and of the whole press.
 
 They describe the ring profile, not the image: a ring blurs along the radius, so a Gaussian of standard deviation s
-reads as one of sqrt(s^2 + `RING_MM`^2 / 6), 1 % wider at 3 mm. Where there is no lump there is no shape: NaN.
+reads as one of sqrt(s^2 + `RING_MM`^2 / 6), 1 % wider at 3 mm. Where there is no inclusion there is no shape: NaN.
 Source: docs/features.md (definitions and measured sensitivities); the words are in `feature_definitions`.
 """
 
@@ -12,15 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.feature_definitions import PRESS_FEATURES, RAMP_FEATURES
-from device.measurement.press_profile import PressProfile
+from device.measurement.arrays import Array
+from device.measurement.paper_mode.feature_definitions import PRESS_FEATURES, RAMP_FEATURES
 from device.measurement.radial_gaussian import NO_GAUSSIAN, fit_gaussian
-from device.measurement.ring_means import RING_AREAS_MM2, RING_MM, RING_RADII_MM, RINGS
-
-Array = NDArray[np.float64]
+from device.measurement.ramp_modes.radial_profile import PressProfile
+from device.measurement.recording.ring_means import RING_AREAS_MM2, RING_MM, RING_RADII_MM, RINGS
 
 NOISE_MULTIPLE = 3.0
-"""A peak up to this many times the profile's residual is noise, not a lump."""
+"""A peak up to this many times the profile's residual is noise, not an inclusion."""
 FINE_MM: Array = np.linspace(0.0, RING_RADII_MM[-1], 901)
 INNER = slice(1, -1)
 """Rings whose harmonics count: the middle has none, and the frame's edges cut the last."""
@@ -30,8 +29,9 @@ INNER = slice(1, -1)
 class ShapeFeatures:
     """Arrays [K] at the forces `force_n`, and numbers of the press; units in the names, words in `feature_definitions`.
 
-    `peak_contrast` and `total_contrast_mm2` are always numbers. The others are NaN without a lump, that is at a force
-    where the peak is within `NOISE_MULTIPLE` of the noise, and where they are not defined: a width beyond the window.
+    `peak_contrast` and `total_contrast_mm2` are always numbers. The others are NaN without an inclusion, that is at a
+    force where the peak is within `NOISE_MULTIPLE` of the noise, and where they are not defined: a width beyond the
+    window.
     """
 
     force_n: Array
@@ -66,15 +66,15 @@ def shape_features(profile: PressProfile) -> ShapeFeatures:
     noise = NOISE_MULTIPLE * profile.residual
     fine = profile.contrast @ _FINE.T
     peak, total = fine.max(axis=1), profile.contrast @ RING_AREAS_MM2
-    lump = peak > noise
-    width = np.where(lump, [_full_width_mm(row) for row in fine], np.nan)
-    mean_radius, rms_radius = np.where(lump, _moments_mm(profile.contrast), np.nan)
+    inclusion = peak > noise
+    width = np.where(inclusion, [_full_width_mm(row) for row in fine], np.nan)
+    mean_radius, rms_radius = np.where(inclusion, _moments_mm(profile.contrast), np.nan)
     gaussian = np.array(
-        [fit_gaussian(row) if seen else NO_GAUSSIAN for row, seen in zip(profile.contrast, lump, strict=True)]
+        [fit_gaussian(row) if seen else NO_GAUSSIAN for row, seen in zip(profile.contrast, inclusion, strict=True)]
     )
-    offset, ellipticity = _asymmetry(profile, lump)
-    mean_offset, mean_ellipticity = _mean_asymmetry(profile) if lump.all() else (np.nan, np.nan)
-    slope = [_slope_per_n(profile.force_n, values) if lump.all() else np.nan for values in (peak, total, width)]
+    offset, ellipticity = _asymmetry(profile, inclusion)
+    mean_offset, mean_ellipticity = _mean_asymmetry(profile) if inclusion.all() else (np.nan, np.nan)
+    slope = [_slope_per_n(profile.force_n, values) if inclusion.all() else np.nan for values in (peak, total, width)]
     return ShapeFeatures(
         force_n=profile.force_n,
         peak_contrast=peak,
@@ -89,8 +89,8 @@ def shape_features(profile: PressProfile) -> ShapeFeatures:
         ellipticity=ellipticity,
         mean_centroid_offset_mm=mean_offset,
         mean_ellipticity=mean_ellipticity,
-        peak_change_per_n=slope[0] / float(peak.mean()) if lump.all() else np.nan,
-        total_change_per_n=slope[1] / float(total.mean()) if lump.all() else np.nan,
+        peak_change_per_n=slope[0] / float(peak.mean()) if inclusion.all() else np.nan,
+        total_change_per_n=slope[1] / float(total.mean()) if inclusion.all() else np.nan,
         width_change_mm_per_n=slope[2],
     )
 
@@ -114,11 +114,11 @@ def _moments_mm(contrast: Array) -> Array:
     return np.array([weight @ RING_RADII_MM / total, np.sqrt(weight @ RING_RADII_MM**2 / total)])
 
 
-def _asymmetry(profile: PressProfile, lump: NDArray[np.bool_]) -> Array:
-    """Return offset (mm) and ellipticity [2, K] of the profile at each force; NaN where there is no lump [K]."""
+def _asymmetry(profile: PressProfile, inclusion: NDArray[np.bool_]) -> Array:
+    """Return offset (mm) and ellipticity [2, K] of the profile at each force; NaN where there is no inclusion [K]."""
     rows = zip(profile.contrast, profile.offset_at_force, profile.elongation_at_force, strict=True)
     return np.array(
-        [_shift_and_stretch(*row) if seen else (np.nan, np.nan) for row, seen in zip(rows, lump, strict=True)]
+        [_shift_and_stretch(*row) if seen else (np.nan, np.nan) for row, seen in zip(rows, inclusion, strict=True)]
     ).T
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import MissingCalibration
+from device.files.durable import write_durably
 from device.measurement.calibration import Calibration, read_calibration
-from device.measurement.durable import write_durably
 from device.measurement.quantities import InvalidQuantity
 
 POINTER = "active"

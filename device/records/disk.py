@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Protocol
 
-from device.measurement.durable import write_and_sync
+from device.files.durable import write_and_sync
 
 
 class Disk(Protocol):

@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import DiskFullError, StorageError, UnknownResource
-from device.measurement.recording import Recording
-from device.measurement.recording_file import write_recording
+from device.files.recording_file import write_recording
+from device.measurement.recording.recording import Recording
 from device.records.disk import Disk, LocalDisk, read_uncached
 
-Record = dict[str, Any]
+StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
 TABLES = """
 CREATE TABLE IF NOT EXISTS measurement
@@ -88,7 +88,7 @@ class Store:
             remedy = "Free the disk, and let no other program hold the database."
             raise kind(f"The disk did not take the record: {error}.", remedy) from error
 
-    def _records(self, query: str, *values: object) -> list[Record]:
+    def _records(self, query: str, *values: object) -> list[StoredRecord]:
         with self._transaction() as db:
             return [json.loads(row[-1]) for row in db.execute(query, values)]
 
@@ -120,17 +120,17 @@ class Store:
             with suppress(OSError):  # a read-only disk refuses that too, and its fault is already under way
                 path.unlink(missing_ok=True)
 
-    def save_press(self, job: Record) -> None:
+    def save_press(self, job: StoredRecord) -> None:
         """Keep the state of a press job."""
         with self._transaction() as db:
             row = job["id"], job["state"] in ENDED, json.dumps(job)
             db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
 
-    def press(self, press_id: str) -> Record:
+    def press(self, press_id: str) -> StoredRecord:
         """Return a press job; raise `UnknownResource` when there is none of that id."""
         return self._one("press", press_id)
 
-    def add_measurement(self, record: Record, recording: Recording) -> Record:
+    def add_measurement(self, record: StoredRecord, recording: Recording) -> StoredRecord:
         """Keep a recording and its measurement; return the record with its sequence number."""
         folder = self._folder_of(recording.id)
         self.write_out(recording, folder)
@@ -152,11 +152,11 @@ class Store:
             kind = DiskFullError if _is_full(error) else StorageError
             raise kind(f"The recording could not be written: {error}.", "Free space on the disk.") from error
 
-    def measurement(self, measurement_id: str) -> Record:
+    def measurement(self, measurement_id: str) -> StoredRecord:
         """Return a measurement; raise `UnknownResource` when there is none of that id."""
         return self._one("measurement", measurement_id)
 
-    def measurements(self, *, before_seq: int, limit: int) -> list[Record]:
+    def measurements(self, *, before_seq: int, limit: int) -> list[StoredRecord]:
         """Return the newest measurements before a sequence number, newest first."""
         query = "SELECT record FROM measurement WHERE seq < ? ORDER BY seq DESC LIMIT ?"
         return self._records(query, before_seq, limit)
@@ -183,7 +183,7 @@ class Store:
     def _folder_of(self, recording_id: str) -> Path:
         return self.folder / "recordings" / recording_id
 
-    def _one(self, table: str, identifier: str) -> Record:
+    def _one(self, table: str, identifier: str) -> StoredRecord:
         found = self._records(f"SELECT record FROM {table} WHERE id = ?", identifier)
         if not found:
             raise UnknownResource(f"There is no {table} {identifier}.", "Use the id that the API gave.")

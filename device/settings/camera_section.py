@@ -1,6 +1,6 @@
 """The settings of the camera: the frames the probe works on, and the mode of the sensor that they are made of.
 
-A frame may be made of a larger mode: of its middle, each pixel the mean over an area (device/hardware/raw_rows.py).
+A frame may be made of a larger mode: of its middle, each pixel the mean over an area (device/hardware/camera.py).
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from device.hardware.raw_mode import RAW_BITS, RawFormat, RawMode
-from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Bound
+from device.measurement.recording.pixel_scale import PixelScale
 from device.settings.setting import Conflict, Section, conflict, setting
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from device.config import Config
 from device.errors import LastGoodConfigError
-from device.measurement.durable import write_durably
+from device.files.durable import write_durably
 from device.settings.catalogue import SETTINGS
 from device.settings.layers import Layers, is_there, read_layers
 

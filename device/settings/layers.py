@@ -14,8 +14,8 @@ from typing import Any, get_type_hints
 
 from device.config import Config
 from device.errors import ConfigError
+from device.files.toml_record import from_table, read_table, table_problems
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.toml_record import from_table, read_table, table_problems
 from device.settings.catalogue import SETTINGS
 from device.settings.setting import Conflict, InvalidSettings
 
@@ -24,7 +24,7 @@ VENDOR, LOCAL, DROP_INS = "usr/lib/tsis/config.toml", "etc/tsis/config.toml", "e
 
 
 @dataclass(frozen=True)
-class Problem:
+class SettingProblem:
     """What is wrong with one setting, or with a whole file."""
 
     file: Path
@@ -55,7 +55,7 @@ class Layers:
     files: tuple[Path, ...]
     values: Mapping[str, Any]
     origins: Mapping[str, Path]
-    problems: tuple[Problem, ...]
+    problems: tuple[SettingProblem, ...]
 
     def config(self) -> Config:
         """Return the configuration; raise `ConfigError` with every problem of every file."""
@@ -63,7 +63,7 @@ class Layers:
             raise self.refusal()
         return from_table(Config, _nested(self.values))
 
-    def refusal(self, *more: Problem) -> ConfigError:
+    def refusal(self, *more: SettingProblem) -> ConfigError:
         """Return the error that tells all problems of these files, and those beside them."""
         cause = "\n".join(str(problem) for problem in (*self.problems, *more))
         return ConfigError(cause, "Then start the daemon again.")
@@ -104,7 +104,7 @@ def read_config(path: Path) -> Config:
 def read_layers(files: Iterable[Path]) -> Layers:
     """Return what these files set, each over those before it, and everything that is wrong with them."""
     read: list[Path] = []
-    problems: list[Problem] = []
+    problems: list[SettingProblem] = []
     values: dict[str, Any] = {}
     origins: dict[str, Path] = {}
     for path in files:
@@ -112,10 +112,10 @@ def read_layers(files: Iterable[Path]) -> Layers:
         try:
             table = read_table(path)
         except InvalidQuantity as error:
-            problems.append(Problem(path, error))
+            problems.append(SettingProblem(path, error))
             continue
         wrong = list(_table_problems(table))
-        problems += [Problem(path, error) for error in wrong]
+        problems += [SettingProblem(path, error) for error in wrong]
         held = {name: value for name, value in _flat(table) if name not in _names(wrong)}
         values |= held
         origins |= dict.fromkeys(held, path)
@@ -124,7 +124,7 @@ def read_layers(files: Iterable[Path]) -> Layers:
         involved = (conflict.quantity, *conflict.others)
         if refused.isdisjoint(involved):
             file = next((origins[name] for name in involved if name in origins), read[-1])
-            problems.append(Problem(file, conflict))
+            problems.append(SettingProblem(file, conflict))
     return Layers(tuple(read), values, origins, tuple(problems))
 
 

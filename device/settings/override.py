@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from device.config import Config
-from device.measurement.toml_record import table_problems
+from device.files.toml_record import table_problems
 from device.settings.setting import Section
 
 Settings = TypeVar("Settings", bound=Section)

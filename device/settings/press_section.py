@@ -38,7 +38,7 @@ class PressSection(Section):
     )
     max_offset_mm: float = setting(
         2.5,
-        "A lump whose bright spot lies further off the middle of the face is off-centre: the press is rejected.",
+        "An inclusion whose bright spot lies further off the middle of the face is off-centre: the press is rejected.",
         Bound(0.5, 30.0, "mm"),
     )
     timeout_s: float = setting(60.0, "A press that takes longer is given up.", Bound(1.0, 3600.0, "s"))

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from device.measurement.led_sides import SIDES, LedRatio
 from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording.led_sides import SIDES, LedRatio
 
 PARAMETERS: dict[str, tuple[str, ...]] = {
     "camera_stall": (),
@@ -69,7 +69,7 @@ FROZEN_POLL_S = 0.02
 
 
 @dataclass(frozen=True)
-class Fault:
+class ScriptedFault:
     """One fault: its kind, from when until when, and what it takes.
 
     `from_s` and `until_s` count from the start of the simulation, or with `from_press` = n from the n-th press that
@@ -126,7 +126,7 @@ class FaultTimeline:
 
     def __init__(
         self,
-        faults: Sequence[Fault] = (),
+        faults: Sequence[ScriptedFault] = (),
         *,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
@@ -189,7 +189,7 @@ class FaultTimeline:
             shown_s = fault.date.timestamp() + now_s - begun_s if fault.date else shown_s
         return shown_s + sum(fault.step_s or 0.0 for fault in self._active("clock_jump", now_s))
 
-    def _active(self, kind: str, t_s: float) -> Iterator[Fault]:
+    def _active(self, kind: str, t_s: float) -> Iterator[ScriptedFault]:
         for fault in self._faults:
             if fault.kind == kind and fault.from_press < len(self._origins_s):
                 origin_s = self._origins_s[fault.from_press]
@@ -197,7 +197,7 @@ class FaultTimeline:
                     yield fault
 
 
-LIGHT_FAULTS: dict[str, Callable[[float, Fault], float]] = {
+LIGHT_FAULTS: dict[str, Callable[[float, ScriptedFault], float]] = {
     "led_dimmed": lambda light, fault: light * fault.strength,
     "led_dead": lambda light, fault: 0.0,
     "led_stuck_on": lambda light, fault: 1.0,

@@ -15,10 +15,10 @@ from threading import Lock
 
 from device.measurement.mode import RAMP_TO_N
 from device.measurement.quantities import Bound, require
-from device.simulation.pressed_face import Placement
+from device.simulation.physics.pressed_face import ProbePlacement
 
 BESIDE_MM = (40.0, 0.0)
-"""Where the hand presses for the reference: far enough that the lump is not felt."""
+"""Where the hand presses for the reference: far enough that the inclusion is not felt."""
 TOUCH_N, RAMP_AIM_N = 0.06, RAMP_TO_N + 0.06
 """What a hand takes a touch to be, and how far it means to go when it is to press slowly harder."""
 TAKEN_UP_FOR = ("hold_block", "put_weight")
@@ -208,6 +208,6 @@ class VirtualHand:
         drift = math.sin(2 * math.pi * 0.4 * t_s) + 0.4 * math.sin(2 * math.pi * 1.1 * t_s + 2.0)
         return max(0.0, steady_n + held * (self.settings.tremor_n * tremor + self.settings.drift_n * drift))
 
-    def place(self, t_s: float) -> Placement:
+    def place(self, t_s: float) -> ProbePlacement:
         """Return where the probe stands relative to the lesion and how it leans; it moves only while it is lifted."""
-        return Placement(*self._move_at(t_s).position_mm, self.settings.tilt_x_deg, self.settings.tilt_y_deg)
+        return ProbePlacement(*self._move_at(t_s).position_mm, self.settings.tilt_x_deg, self.settings.tilt_y_deg)

@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from device.files.toml_record import read_toml
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.toml_record import read_toml
-from device.simulation.faults import Fault
+from device.simulation.faults import ScriptedFault
 from device.simulation.hand import HandSettings
-from device.simulation.lens import Lens
-from device.simulation.neighbour import Neighbour
-from device.simulation.renderer import LinearOptics
-from device.simulation.sensor import Sensor
-from device.simulation.skin import Skin
-from device.simulation.slab import Slab
+from device.simulation.physics.image_formation import LinearOptics
+from device.simulation.physics.lens import Lens
+from device.simulation.physics.neighbour import Neighbour
+from device.simulation.physics.sensor import Sensor
+from device.simulation.physics.skin import Skin
+from device.simulation.physics.slab import Slab
 
 SERIALS = {"physical": "SIM-0001", "linear": "SIM-LINEAR"}
 DEFAULT_INCLUSION = Inclusion(size_mm=12.0, depth_mm=6.0, youngs_modulus_kpa=60.0)
@@ -63,7 +63,7 @@ class Scenario:
     slab_thickness_mm: float = 30.0
     seed: int = 1
     neighbour: Neighbour | None = None
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[ScriptedFault, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     expects: str = ""
     self_test_fails: str = ""

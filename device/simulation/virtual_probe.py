@@ -10,18 +10,18 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from device.measurement.led_sides import LedRatio
-from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.tactile_image import Counts
+from device.measurement.recording.led_sides import LedRatio
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.tactile_image import Counts
 from device.simulation.hand import VirtualHand
-from device.simulation.image_formation import ImageFormation, LinearImage, ScatteredImage
-from device.simulation.lookup_optics import LookupOptics
-from device.simulation.neighbour import Face, NeighbouredFace
-from device.simulation.off_axis_table import OffAxisTable, load_off_axis_table
-from device.simulation.pressed_face import Placement, PressedFace
+from device.simulation.physics.image_formation import ImageFormation, LinearImage, ScatteredImage
+from device.simulation.physics.lookup_optics import LookupOptics
+from device.simulation.physics.neighbour import NeighbouredFace, NeighbourFace
+from device.simulation.physics.off_axis_table import OffAxisTable, load_off_axis_table
+from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
+from device.simulation.physics.surface_table import PressRamps, SurfaceTable, load_surface_table
 from device.simulation.scenario import Scenario
-from device.simulation.surface_table import PressRamps, SurfaceTable, load_surface_table
 
 ACTION = "run `host_tools table` to make both again"
 
@@ -51,7 +51,7 @@ class ProbeTables:
 
 
 class VirtualProbe:
-    """The physics below the chips: hand to force, force and lump to face, face and LEDs to counts."""
+    """The physics below the chips: hand to force, force and inclusion to face, face and LEDs to counts."""
 
     def __init__(
         self,
@@ -70,12 +70,12 @@ class VirtualProbe:
         self._image = _image_formation(scenario, tables, shape, scale)
         self._face = self._faces(tables, ramps)
 
-    def _faces(self, tables: ProbeTables, ramps: PressRamps | None) -> Face:
+    def _faces(self, tables: ProbeTables, ramps: PressRamps | None) -> NeighbourFace:
         scenario, x_mm, y_mm = self.scenario, self._image.x_mm, self._image.y_mm
 
-        def face(lump: Inclusion, solved: PressRamps | None = None) -> Face:
-            solved = solved or tables.centred.ramps(lump, scenario.slab)
-            return PressedFace(solved, tables.off_axis, lump, x_mm, y_mm, scenario.slab)
+        def face(inclusion: Inclusion, solved: PressRamps | None = None) -> NeighbourFace:
+            solved = solved or tables.centred.ramps(inclusion, scenario.slab)
+            return PressedFace(solved, tables.off_axis, inclusion, x_mm, y_mm, scenario.slab)
 
         first, second = face(scenario.inclusion, ramps), scenario.neighbour
         return NeighbouredFace(first, face(second.inclusion), second) if second else first
@@ -89,7 +89,7 @@ class VirtualProbe:
         self,
         *,
         force_n: float,
-        place: Placement,
+        place: ProbePlacement,
         led_ratio: LedRatio,
         exposure_us: float,
         gain: float,

@@ -14,16 +14,16 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
-from device.instrument.press_cost import press_cost
+from device.instrument.press.cost import press_cost
 from device.instrument.procedure import Procedure
-from device.instrument.self_test.job import SelfTestJob
+from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
-from device.web.schema import PROBLEM, Press, SelfTest, Status, Tare, answers
+from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -115,18 +115,18 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
 
 
 def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
-    @app.post(f"{API}/presses", status_code=202, responses=answers(202, Press))
+    @app.post(f"{API}/presses", status_code=202, responses=answers(202, PressResource))
     def start_press(request: PressRequest | None = None) -> JSONResponse:
         """Start a measurement; on the simulated probe the virtual hand takes up the probe."""
         job = procedure.request(request.mode if request else None)
         return JSONResponse(job.as_record(), status_code=202, headers={"Location": f"{API}/presses/{job.id}"})
 
-    @app.get(f"{API}/presses/{{press_id}}", responses=answers(200, Press))
+    @app.get(f"{API}/presses/{{press_id}}", responses=answers(200, PressResource))
     def press(press_id: str) -> dict[str, Any]:
         """Return the state of a press."""
         return store.press(press_id)
 
-    @app.delete(f"{API}/presses/{{press_id}}", status_code=202, responses=answers(202, Press))
+    @app.delete(f"{API}/presses/{{press_id}}", status_code=202, responses=answers(202, PressResource))
     def cancel_press(press_id: str) -> dict[str, Any]:
         """Cancel the press under way."""
         procedure.cancel(press_id)

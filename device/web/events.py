@@ -9,10 +9,10 @@ from typing import Any
 
 from device import __version__
 from device.errors import DeviceError, LoadCellError
-from device.instrument.guidance import Guidance
+from device.instrument.press.frame_choice import ramp_targets_n
+from device.instrument.press.states import Guidance
 from device.instrument.procedure import Procedure
-from device.instrument.ramp_frames import ramp_targets_n
-from device.instrument.status import Status
+from device.instrument.status import ProcedureStatus
 from device.measurement.mode import FRAMES, RAMP_TO_N, Mode
 from device.records.store import ENDED
 
@@ -56,7 +56,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     }
 
 
-def _ramp_n(mode: Mode, status: Status) -> tuple[float, ...]:
+def _ramp_n(mode: Mode, status: ProcedureStatus) -> tuple[float, ...]:
     return ramp_targets_n(FRAMES[mode].count, "reference" if status.step == "reference" else "press")
 
 

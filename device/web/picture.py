@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from device.measurement.recording_file import read_recording
+from device.files.recording_file import read_recording
 
 WIDTH_PX = 480
 

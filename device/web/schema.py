@@ -10,10 +10,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from device.faults.table import FaultCode
-from device.instrument.press_state import PressState
-from device.instrument.self_test.job import SelfTestState
-from device.instrument.self_test.result import Verdict
+from device.fault_table import FaultCode
+from device.instrument.press.states import PressState
+from device.instrument.self_test.report import SelfTestState, Verdict
 from device.instrument.status import JobState, Step
 from device.measurement.mode import Mode
 
@@ -46,7 +45,7 @@ class Fault(_Body):
     remedy: str
 
 
-class Press(_Body):
+class PressResource(_Body):
     """A press; `code` is that of the fault that ended it."""
 
     id: str
@@ -128,7 +127,7 @@ class Status(_Body):
     full_scale_n: float
     frames_taken: int
     frames_needed: int
-    press: Press | None
+    press: PressResource | None
     measurement_id: str | None
     self_test: SelfTestSummary | None
     faults: list[Fault]

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from device.measurement.durable import write_once
-from device.measurement.features import FEATURE_NAMES
-from device.measurement.inversion import FEATURE_UNITS, ModelBundle
+from device.files.durable import write_once
+from device.files.recording_file import read_recording
+from device.measurement.paper_mode.features import FEATURE_NAMES
+from device.measurement.paper_mode.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.recording_file import read_recording
-from device.simulation.surface_table import load_surface_table
-from host_tools.calibration_gates import CalibrationRejected, Gate
+from device.simulation.physics.surface_table import load_surface_table
+from host_tools.calibration.gates import CalibrationRejected, Gate
 from host_tools.commands.model import MODELS
 from host_tools.commands.output import note
 
 if TYPE_CHECKING:
-    from host_tools.calibrate import Calibrated
+    from host_tools.calibration.calibrate import Calibrated
 
 MODEL = MODELS / "paper"
 TABLE = MODELS / "simulated_probe"
@@ -46,8 +46,8 @@ def calibrate(
     Gates of number, spread and age of the phantoms, R2, leave-one-out error, dark level and saturation must all be
     passed; otherwise nothing is written and the exit code is 1. An existing file is never replaced.
     """
-    from host_tools.calibrate import Provenance
-    from host_tools.calibrate import calibrate as run_calibration
+    from host_tools.calibration.calibrate import Provenance
+    from host_tools.calibration.calibrate import calibrate as run_calibration
 
     _require_new(out)
     try:

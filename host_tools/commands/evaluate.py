@@ -1,8 +1,13 @@
-"""`host_tools evaluate`: scores of recordings with truth, or of random presses of the simulated probe, in any mode."""
+"""`host_tools evaluate`: scores of recordings with truth, or of random presses of the simulated probe, in any mode.
+
+What `host_tools evaluate` prints with --noise-free and --posterior: modes standard and precise beside the best.
+
+The chapters are those of `host_tools modes`, on presses of another seed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,22 +16,64 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from device.files.recording_file import read_recording
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.estimate import Estimate
-from device.measurement.inversion import ModelBundle
 from device.measurement.mode import Mode, mode_named, mode_of
 from device.measurement.mode_models import ModeModels, with_models
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.recording import Recording
-from device.measurement.recording_file import read_recording
+from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.recording.recording import Recording
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_tables
 from host_tools.commands.model import MODELS, phantoms_of
 from host_tools.commands.output import note
-from host_tools.commands.reference_scores import print_reference
 
 if TYPE_CHECKING:
-    from host_tools.score_recordings import LeastErrors, Sample
+    from host_tools.pages.benchmark import Chapter
+
+
+def print_reference(
+    model: Path, table: Path, mode: Mode | None, *, noise_free: bool, posterior: bool, scenes: int | None, seed: int
+) -> None:
+    """Print the chapters that are asked for, on `scenes` presses or as many as `host_tools modes` takes.
+
+    Both modes unless one is given. Raises `InvalidQuantity` for one that fits no forward model; exits with code 1 when
+    a figure misses its bound.
+    """
+    from host_tools.scores.noise_free import PRESSES, noise_free_chapter
+    from host_tools.scores.posterior import SCENES, posterior_chapter
+
+    modes = _ramp_modes(mode)
+    trained, tables = ProfileModel.load(model), ProbeTables.load(table)
+    chapters: dict[str, Callable[[], Chapter]] = {}
+    if noise_free:
+        presses = PRESSES if scenes is None else scenes
+        chapters["noise-free"] = lambda: noise_free_chapter(trained.answers, tables, presses=presses, seed=seed)
+    if posterior:
+        count = SCENES if scenes is None else scenes
+        chapters["posterior"] = lambda: posterior_chapter(trained, modes=modes, scenes=count, seed=seed)
+    missed, out = 0, Console(width=160, highlight=False)
+    for timed in measure_chapters(chapters).values():
+        missed += print_chapter(timed)
+        out.print(timed.chapter.claim, markup=False)
+        print_tables(timed.chapter)
+    if missed:
+        raise typer.Exit(1)
+
+
+def _ramp_modes(mode: Mode | None) -> tuple[Mode, ...]:
+    if mode is None:
+        return RAMP_MODES
+    if mode not in RAMP_MODES:
+        raise InvalidQuantity("mode", mode, " or ".join(RAMP_MODES), "only they have a forward model to compare with")
+    return (mode,)
+
+
+if TYPE_CHECKING:
+    from host_tools.scores.score_recordings import LeastErrors, Sample
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 SCENES = 100
@@ -61,7 +108,7 @@ def evaluate(
 
     Example: host_tools evaluate --mode precise --scenes 50
     """
-    from host_tools.score_recordings import print_score, score
+    from host_tools.scores.score_recordings import print_score, score
 
     out = Console(width=110, highlight=False)
     asked = mode_named(mode) if mode else None
@@ -90,8 +137,8 @@ def evaluate(
 
 def _bound_of(models: ModeModels) -> LeastErrors:
     """Return what bounds the errors of standard and precise; the bundles of the other modes hold no forward model."""
-    from host_tools.inverse.press_bound import least_errors
-    from host_tools.score_recordings import unbounded
+    from host_tools.limits.press_bound import least_errors
+    from host_tools.scores.score_recordings import unbounded
 
     return partial(least_errors, models.profile.answers) if models.profile else unbounded
 
@@ -105,7 +152,7 @@ def _certificate(light: str) -> str:
 def _print_paper(
     bundle: ModelBundle, certificate: Calibration, table: Path, light: str, scenes: int, seed: int, out: Console
 ) -> None:
-    from host_tools.score import Rig, print_intervals, print_phantoms
+    from host_tools.scores.paper_scores import Rig, print_intervals, print_phantoms
 
     rig = Rig(bundle, certificate, ProbeTables.load(table), Scenario(light=light))
     print_phantoms(rig, phantoms_of(bundle), seed=seed, out=out)
@@ -114,19 +161,19 @@ def _print_paper(
 
 
 def _named(paths: list[Path] | None) -> Iterator[Sample]:
-    from host_tools.score_recordings import Sample
+    from host_tools.scores.score_recordings import Sample
 
     return (Sample(str(path), partial(read_recording, path)) for path in paths or [])
 
 
 def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[Sample]:
     """Yield presses over the trained ranges that no training has seen, with every drift."""
-    from device.measurement.press_noise import ErrorLevels
-    from device.measurement.press_parameters import PARAMETERS
-    from host_tools.inverse.press_samples import draw_parameters
-    from host_tools.inverse.recorded_presses import recorded_press
-    from host_tools.inverse.seeds import press_seed
-    from host_tools.score_recordings import Sample
+    from device.measurement.parameters import PARAMETERS
+    from device.measurement.ramp_modes.noise import ErrorLevels
+    from host_tools.press_models.press_samples import draw_parameters
+    from host_tools.press_models.recorded_presses import recorded_press
+    from host_tools.press_models.seeds import press_seed
+    from host_tools.scores.score_recordings import Sample
 
     tables = ProbeTables.load(table)
     for number, parameters in enumerate(draw_parameters(scenes, np.random.default_rng([seed, 3]))):

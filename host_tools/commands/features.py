@@ -1,4 +1,6 @@
-"""`host_tools features`: what each number of the image knows of lump, light and skin, measured on simulated presses."""
+"""`host_tools features`: what each number of the image knows of inclusion, light and skin, measured on simulated
+presses.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from device.measurement.durable import write_durably
+from device.files.durable import write_durably
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import ROOT, shown
 from host_tools.commands.output import note, progress, require_writable
@@ -18,8 +20,8 @@ def features(
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = ROOT / "models" / "simulated_probe",
 ) -> None:
     """Measure the sensitivity of every image feature on simulated force ramps, and write definitions and figures."""
-    from host_tools.study.feature_page import page
-    from host_tools.study.feature_sensitivity import PRESSES, SCENES, Phantoms, sensitivity
+    from host_tools.replication.feature_page import page
+    from host_tools.replication.feature_sensitivity import PRESSES, SCENES, Phantoms, sensitivity
 
     require_writable(out, (".md",))
     tables = ProbeTables.load(table)

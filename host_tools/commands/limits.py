@@ -1,4 +1,4 @@
-"""`host_tools limits`: how well a lump can be known by a protocol, or a map of that over the box."""
+"""`host_tools limits`: how well an inclusion can be known by a protocol, or a map of that over the box."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from host_tools.commands.measured_chapters import ROOT, shown
 from host_tools.commands.output import note, progress, require_writable
 
 if TYPE_CHECKING:
-    from host_tools.inverse.limits import Limits
-    from host_tools.scene import Scene
+    from host_tools.limits.bounds import Limits
+    from host_tools.scenes.scene import Scene
 
 STANDARD = ROOT / "protocols" / "standard.toml"
 LETTERS = ("ln d", "ln h", "ln E")
@@ -23,9 +23,9 @@ LETTERS = ("ln d", "ln h", "ln E")
 def limits(
     scene: Annotated[Path | None, typer.Argument(help="TOML file of the scene.")] = None,
     protocol: Annotated[Path, typer.Option(help="TOML file of the protocol.")] = STANDARD,
-    size_mm: Annotated[float | None, typer.Option(help="Diameter of the lump, without a scene file.")] = None,
-    depth_mm: Annotated[float | None, typer.Option(help="Surface to the top of the lump.")] = None,
-    modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the lump.")] = None,
+    size_mm: Annotated[float | None, typer.Option(help="Diameter of the inclusion, without a scene file.")] = None,
+    depth_mm: Annotated[float | None, typer.Option(help="Surface to the top of the inclusion.")] = None,
+    modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the inclusion.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print bounds and correlations as JSON.")] = False,
     whole_map: Annotated[bool, typer.Option("--map", help="Map the box instead of one scene (minutes).")] = False,
     out: Annotated[Path | None, typer.Option(help="With --map: Markdown file; its figure goes beside it.")] = None,
@@ -37,8 +37,8 @@ def limits(
         return
     if out is not None:
         raise InvalidQuantity("out", out, "given with --map", "add --map, or print with --json")
-    from host_tools.inverse.limits import limits as bounds
-    from host_tools.inverse.protocol import read_protocol
+    from host_tools.limits.bounds import limits as bounds
+    from host_tools.limits.protocol import read_protocol
 
     asked = read_protocol(protocol)
     found = bounds(_scene(scene, given), asked)
@@ -49,8 +49,8 @@ def limits(
 
 
 def _scene(path: Path | None, given: tuple[float | None, float | None, float | None]) -> Scene:
-    from host_tools.scene import Scene
-    from host_tools.scene_file import read_scene
+    from host_tools.scenes.scene import Scene
+    from host_tools.scenes.scene_file import read_scene
 
     known = [value for value in given if value is not None]
     if path is not None and not known:
@@ -117,19 +117,19 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     if out is None or any(value is not None for value in given):
         raise InvalidQuantity("map", "asked for", "asked for with --out and no scene", "add --out docs/accuracy.md")
     require_writable(out, (".md",))
-    from device.measurement.durable import write_durably
-    from device.measurement.profile_model import ProfileModel
-    from host_tools.study.accuracy_figure import draw_map
-    from host_tools.study.accuracy_map import lumps, mapped_scene
-    from host_tools.study.accuracy_page import FIGURE, limits_markdown
-    from host_tools.study.beside_axis import beside_over_axis
+    from device.files.durable import write_durably
+    from device.measurement.ramp_modes.model import ProfileModel
+    from host_tools.limits.accuracy_figure import draw_map
+    from host_tools.limits.accuracy_map import inclusions, mapped_scene
+    from host_tools.limits.accuracy_page import FIGURE, limits_markdown
+    from host_tools.limits.press_bound import beside_over_axis
 
     beside = beside_over_axis(ProfileModel.load(ROOT / "models" / "standard").answers)
-    chosen, mapped = lumps(), []
+    chosen, mapped = inclusions(), []
     with progress("scenes") as bar:
         task = bar.add_task("", total=len(chosen))
-        for lump in chosen:
-            mapped.append(mapped_scene(lump))
+        for inclusion in chosen:
+            mapped.append(mapped_scene(inclusion))
             bar.advance(task)
     figures = out.parent / "figures"
     figures.mkdir(exist_ok=True)

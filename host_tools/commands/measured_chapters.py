@@ -14,15 +14,15 @@ from rich.table import Table
 from host_tools.commands.output import progress
 
 if TYPE_CHECKING:
-    from host_tools.study.benchmark import Chapter
-    from host_tools.study.document import Timed
+    from host_tools.pages.benchmark import Chapter
+    from host_tools.pages.document import Timed
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def measure_chapters(chapters: Mapping[str, Callable[[], Chapter]]) -> dict[str, Timed]:
     """Measure every chapter, one after the other, each with the wall time it took."""
-    from host_tools.study.document import Timed
+    from host_tools.pages.document import Timed
 
     measured = {}
     with progress("chapters") as bar:
@@ -37,7 +37,7 @@ def measure_chapters(chapters: Mapping[str, Callable[[], Chapter]]) -> dict[str,
 
 def print_chapter(timed: Timed) -> int:
     """Print one chapter; return how many of its benchmarks miss their bound."""
-    from host_tools.study.document import BENCHMARK_HEADER, benchmark_row
+    from host_tools.pages.document import BENCHMARK_HEADER, benchmark_row
 
     chapter, out = timed.chapter, Console(width=140, highlight=False)
     if chapter.skipped:

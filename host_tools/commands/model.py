@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from device.measurement.inversion import ModelBundle
+from device.files.recording_file import write_recording
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording_file import write_recording
-from device.simulation.pressed_face import Placement
+from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.output import note, progress
 
 if TYPE_CHECKING:
-    from host_tools.phantom_sets import Phantom
+    from host_tools.calibration.phantom_sets import Phantom
 
 MODELS, WIDE = Path(__file__).resolve().parents[2] / "models", Path("build/wide_table")
 
@@ -29,14 +29,15 @@ def table(
     ] = None,
     part: Annotated[str, typer.Option(help="centred, off-axis or all, which are both; or wide.")] = "all",
 ) -> None:
-    """Build the virtual probe's tables of the pressed face: force ramps of centred lumps, and lumps off the axis.
+    """Build the virtual probe's tables of the pressed face: force ramps of centred inclusions, and inclusions off the
+    axis.
 
     The first hold tissue of 4-6.25 kPa and 27-36 mm, the second is carried over to it. Half an hour on two cores.
-    Part wide, another half an hour, is of lumps around the trained ranges: `train --profile standard` needs it.
+    Part wide, another half an hour, is of inclusions around the trained ranges: `train --profile standard` needs it.
     """
-    from host_tools.off_axis_table import build_off_axis_table, write_off_axis_table
-    from host_tools.surface_table import build_surface_table, write_surface_table
-    from host_tools.wide_table import build_wide_table
+    from host_tools.probe_tables.off_axis_table import build_off_axis_table, write_off_axis_table
+    from host_tools.probe_tables.out_of_range_table import build_wide_table
+    from host_tools.probe_tables.surface_table import build_surface_table, write_surface_table
 
     if part not in ("centred", "off-axis", "all", "wide"):
         raise InvalidQuantity("part", part, "centred, off-axis, all or wide", "name one of them")
@@ -70,10 +71,10 @@ def phantom(
 
     Example: host_tools phantom --set random --scenes 5 --force-n 0.2 --force-n 0.4 --out build/random
     """
-    from host_tools.phantom import TARGET_N, Protocol, phantom_recording
+    from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 
     made_of = read_scenario(scenario) if scenario else Scenario()
-    protocol = Protocol(tuple(force_n or [TARGET_N]), place=Placement(x_mm=offset_mm))
+    protocol = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
     tables = ProbeTables.load(table)
     for i, one in enumerate(_phantom_set(which, model, scenes, seed)):
         recording = phantom_recording(
@@ -85,7 +86,7 @@ def phantom(
 
 
 def _phantom_set(which: str, model: Path, scenes: int, seed: int) -> Iterator[Phantom]:
-    from host_tools.phantom_sets import Phantom, breast_imager, random_set
+    from host_tools.calibration.phantom_sets import Phantom, breast_imager, random_set
 
     require("scenes", scenes, Bound(1, 100_000, "phantoms"), "record at least one")
     if which == "breast-imager":

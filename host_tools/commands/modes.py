@@ -9,11 +9,11 @@ from typing import Annotated
 import typer
 
 from device.measurement.calibration import read_calibration
-from device.measurement.held_estimate import HeldModel
-from device.measurement.inversion import ModelBundle
 from device.measurement.mode_models import ModeModels
-from device.measurement.profile_model import RAMP_MODES, ProfileModel
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.quick_mode.model import HeldModel
+from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
 from host_tools.commands.output import note, require_writable
@@ -31,19 +31,18 @@ def modes(
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
-    from host_tools.inverse.seeds import derived_seed
-    from host_tools.study.document import write_document
-    from host_tools.study.mode_breast_imager import breast_imager_chapter
-    from host_tools.study.mode_coverage import coverage_chapter
-    from host_tools.study.mode_dial import dial_chapter
-    from host_tools.study.mode_just_outside import just_outside_chapter
-    from host_tools.study.mode_noise_free import noise_free_chapter
-    from host_tools.study.mode_oblong import oblong_chapter
-    from host_tools.study.mode_outside import outside_chapter
-    from host_tools.study.mode_page import MODES_PAGE
-    from host_tools.study.mode_posterior import posterior_chapter
-    from host_tools.study.mode_span import span_chapter
-    from host_tools.study.outside_presses import kinds
+    from host_tools.pages.document import write_document
+    from host_tools.press_models.seeds import derived_seed
+    from host_tools.scores.breast_imager import breast_imager_chapter
+    from host_tools.scores.coverage import coverage_chapter
+    from host_tools.scores.dial import dial_chapter
+    from host_tools.scores.ellipsoids import oblong_chapter
+    from host_tools.scores.just_outside import just_outside_chapter
+    from host_tools.scores.noise_free import noise_free_chapter
+    from host_tools.scores.outside import kinds, outside_chapter
+    from host_tools.scores.page import MODES_PAGE
+    from host_tools.scores.posterior import posterior_chapter
+    from host_tools.scores.span import span_chapter
 
     if out:
         require_writable(out, (".md",))

@@ -42,14 +42,14 @@ def verify(
     ] = None,
 ) -> None:
     """Check the light against answers on paper and against Mitsuba 3; exit code 1 when one misses its bound."""
-    from host_tools.study.optics_chapters import cover, optics_chapters
+    from host_tools.verification.light.chapters import cover, optics_chapters
 
     require_writable(out, (".md",))
     require("rays", rays, Bound(10_000, 1e10, ""), "trace enough rays to see anything")
     measured = measure_chapters(optics_chapters(rays, mitsuba=mitsuba, mitsuba_python=mitsuba_python))
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        from host_tools.study.document import write_document
+        from host_tools.pages.document import write_document
 
         flags = [f"--rays {rays}"] if rays != DEFAULT_RAYS else []
         flags += ["--mitsuba"] if mitsuba else []

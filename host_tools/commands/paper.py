@@ -28,8 +28,8 @@ def paper(
     """
     require_writable(out, (".md",))
     from host_tools.data.dataset import require_enough, training_rows
-    from host_tools.study.paper_chapters import paper_chapters
-    from host_tools.study.paper_study import PaperStudy
+    from host_tools.replication.chapters import paper_chapters
+    from host_tools.replication.study import PaperStudy
 
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
@@ -41,8 +41,8 @@ def paper(
         failed += print_chapter(timed)
         print_tables(timed.chapter)
     if out:
-        from host_tools.study.document import write_document
-        from host_tools.study.paper_verdict import cover
+        from host_tools.pages.document import write_document
+        from host_tools.replication.verdict import cover
 
         write_document(out, measured, command=_command(out, data, table, seeds), cover=cover(study))
         note.print(f"{out} written.")

@@ -12,12 +12,12 @@ import typer
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from host_tools.commands.output import require_writable
-from host_tools.scene import Press, Scene
+from host_tools.scenes.scene import Press, Scene
 
 if TYPE_CHECKING:
     from host_tools.forward.solution import Solution
 
-Strain = Literal["small", "finite", "auto"]
+SimulateStrain = Literal["small", "finite", "auto"]
 PLOTS, PICTURES, SCENES = (".png", ".pdf", ".svg"), (".png",), (".toml",)
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
 
@@ -29,10 +29,10 @@ def simulate(
     modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the inclusion.")] = None,
     tissue_modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the tissue.")] = None,
     poisson: Annotated[float | None, typer.Option(help="Poisson ratio of probe, tissue and inclusion.")] = None,
-    offset_mm: Annotated[float | None, typer.Option(help="Lump's centre beside the probe's axis.")] = None,
+    offset_mm: Annotated[float | None, typer.Option(help="Inclusion's centre beside the probe's axis.")] = None,
     indentation_mm: Annotated[float | None, typer.Option(help="Prescribe the indentation (1 mm by default).")] = None,
     force_n: Annotated[float | None, typer.Option(help="Prescribe the force instead.")] = None,
-    strain: Annotated[Strain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "small",
+    strain: Annotated[SimulateStrain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "small",
     tolerance: Annotated[str, typer.Option(help="Relative error allowed on O1-O3, such as 0.5% or 0.005.")] = "0.5%",
     explain: Annotated[bool, typer.Option(help="Print which model was chosen, and why.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the whole solution as JSON.")] = False,
@@ -88,7 +88,7 @@ def _scene(
     press: tuple[float | None, float | None],
 ) -> Scene:
     """Return the file's scene, or the default one, with what the options say instead."""
-    from host_tools.scene_file import read_scene
+    from host_tools.scenes.scene_file import read_scene
 
     base = read_scene(path) if path else Scene()
     inclusion = _inclusion(base.inclusion, unknowns, path)
@@ -122,12 +122,12 @@ def _inclusion(
 
 
 def _save(scene: Scene, path: Path) -> None:
-    from host_tools.scene_file import write_scene
+    from host_tools.scenes.scene_file import write_scene
 
     write_scene(scene, path)
 
 
-def _solution(scene: Scene, tolerance_ratio: float, strain: Strain) -> Solution:
+def _solution(scene: Scene, tolerance_ratio: float, strain: SimulateStrain) -> Solution:
     """Return the solution by the cheapest model that holds the tolerance."""
     from host_tools.forward.plan import model_plan
     from host_tools.forward.solve import solve
@@ -137,14 +137,14 @@ def _solution(scene: Scene, tolerance_ratio: float, strain: Strain) -> Solution:
 
 
 def _plot(solution: Solution, path: Path) -> None:
-    from host_tools.plots import plot_solution
+    from host_tools.forward.plots import plot_solution
 
     plot_solution(solution, path)
 
 
 def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int) -> None:
     """Write the frame that the camera would take of the deformed face."""
-    from host_tools.frame import simulated_frame
+    from host_tools.optics.frame import simulated_frame
 
     cv2.imwrite(str(path), simulated_frame(solution, exposure_us=exposure_us, seed=seed))
 

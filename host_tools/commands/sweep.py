@@ -9,7 +9,7 @@ import typer
 
 from host_tools.commands.output import note, progress
 
-Strain = Literal["small", "finite"]
+SweepStrain = Literal["small", "finite"]
 
 
 def sweep(
@@ -19,7 +19,7 @@ def sweep(
     force_n: Annotated[
         list[float] | None, typer.Option(help="Force of every press (0.5 N by default); repeat it for rising loads.")
     ] = None,
-    strain: Annotated[Strain, typer.Option(help="small (linear) or finite.")] = "small",
+    strain: Annotated[SweepStrain, typer.Option(help="small (linear) or finite.")] = "small",
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
     scheduler: Annotated[
         str | None,

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from device import __version__
-from device.measurement.inversion import ModelBundle
+from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.commands.output import note, note_left_out, progress
 
@@ -77,19 +77,19 @@ def _swept() -> Path:
 def _wide() -> Path:
     """Return the folder of the table around the trained ranges, made anew when it is not there."""
     from host_tools.commands.model import WIDE, table
-    from host_tools.wide_table import NAME
+    from host_tools.probe_tables.out_of_range_table import NAME
 
     if not (WIDE / f"{NAME}.npz").exists():
-        note.print(f"{WIDE} is missing: solving lumps around the trained ranges.")
+        note.print(f"{WIDE} is missing: solving inclusions around the trained ranges.")
         table(part="wide")
     return WIDE
 
 
 def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
     from host_tools.data.dataset import require_enough, training_rows
-    from host_tools.inverse.export import export
-    from host_tools.inverse.train import require_trials
-    from host_tools.inverse.train import train as run_training
+    from host_tools.paper_network.export import export
+    from host_tools.paper_network.train import require_trials
+    from host_tools.paper_network.train import train as run_training
 
     require_trials(trials)
     rows = training_rows(data)
@@ -111,14 +111,14 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
 
 def _standard(table: Path, wide: Path | None, out: Path, seed: int, quick: bool, command: str) -> None:
     from device.measurement.calibration import read_calibration
-    from device.measurement.profile_estimate import estimate_profile
-    from device.measurement.profile_model import RAMP_MODES, ProfileModel
+    from device.measurement.ramp_modes.estimate import estimate_profile
+    from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.inverse.export_profile import export_profile
-    from host_tools.inverse.profile_training import QUICK_EFFORT, Effort, train_profile
-    from host_tools.study.publish_dial import publish_dial
-    from host_tools.wide_table import load_wide_table
+    from host_tools.press_models.export import export_profile
+    from host_tools.press_models.ramp_training import QUICK_EFFORT, Effort, train_profile
+    from host_tools.probe_tables.out_of_range_table import load_wide_table
+    from host_tools.scores.dial import publish_dial
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
     effort = QUICK_EFFORT if quick else Effort()
@@ -140,13 +140,13 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, quick: bool,
 
 def _quick(table: Path, out: Path, seed: int, command: str) -> None:
     from device.measurement.calibration import read_calibration
-    from device.measurement.held_estimate import HeldModel, estimate_held
-    from device.measurement.profile_model import ProfileModel
+    from device.measurement.quick_mode.model import HeldModel, estimate_held
+    from device.measurement.ramp_modes.model import ProfileModel
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.inverse.export_profile import export_quick
-    from host_tools.inverse.quick_training import train_quick
-    from host_tools.study.publish_dial import publish_dial
+    from host_tools.press_models.export import export_quick
+    from host_tools.press_models.quick_training import train_quick
+    from host_tools.scores.dial import publish_dial
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
     standard = ProfileModel.load(MODELS / "standard")
@@ -170,7 +170,7 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
 @contextmanager
 def _refusals() -> Iterator[None]:
     """Print why an export was refused and exit with code 1."""
-    from host_tools.inverse.export import ExportRefused
+    from host_tools.paper_network.export import ExportRefused
 
     try:
         yield

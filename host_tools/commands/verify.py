@@ -14,7 +14,7 @@ from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_
 from host_tools.commands.output import note, require_writable
 
 if TYPE_CHECKING:
-    from host_tools.study.benchmark import Chapter
+    from host_tools.pages.benchmark import Chapter
 
 TABLES = ROOT / "host_tools" / "forward" / "accuracy_table.json"
 
@@ -36,7 +36,7 @@ def verify(
     measured = measure_chapters(chapters)
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        from host_tools.study.document import write_document
+        from host_tools.pages.document import write_document
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
         flags += ["--quick"] if quick else []
@@ -49,8 +49,7 @@ def verify(
 
 def _chapters(only: list[str], extra: list[str], *, quick: bool) -> dict[str, Callable[[], Chapter]]:
     """Return the chapters asked for, all of them without a name; refuse a name that is none."""
-    from host_tools.study.chapters import CHAPTERS
-    from host_tools.study.extra_chapters import EXTRA_CHAPTERS
+    from host_tools.verification.chapters import CHAPTERS, EXTRA_CHAPTERS
 
     unknown = [name for name in only if name not in CHAPTERS]
     if unknown:
@@ -60,7 +59,7 @@ def _chapters(only: list[str], extra: list[str], *, quick: bool) -> dict[str, Ca
 
 
 def _measure_tables() -> None:
-    from host_tools.study.tables import measure_tables
+    from host_tools.verification.level_tables import measure_tables
 
     measure_tables(TABLES, on_step=lambda what: note.print(f"measuring {what}"))
     note.print(f"{TABLES} written.")

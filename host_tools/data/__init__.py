@@ -1,1 +1,6 @@
-"""Data sets: one row a scene, resumable, failures kept."""
+"""Data sets: one row a scene, resumable, failures kept.
+
+Modules in reading order: `plan`, `rows`, `executors`, `journal`, `dataset_file`, `sweep`, `dataset`.
+
+No model of the probe: a row is what the solver said.
+"""

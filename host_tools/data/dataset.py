@@ -16,11 +16,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from device.measurement.inversion import FEATURE_UNITS
+from device.measurement.paper_mode.inversion import FEATURE_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.plan import SCHEMA, SCHEMA_OF_LOADS
-from host_tools.inverse.train import MIN_TRAINING_ROWS, TrainingRows
-from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
+from host_tools.paper_network.train import MIN_TRAINING_ROWS, TrainingRows
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 FEATURES = tuple(FEATURE_UNITS)
 L9 = np.array([(0, 0, 0), (0, 1, 1), (0, 2, 2), (1, 0, 1), (1, 1, 2), (1, 2, 0), (2, 0, 2), (2, 1, 0), (2, 2, 1)])

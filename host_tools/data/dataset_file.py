@@ -15,7 +15,7 @@ import h5py  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.durable import sync_directory
+from device.files.durable import sync_directory
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Journal, Row
 

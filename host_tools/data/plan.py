@@ -1,7 +1,7 @@
 """What a sweep sweeps: how many scenes of the paper's box, from which seed, pressed with which forces, in which strain.
 
-Every scene is pressed with the same *forces*, since that is what the probe can hold: at equal force the lump field is
-two thirds of what it is at equal indentation. Source of the box: Lee & Won 2013, section III.
+Every scene is pressed with the same *forces*, since that is what the probe can hold: at equal force the inclusion field
+is two thirds of what it is at equal indentation. Source of the box: Lee & Won 2013, section III.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.forward.plan import Strain
-from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene
+from host_tools.forward.plan import StrainModel
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene
 
 DEFAULT_FORCES_N = (0.5,)
 SCHEMA = "tsis.sweep/1"
@@ -29,12 +29,12 @@ class SweepPlan:
     scenes: int
     seed: int
     forces_n: tuple[float, ...] = DEFAULT_FORCES_N
-    strain: Strain = "small"
+    strain: StrainModel = "small"
 
     def __post_init__(self) -> None:
         require("scenes", self.scenes, Bound(1, 1_000_000, "scenes"), "ask for at least one scene")
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
-        if self.strain not in get_args(Strain):
+        if self.strain not in get_args(StrainModel):
             raise InvalidQuantity("strain", repr(self.strain), "'small' or 'finite'", "choose one of them")
         if not self.forces_n or any(b <= a for a, b in zip(self.forces_n, self.forces_n[1:], strict=False)):
             raise InvalidQuantity("forces_n", self.forces_n, "at least one force, rising", "order the loads")

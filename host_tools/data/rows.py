@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from device.measurement.quantities import UNKNOWNS
 from host_tools.data.journal import Row
 from host_tools.data.plan import SweepPlan
-from host_tools.forward.plan import Strain, model_plan
+from host_tools.forward.plan import StrainModel, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
-from host_tools.scene import Press, Scene
+from host_tools.scenes.scene import Press, Scene
 
 Truth = NDArray[np.float64]
 NOT_COLUMNS = ("plan", "pressure_is_positive", "contact_force_n")
@@ -43,7 +43,7 @@ def bare_row(index: int, truth: Truth, *, reason: str = "") -> Row:
     return {"index": index, **dict(zip(UNKNOWNS, map(float, truth), strict=True)), "reason": reason}
 
 
-def _solve_loads(scene: Scene, forces_n: tuple[float, ...], strain: Strain) -> tuple[Solution, ...]:
+def _solve_loads(scene: Scene, forces_n: tuple[float, ...], strain: StrainModel) -> tuple[Solution, ...]:
     """Return one solution per force, with its stated errors, from one solve of the whole ramp."""
     presses = [Press(force_n=force_n) for force_n in forces_n]
     return solve_ramp(scene, presses, model_plan(scene, strain=strain), estimate_error=True)

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from host_tools.forward.sampling import Sector
-from host_tools.scene import Scene
+from host_tools.forward.sampling import FaceSector
+from host_tools.scenes.scene import Scene
 
 TABLE = "accuracy_table.json"
 NO_INCLUSION_FEATURES = ("force_n", "indentation_mm")
@@ -27,7 +27,7 @@ class Level(NamedTuple):
     order: int
 
 
-class Found(NamedTuple):
+class LevelAccuracy(NamedTuple):
     """A chosen level, what the tables promise of it, and why it was chosen."""
 
     level: Level
@@ -44,14 +44,16 @@ def accuracy_table() -> dict[str, Any]:
     return table
 
 
-def cheapest_level(scene: Scene, symmetry: Sector, strain: str, tolerance: float | None, pinned: Level) -> Found:
+def cheapest_level(
+    scene: Scene, symmetry: FaceSector, strain: str, tolerance: float | None, pinned: Level
+) -> LevelAccuracy:
     """Return the fastest level whose measured error is within the tolerance, or `pinned` when none is asked for."""
     rows = _rows(scene, symmetry, strain)
     if tolerance is None:
-        row = next((row for row in rows if row.level == pinned), Found(pinned, {}, None, ""))
+        row = next((row for row in rows if row.level == pinned), LevelAccuracy(pinned, {}, None, ""))
         return row._replace(reason="the level that all data sets share, so that features are smooth")
     if not rows:
-        return Found(pinned, {}, None, "no measured table for this kind of scene: the shared level")
+        return LevelAccuracy(pinned, {}, None, "no measured table for this kind of scene: the shared level")
     good = [row for row in rows if max(row.predicted_error.values()) <= tolerance]
     if not good:
         best = min(rows, key=lambda row: max(row.predicted_error.values()))
@@ -63,11 +65,11 @@ def cheapest_level(scene: Scene, symmetry: Sector, strain: str, tolerance: float
 
 
 def prescribed(scene: Scene) -> str:
-    """Return whether the indentation or the force is prescribed: lump fields err differently under each."""
+    """Return whether the indentation or the force is prescribed: inclusion fields err differently under each."""
     return "force_n" if scene.press.indentation_mm is None else "indentation_mm"
 
 
-def _rows(scene: Scene, symmetry: Sector, strain: str) -> list[Found]:
+def _rows(scene: Scene, symmetry: FaceSector, strain: str) -> list[LevelAccuracy]:
     """Return what the tables promise of each level for a scene."""
     kind = "finite" if strain == "finite" else "axisymmetric" if symmetry == "axisymmetric" else "solid"
     table = accuracy_table().get(kind)
@@ -84,7 +86,7 @@ def _rows(scene: Scene, symmetry: Sector, strain: str) -> list[Found]:
         errors = {name: _worst_near(scene, table, np.array(values)) for name, values in cells.items()}
         if not scene.has_inclusion:
             errors = {name: error for name, error in errors.items() if name in NO_INCLUSION_FEATURES}
-        found.append(Found(Level(entry["grading"], entry["order"]), errors, seconds, ""))
+        found.append(LevelAccuracy(Level(entry["grading"], entry["order"]), errors, seconds, ""))
     return found
 
 
@@ -104,7 +106,7 @@ def _bracket(nodes: list[float], value: float) -> list[int]:
 
 
 def small_strain_departure(scene: Scene) -> float:
-    """Return by how much (relative, the worst of O1-O3 of the lump) small strain departs from finite strain.
+    """Return by how much (relative, the worst of O1-O3 of the inclusion) small strain departs from finite strain.
 
     Interpolated in indentation, the worst around the scene's size and depth. A force is taken for the indentation it
     makes in the default probe, in proportion to the tissue's modulus.

@@ -1,8 +1,8 @@
 """A field over the face to the paper's three numbers: largest, summed and how wide (O1, O2, O3).
 
-Used on the lump field (press minus the same press without the inclusion) and, for the paper's literal protocol, on the
-raw field, which peaks at the rim with or without a lump. Fields are sampled along rays at even angles; a sum over the
-face is the mean over the angles of a ray's. Source: Lee & Won 2013, section III; docs/measurement.md.
+Used on the inclusion field (press minus the same press without the inclusion) and, for the paper's literal protocol, on
+the raw field, which peaks at the rim with or without an inclusion. Fields are sampled along rays at even angles; a sum
+over the face is the mean over the angles of a ray's. Source: Lee & Won 2013, section III; docs/measurement.md.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import InterpolatedUnivariateSpline
 
-from host_tools.forward.face_state import FloatArray
+from device.measurement.arrays import Array
 
 HALF_MAXIMUM = 0.5
 """Threshold of O3 as a ratio of O1: unlike a fixed one it does not move when the light or the skin does."""
@@ -25,8 +25,8 @@ CENTRAL_RATIO = 0.9
 class Deformation:
     """O1-O3 of one field. `total` is over the whole face; `central` over the central window only.
 
-    At equal force the whole-face integral of the lump field all but vanishes (force balance: what the centre gains the
-    rim loses) and the camera does not see the rim, so the inversion uses the central one.
+    At equal force the whole-face integral of the inclusion field all but vanishes (force balance: what the centre gains
+    the rim loses) and the camera does not see the rim, so the inversion uses the central one.
     """
 
     max_deformation_mm: float
@@ -36,7 +36,7 @@ class Deformation:
 
 
 def deformation(
-    r_mm: FloatArray, field_mm: FloatArray, total_mm3: float, *, threshold_ratio: float = HALF_MAXIMUM
+    r_mm: Array, field_mm: Array, total_mm3: float, *, threshold_ratio: float = HALF_MAXIMUM
 ) -> Deformation:
     """Return O1-O3 of a field [..., R] sampled on rays that ascend from 0 to the rim, at even angles if several.
 
@@ -54,7 +54,7 @@ def deformation(
     )
 
 
-def area_above(r_mm: FloatArray, field_mm: FloatArray, threshold_mm: float) -> float:
+def area_above(r_mm: Array, field_mm: Array, threshold_mm: float) -> float:
     """Return the projected area (mm2) where a field [..., R] exceeds the threshold, by a cubic spline along each ray.
 
     Straight lines between the samples would make the area jitter by 5e-6 as the crossing moves from one to the next.
@@ -63,7 +63,7 @@ def area_above(r_mm: FloatArray, field_mm: FloatArray, threshold_mm: float) -> f
     return float(np.mean([_area_of_ray(r, field - threshold_mm) for r, field in zip(rays, fields, strict=True)]))
 
 
-def _area_of_ray(r_mm: FloatArray, excess_mm: FloatArray) -> float:
+def _area_of_ray(r_mm: Array, excess_mm: Array) -> float:
     """Return the area (mm2) of the rings where the spline through a profile is positive."""
     spline = InterpolatedUnivariateSpline(r_mm, excess_mm)  # its roots are ten times faster than CubicSpline's
     edges = np.concatenate([r_mm[:1], spline.roots(), r_mm[-1:]])

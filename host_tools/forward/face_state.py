@@ -8,14 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from host_tools.scene import Waveguide
+from device.measurement.arrays import Array
+from host_tools.scenes.scene import Waveguide
 
 RADII = 221
 """Samples of a ray from the middle to the rim; 0.05 mm apart on the default face."""
 
-FloatArray = NDArray[np.float64]
 
 MN_PER_N = 1e3
 """kPa times mm2 is mN, and kPa times mm3 is uJ."""
@@ -25,8 +24,8 @@ MN_PER_N = 1e3
 class Rays:
     """Where a face is sampled: `angle_rad` [A], evenly over the full circle, and `r_mm` [A, R] from 0 to the rim."""
 
-    angle_rad: FloatArray
-    r_mm: FloatArray
+    angle_rad: Array
+    r_mm: Array
 
     @classmethod
     def over(cls, waveguide: Waveguide, angles: int = 1) -> Rays:
@@ -38,7 +37,7 @@ class Rays:
         return cls(angle, np.linspace(0.0, reach, RADII, axis=1))
 
     @property
-    def xy_mm(self) -> tuple[FloatArray, FloatArray]:
+    def xy_mm(self) -> tuple[Array, Array]:
         """Coordinates of the samples, two arrays [A, R]."""
         return self.r_mm * np.cos(self.angle_rad)[:, None], self.r_mm * np.sin(self.angle_rad)[:, None]
 
@@ -53,8 +52,8 @@ class FaceState:
     """
 
     indentation_mm: float
-    w_mm: FloatArray
-    p_kpa: FloatArray
+    w_mm: Array
+    p_kpa: Array
     total_mm3: float
     force_n: float
     contact_force_n: float

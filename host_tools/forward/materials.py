@@ -2,7 +2,7 @@
 
 Mesh materials are layer0.. (waveguide, from the face up), tissue0.. (from the surface down, the bulk last) and
 inclusion0.. (the part of the inclusion inside each tissue layer). The baseline is the *same mesh* in which every part
-of the inclusion is made of the layer around it: separate meshes would put 50 % error on the smallest lumps.
+of the inclusion is made of the layer around it: separate meshes would put 50 % error on the smallest inclusions.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 LAYERS, TISSUE, INCLUSION = "layer.*", "tissue.*", "inclusion.*"
 FLESH = f"{TISSUE}|{INCLUSION}"

@@ -13,12 +13,12 @@ from typing import Any, Literal
 from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.accuracy import Level, cheapest_level, small_strain_departure
 from host_tools.forward.materials import LOCKING_POISSON_RATIO, baseline, with_inclusion
-from host_tools.forward.morph import reaches
-from host_tools.forward.sampling import Sector
-from host_tools.forward.solid_mesh import solid_symmetry
-from host_tools.scene import Scene
+from host_tools.forward.meshes.morph import reaches
+from host_tools.forward.meshes.solid_mesh import solid_symmetry
+from host_tools.forward.sampling import FaceSector
+from host_tools.scenes.scene import Scene
 
-Strain = Literal["small", "finite"]
+StrainModel = Literal["small", "finite"]
 Contact = Literal["closed_sliding", "unilateral", "true_sliding", "true_sliding_with_edge_force", "paired"]
 
 DEFAULT_TOLERANCE = 0.005
@@ -32,8 +32,8 @@ BLUNT = Level("blunt", 3)
 class ModelPlan:
     """Which model a scene is solved by; `reasons` says why, one sentence a choice."""
 
-    symmetry: Sector
-    strain: Strain
+    symmetry: FaceSector
+    strain: StrainModel
     contact: Contact
     formulation: Literal["displacement", "mixed"]
     mesh: Literal["morphed", "remeshed"]
@@ -71,7 +71,7 @@ def model_plan(
     )
 
 
-def _symmetry(scene: Scene, reasons: dict[str, str]) -> Sector:
+def _symmetry(scene: Scene, reasons: dict[str, str]) -> FaceSector:
     place = scene.placement if scene.has_inclusion else None
     broken = []
     if scene.waveguide.face == "square":
@@ -79,9 +79,9 @@ def _symmetry(scene: Scene, reasons: dict[str, str]) -> Sector:
     if scene.tissue.edge_mm is not None:
         broken.append("the slab ends in a plane edge")
     if place is not None and place.offset_mm > 0:
-        broken.append(f"the lump lies {place.offset_mm:g} mm off the axis")
+        broken.append(f"the inclusion lies {place.offset_mm:g} mm off the axis")
     if place is not None and not place.is_round:
-        broken.append("the lump is an ellipsoid")
+        broken.append("the inclusion is an ellipsoid")
     if not broken:
         reasons["symmetry"] = "round probe, and nothing off its axis: every section is the same"
         return "axisymmetric"
@@ -92,9 +92,9 @@ def _symmetry(scene: Scene, reasons: dict[str, str]) -> Sector:
 
 
 def aligned(scene: Scene) -> tuple[Scene, float]:
-    """Return the scene turned so that the lump lies on +x, and the angle (rad) it was turned by.
+    """Return the scene turned so that the inclusion lies on +x, and the angle (rad) it was turned by.
 
-    Only what is round in the face, the slab and the lump can be turned; any other scene comes back as it is.
+    Only what is round in the face, the slab and the inclusion can be turned; any other scene comes back as it is.
     """
     place = scene.placement
     round_about = scene.waveguide.face == "round" and scene.tissue.edge_mm is None and place.is_round
@@ -104,7 +104,7 @@ def aligned(scene: Scene) -> tuple[Scene, float]:
     return replace(scene, placement=turned), atan2(place.offset_y_mm, place.offset_x_mm)
 
 
-def _strain(scene: Scene, symmetry: Sector, asked: str, tolerance: float, reasons: dict[str, str]) -> Strain:
+def _strain(scene: Scene, symmetry: FaceSector, asked: str, tolerance: float, reasons: dict[str, str]) -> StrainModel:
     departure = small_strain_departure(scene)
     known = f"small strain departs from finite strain by about {100 * departure:.2g} % here"
     can_finite = symmetry == "axisymmetric" and scene.waveguide.dome_mm == 0
@@ -125,12 +125,14 @@ def _strain(scene: Scene, symmetry: Sector, asked: str, tolerance: float, reason
     return "small"
 
 
-def _contact(scene: Scene, strain: Strain, paired: bool, reasons: dict[str, str]) -> Contact:
+def _contact(scene: Scene, strain: StrainModel, paired: bool, reasons: dict[str, str]) -> Contact:
     if strain == "finite" and paired:
         reasons["contact"] = "asked for: slip ignored, the cheap variant of finite strain"
         return "paired"
     if strain == "finite":
-        reasons["contact"] = "in finite strain the tissue slips under the face; pairing points would inflate the lump"
+        reasons["contact"] = (
+            "in finite strain the tissue slips under the face; pairing points would inflate the inclusion"
+        )
         return "true_sliding"
     if scene.waveguide.dome_mm > 0:
         reasons["contact"] = f"the dome of {scene.waveguide.dome_mm:g} mm may lift off the tissue at its rim"
@@ -139,7 +141,7 @@ def _contact(scene: Scene, strain: Strain, paired: bool, reasons: dict[str, str]
     return "closed_sliding"
 
 
-def _formulation(scene: Scene, strain: Strain, reasons: dict[str, str]) -> Literal["displacement", "mixed"]:
+def _formulation(scene: Scene, strain: StrainModel, reasons: dict[str, str]) -> Literal["displacement", "mixed"]:
     locks = with_inclusion(scene).locks or baseline(scene).locks
     if locks and strain == "finite":
         raise InvalidQuantity(
@@ -159,7 +161,7 @@ def _largest_poisson_ratio(scene: Scene) -> float:
     return max(*with_inclusion(scene).poisson_ratio.values(), *baseline(scene).poisson_ratio.values())
 
 
-def _mesh(scene: Scene, symmetry: Sector, reasons: dict[str, str]) -> Literal["morphed", "remeshed"]:
+def _mesh(scene: Scene, symmetry: FaceSector, reasons: dict[str, str]) -> Literal["morphed", "remeshed"]:
     if symmetry == "axisymmetric" and scene.has_inclusion and reaches(scene):
         reasons["mesh"] = "inside the training box: one mesh of fixed topology, smooth in size and depth"
         return "morphed"
@@ -168,7 +170,7 @@ def _mesh(scene: Scene, symmetry: Sector, reasons: dict[str, str]) -> Literal["m
 
 
 def _level(
-    scene: Scene, symmetry: Sector, strain: Strain, tolerance: float | None, reasons: dict[str, str]
+    scene: Scene, symmetry: FaceSector, strain: StrainModel, tolerance: float | None, reasons: dict[str, str]
 ) -> tuple[Level, dict[str, float], float | None]:
     pinned = BLUNT if strain == "finite" else STANDARD
     found = cheapest_level(scene, symmetry, strain, tolerance, pinned)

@@ -1,4 +1,7 @@
-"""What every tier offers: materials and presses in, the face at each press out."""
+"""What every tier offers: materials and presses in, the face at each press out.
+
+What can go wrong while a scene is solved, as opposed to a scene that cannot exist.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,11 @@ from typing import NamedTuple, Protocol
 
 from host_tools.forward.face_state import FaceState
 from host_tools.forward.materials import Elasticity
-from host_tools.scene import Press
+from host_tools.scenes.scene import Press
+
+
+class PressFailed(RuntimeError):  # noqa: N818 - reads as what it says
+    """A press that no solution was found for; says how far it got and what to do."""
 
 
 class Loaded(NamedTuple):

@@ -13,14 +13,15 @@ from dataclasses import replace
 import numpy as np
 from ngsolve import BilinearForm, InnerProduct
 
+from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.forward.face_state import MN_PER_N, FaceState, FloatArray, Rays
-from host_tools.forward.linear_press import LinearPress, at_press
+from host_tools.forward.face_state import MN_PER_N, FaceState, Rays
 from host_tools.forward.materials import Elasticity, baseline, with_inclusion
 from host_tools.forward.plan import ModelPlan, aligned, model_plan
+from host_tools.forward.small_strain.linear_press import LinearPress, at_press
 from host_tools.forward.solution import Solution
 from host_tools.forward.tiers import build
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 SNAPSHOTS = 4
 SMALLEST_MODE = 1e-14
@@ -65,12 +66,12 @@ class ReducedBasis:
         self.per_kpa = sampler.copies * _work(press, fields, _scaled(materials[0], around=0.0, inclusion=1.0))
         self.modes = self._independent_modes()
 
-    def _nodes_kpa(self, snapshots: int) -> FloatArray:
+    def _nodes_kpa(self, snapshots: int) -> Array:
         nodes = np.cos(np.pi * (np.arange(snapshots) + 0.5) / snapshots)
         low, high = np.log(self.low_kpa), np.log(self.high_kpa)
         return np.asarray(np.exp((low + high) / 2 + (high - low) / 2 * nodes))
 
-    def _independent_modes(self) -> FloatArray:
+    def _independent_modes(self) -> Array:
         """Return combinations of weights that sum to zero, orthonormal in the energy: each row one."""
         n = len(self.faces)
         differences = np.eye(n)[1:] - np.eye(n)[0]
@@ -79,7 +80,7 @@ class ReducedBasis:
         kept = values > SMALLEST_MODE * energy[0, 0]
         return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T @ differences)
 
-    def weights(self, youngs_modulus_kpa: float) -> FloatArray:
+    def weights(self, youngs_modulus_kpa: float) -> Array:
         """Return the snapshots' weights at a modulus; raise `InvalidQuantity` outside the bounds."""
         bound = Bound(self.low_kpa, self.high_kpa, "kPa")
         E = require("youngs_modulus_kpa", youngs_modulus_kpa, bound, "build the basis over a wider range")
@@ -93,7 +94,7 @@ class ReducedBasis:
         weights = self.weights(youngs_modulus_kpa)
         energy = float(weights @ (self.fixed + youngs_modulus_kpa * self.per_kpa) @ weights)
 
-        def mix(name: str) -> FloatArray:
+        def mix(name: str) -> Array:
             return np.asarray(sum(w * getattr(face, name) for w, face in zip(weights, self.faces, strict=True)))
 
         indentation_mm = self.faces[0].indentation_mm
@@ -127,7 +128,7 @@ def _scaled(elasticity: Elasticity, *, around: float, inclusion: float) -> Elast
     return Elasticity(modulus, elasticity.poisson_ratio)
 
 
-def _work(press: LinearPress, fields: list[object], elasticity: Elasticity) -> FloatArray:
+def _work(press: LinearPress, fields: list[object], elasticity: Elasticity) -> Array:
     """Return the work of every snapshot's stress on every snapshot's strain (mN mm) for given materials."""
     form = BilinearForm(press.contact.space, symmetric=True)
     trial, test = press.contact.space.TnT()

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from device.measurement.arrays import Array
 from host_tools.forward.deformation import Deformation, deformation
-from host_tools.forward.face_state import RADII, FaceState, FloatArray, Rays
+from host_tools.forward.face_state import RADII, FaceState, Rays
 from host_tools.forward.plan import ModelPlan
 
 PRESSED_RATIO = 0.95
@@ -34,8 +35,8 @@ class Solution:
     stated_error: dict[str, float]
 
     @cached_property
-    def lump(self) -> Deformation:
-        """O1-O3 of the lump field."""
+    def inclusion_field(self) -> Deformation:
+        """O1-O3 of the inclusion field."""
         total_mm3 = self.pressed.total_mm3 - self.baseline.total_mm3
         return deformation(self.rays.r_mm, self.pressed.w_mm - self.baseline.w_mm, total_mm3)
 
@@ -45,32 +46,32 @@ class Solution:
         return deformation(self.rays.r_mm, self.pressed.w_mm, self.pressed.total_mm3)
 
     @property
-    def r_mm(self) -> FloatArray:
-        """Radii of the first ray, along +x, where an offset lump lies; so are the four profiles below."""
+    def r_mm(self) -> Array:
+        """Radii of the first ray, along +x, where an offset inclusion lies; so are the four profiles below."""
         return np.asarray(self.rays.r_mm[0])
 
     @property
-    def w_mm(self) -> FloatArray:
+    def w_mm(self) -> Array:
         """Deformation of the face along +x."""
         return np.asarray(self.pressed.w_mm[0])
 
     @property
-    def w_baseline_mm(self) -> FloatArray:
+    def w_baseline_mm(self) -> Array:
         """The same press without the inclusion."""
         return np.asarray(self.baseline.w_mm[0])
 
     @property
-    def lump_deformation_mm(self) -> FloatArray:
-        """The lump field along +x: w minus the w of the same press without the inclusion."""
+    def inclusion_deformation_mm(self) -> Array:
+        """The inclusion field along +x: w minus the w of the same press without the inclusion."""
         return self.w_mm - self.w_baseline_mm
 
     @property
-    def p_kpa(self) -> FloatArray:
+    def p_kpa(self) -> Array:
         """Contact pressure along +x; its last sample, at the rim, grows with the mesh and means nothing."""
         return np.asarray(self.pressed.p_kpa[0])
 
     @property
-    def p_baseline_kpa(self) -> FloatArray:
+    def p_baseline_kpa(self) -> Array:
         """Contact pressure without the inclusion."""
         return np.asarray(self.baseline.p_kpa[0])
 
@@ -102,7 +103,7 @@ class Solution:
             "force_n": self.force_n,
             "contact_force_n": self.pressed.contact_force_n,
             "indentation_mm": self.indentation_mm,
-            **asdict(self.lump),
+            **asdict(self.inclusion_field),
             "raw": asdict(self.raw),
             "pressure_is_positive": self.pressure_is_positive,
             "stated_error": self.stated_error,
@@ -125,7 +126,7 @@ class Solution:
         }
 
 
-def _ring_force(r_mm: FloatArray, p_kpa: FloatArray) -> FloatArray:
+def _ring_force(r_mm: Array, p_kpa: Array) -> Array:
     """Return the force (mN per radian) on every ring of a face [A, R], each as wide as `RING_RATIO` says."""
     density = r_mm * p_kpa
     steps = np.diff(r_mm, axis=-1) * (density[:, 1:] + density[:, :-1]) / 2

@@ -1,7 +1,7 @@
 """A scene to its solution: surface deformation w, contact pressure p, force, O1-O3, and the error of each.
 
 The baseline is the *same mesh* with the inclusion made of tissue: separate meshes would put 50 % error on the smallest
-lumps.
+inclusions.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from host_tools.forward.plan import ModelPlan, aligned, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.stated_error import stated_error
 from host_tools.forward.tiers import build
-from host_tools.scene import Press, Scene
+from host_tools.scenes.scene import Press, Scene
 
 ngsglobals.msg_level = 0
 SetNumThreads(1)

@@ -49,6 +49,6 @@ def _step(value: float, other: float) -> float:
 
 
 def numbers(rays: Rays, pressed: FaceState, bare: FaceState) -> dict[str, float]:
-    """Return force, indentation and O1-O3 of the lump field by name."""
-    lump = deformation(rays.r_mm, pressed.w_mm - bare.w_mm, pressed.total_mm3 - bare.total_mm3)
-    return {"force_n": pressed.force_n, "indentation_mm": pressed.indentation_mm, **asdict(lump)}
+    """Return force, indentation and O1-O3 of the inclusion field by name."""
+    inclusion = deformation(rays.r_mm, pressed.w_mm - bare.w_mm, pressed.total_mm3 - bare.total_mm3)
+    return {"force_n": pressed.force_n, "indentation_mm": pressed.indentation_mm, **asdict(inclusion)}

@@ -6,20 +6,18 @@ from typing import Any, NamedTuple
 
 from netgen.meshing import NgException
 
-from host_tools.forward.domed_press import DomedModel
-from host_tools.forward.errors import PressFailed
 from host_tools.forward.face_state import Rays
-from host_tools.forward.finite_press import FiniteStrainModel
-from host_tools.forward.linear_press import LinearModel
-from host_tools.forward.load_path import ContactName
-from host_tools.forward.mesh import Resolution, axisymmetric_mesh
-from host_tools.forward.morph import morphed_mesh
+from host_tools.forward.finite_strain.load_path import ContactName, FiniteStrainModel
+from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
+from host_tools.forward.meshes.morph import morphed_mesh
+from host_tools.forward.meshes.solid_mesh import COARSE, FINE, SolidResolution, solid_mesh
 from host_tools.forward.plan import ModelPlan
-from host_tools.forward.press_model import PressModel
+from host_tools.forward.press_model import PressFailed, PressModel
 from host_tools.forward.sampling import FaceSampler
-from host_tools.forward.solid_mesh import COARSE, FINE, SolidResolution, solid_mesh
+from host_tools.forward.small_strain.domed_press import DomedModel
+from host_tools.forward.small_strain.linear_press import LinearModel
 from host_tools.forward.symmetry import AXISYMMETRIC, SOLID, Symmetry
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 AXISYMMETRIC_SIZES = {
     "coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=10.0),
@@ -59,7 +57,7 @@ class Meshed(NamedTuple):
 
 
 def build(scene: Scene, plan: ModelPlan) -> Meshed:
-    """Mesh a scene (turned so that its lump lies on +x) and return the model of the plan."""
+    """Mesh a scene (turned so that its inclusion lies on +x) and return the model of the plan."""
     axisymmetric = plan.symmetry == "axisymmetric"
     symmetry, mesh = (AXISYMMETRIC if axisymmetric else SOLID), _mesh(scene, plan)
     rays = Rays.over(scene.waveguide, 1 if axisymmetric else SOLID_ANGLES)

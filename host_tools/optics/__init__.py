@@ -1,1 +1,7 @@
-"""The block of light behind the virtual probe: reference ray tracer, lookup table, and the errors between them."""
+"""The block of light behind the virtual probe: reference ray tracer, the table made from it, and a scene's camera frame.
+
+Modules in reading order: `light_block`, `fresnel`, `height_field`, `ray`, `compiled`, `emission`, `block_events`,
+`face_events`, `traced`, `tracer`, `build_lookup`, `frame`.
+
+No finite elements: deformation and pressure are handed in.
+"""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from host_tools.optics.compiled import compiled
 from host_tools.optics.emission import about, isotropic, lambertian_cosine, led_cosine
 from host_tools.optics.fresnel import plate_transmission, reflectance, refracted_cosine
@@ -28,8 +28,6 @@ from host_tools.optics.ray import (
     moved,
     weighing,
 )
-
-Array = NDArray[np.float64]
 
 
 @compiled

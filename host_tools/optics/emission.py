@@ -14,11 +14,11 @@ import numpy as np
 from host_tools.optics.compiled import compiled
 from host_tools.optics.fresnel import reflectance, refracted_cosine
 
-Vector = tuple[float, float, float]
+Direction = tuple[float, float, float]
 
 
 @compiled
-def about(cosine: float, nx: float, ny: float, nz: float) -> Vector:
+def about(cosine: float, nx: float, ny: float, nz: float) -> Direction:
     """Return a direction at an angle to a unit normal, turned about it at random."""
     sine = math.sqrt(max(0.0, 1.0 - cosine * cosine))
     turn = 2.0 * math.pi * np.random.random()  # noqa: NPY002 - numba's generator, seeded in each batch
@@ -49,7 +49,7 @@ def led_cosine(exponent: float, embedded: bool, n_block: float) -> tuple[float, 
 
 
 @compiled
-def isotropic() -> Vector:
+def isotropic() -> Direction:
     """Return a direction that is equally likely anywhere on the sphere."""
     return about(2.0 * np.random.random() - 1.0, 0.0, 0.0, 1.0)  # noqa: NPY002
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from host_tools.optics.block_events import add, camera_transmission
 from host_tools.optics.compiled import compiled
 from host_tools.optics.emission import about, lambertian_cosine, sideways
@@ -40,7 +40,6 @@ from host_tools.optics.ray import (
     weighing,
 )
 
-Array = NDArray[np.float64]
 MOST_RETURNS = 1000
 
 

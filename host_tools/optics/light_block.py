@@ -2,7 +2,8 @@
 
 Four LEDs stand in the middle of the four side walls (+x, +y, -x, -y). "air" puts each behind its flat window, so that
 refraction confines its light to the block; "embedded" casts it into the block, and its light leaks. The skin is not
-part of it: see `device.simulation.skin`. Coordinates: z = 0 at the glass, z = thickness_mm at the undeformed face.
+part of it: see `device.simulation.physics.skin`. Coordinates: z = 0 at the glass, z = thickness_mm at the undeformed
+face.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from device.simulation.skin import Skin
+from device.simulation.physics.skin import Skin
 from host_tools.optics.compiled import compiled
 from host_tools.optics.light_block import LightBlock
 

@@ -10,18 +10,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
 from host_tools.optics.height_field import HeightField
 from host_tools.optics.ray import BOOKS, COUNTERS, TALLIES
 
-Array = NDArray[np.float64]
 GRID = "give ascending, evenly spaced coordinates and fields of shape [ny, nx]"
 
 
 @dataclass(frozen=True)
-class Face:
+class TracedFace:
     """The sensing face: evenly spaced `x_mm` [nx], `y_mm` [ny], and [ny, nx] `w_mm` and `contact_ratio`.
 
     w > 0 pushes the face into the block; beyond the grid both fields go on as at its edge. Without `skin_behind`,

@@ -11,21 +11,20 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.simulation.skin import Skin
+from device.simulation.physics.skin import Skin
 from host_tools.optics.block_events import at_bottom, at_wall, distance_to_wall, emit, in_haze
 from host_tools.optics.compiled import compiled
 from host_tools.optics.face_events import at_face
 from host_tools.optics.height_field import HeightField, distance_to_face
 from host_tools.optics.light_block import LightBlock
 from host_tools.optics.ray import BOOKS, COUNTERS, CUT, ROULETTE, TALLIES, Medium, Ray, medium, moved, weighing
-from host_tools.optics.traced import Face, Traced, summed_up
+from host_tools.optics.traced import Traced, TracedFace, summed_up
 
-__all__ = ["Face", "Traced", "trace"]
+__all__ = ["Traced", "TracedFace", "trace"]
 
-Array = NDArray[np.float64]
 BATCHES = 20
 LONGEST_PATH = 2000
 FAINT = 0.2
@@ -83,7 +82,7 @@ def _batch(
 
 def trace(
     block: LightBlock,
-    face: Face,
+    face: TracedFace,
     skin: Skin,
     *,
     led_ratio: Sequence[float] = (1.0, 1.0, 1.0, 1.0),

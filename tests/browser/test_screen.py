@@ -16,13 +16,13 @@ import uvicorn
 from daemon_process import QUICK_HAND, ROOT, Daemon
 from playwright.sync_api import Page, expect, sync_playwright
 
-from device import assembly
-from device.answers import Answers
-from device.assembly import open_simulated_probe
+from device.assembly import probe as assembly
+from device.assembly.answers import Answers
+from device.assembly.probe import open_simulated_probe
 from device.config import simulated_config
 from device.measurement.estimate import Estimate, Quantity
 from device.measurement.mode import MODES, Mode
-from device.measurement.recording import Recording
+from device.measurement.recording.recording import Recording
 from device.simulation.scenario import Scenario
 from device.web.app import create_app
 

@@ -10,8 +10,8 @@ from daemon_process import ROOT
 
 from device import __main__ as command_line
 from device.__main__ import main
+from device.files.recording_file import write_recording
 from device.measurement.estimate import estimate_recording
-from device.measurement.recording_file import write_recording
 from device.settings.last_good import NAME
 from device.web.events import snapshot
 

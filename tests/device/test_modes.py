@@ -17,21 +17,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from device import assembly
-from device.answers import Answers
-from device.assembly import open_simulated_probe
+from device.assembly import probe as assembly
+from device.assembly.answers import Answers
+from device.assembly.probe import open_simulated_probe
 from device.config import simulated_config
-from device.instrument.press_state import PressState
+from device.instrument.press.frame_choice import ramp_targets_n
+from device.instrument.press.states import PressState
 from device.instrument.procedure import Procedure
-from device.instrument.ramp_frames import ramp_targets_n
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.mode import FRAMES, MODES, Mode
-from device.measurement.recording import Recording
+from device.measurement.recording.recording import Recording
 from device.records.store import ENDED
 from device.settings.camera_section import CameraSection
 from device.settings.press_section import PressSection
 from device.simulation import virtual_probe
-from device.simulation.faults import Fault
+from device.simulation.faults import ScriptedFault
 from device.simulation.hand import HandSettings, VirtualHand
 from device.simulation.scenario import Scenario
 
@@ -183,8 +183,10 @@ def test_a_ramp_that_goes_too_far_is_rejected_with_both_numbers(running, monkeyp
 
 
 @pytest.mark.parametrize("mode", ["paper", "standard"])
-def test_a_press_far_beside_the_lump_is_rejected_and_says_where_to_go(running, mode):
-    """The probe stands 5 mm to the right of the lump: the lump shines on the left, -x, and there it has to go."""
+def test_a_press_far_beside_the_inclusion_is_rejected_and_says_where_to_go(running, mode):
+    """The probe stands 5 mm to the right of the inclusion: the inclusion shines on the left, -x, and there it has to
+    go.
+    """
     with running(Scenario(hand=replace(HAND, miss_x_mm=5.0))) as device:
         job = device.press(mode)
     assert job["state"] == "rejected"
@@ -204,20 +206,20 @@ def test_a_ramp_is_cancelled_in_the_middle(running):
 
 
 def test_a_wet_face_is_seen_in_a_ramp(running):
-    with running(Scenario(hand=HAND, faults=(Fault("wet_face", ratio=1.0),))) as device:
+    with running(Scenario(hand=HAND, faults=(ScriptedFault("wet_face", ratio=1.0),))) as device:
         job = device.press("standard")
     assert (job["state"], job["code"]) == ("rejected", "E501")
 
 
 def test_a_camera_that_tears_its_frames_is_at_fault_in_a_ramp(running):
-    with running(Scenario(hand=HAND, faults=(Fault("camera_torn", from_press=1),))) as device:
+    with running(Scenario(hand=HAND, faults=(ScriptedFault("camera_torn", from_press=1),))) as device:
         job = device.press("standard")
     assert (job["state"], job["code"]) == ("failed", "E103")
 
 
 def test_a_light_that_lost_a_tenth_is_warned_of_after_holds_and_ramps_alike(running):
     """The first press says how bright a side is at the target force, whatever its mode."""
-    with running(Scenario(hand=HAND, faults=(Fault("led_dimmed", ratio=0.9, from_press=4),))) as device:
+    with running(Scenario(hand=HAND, faults=(ScriptedFault("led_dimmed", ratio=0.9, from_press=4),))) as device:
         warned = [[w["code"] for w in device.press(mode)["warnings"]] for mode in ("standard", "quick", "precise")]
         dimmed = device.press("standard")["warnings"]
     assert warned == [[], [], []]

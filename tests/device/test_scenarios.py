@@ -17,29 +17,31 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
-from device.assembly import open_simulated_probe
+from device.assembly.opened_parts import StartFailed
+from device.assembly.probe import open_simulated_probe
 from device.config import simulated_config
 from device.errors import DeviceError, LightBudgetError, MissingCalibration, StalledError, ZeroShiftError
-from device.instrument import bench, force_recorder, procedure, watchdog
-from device.instrument.light_check import level_counts
+from device.files.recording_file import read_recording
+from device.files.toml_record import from_table
+from device.instrument import procedure
+from device.instrument.acquisition import bench, force_recorder
+from device.instrument.acquisition.light_check import level_counts
 from device.instrument.procedure import Procedure
-from device.instrument.restart_note import RestartNote
 from device.instrument.self_test import run as self_test_run
-from device.instrument.watchdog import Watchdog
+from device.instrument.watch import watchdog
+from device.instrument.watch.restart_note import RestartNote
+from device.instrument.watch.watchdog import Watchdog
 from device.measurement.mode import Mode
-from device.measurement.recording import Recording
-from device.measurement.recording_file import read_recording
-from device.measurement.toml_record import from_table
-from device.opened_parts import StartFailed
+from device.measurement.recording.recording import Recording
 from device.records.store import ENDED
 from device.settings.camera_section import CameraSection
 from device.settings.light_section import LightSection
 from device.settings.override import overridden
 from device.settings.press_section import PressSection
-from device.simulation.faults import PARAMETERS, Fault
+from device.simulation.faults import PARAMETERS, ScriptedFault
 from device.simulation.hand import HandSettings
+from device.simulation.physics.sensor import Sensor
 from device.simulation.scenario import Scenario, read_scenario
-from device.simulation.sensor import Sensor
 
 FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).expects]
 SELF_TEST_FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).self_test_fails]
@@ -168,7 +170,7 @@ def test_the_self_test_names_the_part_that_a_scenario_breaks_and_no_other(path, 
 
 def test_a_model_that_is_tampered_with_while_the_probe_runs_is_named_by_the_self_test(running):
     """What is in use was read before; the next start would be refused."""
-    with running(Scenario(faults=(Fault("bundle_tampered", from_press=1),))) as device:
+    with running(Scenario(faults=(ScriptedFault("bundle_tampered", from_press=1),))) as device:
         device.press()
         assert device.board.now.press.state == "done"
         assert device.failed_checks() == {f"model {name}": "Model" for name in ("paper", "quick", "standard")}
@@ -230,7 +232,7 @@ def test_the_page_of_the_self_test_lists_every_scenario_that_must_fail_it():
 def test_the_fault_in_the_document_is_one():
     page = (ROOT / "docs" / "simulated_probe.md").read_text(encoding="utf-8")
     [example] = [text for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "[[faults]]" in text]
-    assert from_table(Scenario, tomllib.loads(example)).faults == (Fault("led_dead", 0.0, 4.0, 1, "+x"),)
+    assert from_table(Scenario, tomllib.loads(example)).faults == (ScriptedFault("led_dead", 0.0, 4.0, 1, "+x"),)
 
 
 def test_a_probe_with_the_other_led_chip_measures_without_a_fault(running):
@@ -263,7 +265,7 @@ def test_a_probe_with_a_larger_sensor_of_ten_bits_measures_without_a_fault(runni
 
 def test_light_that_is_lost_between_two_presses_is_back_in_the_third_and_the_same_in_both_parts_of_each(running):
     """Three tenths are lost before the second press; the level is that of the first press, 61 counts."""
-    dimmed = Scenario(faults=(Fault("led_dimmed", ratio=0.7, from_press=2),))
+    dimmed = Scenario(faults=(ScriptedFault("led_dimmed", ratio=0.7, from_press=2),))
     with running(dimmed, light=LightSection(target_counts=61.0)) as device:
         presses = [recorded(device) for _ in range(3)]
         assert "E206" in device.codes()

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from toolkit_process import run_toolkit
 
+from device.files.recording_file import write_recording
 from device.measurement.calibration import read_calibration
 from device.measurement.quantities import Inclusion
-from device.measurement.recording_file import write_recording
 from device.simulation.scenario import Scenario
-from host_tools.phantom import Protocol, phantom_recording
+from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
 
@@ -107,7 +107,7 @@ def test_calibrate_names_a_certificate_by_its_id_or_prints_all_that_speaks_again
     recordings = []
     for i, (d, h, E) in enumerate([(14, 4.5, 110), (12, 7, 60), (9, 5, 80), (11, 9, 100), (6, 6, 50), (8, 4.5, 90)]):
         one = phantom_recording(
-            Inclusion(d, h, E), tables, seed=i, protocol=Protocol(frames=1), scenario=Scenario(light="linear")
+            Inclusion(d, h, E), tables, seed=i, protocol=PhantomProtocol(frames=1), scenario=Scenario(light="linear")
         )
         recordings.append(tmp_path / f"phantom{i}")
         write_recording(one, recordings[-1])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from host_tools.study import balance
+from host_tools.verification import balance
 
 
 @pytest.mark.parametrize("order", [2, 3])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from host_tools.study import eshelby
+from host_tools.verification import eshelby
 
 
 @pytest.mark.parametrize("pair", eshelby.PAIRS, ids=str)
@@ -12,6 +12,6 @@ def test_the_strain_inside_is_uniform_and_eshelbys(pair):
 
 def test_a_sphere_of_the_matrix_is_no_sphere():
     """E_i = E_m: uniaxial tension, e_zz = 1/E and e_rr = -nu/E."""
-    e_rr, e_zz = eshelby.exact_strain(eshelby.Pair(eshelby.MATRIX_KPA, 0.3, 0.3))
+    e_rr, e_zz = eshelby.exact_strain(eshelby.StrainPair(eshelby.MATRIX_KPA, 0.3, 0.3))
     assert e_zz == pytest.approx(1 / eshelby.MATRIX_KPA)
     assert e_rr == pytest.approx(-0.3 / eshelby.MATRIX_KPA)

@@ -3,13 +3,13 @@
 from ngsolve import GridFunction, IfPos, InnerProduct, grad, x
 
 from device.measurement.quantities import Inclusion
-from host_tools.forward.closed_contact import AXIAL, RADIAL
-from host_tools.forward.equilibrium_path import EquilibriumPath
+from host_tools.forward.finite_strain.closed_contact import AXIAL, RADIAL
+from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath
+from host_tools.forward.finite_strain.pairing import PairedContact
+from host_tools.forward.finite_strain.sliding import SlidingContact
 from host_tools.forward.materials import with_inclusion
-from host_tools.forward.mesh import Resolution, axisymmetric_mesh
-from host_tools.forward.pairing import PairedContact
-from host_tools.forward.sliding import SlidingContact
-from host_tools.scene import Scene
+from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
+from host_tools.scenes.scene import Scene
 
 SCENE = Scene(Inclusion(10, 4, 120))
 CENTRAL_MM = 9.0

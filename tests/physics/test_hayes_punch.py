@@ -4,8 +4,8 @@ from math import pi
 
 import pytest
 
-from host_tools.study import hayes
-from host_tools.study.hayes_equation import kappa
+from host_tools.verification import hayes
+from host_tools.verification.hayes import kappa
 
 
 @pytest.mark.parametrize(

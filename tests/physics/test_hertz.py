@@ -2,7 +2,7 @@
 
 import pytest
 
-from host_tools.study import hertz
+from host_tools.verification import hertz
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """The incompressible limit: with a pressure of its own the solution settles, displacements of order 1 lock."""
 
-from host_tools.study import incompressible
-from host_tools.study.incompressible import Formulation
+from host_tools.verification import incompressible
+from host_tools.verification.incompressible import Formulation
 
 
 def test_the_mixed_formulation_settles_where_displacements_lock():

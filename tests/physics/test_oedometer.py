@@ -9,12 +9,12 @@ from netgen.geom2d import SplineGeometry
 from ngsolve import Mesh
 from scipy.optimize import brentq
 
-from host_tools.forward.equilibrium_path import EquilibriumPath, PathEnded
 from host_tools.forward.face_state import Rays
-from host_tools.forward.load_path import press_along, press_to_forces
+from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath, PathEnded
+from host_tools.forward.finite_strain.load_path import press_along, press_to_forces
+from host_tools.forward.finite_strain.sliding import SlidingContact
 from host_tools.forward.materials import Elasticity
-from host_tools.forward.sliding import SlidingContact
-from host_tools.scene import Waveguide
+from host_tools.scenes.scene import Waveguide
 
 RADIUS, PROBE_MM, TISSUE_MM, NU = 4.0, 3.0, 5.0, 0.4
 E_PROBE, E_TISSUE = 30.0, 10.0

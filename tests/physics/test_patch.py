@@ -2,7 +2,7 @@
 
 import pytest
 
-from host_tools.study import patch
+from host_tools.verification import patch
 
 
 @pytest.mark.parametrize("symmetry", ["axisymmetric", "solid"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from host_tools.study import rates
+from host_tools.verification import rates
 
 
 @pytest.fixture(scope="module")

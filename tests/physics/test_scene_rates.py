@@ -1,6 +1,6 @@
 """The real scene is singular at both rims: grading the elements to them is what makes its force accurate."""
 
-from host_tools.study import scene_rates
+from host_tools.verification import scene_rates
 
 
 def test_grading_to_both_rims_beats_a_uniform_mesh_tenfold():

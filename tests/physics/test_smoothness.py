@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from host_tools.study import smoothness
+from host_tools.verification import smoothness
 
 
 def test_the_fixed_topology_is_smooth_in_size_and_remeshing_is_not():

@@ -1,6 +1,6 @@
 """A quarter of the solid and the meridian plane are the same body."""
 
-from host_tools.study import symmetries
+from host_tools.verification import symmetries
 
 
 def test_a_quarter_of_the_solid_is_the_axisymmetric_scene():

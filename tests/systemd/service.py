@@ -17,8 +17,8 @@ from typing import Any
 from i2c_over_socket import served
 
 from device.records.store import ENDED
-from device.simulation.i2c_bus import EmulatedI2cBus
-from device.simulation.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 
 NAME = "tsis.service"
 URL = "http://127.0.0.1:8000/api/v1/"

@@ -1,4 +1,6 @@
 """The probe tests its own parts: each check measures one thing, says within which bound it must be, and names the part.
 
-What cannot be tested is said to be not tested, with what is needed for it; nothing is taken for passed.
+Modules in reading order: `report`, `checks`, `run`, `requests`.
+
+Checks get numbers and frames; only `run` touches the bench, between presses.
 """

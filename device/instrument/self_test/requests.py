@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from device.errors import BusyError, UnknownResource
-from device.instrument.guidance import Guidance
-from device.instrument.self_test.job import SelfTestJob, SelfTestState
-from device.instrument.self_test.run import SelfTest
+from device.instrument.press.states import Guidance
+from device.instrument.self_test.report import SelfTestJob, SelfTestState
+from device.instrument.self_test.run import SelfTestRun
 from device.instrument.status import StatusBoard
 
 log = logging.getLogger(__name__)
@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 class SelfTestRequests:
     """At most one self-test at a time; the last one is kept until the daemon ends."""
 
-    def __init__(self, board: StatusBoard, test: SelfTest, now: Callable[[], str], asked: threading.Event) -> None:
+    def __init__(self, board: StatusBoard, test: SelfTestRun, now: Callable[[], str], asked: threading.Event) -> None:
         """Take what sets `asked` for: it calls the procedure's thread away from waiting for a press."""
         self._board, self._test, self._now, self._asked = board, test, now, asked
         self._lock = threading.Lock()

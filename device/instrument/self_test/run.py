@@ -1,6 +1,8 @@
 """Runs the self-test on the bench: every check one after the other, also when one before it has failed.
 
 It runs on the procedure's thread, which owns light and camera, between presses. It ends dark.
+
+Waits for what the operator does in a self-test: keep the probe free, hold it on a block, put a weight on it.
 """
 
 from __future__ import annotations
@@ -8,26 +10,75 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from device.config import Config
 from device.errors import DeviceError
-from device.instrument.bench import DARK, Bench
-from device.instrument.clock_watch import ClockWatch
-from device.instrument.guidance import Guidance
-from device.instrument.self_test.check_camera import camera_results
-from device.instrument.self_test.check_clock import clock_results
-from device.instrument.self_test.check_disk import disk_results
-from device.instrument.self_test.check_force import rest_results, untested_weight, weight_result
-from device.instrument.self_test.check_models import model_results
-from device.instrument.self_test.check_sides import side_results, untested_sides
-from device.instrument.self_test.job import SelfTestJob
-from device.instrument.self_test.operator import Operator
-from device.instrument.self_test.result import Result, broken, not_tested, overall
+from device.instrument.acquisition.bench import DARK, Bench
+from device.instrument.acquisition.force_recorder import ForceRecorder
+from device.instrument.press.states import Guidance
+from device.instrument.self_test.checks import (
+    camera_results,
+    clock_results,
+    disk_results,
+    model_results,
+    rest_results,
+    side_results,
+    untested_sides,
+    untested_weight,
+    weight_result,
+)
+from device.instrument.self_test.report import CheckResult, SelfTestJob, broken, not_tested, overall
 from device.instrument.status import StatusBoard
-from device.measurement.led_sides import SIDES, LedRatio
-from device.measurement.tactile_image import Frame
+from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.recording.led_sides import SIDES, LedRatio
+from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
+
+POLL_S = 0.02
+SETTLED_S = 0.5
+
+
+class Operator:
+    """Tells the operator what to do by the screen's guidance, and waits until the load cell says that it is done."""
+
+    def __init__(
+        self, board: StatusBoard, force: ForceRecorder, progress: ProgressBoard, stopping: threading.Event
+    ) -> None:
+        self._board, self._force, self._progress, self._stopping = board, force, progress, stopping
+
+    def until(self, guidance: Guidance, is_done: Callable[[float], bool], timeout_s: float) -> bool:
+        """Show what to do until the force (N) says that it is done; return False when that takes too long.
+
+        Raises `LoadCellError` when the force is not known.
+        """
+        self._board.update(guidance=guidance)
+        deadline_s = time.monotonic() + timeout_s
+        while not self._stopping.is_set():
+            if is_done(self._force.latest_n):
+                return True
+            if time.monotonic() > deadline_s:
+                return False
+            self._beat()
+            time.sleep(POLL_S)
+        return False
+
+    def settle(self, steady_n: float, timeout_s: float) -> None:
+        """Wait until the force has hardly changed (N) for half a second, or until that takes too long."""
+        deadline_s = time.monotonic() + timeout_s
+        while time.monotonic() < deadline_s and not self._stopping.is_set():
+            self._beat()
+            time.sleep(SETTLED_S)
+            if self._force.range_n(time.monotonic(), window_s=SETTLED_S) <= steady_n:
+                return
+
+    def _beat(self) -> None:
+        """Keep the idle parts going for the watchdog; what is wrong with one is for its own check to say."""
+        with suppress(DeviceError):
+            self._progress.beat()
+
 
 DARK_FRAMES = 8
 REST_S = 0.5
@@ -37,10 +88,10 @@ HELD_RATIO = 0.7
 """Below this part of the target force a side lights the opposite half about as much as its own."""
 ZERO_FIRST = "The load cell's zero comes first: without it nobody knows how hard the probe is pressed."
 
-Check = Callable[[SelfTestJob], list[Result]]
+CheckOf = Callable[[SelfTestJob], list[CheckResult]]
 
 
-class SelfTest:
+class SelfTestRun:
     """Every check of this probe. `folder_of` says where an installed model lies."""
 
     def __init__(
@@ -58,10 +109,10 @@ class SelfTest:
         self._folder_of = folder_of
         self._offset_s, self._zero_holds = 0.0, False
 
-    def results(self, job: SelfTestJob) -> Iterator[list[Result]]:
+    def results(self, job: SelfTestJob) -> Iterator[list[CheckResult]]:
         """Yield the results of each check as it ends; a fault is a result, too."""
         self._offset_s, self._zero_holds = self._clock.offset_s, False
-        checks: dict[str, Check] = {
+        checks: dict[str, CheckOf] = {
             "disk": self._disk,
             "models": self._models,
             "dark frames": self._camera,
@@ -77,25 +128,25 @@ class SelfTest:
             except DeviceError as error:
                 yield [broken(name, error)]
 
-    def _disk(self, job: SelfTestJob) -> list[Result]:
+    def _disk(self, job: SelfTestJob) -> list[CheckResult]:
         return disk_results(self._store, self._config.store.min_free_mb)
 
-    def _models(self, job: SelfTestJob) -> list[Result]:
+    def _models(self, job: SelfTestJob) -> list[CheckResult]:
         with self._bench.progress.inside("inference"):
             return model_results(self._config, self._folder_of)
 
-    def _camera(self, job: SelfTestJob) -> list[Result]:
+    def _camera(self, job: SelfTestJob) -> list[CheckResult]:
         self._bench.light(DARK)
         dark = [self._bench.expose().counts for _ in range(DARK_FRAMES)]
         return camera_results(dark, self._config.light.max_dark_counts)
 
-    def _circuits(self, job: SelfTestJob) -> list[Result]:
+    def _circuits(self, job: SelfTestJob) -> list[CheckResult]:
         self._bench.check_lights()
         if self._config.light.chip == "pca9685":
             return [not_tested("Light", "LED circuits", "A pca9685 does not measure current.")]
-        return [Result("Light", "LED circuits", "passed")]
+        return [CheckResult("Light", "LED circuits", "passed")]
 
-    def _rest(self, job: SelfTestJob) -> list[Result]:
+    def _rest(self, job: SelfTestJob) -> list[CheckResult]:
         press, cell = self._config.press, self._config.cell
         self._operator.until(Guidance.KEEP_FREE, lambda force_n: force_n < press.contact_n, FREE_TIMEOUT_S)
         time.sleep(REST_S)
@@ -105,7 +156,7 @@ class SelfTest:
         self._zero_holds = overall(results) == "passed"
         return results
 
-    def _weight(self, job: SelfTestJob) -> list[Result]:
+    def _weight(self, job: SelfTestJob) -> list[CheckResult]:
         weight_n, press = job.weight_n, self._config.press
         if weight_n is None:
             return [untested_weight()]
@@ -118,7 +169,7 @@ class SelfTest:
         self._operator.until(Guidance.TAKE_WEIGHT_OFF, lambda force_n: force_n < press.contact_n, OPERATOR_TIMEOUT_S)
         return [weight_result(measured_n, weight_n, self._config.cell.tare_spread_n)]
 
-    def _sides(self, job: SelfTestJob) -> list[Result]:
+    def _sides(self, job: SelfTestJob) -> list[CheckResult]:
         if not job.on_block:
             return untested_sides()
         if not self._zero_holds:
@@ -133,7 +184,7 @@ class SelfTest:
             self._bench.light(DARK)
             self._board.update(guidance=Guidance.LIFT)
 
-    def _held_sides(self) -> list[Result]:
+    def _held_sides(self) -> list[CheckResult]:
         light, least_n = self._config.light, HELD_RATIO * self._config.press.target_n
         views = [self._view(DARK), *(self._view(_alone(side, light.ratio[side])) for side in range(len(SIDES)))]
         if min(frame.force_n for frame in views) < least_n:
@@ -145,7 +196,7 @@ class SelfTest:
         self._bench.light(ratio)
         return self._bench.take("reference")
 
-    def _time(self, job: SelfTestJob) -> list[Result]:
+    def _time(self, job: SelfTestJob) -> list[CheckResult]:
         drift_s = self._clock.offset_s - self._offset_s
         return clock_results(drift_s, self._config.clock.max_jump_s, self._clock.now())
 

@@ -14,12 +14,11 @@ from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.raw_mode import RawMode
 from device.hardware.tlc59116 import Tlc59116
-from device.measurement.led_sides import LedRatio
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.i2c_bus import EmulatedI2cBus
-from device.simulation.tlc59116_chip import Tlc59116Chip
-from device.simulation.virtual_camera import VirtualPicamera2
-from device.simulation.virtual_request import ExposureRequest
+from device.measurement.recording.led_sides import LedRatio
+from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.virtual_camera import ExposureRequest, VirtualPicamera2
 
 WIDTH_PX, HEIGHT_PX = 96, 64
 SETTINGS = {"mode": RawMode.whole(WIDTH_PX, HEIGHT_PX), "exposure_us": 2000, "gain": 2.0, "frame_rate_hz": 100.0}

@@ -19,7 +19,7 @@ import pytest
 from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera
 from device.hardware.raw_mode import RawMode
-from device.simulation.virtual_camera import VirtualPicamera2
+from device.simulation.chips.virtual_camera import VirtualPicamera2
 
 SIZE = WIDTH_PX, HEIGHT_PX = 768, 492
 BUFFERS = 4

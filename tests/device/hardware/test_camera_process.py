@@ -16,7 +16,7 @@ from daemon_process import ROOT
 from scripted_camera import SHAPE, memory_of, scripted_process
 
 from device.errors import CameraError, CameraProcessError, LateFrameError
-from device.hardware import camera_child
+from device.hardware import camera_process
 from device.hardware.camera_process import CameraProcess
 from device.hardware.restart_limit import RestartLimit
 from device.measurement.quantities import InvalidQuantity
@@ -38,7 +38,7 @@ def opened() -> Iterator[Callable[..., CameraProcess]]:
 
 @pytest.fixture
 def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(camera_child, "GRACE_S", 0.1)
+    monkeypatch.setattr(camera_process, "GRACE_S", 0.1)
 
 
 def is_running(pid: int | None) -> bool:
@@ -122,13 +122,13 @@ def test_a_process_that_dies_again_and_again_is_not_started_for_ever(opened):
 
 
 def test_a_camera_that_hangs_while_it_is_opened_is_given_up(monkeypatch):
-    monkeypatch.setattr(camera_child, "START_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(camera_process, "START_TIMEOUT_S", 0.3)
     with pytest.raises(CameraProcessError, match="did not answer within 0.3 s"):
         CameraProcess(scripted_camera.hanging_opener, shape=SHAPE, limit=RestartLimit(3, 60.0))
 
 
 def test_a_process_that_does_not_end_by_itself_is_killed_at_the_end(monkeypatch, hurried):
-    monkeypatch.setattr(camera_child, "CLOSE_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(camera_process, "CLOSE_TIMEOUT_S", 0.1)
     camera = scripted_process()
     pid = camera.pid
     os.kill(pid, signal.SIGSTOP)

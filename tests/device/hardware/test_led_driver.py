@@ -7,9 +7,9 @@ import pytest
 from device.errors import LightError
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.settings.light_section import LightSection
-from device.simulation.i2c_bus import EmulatedI2cBus
-from device.simulation.pca9685_chip import Pca9685Chip
-from device.simulation.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 
 
 @pytest.mark.parametrize(

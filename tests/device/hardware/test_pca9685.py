@@ -10,9 +10,9 @@ from device.errors import LightError
 from device.hardware.pca9685 import Pca9685
 from device.hardware.pwm_clock import PwmClock
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.i2c_bus import EmulatedI2cBus
-from device.simulation.pca9685_chip import Pca9685Chip
-from device.simulation.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 
 DARK = (0.0, 0.0, 0.0, 0.0)
 FULL = (1.0, 1.0, 1.0, 1.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.hardware.sender_clock import MOST_DRIFT_RATIO, RESTART_S, SenderClock
+from device.hardware.openscale import MOST_DRIFT_RATIO, RESTART_S, SenderClock
 
 AHEAD_S, PERIOD_S = 1234.5, 0.0125
 SENT_S = PERIOD_S * np.arange(2000)

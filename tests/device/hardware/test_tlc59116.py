@@ -9,10 +9,10 @@ import pytest
 from device.errors import HotLedDriverError, LightError, OpenLedError
 from device.hardware.tlc59116 import Tlc59116
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.faults import Fault, FaultTimeline
-from device.simulation.i2c_bus import EmulatedI2cBus
-from device.simulation.pca9685_chip import Pca9685Chip
-from device.simulation.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
+from device.simulation.faults import FaultTimeline, ScriptedFault
 
 
 @pytest.fixture
@@ -184,7 +184,7 @@ def test_a_chip_of_another_kind_is_refused():
         Tlc59116(EmulatedI2cBus({0x60: Pca9685Chip()}))
 
 
-def with_faults(*faults: Fault, clock=time.monotonic) -> tuple[Tlc59116, EmulatedI2cBus, Tlc59116Chip]:
+def with_faults(*faults: ScriptedFault, clock=time.monotonic) -> tuple[Tlc59116, EmulatedI2cBus, Tlc59116Chip]:
     chip = Tlc59116Chip(faults=FaultTimeline(faults, clock=clock))
     bus = EmulatedI2cBus({0x60: chip})
     lights = Tlc59116(bus)
@@ -202,7 +202,7 @@ def test_the_currents_are_checked_with_all_sides_fully_on_and_the_check_ends_dar
 
 
 def test_sides_without_current_are_named_after_the_flags_were_cleared_once():
-    lights, bus, chip = with_faults(Fault("led_open", side="+y"), Fault("led_open", side="-y"))
+    lights, bus, chip = with_faults(ScriptedFault("led_open", side="+y"), ScriptedFault("led_open", side="-y"))
     with pytest.raises(OpenLedError, match=r"No current flows through the LED at \+y and -y"):
         lights.check_outputs()
     assert written(bus)[2:] == ["14 55", "1d", "14 aa", "01 80", "01 00", "14 55", "1d", "14 aa"]
@@ -211,13 +211,13 @@ def test_sides_without_current_are_named_after_the_flags_were_cleared_once():
 
 def test_a_chip_that_stays_hot_has_no_current_at_any_side():
     with pytest.raises(HotLedDriverError, match="too hot, or the LEDs are not connected"):
-        with_faults(Fault("led_driver_hot"))[0].check_outputs()
+        with_faults(ScriptedFault("led_driver_hot"))[0].check_outputs()
 
 
 def test_a_chip_that_has_cooled_down_still_says_that_it_was_hot_once():
     """It is hot at 1 s only: the flags it set then go away when they are cleared."""
     now_s = [0.0]
-    lights, _, chip = with_faults(Fault("led_driver_hot", from_s=1.0, until_s=2.0), clock=lambda: now_s[0])
+    lights, _, chip = with_faults(ScriptedFault("led_driver_hot", from_s=1.0, until_s=2.0), clock=lambda: now_s[0])
     now_s[0] = 1.0
     chip.read(1)
     now_s[0] = 3.0

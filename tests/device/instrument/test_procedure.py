@@ -22,20 +22,19 @@ from device.errors import (
     UnknownResource,
     ZeroShiftError,
 )
+from device.files.recording_file import read_recording
 from device.instrument import procedure as procedure_module
-from device.instrument.calibration_watch import CalibrationWatch
-from device.instrument.guidance import Guidance
-from device.instrument.light_budget import LightBudget
-from device.instrument.press_state import PressState
+from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.press.states import Guidance, PressState
 from device.instrument.procedure import Procedure
-from device.instrument.progress import ProgressBoard
-from device.instrument.self_test.result import Result
+from device.instrument.self_test.report import CheckResult
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.calibration import Validity
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.recording_file import read_recording
-from device.measurement.tactile_image import Frame
-from device.measurement.untouched_face import UntouchedFace
-from device.measurement.validity import Validity
+from device.measurement.recording.tactile_image import Frame
+from device.measurement.recording.untouched_face import UntouchedFace
 from device.records.store import ENDED, Store
 from device.settings.camera_section import CameraSection
 from device.settings.press_section import PressSection
@@ -543,7 +542,7 @@ def held_self_test(rig, monkeypatch):
 
     def results(job):
         assert go_on.wait(10.0)
-        yield [Result("Light", "LED +x", "passed")]
+        yield [CheckResult("Light", "LED +x", "passed")]
 
     monkeypatch.setattr(rig.procedure._self_tests._test, "results", results)
     yield go_on

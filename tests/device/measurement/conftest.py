@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from daemon_process import ROOT
 
-from device.measurement.held_estimate import HeldModel
 from device.measurement.mode import Mode
-from device.measurement.press_parameters import NOMINAL
-from device.measurement.profile_model import ProfileModel
-from device.measurement.recording import Recording
-from device.simulation.neighbour import Neighbour
+from device.measurement.parameters import NOMINAL
+from device.measurement.quick_mode.model import HeldModel
+from device.measurement.ramp_modes.model import ProfileModel
+from device.measurement.recording.recording import Recording
+from device.simulation.physics.neighbour import Neighbour
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.inverse.recorded_presses import recorded_press
+from host_tools.press_models.recorded_presses import recorded_press
 
 Press = Callable[..., Recording]
 

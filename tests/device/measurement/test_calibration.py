@@ -9,8 +9,8 @@ import pytest
 from small_certificate import small_certificate
 
 from device.measurement.calibration import Regression, certificate_id, read_calibration
-from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.pixel_scale import PixelScale
 
 
 @dataclass(frozen=True)

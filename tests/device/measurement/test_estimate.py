@@ -76,11 +76,13 @@ def test_a_single_frame_has_no_scatter(estimated, recording):
     assert estimated(replace(recording, frames=tuple(frames))).size_mm.std == 0.0
 
 
-def test_the_features_are_named_and_the_peak_is_that_of_the_lump(estimated, recording, bundle, table):
-    """The table's lump field in the middle, at 0.5 N; light is no straight line of it, and R2 is 0.98."""
+def test_the_features_are_named_and_the_peak_is_that_of_the_inclusion(estimated, recording, bundle, table):
+    """The table's inclusion field in the middle, at 0.5 N; light is no straight line of it, and R2 is 0.98."""
     features = estimated(recording).features
     assert list(features) == ["centroid_intensity", "total_intensity", "bright_area_mm2", *bundle.feature_names]
-    assert features["max_deformation_mm"] == pytest.approx(table.lump(recording.truth).at(0.5).w_mm[0], rel=0.1)
+    assert features["max_deformation_mm"] == pytest.approx(
+        table.inclusion_field(recording.truth).at(0.5).w_mm[0], rel=0.1
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.99])

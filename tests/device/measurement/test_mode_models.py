@@ -2,11 +2,11 @@
 
 import pytest
 
-from device.measurement.held_estimate import estimate_held
 from device.measurement.mode import MODES
 from device.measurement.mode_models import ModeModels, with_models
-from device.measurement.profile_estimate import estimate_profile
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.quick_mode.model import estimate_held
+from device.measurement.ramp_modes.estimate import estimate_profile
 
 
 @pytest.fixture(scope="module")

@@ -87,5 +87,5 @@ def test_an_impossible_inclusion_is_refused_by_the_name_of_what_is_impossible(in
         Inclusion(*inclusion)
 
 
-def test_an_inclusion_of_no_size_is_tissue_without_a_lump():
+def test_an_inclusion_of_no_size_is_tissue_without_an_inclusion():
     assert Inclusion(0.0, 5.0, 80.0).size_mm == 0.0

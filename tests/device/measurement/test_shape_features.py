@@ -9,20 +9,20 @@ import math
 import numpy as np
 import pytest
 
-from device.measurement.feature_definitions import (
+from device.measurement.paper_mode.feature_definitions import (
     HELD_FEATURES,
-    LUMP_FIELD_FEATURES,
+    INCLUSION_FIELD_FEATURES,
     PAPER_FEATURES,
     PRESS_FEATURES,
     PROFILE_FEATURES,
     RAMP_FEATURES,
     definition_of,
 )
-from device.measurement.features import FEATURE_NAMES
-from device.measurement.pixel_scale import PixelScale
-from device.measurement.press_profile import PROFILE_FORCES_N, ROW_NAMES, PressProfile, harmonic_at_forces
+from device.measurement.paper_mode.features import FEATURE_NAMES
 from device.measurement.radial_gaussian import SIGMAS_MM, fit_gaussian
-from device.measurement.ring_means import RING_MM, RING_RADII_MM, RingMeans, ring_weights
+from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, ROW_NAMES, PressProfile, harmonic_at_forces
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RingMeans, ring_weights
 from device.measurement.shape_features import NOISE_MULTIPLE, shape_features
 
 SCALE, SHAPE = PixelScale(0.08, 0.08), (264, 264)
@@ -164,7 +164,7 @@ def test_the_width_grows_by_what_it_grows_with_the_force():
 
 
 @pytest.mark.parametrize("factor", [0.1, 2.0])
-def test_the_light_of_the_lump_changes_no_length(factor):
+def test_the_light_of_the_inclusion_changes_no_length(factor):
     """Peak, integral and Gaussian peak are in proportion; the other numbers stay."""
     once, more = (shape_features(profile_of(c)).as_dict() for c in (bell(2.0).contrast, factor * bell(2.0).contrast))
     for name, value in more.items():
@@ -173,19 +173,19 @@ def test_the_light_of_the_lump_changes_no_length(factor):
 
 
 @pytest.mark.parametrize("contrast", [0.0, -0.1])
-def test_without_a_lump_only_peak_and_integral_are_numbers(contrast):
+def test_without_an_inclusion_only_peak_and_integral_are_numbers(contrast):
     found = shape_features(profile_of(contrast)).as_dict()
     for name, value in found.items():
         assert math.isfinite(value) == name.startswith(("peak_contrast_", "total_contrast_")), name
 
 
-@pytest.mark.parametrize(("share", "is_lump"), [(0.99, False), (1.01, True)])
-def test_a_peak_within_the_noise_is_no_lump(share, is_lump):
+@pytest.mark.parametrize(("share", "is_inclusion"), [(0.99, False), (1.01, True)])
+def test_a_peak_within_the_noise_is_no_inclusion(share, is_inclusion):
     noise = 0.001
     found = shape_features(profile_of(share * NOISE_MULTIPLE * np.exp(-(R**2) / 8) * noise, residual=noise))
-    assert np.isfinite(found.gaussian_sigma_mm).all() == is_lump
-    assert np.isfinite(found.centroid_offset_mm).all() == is_lump
-    assert math.isfinite(found.mean_centroid_offset_mm) == is_lump
+    assert np.isfinite(found.gaussian_sigma_mm).all() == is_inclusion
+    assert np.isfinite(found.centroid_offset_mm).all() == is_inclusion
+    assert math.isfinite(found.mean_centroid_offset_mm) == is_inclusion
 
 
 def test_a_spot_wider_than_the_window_has_no_width_but_moments():
@@ -205,7 +205,7 @@ def test_every_number_has_a_unit_and_a_sentence():
     assert names == [*expected, *PRESS_FEATURES]
     assert tuple(PAPER_FEATURES) == FEATURE_NAMES
     assert {name.split("_")[0] for name in ROW_NAMES} == set(PROFILE_FEATURES)
-    groups = (LUMP_FIELD_FEATURES, PAPER_FEATURES, PROFILE_FEATURES, HELD_FEATURES, RAMP_FEATURES, PRESS_FEATURES)
+    groups = (INCLUSION_FIELD_FEATURES, PAPER_FEATURES, PROFILE_FEATURES, HELD_FEATURES, RAMP_FEATURES, PRESS_FEATURES)
     for name, definition in (item for group in groups for item in group.items()):
         assert definition.sentence.endswith("."), name
         assert definition.unit in {"1", "N", "mm", "mm2", "mm3", "1/N", "mm/N"}, name

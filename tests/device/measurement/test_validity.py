@@ -2,8 +2,8 @@
 
 import pytest
 
+from device.measurement.calibration import Validity, moment
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.validity import Validity, moment
 
 YEAR = Validity.of("2027-01-31T12:00:00Z", 365)
 

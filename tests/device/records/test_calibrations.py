@@ -4,8 +4,8 @@ import pytest
 from small_certificate import small_certificate
 
 from device.errors import MissingCalibration
-from device.measurement import durable
-from device.measurement.durable import write_once
+from device.files import durable
+from device.files.durable import write_once
 from device.records.calibrations import Calibrations
 
 FIRST, SECOND = small_certificate(), small_certificate(operator="Another")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from device.errors import DiskFullError, StorageError, UnknownResource
-from device.measurement.recording import CameraSettings, Recording
-from device.measurement.recording_file import read_recording
-from device.measurement.tactile_image import Frame
+from device.files.recording_file import read_recording
+from device.measurement.recording.recording import CameraSettings, Recording
+from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
 
 CAMERA = CameraSettings(

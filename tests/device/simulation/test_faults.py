@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.faults import NO_FAULTS, Fault, FaultTimeline
+from device.simulation.faults import NO_FAULTS, FaultTimeline, ScriptedFault
 
 LIT = (0.6, 0.5, 0.4, 0.3)
 
@@ -31,7 +31,7 @@ def clock() -> Clock:
     ("t_s", "is_active"), [(99.0, False), (102.9, False), (103.0, True), (104.9, True), (105.0, False)]
 )
 def test_a_fault_counts_from_the_start_of_the_simulation(clock, t_s, is_active):
-    faults = FaultTimeline([Fault("camera_stall", from_s=3.0, until_s=5.0)], clock=clock)
+    faults = FaultTimeline([ScriptedFault("camera_stall", from_s=3.0, until_s=5.0)], clock=clock)
     assert faults.is_active("camera_stall", t_s) is is_active
     assert not faults.is_active("camera_torn", t_s)
     clock.now_s = t_s
@@ -39,7 +39,7 @@ def test_a_fault_counts_from_the_start_of_the_simulation(clock, t_s, is_active):
 
 
 def test_a_fault_of_a_press_waits_for_that_press(clock):
-    faults = FaultTimeline([Fault("cell_silent", from_s=1.0, from_press=2)], clock=clock)
+    faults = FaultTimeline([ScriptedFault("cell_silent", from_s=1.0, from_press=2)], clock=clock)
     for now_s in (110.0, 120.0):
         assert not faults.is_active("cell_silent", 1000.0)
         clock.now_s = now_s
@@ -50,14 +50,14 @@ def test_a_fault_of_a_press_waits_for_that_press(clock):
 @pytest.mark.parametrize(
     ("fault", "light"),
     [
-        (Fault("led_dead", side="+x"), (0.0, 0.5, 0.4, 0.3)),
-        (Fault("led_dead", side="-y"), (0.6, 0.5, 0.4, 0.0)),
-        (Fault("led_stuck_on", side="+y"), (0.6, 1.0, 0.4, 0.3)),
-        (Fault("led_dimmed", side="-x", ratio=0.5), (0.6, 0.5, 0.2, 0.3)),
-        (Fault("led_open", side="+x"), (0.0, 0.5, 0.4, 0.3)),
-        (Fault("led_swapped", side="+x", other_side="-y"), (0.3, 0.5, 0.4, 0.6)),
-        (Fault("led_driver_hot"), (0.0, 0.0, 0.0, 0.0)),
-        (Fault("led_dimmed"), (0.54, 0.45, 0.36, 0.27)),
+        (ScriptedFault("led_dead", side="+x"), (0.0, 0.5, 0.4, 0.3)),
+        (ScriptedFault("led_dead", side="-y"), (0.6, 0.5, 0.4, 0.0)),
+        (ScriptedFault("led_stuck_on", side="+y"), (0.6, 1.0, 0.4, 0.3)),
+        (ScriptedFault("led_dimmed", side="-x", ratio=0.5), (0.6, 0.5, 0.2, 0.3)),
+        (ScriptedFault("led_open", side="+x"), (0.0, 0.5, 0.4, 0.3)),
+        (ScriptedFault("led_swapped", side="+x", other_side="-y"), (0.3, 0.5, 0.4, 0.6)),
+        (ScriptedFault("led_driver_hot"), (0.0, 0.0, 0.0, 0.0)),
+        (ScriptedFault("led_dimmed"), (0.54, 0.45, 0.36, 0.27)),
     ],
 )
 def test_an_led_gives_another_light_than_its_register_asks_for(clock, fault, light):
@@ -65,33 +65,37 @@ def test_an_led_gives_another_light_than_its_register_asks_for(clock, fault, lig
 
 
 def test_a_dead_led_is_dark_even_when_it_is_dimmed_and_a_stuck_one_shines_while_all_are_off(clock):
-    faults = [Fault("led_dimmed"), Fault("led_dead", side="+x"), Fault("led_stuck_on", side="-x")]
+    faults = [
+        ScriptedFault("led_dimmed"),
+        ScriptedFault("led_dead", side="+x"),
+        ScriptedFault("led_stuck_on", side="-x"),
+    ]
     assert FaultTimeline(faults, clock=clock).led_output((0.0,) * 4, 100.0) == (0.0, 0.0, 1.0, 0.0)
 
 
 def test_swapped_plugs_are_before_the_leds(clock):
     """The output of +x feeds the LED at -x, which is dead."""
-    faults = [Fault("led_dead", side="-x"), Fault("led_swapped", side="+x", other_side="-x")]
+    faults = [ScriptedFault("led_dead", side="-x"), ScriptedFault("led_swapped", side="+x", other_side="-x")]
     assert FaultTimeline(faults, clock=clock).led_output((0.6, 0.0, 0.4, 0.0), 100.0) == (0.4, 0.0, 0.0, 0.0)
 
 
 def test_foreign_light_adds_up_and_the_wettest_counts(clock):
-    faults = [Fault("ambient_light", ratio=0.1), Fault("ambient_light", ratio=0.2, from_s=1.0)]
-    faults += [Fault("wet_face", ratio=0.4), Fault("wet_face", ratio=0.7, from_s=1.0)]
+    faults = [ScriptedFault("ambient_light", ratio=0.1), ScriptedFault("ambient_light", ratio=0.2, from_s=1.0)]
+    faults += [ScriptedFault("wet_face", ratio=0.4), ScriptedFault("wet_face", ratio=0.7, from_s=1.0)]
     timeline = FaultTimeline(faults, clock=clock)
     assert (timeline.ambient_ratio(100.5), timeline.wet_ratio(100.5)) == pytest.approx((0.1, 0.4))
     assert (timeline.ambient_ratio(101.0), timeline.wet_ratio(101.0)) == pytest.approx((0.3, 0.7))
 
 
 def test_dirt_lets_out_light_only_of_leds_that_are_on(clock):
-    timeline = FaultTimeline([Fault("dirty_face", ratio=0.2)], clock=clock)
+    timeline = FaultTimeline([ScriptedFault("dirty_face", ratio=0.2)], clock=clock)
     assert timeline.stray_ratio((0.5, 0.5, 0.0, 0.0), 100.5) == pytest.approx(0.05)
     assert timeline.stray_ratio((0.0,) * 4, 100.5) == 0.0
     assert NO_FAULTS.stray_ratio((1.0,) * 4, 100.5) == 0.0
 
 
 def test_a_clock_that_jumped_shows_another_time_and_the_monotonic_clock_does_not(clock):
-    faults = [Fault("clock_jump", step_s=-3600.0, from_s=2.0, until_s=4.0)]
+    faults = [ScriptedFault("clock_jump", step_s=-3600.0, from_s=2.0, until_s=4.0)]
     timeline = FaultTimeline(faults, clock=clock, wall_clock=lambda: 5000.0)
     shown = []
     for clock.now_s in (100.0, 102.0, 104.0):
@@ -101,7 +105,10 @@ def test_a_clock_that_jumped_shows_another_time_and_the_monotonic_clock_does_not
 
 def test_a_clock_that_was_set_goes_on_from_its_date_whatever_the_true_one_says(clock):
     date = datetime(1970, 1, 1, 0, 10, tzinfo=UTC)
-    faults = [Fault("clock_set", date=date, from_s=2.0, until_s=6.0), Fault("clock_jump", step_s=60.0, from_s=4.0)]
+    faults = [
+        ScriptedFault("clock_set", date=date, from_s=2.0, until_s=6.0),
+        ScriptedFault("clock_jump", step_s=60.0, from_s=4.0),
+    ]
     timeline = FaultTimeline(faults, clock=clock, wall_clock=lambda: 5000.0)
     shown = []
     for clock.now_s in (100.0, 102.0, 103.0, 105.0, 106.0):
@@ -111,7 +118,7 @@ def test_a_clock_that_was_set_goes_on_from_its_date_whatever_the_true_one_says(c
 
 def test_the_bus_answers_with_the_kernels_error_numbers(clock):
     for kind, number in (("i2c_nack", 121), ("i2c_stuck", 110), ("camera_stall", None)):
-        assert FaultTimeline([Fault(kind)], clock=clock).i2c_errno() == number
+        assert FaultTimeline([ScriptedFault(kind)], clock=clock).i2c_errno() == number
 
 
 def test_without_faults_nothing_is_wrong():
@@ -141,12 +148,12 @@ def test_without_faults_nothing_is_wrong():
 )
 def test_a_fault_that_makes_no_sense_is_refused_by_its_key(settings, quantity, words):
     with pytest.raises(InvalidQuantity, match=words) as refusal:
-        Fault(**settings)
+        ScriptedFault(**settings)
     assert refusal.value.quantity == quantity
 
 
 def test_a_call_is_held_up_until_the_fault_is_over(clock, monkeypatch):
-    faults = FaultTimeline([Fault("i2c_frozen", until_s=0.05)], clock=clock)
+    faults = FaultTimeline([ScriptedFault("i2c_frozen", until_s=0.05)], clock=clock)
     monkeypatch.setattr(
         "device.simulation.faults.time.sleep", lambda seconds: setattr(clock, "now_s", clock.now_s + seconds)
     )

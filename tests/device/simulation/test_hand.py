@@ -9,7 +9,7 @@ import pytest
 from device.measurement.mode import RAMP_TO_N
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.hand import BESIDE_MM, RAMP_AIM_N, TOUCH_N, HandSettings, VirtualHand
-from device.simulation.pressed_face import Placement
+from device.simulation.physics.pressed_face import ProbePlacement
 
 STEADY = HandSettings(rate_n_per_s=0.5, reaction_s=0.2, aim_n=0.4, tremor_n=0.0, drift_n=0.0)
 
@@ -96,12 +96,12 @@ def test_tremor_is_of_eight_to_twelve_hertz():
 
 def test_it_presses_beside_first_and_then_on_the_lesion():
     hand = hand_at(STEADY, ("press_beside", 0.0))
-    assert hand.place(5.0) == Placement(*BESIDE_MM)
+    assert hand.place(5.0) == ProbePlacement(*BESIDE_MM)
     hand.follow("lift", 5.0)
-    assert hand.place(8.0) == Placement(*BESIDE_MM)
+    assert hand.place(8.0) == ProbePlacement(*BESIDE_MM)
     hand.follow("press_lesion", 8.0)
-    assert hand.place(8.1) == Placement(*BESIDE_MM)
-    assert hand.place(8.3) == Placement()
+    assert hand.place(8.1) == ProbePlacement(*BESIDE_MM)
+    assert hand.place(8.3) == ProbePlacement()
 
 
 @pytest.mark.parametrize("end", ["done", "rejected", "fault"])
@@ -155,12 +155,12 @@ def test_it_touches_and_waits_for_what_is_next():
     hand = hand_at(SLOW, ("touch_beside", 0.0))
     assert hand.force_n(0.7) == pytest.approx(0.05)
     assert hand.force_n(9.0) == pytest.approx(TOUCH_N)
-    assert hand.place(9.0) == Placement(*BESIDE_MM)
+    assert hand.place(9.0) == ProbePlacement(*BESIDE_MM)
 
 
 def test_it_presses_slowly_to_a_little_above_the_ramp():
     hand = hand_at(SLOW, ("touch_lesion", 0.0), ("press_slowly", 1.0))
-    assert hand.place(9.0) == Placement()
+    assert hand.place(9.0) == ProbePlacement()
     assert hand.force_n(2.2) == pytest.approx(TOUCH_N + 0.1)
     assert hand.force_n(20.0) == pytest.approx(RAMP_AIM_N)
     assert 0 < RAMP_AIM_N - RAMP_TO_N < 0.1
@@ -234,7 +234,7 @@ def test_a_hand_that_misses_and_leans_presses_beside_the_middle_at_an_angle():
     hand = VirtualHand(HandSettings(miss_x_mm=3.0, miss_y_mm=-1.0, tilt_y_deg=2.0))
     hand.begin()
     hand.follow("press_lesion", 0.0)
-    assert hand.place(1.0) == Placement(3.0, -1.0, 0.0, 2.0)
+    assert hand.place(1.0) == ProbePlacement(3.0, -1.0, 0.0, 2.0)
 
 
 @pytest.mark.parametrize(("taken_up", "put_down"), [("hold_block", "lift"), ("put_weight", "take_weight_off")])

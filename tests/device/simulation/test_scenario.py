@@ -3,14 +3,14 @@
 import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.simulation.faults import Fault
+from device.simulation.faults import ScriptedFault
 from device.simulation.hand import HandSettings
-from device.simulation.lens import Lens
-from device.simulation.renderer import LinearOptics
+from device.simulation.physics.image_formation import LinearOptics
+from device.simulation.physics.lens import Lens
+from device.simulation.physics.sensor import Sensor
+from device.simulation.physics.skin import Skin
+from device.simulation.physics.slab import Slab
 from device.simulation.scenario import CellSettings, Scenario, read_scenario
-from device.simulation.sensor import Sensor
-from device.simulation.skin import Skin
-from device.simulation.slab import Slab
 
 
 @pytest.fixture
@@ -51,7 +51,10 @@ def test_faults_are_a_list_with_the_code_that_is_expected(read):
         'expects = "E203"\n[[faults]]\nkind = "led_dead"\nside = "+y"\nfrom_s = 1\nuntil_s = 2.5\n'
         '[[faults]]\nkind = "camera_stall"\nfrom_press = 2\n[cell]\ndrift_counts_per_s = -5\n'
     )
-    assert scenario.faults == (Fault("led_dead", 1, 2.5, side="+y"), Fault("camera_stall", from_press=2))
+    assert scenario.faults == (
+        ScriptedFault("led_dead", 1, 2.5, side="+y"),
+        ScriptedFault("camera_stall", from_press=2),
+    )
     assert scenario.expects == "E203"
     assert scenario.cell.drift_counts_per_s == -5
 

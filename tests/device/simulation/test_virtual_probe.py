@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 from daemon_process import ROOT
 
-from device.measurement.pixel_scale import PixelScale
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording.pixel_scale import PixelScale
 from device.simulation.hand import BESIDE_MM
-from device.simulation.light_table import load_light_table
-from device.simulation.off_axis_table import load_off_axis_table
-from device.simulation.pressed_face import Placement
+from device.simulation.physics.light_table import load_light_table
+from device.simulation.physics.off_axis_table import load_off_axis_table
+from device.simulation.physics.pressed_face import ProbePlacement
+from device.simulation.physics.slab import Slab
 from device.simulation.scenario import CellSettings, Scenario
-from device.simulation.slab import Slab
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 
 MODELS = ROOT / "models" / "simulated_probe"
 SHAPE = (123, 193)
 SCALE = PixelScale(0.125, 0.146)
 LIT, OFF = (0.6, 0.6, 0.6, 0.6), (0.0, 0.0, 0.0, 0.0)
-BESIDE = Placement(*BESIDE_MM)
+BESIDE = ProbePlacement(*BESIDE_MM)
 
 
 @pytest.fixture(scope="module", params=["physical", "linear"])
@@ -29,7 +29,7 @@ def probe(request, tables):
     return VirtualProbe(Scenario(light=request.param), tables, SHAPE, SCALE)
 
 
-def frame(probe, *, force_n=0.5, place=Placement(), led_ratio=LIT, frame_number=1, **weather):  # noqa: B008
+def frame(probe, *, force_n=0.5, place=ProbePlacement(), led_ratio=LIT, frame_number=1, **weather):  # noqa: B008
     return probe.frame_counts(
         force_n=force_n,
         place=place,
@@ -51,7 +51,7 @@ def test_light_rises_with_the_force(probe):
     assert none < once < twice
 
 
-def test_the_lump_makes_the_image_brighter(probe):
+def test_the_inclusion_makes_the_image_brighter(probe):
     assert light(frame(probe)) > 1.05 * light(frame(probe, place=BESIDE))
 
 
@@ -99,7 +99,7 @@ def test_an_led_is_brighter_on_its_own_side(probe):
     np.testing.assert_allclose(right.mean(axis=0), left.mean(axis=0)[::-1], atol=2.0)
 
 
-def test_gel_on_the_face_takes_the_contrast_of_the_lump(probe):
+def test_gel_on_the_face_takes_the_contrast_of_the_inclusion(probe):
     def contrast(**weather):
         return light(frame(probe, **weather)) / light(frame(probe, place=BESIDE, **weather)) - 1
 

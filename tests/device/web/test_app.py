@@ -10,10 +10,9 @@ from small_certificate import small_certificate
 
 from device.config import Config
 from device.errors import BusyError, ModeUnavailable, ZeroShiftError
-from device.instrument.calibration_watch import CalibrationWatch
-from device.instrument.self_test.job import SelfTestJob
-from device.instrument.self_test.result import Result
+from device.instrument.self_test.report import CheckResult, SelfTestJob
 from device.instrument.status import PressJob
+from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.records.calibrations import Calibrations
 from device.web.app import create_app
 from device.web.schema import SelfTest, Tare
@@ -45,7 +44,9 @@ class Procedure:
 
     @property
     def self_test(self):
-        return SelfTestJob("s-1", "2026-01-01T00:00:00Z", state="done", results=(Result("Light", "LED +x", "passed"),))
+        return SelfTestJob(
+            "s-1", "2026-01-01T00:00:00Z", state="done", results=(CheckResult("Light", "LED +x", "passed"),)
+        )
 
 
 @pytest.fixture

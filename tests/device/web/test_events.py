@@ -5,9 +5,8 @@ import types
 import pytest
 
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
-from device.instrument.guidance import Guidance
-from device.instrument.press_state import PressState
-from device.instrument.status import PressJob, Status
+from device.instrument.press.states import Guidance, PressState
+from device.instrument.status import PressJob, ProcedureStatus
 from device.settings.press_section import PressSection
 from device.web import schema
 from device.web.events import snapshot
@@ -39,13 +38,13 @@ def told():
 
 
 def test_a_probe_without_a_fault_tells_its_force_and_no_fault(told):
-    status = told(Status(), Force())
+    status = told(ProcedureStatus(), Force())
     assert (status["force_n"], status["faults"]) == (0.25, [])
 
 
 def test_a_fault_comes_before_the_warnings_and_each_says_what_it_is(told):
     fault, warning = LightBusError("The bus is stuck.", "Switch off."), ClockJumpError("It was set.", "Check it.")
-    status = told(Status(fault=fault, warnings=(warning,)), Force())
+    status = told(ProcedureStatus(fault=fault, warnings=(warning,)), Force())
     assert schema.Status.model_validate(status).step == "starting"
     assert status["faults"] == [
         {
@@ -66,13 +65,15 @@ def test_a_fault_comes_before_the_warnings_and_each_says_what_it_is(told):
 
 
 def test_a_load_cell_at_fault_is_told_at_once_and_has_no_force(told):
-    status = told(Status(), Force(UnpluggedCellError("It is gone.", "Plug it in.")))
+    status = told(ProcedureStatus(), Force(UnpluggedCellError("It is gone.", "Plug it in.")))
     assert status["force_n"] is None
     assert [fault["code"] for fault in status["faults"]] == ["E304"]
 
 
 def test_a_hold_has_a_narrow_band_around_its_target(told):
-    status = told(Status(press=PressJob("p-1", "quick", "capturing"), frames_taken=0, wanted_n=(0.5,)), Force())
+    status = told(
+        ProcedureStatus(press=PressJob("p-1", "quick", "capturing"), frames_taken=0, wanted_n=(0.5,)), Force()
+    )
     assert (status["mode"], status["kind"], status["frames_needed"]) == ("quick", "hold", 1)
     assert status["band_n"] == pytest.approx((0.475, 0.525))
     assert status["wanted_n"] == (0.5,)
@@ -80,31 +81,31 @@ def test_a_hold_has_a_narrow_band_around_its_target(told):
 
 def test_a_ramp_has_the_forces_at_which_frames_are_still_wanted(told):
     job = PressJob("p-1", "standard", "capturing")
-    status = told(Status(step="lesion", press=job, frames_taken=9, wanted_n=(0.6,)), Force())
+    status = told(ProcedureStatus(step="lesion", press=job, frames_taken=9, wanted_n=(0.6,)), Force())
     assert (status["mode"], status["kind"], status["frames_needed"]) == ("standard", "ramp", 10)
     assert status["band_n"] == pytest.approx((0.08, 0.6))
     assert status["wanted_n"] == (0.6,)
-    reference = told(Status(step="reference", press=job, wanted_n=(0.62,)), Force())
+    reference = told(ProcedureStatus(step="reference", press=job, wanted_n=(0.62,)), Force())
     assert reference["band_n"] == pytest.approx((0.06, 0.62))
 
 
 def test_the_state_of_the_press_is_told_by_its_code(told):
-    assert told(Status(), Force())["press_state"] == "idle"
-    assert told(Status(state=PressState.TOO_HARD), Force())["press_state"] == "too_hard"
+    assert told(ProcedureStatus(), Force())["press_state"] == "idle"
+    assert told(ProcedureStatus(state=PressState.TOO_HARD), Force())["press_state"] == "too_hard"
 
 
 def test_before_a_press_the_mode_is_that_of_the_settings(told):
-    status = told(Status(press=PressJob("p-1", "standard", "done"), wanted_n=()), Force())
+    status = told(ProcedureStatus(press=PressJob("p-1", "standard", "done"), wanted_n=()), Force())
     assert (status["mode"], status["kind"], status["wanted_n"]) == ("paper", "hold", (0.5,))
 
 
 def test_a_press_that_failed_has_its_code(told):
-    status = told(Status(press=PressJob("p-1", "paper", "failed", code="E203", reason="No light.")), Force())
+    status = told(ProcedureStatus(press=PressJob("p-1", "paper", "failed", code="E203", reason="No light.")), Force())
     assert (status["press"]["code"], status["press"]["warnings"]) == ("E203", ())
 
 
 def test_a_part_that_makes_no_progress_is_a_fault_whatever_the_frozen_procedure_says(told):
     stall = StalledError("The LED chip made no progress for 7.6 s.", "Wait.")
-    status = told(Status(step="reference", guidance=Guidance.HOLD_STILL, stall=stall), Force())
+    status = told(ProcedureStatus(step="reference", guidance=Guidance.HOLD_STILL, stall=stall), Force())
     assert (status["step"], status["guidance"]["code"]) == ("fault", "fault")
     assert [fault["code"] for fault in status["faults"]] == ["E901"]

@@ -5,11 +5,11 @@ import types
 import pytest
 
 from device.errors import LightError
-from device.faults.table import FAULTS
-from device.instrument.press_state import PressState
+from device.fault_table import FAULTS
+from device.instrument.press.states import PressState
 from device.instrument.status import PressJob
 from device.web.app import create_app
-from device.web.schema import Press
+from device.web.schema import PressResource
 
 CODES = "#/components/schemas/FaultCode"
 
@@ -26,7 +26,7 @@ def test_the_enumeration_is_the_table(schema):
 def test_the_codes_of_faults_and_presses_are_of_the_enumeration(schema):
     models = schema["components"]["schemas"]
     assert models["Fault"]["properties"]["code"]["$ref"] == CODES
-    assert models["Press"]["properties"]["code"]["anyOf"] == [{"$ref": CODES}, {"type": "null"}]
+    assert models["PressResource"]["properties"]["code"]["anyOf"] == [{"$ref": CODES}, {"type": "null"}]
     assert models["Status"]["properties"]["faults"]["items"]["$ref"] == "#/components/schemas/Fault"
 
 
@@ -46,6 +46,6 @@ def test_every_route_may_answer_with_a_problem_of_the_enumeration(schema):
 def test_a_press_is_as_described_and_an_unknown_code_is_not():
     warning = LightError("It broke.", "Mend it.").as_record()
     record = PressJob("p-1", "paper", state="failed", code="E201", warnings=(warning,)).as_record()
-    assert Press.model_validate(record).code == "E201"
+    assert PressResource.model_validate(record).code == "E201"
     with pytest.raises(ValueError, match="code"):
-        Press.model_validate(record | {"code": "E999"})
+        PressResource.model_validate(record | {"code": "E999"})

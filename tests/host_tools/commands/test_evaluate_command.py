@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from device.measurement.press_parameters import NOMINAL
-from device.measurement.recording_file import write_recording
+from device.files.recording_file import write_recording
+from device.measurement.parameters import NOMINAL
 from host_tools.__main__ import app
-from host_tools.inverse.recorded_presses import recorded_press
+from host_tools.press_models.recorded_presses import recorded_press
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.optics import build_lookup
-from host_tools.study import optics_chapters
-from host_tools.study.benchmark import Chapter, at_most
-from host_tools.study.document import Cover
+from host_tools.pages.benchmark import Chapter, at_most
+from host_tools.pages.document import Cover
+from host_tools.verification.light import chapters
 
 Asked = list[dict[str, object]]
 
@@ -32,8 +32,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
         calls.append({"rays": rays, **options})
         return {"one": lambda: Chapter("One", "", "", (at_most("case", "noise", rays / 1e6, 1.0),))}
 
-    monkeypatch.setattr(optics_chapters, "optics_chapters", fake)
-    monkeypatch.setattr(optics_chapters, "cover", lambda rays: Cover("Light", (f"{rays} rays",), ("nothing",)))
+    monkeypatch.setattr(chapters, "optics_chapters", fake)
+    monkeypatch.setattr(chapters, "cover", lambda rays: Cover("Light", (f"{rays} rays",), ("nothing",)))
     return calls
 
 

@@ -13,9 +13,11 @@ from device.measurement.quantities import InvalidQuantity
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.__main__ import app
 from host_tools.data import dataset
-from host_tools.study import paper_chapters, paper_study, paper_verdict
-from host_tools.study.benchmark import Chapter, Table, at_most
-from host_tools.study.document import Cover
+from host_tools.pages.benchmark import Chapter, Table, at_most
+from host_tools.pages.document import Cover
+from host_tools.replication import chapters as paper_chapters
+from host_tools.replication import study as paper_study
+from host_tools.replication import verdict
 
 
 def run(*words: object) -> Any:
@@ -34,7 +36,7 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ProbeTables, "load", lambda folder: None)
     monkeypatch.setattr(paper_study, "PaperStudy", lambda rows, tables, seeds: SimpleNamespace(seeds=seeds))
     monkeypatch.setattr(paper_chapters, "paper_chapters", chapters)
-    monkeypatch.setattr(paper_verdict, "cover", lambda study: Cover("Paper", (f"{study.seeds} seeds",), ("nothing",)))
+    monkeypatch.setattr(verdict, "cover", lambda study: Cover("Paper", (f"{study.seeds} seeds",), ("nothing",)))
 
 
 def test_a_missed_bound_is_exit_code_1() -> None:

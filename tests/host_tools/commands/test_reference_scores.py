@@ -7,8 +7,9 @@ from typer.testing import CliRunner
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
-from host_tools.study import mode_noise_free, mode_posterior
-from host_tools.study.benchmark import Chapter, Table, at_most
+from host_tools.pages.benchmark import Chapter, Table, at_most
+from host_tools.scores import noise_free as mode_noise_free
+from host_tools.scores import posterior as mode_posterior
 
 
 def chapter(title: str, error: float = 0.4) -> Chapter:

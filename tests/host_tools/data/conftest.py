@@ -1,35 +1,15 @@
-"""A sweep to compare with, and rows that cost nothing."""
+"""A sweep to compare with."""
 
-from collections.abc import Callable, Iterable, Iterator
-
-import numpy as np
 import pytest
 import xarray as xr
+from sweep_rows import SCENES
 
 from host_tools.data.dataset import read_dataset
-from host_tools.data.executors import Case
-from host_tools.data.journal import Row
 from host_tools.data.plan import SweepPlan
-from host_tools.data.rows import Truth, bare_row
 from host_tools.data.sweep import sweep
-
-SCENES = 12
 
 
 @pytest.fixture(scope="session")
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     """Twelve scenes, solved here one after the other."""
     return read_dataset(sweep(SweepPlan(SCENES, 4), tmp_path_factory.mktemp("sweep") / "whole.nc", jobs=1))
-
-
-def synthetic_row(index: int, truth: Truth) -> Row:
-    """A row of real size that is solved without finite elements; its profiles begin with the index."""
-    profiles = np.random.default_rng(index).normal(size=(3, 221))
-    profiles[:, 0] = index
-    r_mm = {"r_mm": np.linspace(0.0, 11.0, 221).tolist()}
-    return bare_row(index, truth) | r_mm | dict(zip(("w_mm", "w_baseline_mm", "p_kpa"), profiles.tolist(), strict=True))
-
-
-def synthetic_rows(solve: Callable[[int, Truth], Row], cases: Iterable[Case]) -> Iterator[Row]:
-    """An executor whose rows are synthetic."""
-    return (synthetic_row(*case) for case in cases)

@@ -5,7 +5,7 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from conftest import synthetic_row, synthetic_rows
+from sweep_rows import synthetic_row, synthetic_rows
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data import dataset_file

@@ -9,8 +9,8 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from conftest import SCENES, synthetic_rows
 from daemon_process import ROOT
+from sweep_rows import SCENES, synthetic_rows
 from typer.testing import CliRunner
 
 from device.measurement.quantities import InvalidQuantity
@@ -21,7 +21,7 @@ from host_tools.data.dataset import phantom_index, read_dataset, training_rows
 from host_tools.data.plan import SweepPlan
 from host_tools.data.rows import solve_row
 from host_tools.data.sweep import sweep
-from host_tools.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 
 def _start(folder, name):

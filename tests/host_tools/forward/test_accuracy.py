@@ -7,7 +7,7 @@ import pytest
 from device.measurement.quantities import Inclusion
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solve import solve
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 
 def finest(scene):
@@ -22,12 +22,16 @@ def test_the_default_mesh_is_accurate(truth):
     scene = Scene(Inclusion(*truth))
     default, fine = solve(scene), finest(scene)
     assert default.force_n == pytest.approx(fine.force_n, rel=1.5e-3)
-    assert default.lump.max_deformation_mm == pytest.approx(fine.lump.max_deformation_mm, rel=1.5e-3)
-    assert default.lump.central_deformation_mm3 == pytest.approx(fine.lump.central_deformation_mm3, rel=1.5e-3)
+    assert default.inclusion.max_deformation_mm == pytest.approx(fine.inclusion.max_deformation_mm, rel=1.5e-3)
+    assert default.inclusion.central_deformation_mm3 == pytest.approx(
+        fine.inclusion.central_deformation_mm3, rel=1.5e-3
+    )
 
 
-def test_the_same_mesh_baseline_keeps_a_tiny_lump():
-    """A lump of half an element of the face, contrast a millionth of the press: separate meshes would lose it whole."""
+def test_the_same_mesh_baseline_keeps_a_tiny_inclusion():
+    """An inclusion of half an element of the face, contrast a millionth of the press: separate meshes would lose it
+    whole.
+    """
     scene = Scene(Inclusion(0.5, 8.0, 80.0))
     default, fine = solve(scene), finest(scene)
-    assert default.lump.max_deformation_mm == pytest.approx(fine.lump.max_deformation_mm, rel=0.01)
+    assert default.inclusion.max_deformation_mm == pytest.approx(fine.inclusion.max_deformation_mm, rel=0.01)

@@ -8,28 +8,28 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.accuracy import accuracy_table
 from host_tools.forward.plan import STANDARD, aligned, model_plan
 from host_tools.forward.solve import solve
-from host_tools.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
+from host_tools.scenes.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
 
-LUMP = Inclusion(10.0, 6.0, 80.0)
+INCLUSION = Inclusion(10.0, 6.0, 80.0)
 SQUARE, DOMED, EDGE = Waveguide(face="square"), Waveguide(dome_mm=0.5), Tissue(edge_mm=20.0)
 
 
 @pytest.mark.parametrize(
     ("scene", "symmetry", "because"),
     [
-        (Scene(LUMP), "axisymmetric", "every section is the same"),
-        (Scene(LUMP, placement=Placement(0.0, 0.0, 1.5, 1.5)), "axisymmetric", "every section"),
-        (Scene(LUMP, waveguide=DOMED), "axisymmetric", "every section"),
+        (Scene(INCLUSION), "axisymmetric", "every section is the same"),
+        (Scene(INCLUSION, placement=Placement(0.0, 0.0, 1.5, 1.5)), "axisymmetric", "every section"),
+        (Scene(INCLUSION, waveguide=DOMED), "axisymmetric", "every section"),
         (Scene(Inclusion(0.0, 6.0, 80.0), placement=Placement(6.0)), "axisymmetric", "every section"),
         (Scene(Inclusion(10.0, 6.0, 5.0), placement=Placement(6.0)), "axisymmetric", "every section"),
-        (Scene(LUMP, waveguide=SQUARE), "quarter", "the face is square"),
-        (Scene(LUMP, placement=Placement(0.0, 0.0, 1.0, 2.0)), "quarter", "ellipsoid"),
-        (Scene(LUMP, placement=Placement(6.0)), "half", "6 mm off the axis"),
-        (Scene(LUMP, placement=Placement(3.0, -4.0)), "half", "5 mm off the axis"),
-        (Scene(LUMP, tissue=EDGE), "half", "plane edge"),
-        (Scene(LUMP, waveguide=SQUARE, placement=Placement(3.0, 4.0)), "full", "no plane"),
-        (Scene(LUMP, tissue=EDGE, placement=Placement(0.0, 4.0)), "full", "no plane"),
-        (Scene(LUMP, placement=Placement(3.0, 4.0, 1.0, 2.0)), "full", "no plane"),
+        (Scene(INCLUSION, waveguide=SQUARE), "quarter", "the face is square"),
+        (Scene(INCLUSION, placement=Placement(0.0, 0.0, 1.0, 2.0)), "quarter", "ellipsoid"),
+        (Scene(INCLUSION, placement=Placement(6.0)), "half", "6 mm off the axis"),
+        (Scene(INCLUSION, placement=Placement(3.0, -4.0)), "half", "5 mm off the axis"),
+        (Scene(INCLUSION, tissue=EDGE), "half", "plane edge"),
+        (Scene(INCLUSION, waveguide=SQUARE, placement=Placement(3.0, 4.0)), "full", "no plane"),
+        (Scene(INCLUSION, tissue=EDGE, placement=Placement(0.0, 4.0)), "full", "no plane"),
+        (Scene(INCLUSION, placement=Placement(3.0, 4.0, 1.0, 2.0)), "full", "no plane"),
     ],
 )
 def test_the_symmetry_is_the_largest_that_the_scene_has(scene, symmetry, because):
@@ -38,32 +38,32 @@ def test_the_symmetry_is_the_largest_that_the_scene_has(scene, symmetry, because
     assert because in plan.reasons["symmetry"]
 
 
-def test_a_lump_anywhere_round_the_axis_is_turned_onto_x():
-    turned, angle_rad = aligned(Scene(LUMP, placement=Placement(0.0, -5.0)))
+def test_an_inclusion_anywhere_round_the_axis_is_turned_onto_x():
+    turned, angle_rad = aligned(Scene(INCLUSION, placement=Placement(0.0, -5.0)))
     assert (turned.placement.offset_x_mm, turned.placement.offset_y_mm) == (5.0, 0.0)
     assert angle_rad == pytest.approx(-1.5707963)
 
 
 def test_contact_is_searched_for_only_under_a_dome():
-    assert model_plan(Scene(LUMP)).contact == "closed_sliding"
-    assert model_plan(Scene(LUMP, waveguide=DOMED)).contact == "unilateral"
+    assert model_plan(Scene(INCLUSION)).contact == "closed_sliding"
+    assert model_plan(Scene(INCLUSION, waveguide=DOMED)).contact == "unilateral"
 
 
 def test_a_pressure_is_solved_for_only_where_displacements_lock():
-    nearly = Scene(LUMP, tissue=Tissue(poisson_ratio=0.4995))
-    assert model_plan(Scene(LUMP)).formulation == "displacement"
+    nearly = Scene(INCLUSION, tissue=Tissue(poisson_ratio=0.4995))
+    assert model_plan(Scene(INCLUSION)).formulation == "displacement"
     assert model_plan(nearly).formulation == "mixed"
 
 
 def test_the_topology_is_fixed_over_the_training_box_only():
     assert model_plan(Scene(Inclusion(2.0, 12.0, 40.0))).mesh == "morphed"
     assert model_plan(Scene(Inclusion(1.9, 12.0, 40.0))).mesh == "remeshed"
-    layered = Scene(LUMP, tissue=Tissue(layers=(TissueLayer("skin", 1.5, 20.0),)))
+    layered = Scene(INCLUSION, tissue=Tissue(layers=(TissueLayer("skin", 1.5, 20.0),)))
     assert model_plan(layered).mesh == "remeshed"
 
 
 def test_a_looser_tolerance_never_costs_more_and_a_tighter_one_never_promises_less():
-    plans = [model_plan(Scene(LUMP), tolerance=tolerance) for tolerance in (0.05, 0.005, 0.0005)]
+    plans = [model_plan(Scene(INCLUSION), tolerance=tolerance) for tolerance in (0.05, 0.005, 0.0005)]
     seconds = [plan.predicted_seconds for plan in plans]
     promised = [max(plan.predicted_error.values()) for plan in plans]
     assert seconds == sorted(seconds)
@@ -79,9 +79,15 @@ def test_what_is_promised_is_kept(truth):
     found = solve(scene, plan)
     finest = solve(scene, replace(plan, mesh="remeshed", grading="finest", order=4))
     assert found.force_n == pytest.approx(finest.force_n, rel=0.005)
-    assert found.lump.max_deformation_mm == pytest.approx(finest.lump.max_deformation_mm, rel=0.005)
-    assert found.lump.central_deformation_mm3 == pytest.approx(finest.lump.central_deformation_mm3, rel=0.005)
-    assert found.lump.deformation_area_mm2 == pytest.approx(finest.lump.deformation_area_mm2, rel=0.005)
+    assert found.inclusion_field.max_deformation_mm == pytest.approx(
+        finest.inclusion_field.max_deformation_mm, rel=0.005
+    )
+    assert found.inclusion_field.central_deformation_mm3 == pytest.approx(
+        finest.inclusion_field.central_deformation_mm3, rel=0.005
+    )
+    assert found.inclusion_field.deformation_area_mm2 == pytest.approx(
+        finest.inclusion_field.deformation_area_mm2, rel=0.005
+    )
 
 
 def test_without_a_tolerance_every_scene_gets_the_same_level():
@@ -91,14 +97,14 @@ def test_without_a_tolerance_every_scene_gets_the_same_level():
 
 def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
     light, deep = Press(indentation_mm=0.05), Press(indentation_mm=3.0)
-    assert model_plan(Scene(LUMP, light), strain="auto", tolerance=0.02).strain == "small"
-    plan = model_plan(Scene(LUMP, deep), strain="auto", tolerance=0.02)
+    assert model_plan(Scene(INCLUSION, light), strain="auto", tolerance=0.02).strain == "small"
+    plan = model_plan(Scene(INCLUSION, deep), strain="auto", tolerance=0.02)
     assert (plan.strain, plan.contact) == ("finite", "true_sliding")
     assert "more than the tolerance" in plan.reasons["strain"]
 
 
 def test_off_the_axis_auto_stays_small_and_says_what_that_costs():
-    plan = model_plan(Scene(LUMP, Press(indentation_mm=3.0), placement=Placement(6.0)), strain="auto")
+    plan = model_plan(Scene(INCLUSION, Press(indentation_mm=3.0), placement=Placement(6.0)), strain="auto")
     assert plan.strain == "small"
     assert "axisymmetric" in plan.reasons["strain"]
 
@@ -106,9 +112,9 @@ def test_off_the_axis_auto_stays_small_and_says_what_that_costs():
 @pytest.mark.parametrize(
     ("scene", "quantity"),
     [
-        (Scene(LUMP, placement=Placement(6.0)), "strain"),
-        (Scene(LUMP, waveguide=DOMED), "strain"),
-        (Scene(LUMP, tissue=Tissue(poisson_ratio=0.4999)), "poisson_ratio"),
+        (Scene(INCLUSION, placement=Placement(6.0)), "strain"),
+        (Scene(INCLUSION, waveguide=DOMED), "strain"),
+        (Scene(INCLUSION, tissue=Tissue(poisson_ratio=0.4999)), "poisson_ratio"),
     ],
 )
 def test_finite_strain_is_refused_where_no_model_has_it(scene, quantity):

@@ -8,7 +8,7 @@ import pytest
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.reduced_basis import ReducedBasis
 from host_tools.forward.solve import solve
-from host_tools.scene import Placement, Press, Scene, Waveguide
+from host_tools.scenes.scene import Placement, Press, Scene, Waveguide
 
 SCENE = Scene(Inclusion(10.0, 6.0, 80.0), Press(indentation_mm=1.0))
 
@@ -19,7 +19,7 @@ def basis():
 
 
 def numbers(solution):
-    return np.array([solution.force_n, *asdict(solution.lump).values(), *asdict(solution.raw).values()])
+    return np.array([solution.force_n, *asdict(solution.inclusion_field).values(), *asdict(solution.raw).values()])
 
 
 @pytest.mark.parametrize("modulus_kpa", [40.0, 57.3, 120.0])
@@ -31,8 +31,11 @@ def test_four_snapshots_hold_a_millionth_of_every_feature(basis, modulus_kpa):
 
 def test_the_error_falls_with_every_snapshot():
     """Exponential convergence: from one snapshot more, at least ten times less error."""
-    direct = solve(replace(SCENE, inclusion=Inclusion(10.0, 6.0, 57.3))).lump.max_deformation_mm
-    found = [ReducedBasis(SCENE, 40.0, 120.0, snapshots=n).solution(57.3).lump.max_deformation_mm for n in (1, 2, 3)]
+    direct = solve(replace(SCENE, inclusion=Inclusion(10.0, 6.0, 57.3))).inclusion_field.max_deformation_mm
+    found = [
+        ReducedBasis(SCENE, 40.0, 120.0, snapshots=n).solution(57.3).inclusion_field.max_deformation_mm
+        for n in (1, 2, 3)
+    ]
     errors = np.abs(np.array(found) / direct - 1)
     assert (errors[1:] < errors[:-1] / 10).all()
 
@@ -48,8 +51,10 @@ def test_nine_decades_of_modulus_take_twelve_snapshots():
 
 def test_the_inclusion_keeps_its_own_poisson_ratio():
     scene = replace(SCENE, placement=Placement(poisson_ratio=0.3))
-    direct = solve(scene).lump.max_deformation_mm
-    assert ReducedBasis(scene, 40.0, 120.0).solution(80.0).lump.max_deformation_mm == pytest.approx(direct, rel=1e-6)
+    direct = solve(scene).inclusion_field.max_deformation_mm
+    assert ReducedBasis(scene, 40.0, 120.0).solution(80.0).inclusion_field.max_deformation_mm == pytest.approx(
+        direct, rel=1e-6
+    )
 
 
 @pytest.mark.parametrize(

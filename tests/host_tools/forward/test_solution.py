@@ -8,7 +8,7 @@ import pytest
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solution import Solution
-from host_tools.scene import Scene
+from host_tools.scenes.scene import Scene
 
 RAYS = Rays.over(Scene().waveguide)
 

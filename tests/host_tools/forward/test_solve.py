@@ -5,7 +5,7 @@ import pytest
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.solve import solve
-from host_tools.scene import Press, Scene, Tissue, Waveguide
+from host_tools.scenes.scene import Press, Scene, Tissue, Waveguide
 
 
 @pytest.fixture(scope="module")
@@ -39,15 +39,15 @@ def test_the_contact_pressure_is_positive_everywhere(truth):
 
 def test_no_inclusion_is_the_limit_of_a_vanishing_one():
     bare, tiny = solve(Scene(None)), solve(Scene(Inclusion(0.001, 6.0, 80.0)))
-    assert bare.lump.max_deformation_mm == 0.0
-    assert abs(tiny.lump.max_deformation_mm) < 1e-9
+    assert bare.inclusion_field.max_deformation_mm == 0.0
+    assert abs(tiny.inclusion_field.max_deformation_mm) < 1e-9
     np.testing.assert_allclose(tiny.w_mm, bare.w_mm, rtol=2e-4)
 
 
 def test_an_inclusion_of_tissue_is_no_inclusion():
     same, bare = solve(Scene(Inclusion(10.0, 6.0, 5.0))), solve(Scene(None))
     np.testing.assert_array_equal(same.w_mm, bare.w_mm)
-    assert same.lump.total_deformation_mm3 == 0.0
+    assert same.inclusion_field.total_deformation_mm3 == 0.0
 
 
 def test_the_solution_is_proportional_to_the_press(default):
@@ -55,14 +55,16 @@ def test_the_solution_is_proportional_to_the_press(default):
     twice = solve(Scene(Inclusion(10.0, 6.0, 80.0), Press(indentation_mm=2.0)))
     assert twice.force_n == pytest.approx(2 * default.force_n, rel=1e-9)
     np.testing.assert_allclose(twice.w_mm, 2 * default.w_mm, rtol=1e-9)
-    assert twice.lump.deformation_area_mm2 == pytest.approx(default.lump.deformation_area_mm2, rel=1e-9)
+    assert twice.inclusion_field.deformation_area_mm2 == pytest.approx(
+        default.inclusion_field.deformation_area_mm2, rel=1e-9
+    )
 
 
 def test_a_prescribed_force_is_carried_by_both_presses():
     solution = solve(Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=0.5)))
     assert solution.force_n == pytest.approx(0.5)
     assert solution.baseline.force_n == pytest.approx(0.5)
-    assert solution.indentation_mm < solution.baseline.indentation_mm  # the lump stiffens the tissue
+    assert solution.indentation_mm < solution.baseline.indentation_mm  # the inclusion stiffens the tissue
 
 
 def test_the_stated_error_is_small_and_not_nothing():
@@ -74,8 +76,8 @@ def test_the_stated_error_is_small_and_not_nothing():
 @pytest.mark.parametrize(
     ("deeper", "shallower"), [((10, 8, 80), (10, 6, 80)), ((8, 6, 80), (10, 6, 80)), ((10, 6, 40), (10, 6, 80))]
 )
-def test_the_lump_field_rises_with_size_and_modulus_and_falls_with_depth(deeper, shallower):
+def test_the_inclusion_field_rises_with_size_and_modulus_and_falls_with_depth(deeper, shallower):
     """Lee & Won 2013, section III-B: O1 rises with d, falls with h, rises with E."""
-    less, more = (solve(Scene(Inclusion(*map(float, truth)))).lump for truth in (deeper, shallower))
+    less, more = (solve(Scene(Inclusion(*map(float, truth)))).inclusion_field for truth in (deeper, shallower))
     assert less.max_deformation_mm < more.max_deformation_mm
     assert less.total_deformation_mm3 < more.total_deformation_mm3

@@ -10,7 +10,7 @@ from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.plan import model_plan
 from host_tools.forward.press_model import Loaded
 from host_tools.forward.stated_error import STEP_DOWN_FACTOR, STEP_UP_FACTOR, stated_error
-from host_tools.scene import Scene, Waveguide
+from host_tools.scenes.scene import Scene, Waveguide
 
 PLAN = model_plan(Scene(Inclusion(10.0, 6.0, 80.0)))
 RAYS = Rays.over(Waveguide())
@@ -21,7 +21,7 @@ def face(force_n, peak_mm):
     return FaceState(1.0, peak_mm * BUMP_MM, BUMP_MM, 50.0 * peak_mm, force_n, force_n)
 
 
-PRESSED = Loaded(face(0.200, 0.0200), other=face(0.202, 0.0201))  # 1 % in force, 0.5 % in the lump field
+PRESSED = Loaded(face(0.200, 0.0200), other=face(0.202, 0.0201))  # 1 % in force, 0.5 % in the inclusion field
 BARE = Loaded(face(0.19, 0.0), other=face(0.19, 0.0))
 
 

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from device.simulation.light_table import load_light_table
-from device.simulation.lookup_optics import LookupOptics
-from host_tools.optics.build_lookup import STEPS, write_light_table
+from device.simulation.physics.light_table import load_light_table
+from device.simulation.physics.lookup_optics import LookupOptics
+from host_tools.optics.build_lookup import STEPS, light_field, write_light_table
 from host_tools.optics.light_block import LightBlock
-from host_tools.optics.light_field import light_field
 
 CLEAR = LightBlock(refractive_index=1.0, glass_refractive_index=1.0, led_radius_mm=0.05)
 

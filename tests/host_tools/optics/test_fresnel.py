@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from device.simulation.face_transmission import transmission
+from device.simulation.physics.lookup_optics import transmission
 from host_tools.optics.fresnel import plate_transmission, reflectance, refracted_cosine
 
 BLOCK, GLASS, SKIN, AIR = 1.41, 1.52, 1.38, 1.0

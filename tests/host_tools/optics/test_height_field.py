@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from host_tools.optics.height_field import NO_HIT, bilinear, distance_to_face, slope
-from host_tools.optics.traced import Face
+from host_tools.optics.traced import TracedFace
 
 X = np.linspace(-12.0, 12.0, 161)
 
 
 def field(w):
     x, y = np.meshgrid(X, X)
-    return Face(X, X, w(x, y), np.zeros((161, 161))).height_field(10.0)
+    return TracedFace(X, X, w(x, y), np.zeros((161, 161))).height_field(10.0)
 
 
 FLAT = field(lambda x, y: 0 * x)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.skin import Skin
+from device.simulation.physics.skin import Skin
 from host_tools.optics.light_block import LightBlock
-from host_tools.optics.traced import Face
+from host_tools.optics.traced import TracedFace
 from host_tools.optics.tracer import trace
 
 X = np.linspace(-12.0, 12.0, 97)
@@ -18,7 +18,7 @@ BLOCK, SKIN = LightBlock(), Skin()
 def face(contact=0.0, depth_mm=0.0, width_mm=2.5, *, skin_behind=True):
     x, y = np.meshgrid(X, X)
     w = depth_mm * np.exp(-(x**2 + y**2) / (2 * width_mm**2))
-    return Face(X, X, w, np.full_like(w, contact), skin_behind)
+    return TracedFace(X, X, w, np.full_like(w, contact), skin_behind)
 
 
 @pytest.mark.parametrize(
@@ -141,4 +141,4 @@ def test_a_face_that_reaches_the_leds_is_refused():
 def test_a_face_that_is_no_grid_of_ratios_is_refused(change, name):
     good = {"x_mm": X, "y_mm": X, "w_mm": np.zeros((97, 97)), "contact_ratio": np.zeros((97, 97))}
     with pytest.raises(InvalidQuantity, match=name):
-        Face(**{**good, **change})
+        TracedFace(**{**good, **change})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.instrument.self_test.check_camera import LEAST_NOISE_COUNTS, camera_results
+from device.instrument.self_test.checks import LEAST_NOISE_COUNTS, camera_results
 
 SHAPE = 100, 100
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from device.instrument.self_test.check_clock import clock_results
+from device.instrument.self_test.checks import clock_results
 
 NOW = "2026-01-01T12:00:00.000Z"
 

@@ -4,7 +4,7 @@ import errno
 
 import pytest
 
-from device.instrument.self_test.check_disk import disk_results
+from device.instrument.self_test.checks import disk_results
 from device.records.disk import LocalDisk
 from device.records.store import Store
 

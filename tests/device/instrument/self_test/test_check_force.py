@@ -2,7 +2,7 @@
 
 import pytest
 
-from device.instrument.self_test.check_force import rest_results, untested_weight, weight_result
+from device.instrument.self_test.checks import rest_results, untested_weight, weight_result
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from daemon_process import ROOT
 
 from device.config import simulated_config
-from device.instrument.self_test.check_models import model_results
+from device.instrument.self_test.checks import model_results
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from device.instrument.self_test.check_sides import side_results, untested_sides
-from device.measurement.led_sides import SIDES
+from device.instrument.self_test.checks import side_results, untested_sides
+from device.measurement.recording.led_sides import SIDES
 
 DARK = np.full((40, 60), 4.0)
 FULL = (0.6, 0.6, 0.6, 0.6)

@@ -7,11 +7,11 @@ import types
 import pytest
 
 from device.errors import CameraError
-from device.instrument.guidance import Guidance
-from device.instrument.progress import ProgressBoard
-from device.instrument.self_test import operator as operator_module
-from device.instrument.self_test.operator import Operator
+from device.instrument.press.states import Guidance
+from device.instrument.self_test import run as operator_module
+from device.instrument.self_test.run import Operator
 from device.instrument.status import StatusBoard
+from device.instrument.watch.progress import ProgressBoard
 
 
 class Force:

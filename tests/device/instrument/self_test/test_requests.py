@@ -5,11 +5,11 @@ import threading
 import pytest
 
 from device.errors import BusyError, UnknownResource
+from device.instrument.self_test.report import CheckResult
 from device.instrument.self_test.requests import SelfTestRequests
-from device.instrument.self_test.result import Result
 from device.instrument.status import StatusBoard
 
-GOOD, BAD = Result("Light", "a", "passed"), Result("Camera", "b", "failed")
+GOOD, BAD = CheckResult("Light", "a", "passed"), CheckResult("Camera", "b", "failed")
 
 
 class ScriptedTest:

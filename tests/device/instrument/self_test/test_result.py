@@ -3,7 +3,7 @@
 import pytest
 
 from device.errors import DiskFullError
-from device.instrument.self_test.result import Result, broken, judged, not_tested, overall
+from device.instrument.self_test.report import CheckResult, broken, judged, not_tested, overall
 from device.measurement.quantities import Bound
 
 BOUND = Bound(-0.02, 0.02, "N")
@@ -27,7 +27,7 @@ def test_a_fault_fails_the_check_with_its_code_and_names_its_own_part():
     assert (result.cause, result.remedy) == ("It is full.", "Free it.")
 
 
-PASSED, UNTESTED = Result("Light", "a", "passed"), not_tested("Light", "b", "Use the block.")
+PASSED, UNTESTED = CheckResult("Light", "a", "passed"), not_tested("Light", "b", "Use the block.")
 FAILED = broken("c", DiskFullError("It is full.", "Free it."))
 
 

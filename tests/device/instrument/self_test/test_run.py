@@ -10,16 +10,16 @@ import pytest
 from device.config import Config, simulated_config
 from device.errors import CameraError, LightError, LoadCellError
 from device.hardware.interfaces import CameraFrame
-from device.instrument.bench import DARK
-from device.instrument.guidance import Guidance
-from device.instrument.progress import ProgressBoard
-from device.instrument.self_test import operator as operator_module
+from device.instrument.acquisition.bench import DARK
+from device.instrument.press.states import Guidance
+from device.instrument.self_test import run as operator_module
 from device.instrument.self_test import run as run_module
-from device.instrument.self_test.job import SelfTestJob
-from device.instrument.self_test.run import SelfTest
+from device.instrument.self_test.report import SelfTestJob
+from device.instrument.self_test.run import SelfTestRun
 from device.instrument.status import StatusBoard
-from device.measurement.led_sides import SIDES
-from device.measurement.tactile_image import Frame
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.recording.led_sides import SIDES
+from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
 from device.settings.camera_section import CameraSection
 from device.settings.light_section import LightSection
@@ -98,7 +98,7 @@ def test_of(board, bench, tmp_path):
     clock = types.SimpleNamespace(offset_s=100.0, now=lambda: "2026-01-01T00:00:00Z")
 
     def run(job=ON_BLOCK, config: Config = CONFIG):
-        test = SelfTest(config, bench, store, clock, board, threading.Event())
+        test = SelfTestRun(config, bench, store, clock, board, threading.Event())
         return {result.check: result for results in test.results(job) for result in results}
 
     yield run

@@ -1,0 +1,116 @@
+"""The models of a probe to its answers: the modes in which it can be pressed, and what estimates a recording of each.
+
+A mode is offered only when its model is there; the mode of the settings must be one of those. Between presses the
+models prove themselves on their golden vectors: an inference that hangs or errs is known before a press needs it.
+
+The certificate a start uses: the active one, once it is for this probe, its model and its settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from device.config import Config
+from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
+from device.instrument.press.record import Estimator
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.calibration import Calibration
+from device.measurement.estimate import Estimate
+from device.measurement.mode import Mode
+from device.measurement.mode_models import ModeModels, with_models
+from device.measurement.model_card import BundleRefused
+from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.recording import Recording
+from device.records.calibrations import Calibrations
+
+
+def active_calibration(config: Config, bundle: ModelBundle) -> Calibration | None:
+    """Return the active certificate, None for a probe that was never calibrated; its dates are not looked at.
+
+    Raises `MissingCalibration` when the one that is named cannot be used, `ForeignCalibration` when it is not for this
+    probe, with all that tells.
+    """
+    calibration = Calibrations(config.calibration).active()
+    if calibration:
+        require_own(calibration, config, bundle)
+    return calibration
+
+
+def require_own(calibration: Calibration, config: Config, bundle: ModelBundle) -> None:
+    """Raise `ForeignCalibration` with everything by which a certificate is not for this probe and its settings."""
+    problems = [str(problem) for problem in _foreign(calibration, config, bundle)]
+    if problems:
+        raise ForeignCalibration(" ".join(problems), "Then start the daemon again.")
+
+
+def _foreign(calibration: Calibration, config: Config, bundle: ModelBundle) -> Iterator[InvalidQuantity]:
+    yield from calibration.foreign(config.serial, bundle)
+    if not calibration.holds_at(config.press.target_n):
+        bound = f"{calibration.force_n:g} N as calibrated"
+        action = "set that force, or calibrate with this one"
+        yield InvalidQuantity("press.target_n", config.press.target_n, bound, action)
+    camera = config.camera
+    yield from calibration.other_settings(
+        camera.scale,
+        exposure_us=camera.exposure_us,
+        gain=camera.gain,
+        cell_counts_per_n=config.cell.sensitivity_counts_per_n,
+    )
+
+
+def _nothing_to_prove() -> None:
+    """Stand for models without golden vectors."""
+
+
+class Answers(NamedTuple):
+    """The modes in which this probe has a model, what answers in them, and what proves that it still does."""
+
+    modes: tuple[Mode, ...]
+    estimator: Estimator
+    prove: Callable[[], None] = _nothing_to_prove
+
+    def require(self, mode: Mode) -> None:
+        """Raise `ConfigError` when the settings ask for a mode that is not among them."""
+        if mode not in self.modes:
+            cause = f"press.mode is {mode}, but this probe has models for {', '.join(self.modes)} only."
+            raise ConfigError(cause, "Choose one of those, or install the model.")
+
+    def watched(self, progress: ProgressBoard, begin: Callable[[], None]) -> Answers:
+        """Return the same, each run of it noted as progress of the inference; `begin` is called before each."""
+
+        def estimator(recording: Recording, mode: Mode) -> Estimate:
+            with progress.inside("inference"):
+                begin()
+                return self.estimator(recording, mode)
+
+        def prove() -> None:
+            with progress.inside("inference"):
+                begin()
+                self.prove()
+
+        return Answers(self.modes, estimator, prove)
+
+
+def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+    """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
+
+    Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
+    """
+    models = with_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        if calibration is None:
+            raise MissingCalibration("The probe is not calibrated.", "Calibrate it and activate the certificate.")
+        return models.estimate(recording, mode, calibration)
+
+    return Answers(models.modes, estimate, lambda: _prove(models))
+
+
+def _prove(models: ModeModels) -> None:
+    """Raise `ModelError` when a model does not answer its golden vectors any more."""
+    try:
+        models.prove()
+    except BundleRefused as error:
+        raise ModelError(str(error), "Then start the daemon again.") from error

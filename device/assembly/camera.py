@@ -1,0 +1,52 @@
+"""Puts the camera together: the driver in a process of its own, above picamera2 or above the virtual one.
+
+The camera's process imports this file: nothing here may need the web server or the network's runtime.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from device.errors import DeviceError
+from device.hardware.camera import RawMonoCamera, open_camera
+from device.hardware.camera_process import WINDOW_S, CameraProcess
+from device.hardware.camera_worker import CameraOpener
+from device.hardware.restart_limit import RestartLimit
+from device.measurement.quantities import InvalidQuantity
+from device.settings.camera_section import CameraSection
+from device.simulation.chips.remote_camera import RemotePicamera2
+
+
+def real_camera(settings: CameraSection) -> CameraProcess:
+    """Start the board's camera; raise `CameraError` when it cannot be opened or does not do what is asked."""
+    return _in_its_process(partial(open_camera, settings.index, **_driver_settings(settings)), settings)
+
+
+def emulated_camera(settings: CameraSection, address: str) -> CameraProcess:
+    """Start the camera that a `CameraServer` serves at an address; raise as `real_camera`."""
+    return _in_its_process(partial(open_remote_camera, address, **_driver_settings(settings)), settings)
+
+
+def open_remote_camera(address: str, **driver_settings: Any) -> RawMonoCamera:
+    """Open the served camera in this process."""
+    picam2 = RemotePicamera2(address)
+    try:
+        return RawMonoCamera(picam2, **driver_settings)
+    except (DeviceError, InvalidQuantity):
+        picam2.close()
+        raise
+
+
+def _in_its_process(opener: CameraOpener, settings: CameraSection) -> CameraProcess:
+    limit = RestartLimit(settings.max_restarts, WINDOW_S)
+    return CameraProcess(opener, shape=(settings.height_px, settings.width_px), limit=limit)
+
+
+def _driver_settings(settings: CameraSection) -> dict[str, Any]:
+    return {
+        "mode": settings.raw_mode,
+        "exposure_us": settings.exposure_us,
+        "gain": settings.gain,
+        "frame_rate_hz": settings.frame_rate_hz,
+    }

@@ -1,0 +1,272 @@
+"""Puts the daemon together: real chips, or emulated ones under the very same drivers, and the hand that presses them.
+
+Lets the virtual hand read the guidance of whatever leads its presses.
+
+Opens a probe for presses on phantoms: as the daemon does, but without model and certificate.
+
+Puts the daemon together: real chips, or emulated ones under the very same drivers.
+
+Every part that fails to open is listed at once: device/assembly/opened_parts.py.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol, TypeVar
+
+from device.assembly.answers import Answers, active_calibration, answers_for
+from device.assembly.camera import emulated_camera, real_camera
+from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
+from device.assembly.opened_parts import OpenedParts
+from device.config import SIMULATED_PROBE, Config
+from device.errors import ConfigError
+from device.hardware.interfaces import Camera, Lights, LoadCell
+from device.hardware.led_driver import led_driver, open_led_driver
+from device.hardware.raw_mode import RAW_BITS
+from device.instrument.acquisition.bench import Bench
+from device.instrument.acquisition.force_recorder import ForceRecorder
+from device.instrument.acquisition.frame_check import FramePace
+from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.press.phantom_press import PhantomPress
+from device.instrument.press.states import Guidance, before_contact
+from device.instrument.procedure import Procedure
+from device.instrument.status import StatusBoard
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.calibration import Calibration
+from device.measurement.mode import Mode
+from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.quantities import Inclusion
+from device.records.disk import Disk
+from device.records.store import Store
+from device.simulation.chips.camera_server import CameraServer
+from device.simulation.chips.emulated_amplifier import FreezingCell
+from device.simulation.chips.emulated_storage import EmulatedBundles, EmulatedDisk
+from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
+from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
+from device.simulation.chips.virtual_camera import ExposureRequest, VirtualPicamera2
+from device.simulation.faults import NO_FAULTS, FaultTimeline
+from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import ProbeTables, VirtualProbe
+
+
+class Guide(Protocol):
+    """What leads an operator through presses: the guidance on its board, and word of each press that is to begin."""
+
+    board: StatusBoard
+
+    def on_request(self, listener: Callable[[Mode], None]) -> None:
+        """Call `listener` with the mode whenever a press is to begin."""
+
+
+SomeGuide = TypeVar("SomeGuide", bound=Guide)
+
+
+def lead_by_hand(guide: Guide, probe: VirtualProbe) -> None:
+    """Let the virtual hand read the screen: it takes up the probe when a press is requested."""
+
+    def follow(guidance: Guidance) -> None:
+        probe.hand.follow(guidance.code, time.monotonic())
+
+    def begin(mode: Mode) -> None:
+        probe.hand.begin()
+        guidance = guide.board.now.guidance
+        if guidance is before_contact("reference", mode):  # shown since before the hand took up the probe
+            follow(guidance)
+
+    guide.board.on_guidance(follow)
+    guide.on_request(begin)
+
+
+def open_phantom_press(config: Config, scenario: Scenario | None) -> PhantomPress:
+    """Return presses of the real probe, or of the virtual one on a scene.
+
+    Raises `StartFailed` with every part that failed.
+    """
+    return open_simulated(config, scenario, _phantom_press) if scenario else open_real(config, _phantom_press)
+
+
+def _phantom_press(probe: OpenedProbe) -> PhantomPress:
+    progress = ProgressBoard()
+    force, store = probe.force(progress), probe.store()
+    bench = probe.bench(force, progress)
+    assert store is not None  # or there were no bench
+    is_simulated = probe.scenario is not None
+    return PhantomPress(
+        probe.config, bench, store, clock=probe.clock, opened=probe.parts.opened, simulated=is_simulated
+    )
+
+
+@dataclass(frozen=True)
+class OpenedProbe:
+    """The opened parts of a probe, None for one that failed, and what is simulated of it."""
+
+    config: Config
+    parts: OpenedParts
+    lights: Lights | None
+    camera: Camera | None
+    cell: LoadCell | None
+    clock: ClockWatch
+    disk: Disk | None = None
+    scenario: Scenario | None = None
+    faults: FaultTimeline = NO_FAULTS
+    folder_of: Callable[[Path], Path] = Path
+
+    @property
+    def simulated_truth(self) -> Inclusion | None:
+        """What a simulated probe is pressed on."""
+        return self.scenario.inclusion if self.scenario else None
+
+    def force(self, progress: ProgressBoard) -> ForceRecorder | None:
+        """Return the recorder of the tared load cell, or None when that failed."""
+        cell = self.cell
+        return self.parts.open(lambda: tared(self.config, cell, progress)) if cell else None
+
+    def force_once_lifted(self, progress: ProgressBoard) -> ForceRecorder | None:
+        """Return the same, also while its tare fails: that alone is told only beside what ends the start."""
+        cell = self.cell
+        force = self.parts.open(lambda: tared_once_lifted(self.config, cell, progress)) if cell else None
+        if force and (fault := force.fault):
+            self.parts.faults.append(fault)
+        return force
+
+    def store(self) -> Store | None:
+        """Return the store of the settings' data folder, or None when it did not open."""
+        return self.parts.open(lambda: Store(self.config.data, self.disk))
+
+    def bench(self, force: ForceRecorder | None, progress: ProgressBoard) -> Bench:
+        """Return light, camera and force as one, once no part has failed."""
+        self.parts.require_all()
+        # require_all has raised if any of these is missing; the type checker cannot know.
+        assert self.lights is not None
+        assert self.camera is not None
+        assert force is not None
+        pace = FramePace(self.config.camera.late_frames / self.config.camera.frame_rate_hz)
+        budget = LightBudget(self.config.light.max_on_s)
+        return Bench(self.lights, self.camera, force, pace, budget, progress)
+
+
+def open_probe(config: Config) -> Procedure:
+    """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
+    return open_real(config, _procedure)
+
+
+def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
+    """Return the procedure of a virtual probe; raise `StartFailed` as `open_probe` does."""
+    return open_simulated(config, scenario, _procedure)
+
+
+def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
+    """Return what `on_top` makes of the real probe's parts; raise `StartFailed` with every part that failed."""
+    parts = OpenedParts()
+    lights = parts.open(lambda: open_led_driver(config.light))
+    camera = parts.open(lambda: real_camera(config.camera))
+    cell = parts.open(lambda: open_cell(config, config.cell.device))
+    return on_top(OpenedProbe(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s)))
+
+
+def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
+    """Return the same of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
+    parts, faults = OpenedParts(), FaultTimeline(scenario.faults)
+    bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
+    config = replace(commissioned(config), model=bundles.folder(config.model))
+    parts.open(lambda: _require_own_serial(config, scenario))
+    width_px, height_px = config.camera.raw_mode.sensor_px
+    shape, scale = (height_px, width_px), config.camera.sensor_scale
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale))
+    parts.require_all()
+    assert probe is not None  # require_all has raised otherwise
+    chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
+    open_picam2 = partial(
+        VirtualPicamera2,
+        partial(_render, probe, faults),
+        width_px=width_px,
+        height_px=height_px,
+        raw_formats=(config.camera.raw_format,),
+        led_ratio_at=lambda t_s: faults.led_output(chip.ratio_at(t_s), t_s),
+        faults=faults,
+    )
+    server = CameraServer(open_picam2)
+    parts.opened.callback(server.close)
+    line = emulated_amplifier(config, probe, faults)
+    parts.opened.callback(line.close)
+    bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
+    lights = parts.open(lambda: led_driver(config.light, bus))
+    camera = parts.open(lambda: emulated_camera(config.camera, server.address))
+    cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
+    clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
+    disk = EmulatedDisk(faults)
+    guide = on_top(OpenedProbe(config, parts, lights, camera, cell, clock, disk, scenario, faults, bundles.folder))
+    guide.on_request(lambda mode: faults.begin_press())
+    lead_by_hand(guide, probe)
+    return guide
+
+
+def _require_own_serial(config: Config, scenario: Scenario) -> None:
+    """Refuse settings of another probe: a certificate made under one light is wrong under the other."""
+    if config.serial != scenario.serial:
+        raise ConfigError(
+            f"serial is {config.serial}, but the simulated probe with {scenario.light} light is {scenario.serial}.",
+            "Correct the setting, and its calibration with it.",
+        )
+    bits, raw_format = scenario.sensor.bits, config.camera.raw_format
+    if bits != RAW_BITS[raw_format]:
+        cause = f"The scene's sensor.bits is {bits}, but camera.raw_format is {raw_format}."
+        raise ConfigError(cause, "Correct one of them.")
+
+
+def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureRequest) -> Any:
+    return probe.frame_counts(
+        force_n=probe.hand.force_n(exposure.t_s),
+        place=probe.hand.place(exposure.t_s),
+        led_ratio=exposure.led_ratio,
+        exposure_us=exposure.exposure_us,
+        gain=exposure.gain,
+        frame_number=exposure.frame_number,
+        wet_ratio=faults.wet_ratio(exposure.t_s),
+        ambient_ratio=faults.ambient_ratio(exposure.t_s) + faults.stray_ratio(exposure.led_ratio, exposure.t_s),
+    )
+
+
+def _procedure(probe: OpenedProbe) -> Procedure:
+    """Tare, load model and calibration, open the store; then nothing is missing but the tare of a held probe."""
+    config, parts, progress = probe.config, probe.parts, ProgressBoard()
+    force = probe.force_once_lifted(progress)
+    bundle = parts.open(lambda: ModelBundle.load(config.model))
+    watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
+    calibration = watch.calibration if watch else None
+    answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None
+    store = probe.store()
+    bench = probe.bench(force, progress)
+    # Nothing has failed, or there were no bench; the type checker cannot know.
+    assert answers is not None
+    assert watch is not None
+    assert store is not None
+    answers = answers.watched(progress, begin=partial(probe.faults.hold_up, "inference_frozen"))
+    progress.exercise("inference", answers.prove)
+    return Procedure(
+        config,
+        bench,
+        answers.estimator,
+        store,
+        modes=answers.modes,
+        calibration=watch,
+        opened=parts.opened,
+        clock=probe.clock,
+        progress=progress,
+        simulated_truth=probe.simulated_truth,
+        folder_of=probe.folder_of,
+    )
+
+
+def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+    answers = answers_for(config, bundle, calibration)
+    answers.require(config.press.mode)
+    return answers

@@ -1,0 +1,71 @@
+"""`python -m device faults`: every fault code with its meaning, as a listing or as the page docs/faults.md. Exit code
+0.
+
+The table of faults as the page docs/faults.md.
+
+`python -m device faults`: every fault code with its meaning. Exit code 0.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from itertools import groupby
+from typing import Any
+
+from device.fault_table import FAULTS, FaultEntry
+from device.files.text_table import aligned
+
+PAGE = """# Faults
+
+Written by `python -m device faults --markdown > docs/faults.md` from the classes of `device/errors.py`.
+
+The first digit of a code is the part. The screen shows code and title with what was measured and what to do;
+a program finds the code in the status, in a press, and in a problem document (RFC 9457), with the HTTP status below.
+A fault keeps the probe from measuring, or ends a press; a warning is kept with the press and its measurement,
+and a lasting one is shown until the daemon is started again.
+[The simulated probe](simulated_probe.md) says how a fault is provoked and how the device knows of it.
+"""
+HEADER = "| code | title | what it means | severity | status |\n|---|---|---|---|---|\n"
+
+
+def markdown() -> str:
+    """Return the page of all faults, docs/faults.md."""
+    lines = [PAGE]
+    for part, faults in groupby(FAULTS, key=lambda fault: fault.part):
+        lines += [f"\n## {part}\n\n", HEADER, *map(_row, faults)]
+    return "".join(lines)
+
+
+def _row(fault: FaultEntry) -> str:
+    severity = f"lasting {fault.severity}" if fault.is_lasting else fault.severity
+    return f"| {fault.code} | {fault.title} | {fault.meaning} | {severity} | {fault.status} |\n"
+
+
+EXAMPLES = """examples:
+  python -m device faults                          every code with title and meaning
+  python -m device faults --markdown               the page docs/faults.md
+"""
+COLUMNS = ("code", "part", "title", "severity", "meaning")
+
+
+def add_faults_command(commands: Any) -> None:
+    """Add `faults` to the daemon's commands."""
+    faults = commands.add_parser(
+        "faults", help="list the fault codes", epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    form = faults.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="as one JSON list")
+    form.add_argument("--markdown", action="store_true", help="the page docs/faults.md")
+
+
+def run_faults_command(options: argparse.Namespace) -> int:
+    """Print the table of faults; return the exit code."""
+    if options.markdown:
+        print(markdown(), end="")
+    elif options.json:
+        print(json.dumps([fault.as_record() for fault in FAULTS]))
+    else:
+        rows = [(fault.code, fault.part, fault.title, fault.severity, fault.meaning) for fault in FAULTS]
+        print("\n".join(aligned([COLUMNS, *rows])))
+    return 0

@@ -1,0 +1,195 @@
+"""A recording to a folder and back: `recording.json` and lossless mono PNGs; a .zip of the folder is read too.
+
+What is missing, not finite or contradictory is refused with the field's name. A recording is written whole or not at
+all. Source: docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import cv2
+import numpy as np
+
+from device.files.durable import sync_directory, write_and_sync
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
+from device.measurement.recording.recording import REPAIR, CameraSettings, RecordedCell, Recording
+from device.measurement.recording.tactile_image import Frame
+
+SCHEMA = "tsis.recording/1"
+NUMBER = (int, float)
+UNREADABLE = (OSError, KeyError, zipfile.BadZipFile, zlib.error)
+"""What reading a file of a folder or .zip raises when it is missing or damaged."""
+
+FileWriter = Callable[[Path, bytes], None]
+"""Writes a file; when it returns, the content is on the disk."""
+
+
+def write_recording(recording: Recording, folder: Path, *, write: FileWriter = write_and_sync) -> None:
+    """Write a recording to a new folder; when this returns, it is on the disk. After an `OSError` nothing is left."""
+    temporary = folder.with_name(folder.name + ".tmp")
+    shutil.rmtree(temporary, ignore_errors=True)
+    try:
+        _write_files(recording, temporary, write)
+        temporary.rename(folder)
+    except OSError:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+    sync_directory(folder.parent)
+
+
+def _write_files(recording: Recording, temporary: Path, write: FileWriter) -> None:
+    (temporary / "frames").mkdir(parents=True)
+    for i, frame in enumerate(recording.frames):
+        write(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
+    text = json.dumps(_as_json(recording), indent=1)
+    write(temporary / "recording.json", text.encode())
+    for directory in (temporary / "frames", temporary):
+        sync_directory(directory)
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a folder or .zip; raise `InvalidQuantity` naming what is wrong."""
+    with _files(path) as read:
+        try:
+            record = json.loads(read("recording.json"))
+        except (*UNREADABLE, ValueError) as error:
+            raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
+        return _from_json(record, read)
+
+
+def _frame_name(i: int) -> str:
+    return f"frames/{i:03d}.png"
+
+
+def _as_json(recording: Recording) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "id": recording.id,
+        "device": {"serial": recording.serial, "software": recording.software},
+        "started_at": recording.started_at,
+        "simulated": recording.simulated,
+        "camera": asdict(recording.camera),
+        "cell": asdict(recording.cell) if recording.cell else None,
+        "frames": [
+            {
+                "file": _frame_name(i),
+                "role": frame.role,
+                "t_s": frame.t_s,
+                "force_n": frame.force_n,
+                "led_ratio": frame.led_ratio,
+            }
+            for i, frame in enumerate(recording.frames)
+        ],
+        "calibration_id": recording.calibration_id,
+        "position_mm": recording.position_mm,
+        "truth": asdict(recording.truth) if recording.truth else None,
+        "phantom_serial": recording.phantom_serial,
+    }
+
+
+@contextmanager
+def _files(path: Path) -> Iterator[Callable[[str], bytes]]:
+    if path.suffix == ".zip" and path.is_file():
+        try:
+            opened = zipfile.ZipFile(path)
+        except zipfile.BadZipFile as error:
+            raise InvalidQuantity("recording", path, "a readable .zip", REPAIR) from error
+        with opened as archive:
+            names = archive.namelist()
+            root = next((n.removesuffix("recording.json") for n in names if n.endswith("recording.json")), "")
+            yield lambda name: archive.read(root + name)
+    else:
+        yield lambda name: (path / name).read_bytes()
+
+
+def _field(record: Any, name: str, kind: type | tuple[type, ...], where: str = "") -> Any:
+    """Return a field of the right type; JSON's true is a number to Python, but not to us."""
+    value = record.get(name) if isinstance(record, dict) else None
+    if not isinstance(value, kind) or isinstance(value, bool):
+        found = "missing" if value is None else repr(value)
+        expected = "a number" if kind is NUMBER else f"of type {kind.__name__}" if isinstance(kind, type) else str(kind)
+        raise InvalidQuantity(where + name, found, expected, REPAIR)
+    return value
+
+
+def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recording:
+    if _field(record, "schema", str) != SCHEMA:
+        raise InvalidQuantity("schema", record["schema"], SCHEMA, "convert the recording with matching software")
+    device, camera = _field(record, "device", dict), _field(record, "camera", dict)
+    names = CameraSettings.__dataclass_fields__
+    settings = CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names})
+    truth = record.get("truth")
+    return Recording(
+        id=_field(record, "id", str),
+        serial=_field(device, "serial", str, "device."),
+        software=_field(device, "software", str, "device."),
+        started_at=_time(record),
+        camera=settings,
+        frames=tuple(_frame(entry, i, read) for i, entry in enumerate(_field(record, "frames", list))),
+        calibration_id=_optional(record, "calibration_id", str, None),
+        position_mm=_position_mm(_optional(record, "position_mm", list, [0.0, 0.0])),
+        truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth is not None else None,
+        simulated=_optional(record, "simulated", bool, False),
+        cell=_cell(_optional(record, "cell", dict, None)),
+        phantom_serial=_optional(record, "phantom_serial", str, ""),
+    )
+
+
+def _cell(record: dict[str, Any] | None) -> RecordedCell | None:
+    if record is None:
+        return None
+    tare = _field(record, "tare_counts", NUMBER, "cell.") if record.get("tare_counts") is not None else None
+    return RecordedCell(_field(record, "counts_per_n", NUMBER, "cell."), tare)
+
+
+def _time(record: dict[str, Any]) -> str:
+    text = str(_field(record, "started_at", str))
+    try:
+        datetime.fromisoformat(text)
+    except ValueError as error:
+        raise InvalidQuantity("started_at", text, "a time of RFC 3339", REPAIR) from error
+    return text
+
+
+def _optional(record: dict[str, Any], name: str, kind: type, default: Any) -> Any:
+    """Return a field that may be null or absent, then the default."""
+    value = record.get(name)
+    if value is not None and not isinstance(value, kind):
+        raise InvalidQuantity(name, repr(value), f"of type {kind.__name__}", REPAIR)
+    return default if value is None else value
+
+
+def _position_mm(values: list[Any]) -> tuple[float, float]:
+    if len(values) != 2:
+        raise InvalidQuantity("position_mm", values, "two numbers, x and y", REPAIR)
+    x, y = (require("position_mm", value, Bound(-1e3, 1e3, "mm"), REPAIR) for value in values)
+    return x, y
+
+
+def _frame(entry: dict[str, Any], i: int, read: Callable[[str], bytes]) -> Frame:
+    where = f"frames[{i}]."
+    name = _field(entry, "file", str, where)
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+        raise InvalidQuantity(where + "file", name, "a path inside the recording", REPAIR)
+    try:
+        counts = cv2.imdecode(np.frombuffer(read(name), np.uint8), cv2.IMREAD_UNCHANGED)
+    except (*UNREADABLE, cv2.error) as error:
+        raise InvalidQuantity(where + "file", name, "a readable PNG", REPAIR) from error
+    if counts is None:
+        raise InvalidQuantity(where + "file", name, "a readable PNG", REPAIR)
+    ratio = _field(entry, "led_ratio", list, where)
+    if len(ratio) != 4:
+        raise InvalidQuantity(where + "led_ratio", ratio, "four numbers, one a side", REPAIR)
+    force_n, t_s = (_field(entry, n, NUMBER, where) for n in ("force_n", "t_s"))
+    require(where + "force_n", force_n, Bound(-1e3, 1e3, "N"), REPAIR)
+    return Frame(counts, _field(entry, "role", str, where), t_s, force_n, tuple(ratio))

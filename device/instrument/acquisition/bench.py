@@ -1,0 +1,119 @@
+"""Light, camera and force as one: a frame that knows under which light and force it was taken."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+from device.hardware.interfaces import Camera, CameraFrame, Lights
+from device.instrument.acquisition.force_recorder import ForceRecorder
+from device.instrument.acquisition.frame_check import FramePace
+from device.instrument.acquisition.frame_level import LevelWatch
+from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.press.machine import STEADY_WINDOW_S
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.recording.led_sides import LedRatio
+from device.measurement.recording.tactile_image import Frame, Role
+
+DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
+FRAME_TIMEOUT_S = 1.0
+LATE_S = 0.1
+"""Three frames of 30 Hz."""
+
+
+@dataclass
+class Bench:
+    """The opened hardware. Owned by the procedure's thread alone, except `force`, which anyone may read."""
+
+    lights: Lights
+    camera: Camera
+    force: ForceRecorder
+    pace: FramePace = field(default_factory=lambda: FramePace(LATE_S))
+    budget: LightBudget = field(default_factory=LightBudget)
+    progress: ProgressBoard = field(default_factory=ProgressBoard)
+    levels: LevelWatch = field(default_factory=LevelWatch)
+    _light: LedRatio = DARK
+    _is_known: bool = False
+    _not_before_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.progress.exercise("camera", self._look)
+        self.progress.exercise("light", self._confirm_light)
+
+    def light(self, ratio: LedRatio) -> None:
+        """Set the four sides; frames begun before the chip acknowledged it are not taken.
+
+        After a `LightError` nobody knows what the light is: it is set again at the next call, whatever it asks for.
+        """
+        if ratio != self._light or not self._is_known:
+            self._is_known = False
+            if any(ratio):
+                self.budget.note_lit()
+            self._not_before_s = self._acknowledged_s(ratio)
+            self._light, self._is_known = ratio, True
+            if not any(ratio):
+                self.budget.note_dark()
+
+    def check_lights(self) -> None:
+        """Raise `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not flow; ends dark."""
+        self._is_known = False
+        with self.progress.inside("light"):
+            self.lights.check_outputs()
+        self.budget.note_dark()
+
+    def take(self, role: Role) -> Frame:
+        """Return the next frame under the present light, with the force in the middle of its exposure.
+
+        Raises `CameraError` when none comes, most are left out or one shows another light, `LoadCellError` when its
+        force is not known.
+        """
+        taken = self.expose()
+        middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
+        frame = Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
+        self.levels.saw(frame)
+        return frame
+
+    def expose(self) -> CameraFrame:
+        """Return the next frame under the present light, whatever the force; raises `CameraError` as `take` does."""
+        asked_s = max(time.monotonic(), self._not_before_s)
+        taken = self._capture()
+        self.pace.saw(asked_s, taken.exposure_start_s)
+        return taken
+
+    def _capture(self) -> CameraFrame:
+        with self.progress.inside("camera"):
+            taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
+        self._not_before_s = taken.exposure_start_s + 1e-6
+        return taken
+
+    def _look(self) -> None:
+        """Take a frame that nobody needs."""
+        self._capture()
+
+    def _acknowledged_s(self, ratio: LedRatio) -> float:
+        with self.progress.inside("light"):
+            return self.lights.set_ratio(ratio)
+
+    def _confirm_light(self) -> None:
+        """Write what the light is once more, and have it read back; frames that were begun under it remain good.
+
+        A light that nobody knows is switched off.
+        """
+        if not self._is_known:
+            self.light(DARK)
+            return
+        self._is_known = False
+        self._acknowledged_s(self._light)
+        self._is_known = True
+
+    def range_n(self, t_s: float, *, around_line: bool) -> float:
+        """Return by how much the force varied just before a time, or on a ramp around it: a ramp is no hold."""
+        return self.force.range_n(t_s, window_s=STEADY_WINDOW_S, around_line=around_line)
+
+    def peak_n(self, since_s: float, t_s: float) -> float:
+        """Return the largest force of the samples after one time and until another, and of the latter itself."""
+        return self.force.peak_n(since_s, t_s)
+
+    def rate_n_per_s(self, t_s: float) -> float:
+        """Return how fast the force grew just before a time, tremor averaged out; negative while the hand eases."""
+        return (self.force.at(t_s) - self.force.at(t_s - STEADY_WINDOW_S)) / STEADY_WINDOW_S

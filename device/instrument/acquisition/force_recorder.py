@@ -1,0 +1,187 @@
+"""The load cell's stream to force over time: newtons on the one clock, interpolated to when a frame was exposed.
+
+One thread owns the serial line. It first takes the tare, again and again while that fails, as when the probe is held or
+its cell unplugged. A silent, unplugged or overloaded cell is a fault that is kept until samples come that it can bear.
+What is kept are counts: they become newtons when they are asked for, by the tare of then.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from device.errors import LoadCellError, OverloadedCellError
+from device.hardware.interfaces import CellCounts, CellSample, ForceScale, LoadCell, Newtons
+from device.instrument.acquisition.load_limit import LoadLimit
+from device.instrument.watch.progress import ProgressBoard
+
+KEPT_SAMPLES = 1000
+FIRST_SAMPLE_S = 5.0
+"""Opening the port resets an OpenScale: its banner may last three seconds."""
+SILENCE_S = 1.0
+RETRY_S = 0.2
+
+Zero = tuple[ForceScale, LoadLimit]
+TareOf = Callable[[Callable[[], CellSample]], Zero]
+"""Readings of the cell, one a call, to the scale of this start and the load from the zero of commissioning."""
+
+
+def force_range_n(samples: Sequence[tuple[float, float]], *, around_line: bool) -> Newtons:
+    """Return by how much the forces of one or more samples (s, N) vary, or what their straight line leaves of it."""
+    if not around_line:
+        return Newtons(max(force for _, force in samples) - min(force for _, force in samples))
+    times, forces = np.array(samples).T
+    centred = times - times.mean()
+    slope = float(centred @ forces) / max(float(centred @ centred), 1e-12)
+    return Newtons(float(np.ptp(forces - slope * centred)))
+
+
+class ForceRecorder:
+    """Force history of the last seconds."""
+
+    def __init__(self, cell: LoadCell, tare: TareOf, progress: ProgressBoard | None = None) -> None:
+        """Start to tare and record; when this returns there is a sample, or a `fault` that says why there is none yet.
+
+        `tare` raises the `LoadCellError` that forbids it; then it is asked again.
+        """
+        self._cell, self._tare = cell, tare
+        self._zero: Zero | None = None
+        self._timeout_s = FIRST_SAMPLE_S
+        self._samples: deque[tuple[float, CellCounts]] = deque(maxlen=KEPT_SAMPLES)
+        self._news, self._stopping = threading.Condition(), threading.Event()
+        self.fault: LoadCellError | None = None
+        self._progress = progress or ProgressBoard()
+        self._thread = threading.Thread(target=self._run, name="force", daemon=True)
+        self._thread.start()
+        with self._news:
+            if not self._news.wait_for(lambda: self._samples or self.fault, timeout=2 * FIRST_SAMPLE_S):
+                self.fault = LoadCellError("The load cell gives no samples.", "Check its cable and its power.")
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._zero = self._zero or self._tare(self._read)
+                _, limit = self._zero
+                self._record(limit)
+            except OverloadedCellError as error:
+                self._fail(error)  # and the next sample at once: those behind it must not grow old
+            except LoadCellError as error:
+                self._fail(error)
+                self._stopping.wait(RETRY_S)
+
+    def _read(self) -> CellSample:
+        """Return the next sample; a tare that needs many of them ends with the recorder."""
+        if self._stopping.is_set():
+            raise LoadCellError("The load cell is read no more.", "Start the daemon again.")
+        timeout_s, self._timeout_s = self._timeout_s, SILENCE_S
+        with self._progress.inside("force"):
+            return self._cell.read(timeout_s=timeout_s)
+
+    def _record(self, limit: LoadLimit) -> None:
+        sample = self._read()
+        limit.require_bearable(sample.counts)
+        with self._news:
+            self._samples.append((sample.t_s, sample.counts))
+            self.fault = None
+            self._news.notify_all()
+
+    def _fail(self, error: LoadCellError) -> None:
+        with self._news:
+            self.fault = error
+            self._news.notify_all()
+
+    def retare(self) -> Newtons:
+        """Take the tare anew, of samples from now on; return by how much (N) the zero has moved.
+
+        Raises the `LoadCellError` that forbids it, or that the cell is at fault by: then the zero is what it was. How
+        far it may go counts from that of commissioning, without which the first tare of this start stands in.
+        """
+        with self._news:
+            if self.fault:
+                raise self.fault
+            before, limit = self._tared()
+            scale, _ = self._tare(self._next)
+            limit.require_tare(scale.tare_counts)
+            self._zero = scale, limit
+        return before.newtons(scale.tare_counts)
+
+    def _next(self) -> CellSample:
+        """Return the next sample that is recorded; raise the `LoadCellError` that comes instead."""
+        with self._news:
+            if not self._news.wait(SILENCE_S) or self.fault:
+                raise self.fault or _no_sample(SILENCE_S)
+            return CellSample(*self._samples[-1])
+
+    def _tared(self) -> Zero:
+        if self._zero is None:
+            raise self.fault or LoadCellError("The load cell is not tared.", "Lift the probe.")
+        return self._zero
+
+    def _newtons(self, counts: CellCounts) -> Newtons:
+        scale, _ = self._tared()
+        return scale.newtons(counts)
+
+    @property
+    def latest_n(self) -> Newtons:
+        """Return the newest force; raise `LoadCellError` when the cell is at fault."""
+        with self._news:
+            if self.fault:
+                raise self.fault
+            return self._newtons(self._samples[-1][1])
+
+    def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> Newtons:
+        """Return the force at a time on the monotonic clock, waiting until a later sample has come.
+
+        Raises `LoadCellError` when none comes, or when the history does not reach back so far.
+        """
+        deadline_s = time.monotonic() + timeout_s
+        with self._news:
+            while not self._samples or self._samples[-1][0] < t_s:
+                if not self._news.wait(max(0.0, deadline_s - time.monotonic())) and time.monotonic() >= deadline_s:
+                    raise self.fault or _no_sample(timeout_s)
+            times, counts = np.array(self._samples).T
+        if t_s < times[0]:
+            raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
+        return self._newtons(CellCounts(float(np.interp(t_s, times, counts))))
+
+    def mean_n(self, *, window_s: float) -> Newtons:
+        """Return the mean force of the last seconds, as far as they are known; raises as `latest_n` does."""
+        newest_n, now_s = self.latest_n, time.monotonic()
+        with self._news:
+            inside = [self._newtons(counts) for t, counts in self._samples if now_s - window_s <= t]
+        return Newtons(sum(inside) / len(inside)) if inside else newest_n
+
+    @property
+    def zero_shift_n(self) -> Newtons:
+        """Return how far the tare of now is from that of commissioning; raises the fault until it is taken."""
+        scale, limit = self._tared()
+        return limit.commissioned.newtons(scale.tare_counts)
+
+    def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
+        """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""
+        with self._news:
+            inside = [(t - t_s, self._newtons(counts)) for t, counts in self._samples if t_s - window_s <= t <= t_s]
+        return force_range_n(inside, around_line=around_line) if inside else Newtons(float("inf"))
+
+    def peak_n(self, since_s: float, t_s: float) -> Newtons:
+        """Return the largest force of the samples after one time and until another, and of that time itself.
+
+        Waits for a later sample and raises `LoadCellError` as `at` does.
+        """
+        at_the_end = self.at(t_s)
+        with self._news:
+            return max([at_the_end, *(self._newtons(counts) for t, counts in self._samples if since_s < t <= t_s)])
+
+    def close(self) -> None:
+        """Stop the thread and release the cell."""
+        self._stopping.set()
+        self._thread.join(timeout=2 * SILENCE_S)
+        self._cell.close()
+
+
+def _no_sample(waited_s: float) -> LoadCellError:
+    return LoadCellError(f"The load cell gave no sample for {waited_s:g} s.", "Check its cable and its power.")

@@ -1,0 +1,300 @@
+"""Takes the frames a measurement is made of: unloaded ones, and those of a press in the mode that was asked for.
+
+It drives the press machine: each frame becomes an observation, and what the machine makes of it goes to the board. A
+press that the machine rejects ends with `PressEnded`. The light of each side is looked at while the reference press is
+still held.
+
+Where the inclusion lies under the face: the frames of both presses to the bright spot's centroid, or None.
+
+Frames are binned before anything is divided, and only the hardest of the press are looked at, where the inclusion is
+brightest. A face that shows no inclusion has no spot. Source: centroid of the paper's features, docs/measurement.md.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from device.config import Config
+from device.instrument.acquisition.bench import DARK, Bench
+from device.instrument.acquisition.frame_check import TearWatch
+from device.instrument.acquisition.frame_level import require_lit
+from device.instrument.acquisition.light_check import (
+    Levels,
+    growth_ratio,
+    level_counts,
+    require_contrast,
+    require_dark,
+    require_every_side,
+)
+from device.instrument.press.frame_choice import WantedFrames, wanted_frames
+from device.instrument.press.machine import Ending, FrameSeen, PressRules, PressUnderWay
+from device.instrument.press.states import ACTIVE, Guidance, before_contact
+from device.instrument.status import StatusBoard
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.mode import Mode
+from device.measurement.paper_mode.features import FeatureSettings, extract_features
+from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid
+from device.measurement.recording.led_sides import SIDES, LedRatio
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.reference_light import Image, reference_light
+from device.measurement.recording.tactile_image import Frame, Role, TactileImage, saturated_ratio
+
+BINNED_MM = 0.25
+HARD_RATIO = 0.7
+"""Press frames from this part of the largest force on are looked at."""
+SPOT_CONTRAST = 0.02
+"""A bright spot fainter than this is not told from the residue of two presses that were not quite alike."""
+
+
+def inclusion_spot_mm(
+    dark: Sequence[Frame], reference: Sequence[Frame], press: Sequence[Frame], scale: PixelScale
+) -> tuple[float, float] | None:
+    """Return x (right) and y (down) in mm of the bright spot's centroid from the middle of the face.
+
+    Frames of one shape, at least one of each; pixels of `scale`. None when nothing stands out.
+    """
+    factor = _factor(scale.mm_per_px_x), _factor(scale.mm_per_px_y)
+    base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
+    lit = [_binned(frame, factor) - base for frame in reference]
+    light = reference_light([frame.force_n for frame in reference], lit, FLOOR_COUNTS)
+    hardest_n = max(frame.force_n for frame in press)
+    hard = [frame for frame in press if frame.force_n >= HARD_RATIO * hardest_n]
+    seen = [contrast_and_valid(_binned(frame, factor) - base, light, frame.force_n) for frame in hard]
+    contrast = np.asarray(np.mean([contrast for contrast, _ in seen], axis=0), dtype=np.float32)
+    binned = PixelScale(scale.mm_per_px_x * factor[0], scale.mm_per_px_y * factor[1])
+    image = TactileImage(contrast, np.all([valid for _, valid in seen], axis=0), binned, hardest_n)
+    features = extract_features(image, FeatureSettings())
+    if features.centroid_intensity < SPOT_CONTRAST:
+        return None
+    return features.centroid_x_mm, features.centroid_y_mm
+
+
+def _factor(mm_per_px: float) -> int:
+    return max(round(BINNED_MM / mm_per_px), 1)
+
+
+def _binned(frame: Frame, factor: tuple[int, int]) -> Image:
+    """Return means over blocks of pixels; the rows and columns left over are dropped evenly."""
+    (height, width), (x, y) = frame.counts.shape, factor
+    top, left = height % y // 2, width % x // 2
+    counts = frame.counts[top : top + height // y * y, left : left + width // x * x].astype(np.float32)
+    return np.asarray(cv2.resize(counts, (width // x, height // y), interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+UNLOADED_FRAMES = 4
+POLL_S = 0.02
+CANCELLED = "Cancelled by the operator."
+
+
+class PressEnded(Exception):  # noqa: N818 - not every end is an error
+    """The press ended without a measurement: rejected with a reason, or cancelled."""
+
+    def __init__(self, state: Ending, reason: str) -> None:
+        self.state, self.reason = state, reason
+        super().__init__(reason)
+
+
+class CalledAway(Exception):  # noqa: N818 - not an error: something else is to be done first
+    """The wait for an untouched probe was given up."""
+
+
+class Capture:
+    """The part of the procedure that moves the light and takes frames."""
+
+    def __init__(self, bench: Bench, config: Config, board: StatusBoard, progress: ProgressBoard | None = None) -> None:
+        self._progress = progress or ProgressBoard()
+        self.bench, self.config, self.press, self.light, self.board = bench, config, config.press, config.light, board
+        self.lit = (self.light.ratio[0], self.light.ratio[1], self.light.ratio[2], self.light.ratio[3])
+        self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
+        self.machine = PressUnderWay()
+        self._tears = TearWatch(config.camera.tear_counts)
+        self._dark: list[Frame] = []
+        self._reference: list[Frame] = []
+        self._dark_counts = self._before_s = 0.0
+
+    def unloaded(self) -> list[Frame]:
+        """Return dark and lit frames of the untouched probe; waits until it is, and takes them again if it was not.
+
+        Raises `CalledAway` when something else is to be done meanwhile, `StuckLightError` or `AmbientLightError` when
+        the dark ones are not dark, `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not
+        flow.
+        """
+        guidance = self.board.now.guidance
+        while True:
+            self._wait_until_untouched()
+            self.board.update(guidance=guidance)
+            began_s = time.monotonic()
+            frames = self._untouched_frames()
+            # A flat field under load would be wrong in every pixel, and nothing else would tell.
+            if self.stopping.is_set() or self.bench.peak_n(began_s, frames[-1].t_s) < self.press.contact_n:
+                return frames
+            self.board.update(guidance=Guidance.LIFT)
+
+    def _wait_until_untouched(self) -> None:
+        self.bench.light(DARK)
+        while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
+            self._progress.beat()
+            if self.called_away.is_set():
+                raise CalledAway
+            if self.board.now.guidance is Guidance.WAIT:  # of the start: nothing else has told the operator
+                self.board.update(guidance=Guidance.LIFT)
+            time.sleep(POLL_S)
+
+    def _untouched_frames(self) -> list[Frame]:
+        self.bench.check_lights()
+        dark = self._agreeing("dark", DARK)
+        for frame in dark:
+            require_dark(frame, self.light.max_dark_counts)
+        self._dark, self._dark_counts = dark, level_counts(dark[-1])
+        lit = self._agreeing("reference", self.lit)
+        self.bench.light(DARK)
+        return dark + lit
+
+    def relit(self, unloaded: list[Frame], ratio: LedRatio) -> list[Frame]:
+        """Return the same with frames lit at another brightness, taken now; as they are if it is theirs. Ends dark."""
+        if ratio == self.lit:
+            return unloaded
+        lit = self._agreeing("reference", ratio)
+        self.bench.light(DARK)
+        return [frame for frame in unloaded if frame.role == "dark"] + lit
+
+    def loaded(self, role: Role, mode: Mode) -> list[Frame]:
+        """Return the frames of one press, as many as the mode needs.
+
+        Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
+        depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
+        light fails before it, `LightBudgetError` when it was on for too long.
+        """
+        wanted = wanted_frames(mode, role, self.press, self._tears)
+        rules = PressRules.of(self.press, wanted.window_n, is_ramp=wanted.is_ramp)
+        begin = before_contact(role, mode)
+        self._before_s = time.monotonic()
+        self._become(self.machine.begin(role, self._before_s))
+        self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
+        self.bench.check_lights()
+        self.bench.light(self.lit)
+        while not wanted.is_complete:
+            self._require_going_on()
+            frame = self.bench.take(role)
+            self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
+            if self.machine.is_touching:
+                guidance = wanted.see(frame, self.machine.state)
+                self._drop_outliers(wanted)
+            else:
+                guidance = begin
+                wanted.begin_again()
+            self.board.update(guidance=guidance, frames_taken=len(wanted.frames), wanted_n=wanted.wanted_n)
+        require_lit(wanted.frames, self._dark_counts)
+        if seen := wanted.light_and_hard():
+            require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
+        self._become(self.machine.hold(self._spot_mm(role, wanted.frames), rules))
+        return wanted.frames
+
+    def _drop_outliers(self, wanted: WantedFrames) -> None:
+        """Take the frames again that are unlike the others, once all are there."""
+        while wanted.is_complete and (dropped := wanted.drop_outlier(self._dark_counts)):
+            self._become(self.machine.replace_frame(dropped.deviation_ratio))
+
+    def _spot_mm(self, role: Role, frames: list[Frame]) -> tuple[float, float] | None:
+        """Return where the inclusion lies from the middle of the face; None beside it, or when it does not stand
+        out.
+        """
+        if role == "reference":
+            self._reference = frames
+            return None
+        if not (self._dark and self._reference):
+            return None
+        return inclusion_spot_mm(self._dark, self._reference, frames, self.config.camera.scale)
+
+    def _observation(self, frame: Frame, *, is_ramp: bool) -> FrameSeen:
+        since_s, self._before_s = self._before_s, frame.t_s
+        return FrameSeen(
+            t_s=frame.t_s,
+            force_n=frame.force_n,
+            peak_n=self.bench.peak_n(since_s, frame.t_s),
+            range_n=self.bench.range_n(frame.t_s, around_line=is_ramp),
+            rate_n_per_s=self.bench.rate_n_per_s(frame.t_s),
+            saturated_ratio=saturated_ratio(frame.counts),
+        )
+
+    def _become(self, press: PressUnderWay) -> None:
+        """Take over what the machine says, and tell the board; raise `PressEnded` when it is the end."""
+        self.machine = press
+        self.board.update(state=press.state)
+        if press.ending:
+            raise PressEnded(press.ending, press.reason)
+
+    def side_levels(self, reference: Sequence[Frame]) -> Levels:
+        """Return the light of each side alone, under the load of the reference press that is being held.
+
+        The levels are those at the target force; the frames of the press tell how its light grows with the force.
+        Raises `DarkSideError` when a side gives none, `StuckLightError` or `AmbientLightError` when the dark is not
+        dark, `PressEnded` when the hand lifts meanwhile.
+        """
+        dark = self._under_load(DARK)
+        require_dark(dark, self.light.max_dark_counts)
+        levels = []
+        for side, ratio in enumerate(self.lit):
+            plus_x, plus_y, minus_x, minus_y = (ratio if side == number else 0.0 for number in range(len(SIDES)))
+            frame = self._under_load((plus_x, plus_y, minus_x, minus_y))
+            light = level_counts(frame) - level_counts(dark)
+            growth = growth_ratio(reference, self._dark_counts, frame.force_n, self.press.target_n)
+            levels.append(light / ratio * growth)
+        require_every_side(tuple(levels), self.light.min_side_ratio)
+        return tuple(levels)
+
+    def release(self) -> None:
+        """Let the hand lift: every frame is there."""
+        self._become(self.machine.release(time.monotonic()))
+
+    def lifted(self) -> None:
+        """Return once the probe touches nothing between the two presses; raises `PressEnded` as `loaded` does."""
+        self.bench.light(DARK)
+        while (force_n := self.bench.force.latest_n) >= self.press.contact_n:
+            self._require_going_on()
+            self._become(self.machine.wait(time.monotonic(), force_n, self.press))
+            time.sleep(POLL_S)
+
+    def done(self) -> None:
+        """Say that the measurement is kept."""
+        self._become(self.machine.done())
+
+    def end(self, reason: str, ending: Ending = "rejected") -> None:
+        """End the press under way, if there is one, for a reason that the machine does not know."""
+        if self.machine.state in ACTIVE:
+            self.machine = self.machine.reject(reason, ending)
+            self.board.update(state=self.machine.state)
+
+    def clear(self) -> None:
+        """Forget the last press: the next may begin."""
+        self.machine = PressUnderWay()
+
+    def _agreeing(self, role: Role, ratio: LedRatio) -> list[Frame]:
+        self.bench.light(ratio)
+        frames: list[Frame] = []
+        while len(frames) < UNLOADED_FRAMES:
+            self._tears.append(frames, self.bench.take(role))
+        return frames
+
+    def _under_load(self, ratio: LedRatio) -> Frame:
+        """Return the second of two frames that agree, taken under a light while the probe is held pressed."""
+        self.bench.light(ratio)
+        frames: list[Frame] = []
+        while len(frames) < 2:
+            self._require_going_on()
+            self._tears.append(frames, self.bench.take("reference"))
+        self._become(self.machine.check(self._observation(frames[-1], is_ramp=False), self.press))
+        return frames[-1]
+
+    def _require_going_on(self) -> None:
+        self._progress.beat()
+        self.bench.budget.require_left()
+        if self.cancelled.is_set():
+            self._become(self.machine.reject(CANCELLED, "cancelled"))
+        if self.stopping.is_set():
+            self._become(self.machine.reject("The daemon was stopped during the press.", "failed"))

@@ -1,0 +1,181 @@
+"""What a press leaves behind: its job while it is under way, the recording of its frames, its answer, both kept.
+
+What a press leaves behind: the recording of its frames, and the record of what was measured.
+
+The record says in which mode the press was taken; the estimate in it, which mode's model answered. They are kept by
+`device.records.store` and described in docs/contracts.md.
+
+Frames of a press to its answer, kept: the recording of the frames, what the estimator says of it, both in the store.
+
+An estimate without numbers is kept too: it says why there are none.
+
+What is kept of the press under way besides its frames: its job, its warnings, how it failed, and the light it took.
+
+The store first, then the board: whoever reads that a press has changed finds it kept.
+"""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from device import __version__
+from device.config import Config
+from device.errors import DeviceError
+from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.status import PressJob, StatusBoard
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.estimate import Estimate
+from device.measurement.mode import Mode
+from device.measurement.quantities import Inclusion
+from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
+from device.measurement.recording.tactile_image import Frame
+from device.records.store import ENDED, Store
+
+
+def recording_of(
+    frames: Sequence[Frame],
+    config: Config,
+    *,
+    started_at: str,
+    calibration_id: str | None,
+    simulated_truth: Inclusion | None,
+) -> Recording:
+    """Return a new recording of a probe's frames; a probe whose truth is known is a simulated one."""
+    camera = config.camera
+    settings = CameraSettings(
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        bits=8,
+        mm_per_px_x=camera.mm_per_px_x,
+        mm_per_px_y=camera.mm_per_px_y,
+        exposure_us=camera.exposure_us,
+        gain=camera.gain,
+    )
+    return Recording(
+        id=str(uuid.uuid4()),
+        serial=config.serial,
+        software=__version__,
+        started_at=started_at,
+        camera=settings,
+        frames=tuple(frames),
+        calibration_id=calibration_id,
+        truth=simulated_truth,
+        simulated=simulated_truth is not None,
+        cell=RecordedCell(config.cell.sensitivity_counts_per_n, config.cell.commissioned_tare_counts),
+    )
+
+
+def measurement_record(
+    recording: Recording, estimate: Estimate, mode: Mode, warnings: Sequence[DeviceError]
+) -> dict[str, Any]:
+    """Return the JSON object of a new measurement, without its sequence number."""
+    press = recording.with_role("press")
+    return {
+        "id": str(uuid.uuid4()),
+        "taken_at": recording.started_at,
+        "mode": mode,
+        "estimate": estimate.as_record(),
+        "features": estimate.features,
+        "force_n": sum(frame.force_n for frame in press) / len(press),
+        "frames": len(press),
+        "recording_id": recording.id,
+        "truth": None if recording.truth is None else vars(recording.truth),
+        "warnings": [warning.as_record() for warning in warnings],
+    }
+
+
+Estimator = Callable[[Recording, Mode], Estimate]
+
+
+class PressAnswers:
+    """Answers one press after the other, each in its mode."""
+
+    def __init__(
+        self,
+        config: Config,
+        calibration: CalibrationWatch,
+        estimator: Estimator,
+        store: Store,
+        progress: ProgressBoard,
+        truth: Inclusion | None,
+    ) -> None:
+        """Take the inclusion that a simulated probe presses on as `truth`."""
+        self._config, self._calibration, self._truth = config, calibration, truth
+        self._estimator, self._store, self._progress = estimator, store, progress
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether what is pressed on is known, as on the simulated probe alone."""
+        return self._truth is not None
+
+    def keep(
+        self, frames: Sequence[Frame], mode: Mode, started_at: str, warnings: Sequence[DeviceError]
+    ) -> dict[str, Any]:
+        """Return the measurement that was made of a press's frames, once it and its recording are on the disk.
+
+        Raises `InvalidQuantity` when an estimate cannot be made of them, `StorageError` when it cannot be kept.
+        """
+        recording = recording_of(
+            frames,
+            self._config,
+            started_at=started_at,
+            calibration_id=self._calibration.id,
+            simulated_truth=self._truth,
+        )
+        estimate = self._estimator(recording, mode)
+        record = measurement_record(recording, estimate, mode, warnings)
+        with self._progress.inside("storage"):
+            return self._store.add_measurement(record, recording)
+
+
+log = logging.getLogger(__name__)
+
+SAVE_LIGHT_EVERY_S = 10.0
+"""So much light may be missing from the hours counter after a power cut, and that of the press under way."""
+
+
+class PressBook:
+    """Keeps one press after the other; the procedure's thread alone writes in it."""
+
+    def __init__(self, board: StatusBoard, store: Store, budget: LightBudget) -> None:
+        self._board, self._store, self._budget = board, store, budget
+
+    def note(self, job: PressJob, **changes: Any) -> None:
+        """Keep and show what has changed of a press, with the warnings and the light until now."""
+        warnings = tuple(warning.as_record() for warning in self._board.now.warnings)
+        light_on_s = round(self._budget.press_s, 2)
+        changed = replace(self._board.now.press or job, warnings=warnings, light_on_s=light_on_s, **changes)
+        self._store.save_press(changed.as_record())
+        self._board.update(press=changed)
+
+    def warn(self, warning: DeviceError | None) -> None:
+        """Show what does not end a press; the next `note` keeps it with the press."""
+        if warning:
+            log.warning("%s %s", warning.code, warning)
+            others = tuple(one for one in self._board.now.warnings if one.code != warning.code)
+            self._board.update(warnings=(*others, warning))
+
+    def fail(self, waiting: PressJob | None, end: DeviceError) -> None:
+        """End the press that waits, or is under way, so that the next may begin: also when the store is at fault."""
+        job = waiting or self._board.now.press
+        if job is None or job.state in ENDED:
+            return
+        light_on_s = 0.0 if waiting else round(self._budget.press_s, 2)
+        failed = replace(job, state="failed", reason=str(end), code=end.code, light_on_s=light_on_s)
+        self._board.update(press=failed)
+        try:
+            self._store.save_press(failed.as_record())
+        except DeviceError as error:
+            log.error("%s %s", error.code, error)
+
+    def save_light_hours(self, *, at_least_s: float = 0.0) -> None:
+        """Add the light since the last time to the hours counter, unless it is less than `at_least_s`."""
+        seconds = self._budget.unsaved_s
+        if seconds >= at_least_s:
+            self._store.add_light_on_s(seconds)
+            self._budget.note_saved(seconds)

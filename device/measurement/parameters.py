@@ -1,0 +1,92 @@
+"""What a press depends on: the three unknowns, and the nuisances that nobody tells the probe.
+
+Every model of a press - surrogate, networks, limits - takes them in this order and inside these ranges. A range is also
+the prior: nothing else is known before the probe touches. `offset_mm` is how far the inclusion's middle lies beside the
+probe's axis.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import UNKNOWNS
+
+
+class Range(NamedTuple):
+    """Lowest, highest, and whether ratios count rather than differences: then its logarithm is evenly spread."""
+
+    low: float
+    high: float
+    by_ratio: bool = False
+
+
+RANGES: dict[str, Range] = {
+    "size_mm": Range(2.0, 15.0),
+    "depth_mm": Range(4.0, 12.0),
+    "youngs_modulus_kpa": Range(10.0, 160.0, by_ratio=True),
+    "tissue_modulus_kpa": Range(4.0, 6.0),
+    "slab_thickness_mm": Range(27.0, 33.0),
+    "contact_pressure_kpa": Range(1.5, 2.7, by_ratio=True),
+    "albedo": Range(0.4, 0.6),
+    "spread_mm": Range(0.8, 1.25, by_ratio=True),
+    "offset_mm": Range(0.0, 2.0),
+}
+"""Tissue +-20 %, slab +-10 % about the paper's; skin +-30 % in its contact law, +-20 % in its light."""
+PARAMETERS = tuple(RANGES)
+COUNT = len(UNKNOWNS)
+NUISANCES = PARAMETERS[COUNT:]
+LOW: Array = np.array([entry.low for entry in RANGES.values()])
+HIGH: Array = np.array([entry.high for entry in RANGES.values()])
+BY_RATIO = np.array([entry.by_ratio for entry in RANGES.values()])
+EVEN_STD = 3**-0.5
+"""Standard deviation of a coordinate that is even between -1 and 1."""
+NOMINAL = {
+    "tissue_modulus_kpa": 5.0,
+    "slab_thickness_mm": 30.0,
+    "contact_pressure_kpa": 2.0,
+    "albedo": 0.5,
+    "spread_mm": 1.0,
+    "offset_mm": 0.0,
+}
+
+
+def to_unit(values: Array) -> Array:
+    """Return parameters [..., 9] as coordinates that are -1 and 1 at the ends of their ranges."""
+    low, high = _evenly(LOW), _evenly(HIGH)
+    return np.asarray(2 * (_evenly(values) - low) / (high - low) - 1)
+
+
+def from_unit(unit: Array) -> Array:
+    """Return parameters [..., 9] of coordinates; the inverse of `to_unit`, and exact at the ends of the ranges."""
+    low, high = _evenly(LOW), _evenly(HIGH)
+    values = low + (unit + 1) / 2 * (high - low)
+    values[..., BY_RATIO] = np.exp(values[..., BY_RATIO])
+    return np.where(unit == -1, LOW, np.where(unit == 1, HIGH, values))
+
+
+def unknowns_to_unit(values: Array) -> Array:
+    """Return size, depth and modulus [..., 3] as coordinates."""
+    others = np.broadcast_to(HIGH[COUNT:], (*values.shape[:-1], len(NUISANCES)))
+    return to_unit(np.concatenate([values, others], axis=-1))[..., :COUNT]
+
+
+def unknowns_from_unit(unit: Array) -> Array:
+    """Return size, depth and modulus [..., 3] of coordinates."""
+    others = np.zeros((*unit.shape[:-1], len(NUISANCES)))
+    return from_unit(np.concatenate([unit, others], axis=-1))[..., :COUNT]
+
+
+def slope_of_unit(values: Array) -> Array:
+    """Return d(parameters) / d(coordinates) [..., 9]."""
+    half = (_evenly(HIGH) - _evenly(LOW)) / 2
+    return np.asarray(np.where(BY_RATIO, values * half, half))
+
+
+def _evenly(values: Array) -> Array:
+    """Return parameters with the logarithm of those whose ratios count."""
+    spread = np.array(values, dtype=np.float64)
+    spread[..., BY_RATIO] = np.log(spread[..., BY_RATIO])
+    return spread

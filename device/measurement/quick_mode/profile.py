@@ -1,0 +1,52 @@
+"""A recording of held presses to one row: the contrast on rings of the face at one force, and that force.
+
+What mode quick reads: one frame beside the lesion and one on it are enough. Frames are binned before they are divided,
+as in `press_profile`, and the reference light follows the power law that a hold has.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.quick_mode.roundness import elongation_ratio
+from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid, harmonic, lights_of
+from device.measurement.recording.recording import Recording
+from device.measurement.recording.reference_light import reference_light
+from device.measurement.recording.ring_means import RING_RADII_MM, RingMeans, ring_weights
+
+HELD_FORCES_N = 0.44, 0.56
+"""Mean forces of a hold that the network has learnt from; `press.target_n` is 0.5 N."""
+AGAIN = "hold 0.5 N beside the lesion and on it"
+HELD_NAMES = (*(f"contrast_{r:.1f}_mm" for r in RING_RADII_MM), "force_n")
+
+
+class HeldPress(NamedTuple):
+    """Contrast on the rings and mean force [12], in the order of `HELD_NAMES`; and the `roundness.elongation_ratio`."""
+
+    row: Array
+    elongation_ratio: float
+
+
+def held_press(recording: Recording) -> HeldPress:
+    """Return what a recording shows, mean over its press frames.
+
+    Raises `InvalidQuantity` when a role is missing or a press was not held within `HELD_FORCES_N`.
+    """
+    reference, press = lights_of(recording)
+    for name, force_n in (("reference", reference.force_n), ("press", press.force_n)):
+        if not len(force_n):
+            raise InvalidQuantity(f"{name} frames", 0, "at least one", AGAIN)
+        require(f"mean {name} force", float(np.mean(force_n)), Bound(*HELD_FORCES_N, "N"), AGAIN)
+    light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
+    weights = ring_weights(press.images[0].shape, press.scale)
+    frames = [
+        weights.means(*contrast_and_valid(image, light, float(force)))
+        for force, image in zip(press.force_n, press.images, strict=True)
+    ]
+    rings = RingMeans(*(np.array(part) for part in zip(*frames, strict=True)))
+    row = np.append(rings.mean.mean(axis=0), np.mean(press.force_n))
+    return HeldPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))

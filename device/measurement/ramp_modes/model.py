@@ -1,0 +1,149 @@
+"""A press profile to mean and spread of the unknowns: standard by networks, precise by fitting the forward model.
+
+Either way the best fit of the forward model is sought, because how badly it fits is what tells that a press is not of
+one round inclusion, and whose second harmonic a round one has; whether it lies in the trained ranges, networks of
+their own tell. The bundle is a folder:
+`model.onnx` and `model.json` as every bundle, `surrogate.npz`, `range.onnx` and `round.npz` beside them.
+Source of the format: docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.confidence_belt import Bands
+from device.measurement.mode import Mode
+from device.measurement.model_card import BundleRefused
+from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from device.measurement.ramp_modes.ellipticity import ROUND_FILE, RoundSpot, load_round_spot
+from device.measurement.ramp_modes.fit import PressPosterior, best_fit
+from device.measurement.ramp_modes.noise import PressNoise
+from device.measurement.ramp_modes.posterior import sample_press
+from device.measurement.ramp_modes.range_classifier import RangeTest
+from device.measurement.ramp_modes.surrogate import TISSUE, PressSurrogate, load_surrogate
+
+SURROGATE_FILE = "surrogate.npz"
+RAMP_MODES: tuple[Mode, ...] = ("standard", "precise")
+WELL_INSIDE = 0.95
+"""A fit is begun no nearer to the ends of the ranges, where it would stick."""
+
+
+class RampAnswer(NamedTuple):
+    """Mean and spread [3] of the unknowns' coordinates, and how well one inclusion explains the press.
+
+    `misfit_ratio`: squared residuals of the best fit, each over its standard deviation, over their number.
+    `best`: coordinates [9] of the best fit.
+    `tissue_kpa`: mean and spread of the tissue's modulus, which the press beside the lesion tells; precise only.
+    """
+
+    mean: Array
+    spread: Array
+    misfit_ratio: float
+    best: Array
+    tissue_kpa: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ModeLimits:
+    """What held-out presses of a mode have shown: bands of each unknown, and the largest usual values of doubt."""
+
+    bands: tuple[Bands, ...]
+    misfit_ratio: float
+    elongation_deviations: float
+    outside_log_odds: float
+
+
+class ProfileAnswers:
+    """Networks, surrogate and noise of each mode: what answers, without any limit on its answers."""
+
+    def __init__(self, surrogate: PressSurrogate, noise: Mapping[Mode, PressNoise]) -> None:
+        self.surrogate, self.noise = surrogate, noise
+
+    def answer(self, row: Array, mode: Mode, mean: Array, spread: Array) -> RampAnswer:
+        """Return the answer to a profile row [P] for which the networks say `mean` and `spread` [3]."""
+        posterior = PressPosterior(row, self.surrogate, self.noise[mode])
+        start = np.concatenate([np.clip(mean, -WELL_INSIDE, WELL_INSIDE), np.zeros(len(NUISANCES))])
+        if mode != "precise":
+            return _answer(posterior, best_fit(posterior, start), mean, spread)
+        fit = sample_press(posterior, start)
+        values = from_unit(fit.mean)
+        tissue_kpa = float(values[TISSUE]), float((fit.spread * slope_of_unit(values))[TISSUE])
+        unknowns = slice(len(UNKNOWNS))
+        return _answer(posterior, fit.best, fit.mean[unknowns], fit.spread[unknowns])._replace(tissue_kpa=tissue_kpa)
+
+
+def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) -> RampAnswer:
+    residuals = posterior.residuals(best)
+    return RampAnswer(mean, spread, float(np.mean(residuals**2)), best)
+
+
+class ProfileModel:
+    """A verified bundle: networks, forward model, what tells the ranges and what is round, and each mode's limits."""
+
+    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers, ranges: RangeTest, round_spot: RoundSpot) -> None:
+        """Use `load` for what is installed. Raises `BundleRefused` when the card lacks the limits of a mode."""
+        self.bundle, self.answers, self.ranges, self.round_spot = bundle, answers, ranges, round_spot
+        try:
+            self.limits = {mode: _limits(bundle.card["modes"][mode]) for mode in RAMP_MODES}
+        except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
+            raise BundleRefused(Path(bundle.name), "modes", f"incomplete ({error})", "limits of every mode") from error
+
+    @classmethod
+    def load(cls, folder: Path) -> ProfileModel:
+        """Return the model of a folder; raises `BundleRefused` or `InvalidQuantity` when anything does not hold."""
+        bundle = ModelBundle.load(folder)
+        path = _verified(folder, SURROGATE_FILE, bundle.card.get("surrogate_sha256"))
+        with np.load(path) as file:
+            noise = {mode: PressNoise(np.asarray(file[f"camera_{mode}"], np.float64)) for mode in RAMP_MODES}
+        surrogate = load_surrogate(path)
+        ranges = RangeTest.load(folder, bundle.card, RAMP_MODES)
+        round_path = _verified(folder, ROUND_FILE, bundle.card.get("round_sha256"))
+        return cls(bundle, ProfileAnswers(surrogate, noise), ranges, load_round_spot(round_path, surrogate, RAMP_MODES))
+
+    def prove(self) -> None:
+        """Run the golden vectors of all its networks; raises `BundleRefused` when one does not hold."""
+        self.bundle.prove()
+        self.ranges.prove()
+
+    def answer(self, row: Array, mode: Mode) -> RampAnswer:
+        """Return what mode standard or precise makes of a profile row [P]."""
+        mean, spread = self.networks(row[None])
+        return self.answers.answer(row, mode, mean[0], spread[0])
+
+    def networks(self, rows: Array) -> tuple[Array, Array]:
+        """Return the networks' mean and spread [n, 3] of the unknowns' coordinates, for rows [n, P]."""
+        raw = self.bundle.estimate(rows)
+        return unknowns_to_unit(raw.estimate), raw.spread
+
+
+def _verified(folder: Path, name: str, stated: str | None) -> Path:
+    """Return the path of a bundle's file whose hash is the one stated; raises `BundleRefused`."""
+    path = folder / name
+    if stated is None:
+        raise BundleRefused(folder, f"the hash of {name}", "missing", "in the card: use a bundle of this version")
+    found = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
+    if found != stated:
+        raise BundleRefused(folder, name, found, f"{stated} as model.json states")
+    return path
+
+
+def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
+    """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
+    parts = ("truth", "log_spread", "low", "high")
+    return tuple(
+        Bands(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS
+    )
+
+
+def _limits(entry: Mapping[str, Any]) -> ModeLimits:
+    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"))
+    return ModeLimits(bands_of(entry), *doubts)

@@ -1,0 +1,242 @@
+"""A recording of a force ramp to its press profile: the contrast on rings of the face at four forces.
+
+Also in it: how the untouched tissue's light grows with the force, ring by ring (it knows of tissue and skin), and how
+far the inclusion lies off the axis. Every frame counts with its own force; a polynomial in the force brings them to the
+profile's forces. Frames are binned before anything is divided: noise in a denominator would raise every contrast.
+Source: docs/measurement.md; that the ramp and the whole profile are what the unknowns need: docs/accuracy.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.recording import Recording
+from device.measurement.recording.reference_light import BEYOND_RATIO, HeldLight, Image, RampLight, reference_light
+from device.measurement.recording.ring_means import RING_RADII_MM, RingMeans, ring_weights
+from device.measurement.recording.tactile_image import Frame
+
+PROFILE_FORCES_N: Array = np.array([0.12, 0.25, 0.40, 0.55])
+"""From some 0.6 to 2.7 mm of indentation."""
+BINNED_MM = 0.125
+"""Pixels are put together to about this width: light spreads eight times as far in the skin."""
+FLOOR_COUNTS = 3.0
+"""A binned reference dimmer than this above dark (of 8 bits) is no flat field."""
+RAMP_DEGREE = 3
+RAMP_LOW_N, RAMP_HIGH_N = 0.17, 0.5
+"""A ramp reaches from at most the first to at least the second of these forces."""
+TOUCHED_N = 0.07
+"""Below this force a reference frame shows an untouched face."""
+MIN_RAMP_FRAMES = 6
+LARGEST_STEP_N = 0.17
+"""Between forces further apart than this a ramp's polynomials are not held: four forces hold them, three do not."""
+AGAIN = "press slowly harder from the first touch to 0.6 N, beside the lesion and on it"
+
+
+@dataclass(frozen=True, eq=False)
+class PressProfile:
+    """What a press says about inclusion, tissue and skin; K forces `force_n`, J rings `RING_RADII_MM`.
+
+    contrast [K, J]: ring means of the tactile image. growth [K - 1, J]: ln of the inclusion-free light at each force
+    over that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the
+    forces, without the ring in the middle. elongation [J - 1]: the same of the second harmonic, along its own
+    direction. offset_at_force, elongation_at_force [K, J - 1]: both at each force, along the direction of their mean,
+    so that noise makes neither longer. second_harmonic [2, K, J - 2]: the second harmonic at each force, along and
+    across the direction of the bright side, also without the outermost ring. residual: root mean square, over rings and
+    frames, of what the polynomial in the force leaves.
+    """
+
+    force_n: Array
+    contrast: Array
+    growth: Array
+    offset: Array
+    elongation: Array
+    offset_at_force: Array
+    elongation_at_force: Array
+    second_harmonic: Array
+    residual: float
+
+    def as_row(self) -> Array:
+        """Return contrast, growth and offset as one row, in the order of `ROW_NAMES`."""
+        return np.concatenate([self.contrast.ravel(), self.growth.ravel(), self.offset])
+
+
+def _row_names() -> tuple[str, ...]:
+    rings, forces = [f"{r:.1f}_mm" for r in RING_RADII_MM], [f"{f:.2f}_n" for f in PROFILE_FORCES_N]
+    contrast = [f"contrast_{f}_{r}" for f in forces for r in rings]
+    growth = [f"growth_{f}_{r}" for f in forces[:-1] for r in rings]
+    return (*contrast, *growth, *(f"offset_{r}" for r in rings[1:]))
+
+
+ROW_NAMES = _row_names()
+
+
+@dataclass(frozen=True, eq=False)
+class RampLights:
+    """Light above dark of lit frames, binned: forces [n] and images [n, height, width] of a pixel scale."""
+
+    force_n: Array
+    images: Sequence[Image]
+    scale: PixelScale
+
+
+def press_profile(recording: Recording) -> PressProfile:
+    """Return the profile of a recording whose reference and press are force ramps.
+
+    Press frames far below or above the reference's forces count nothing. Raises `InvalidQuantity` when a role is
+    missing, or a ramp is too short, has too few frames or a gap.
+    """
+    return profile_of_lights(*lights_of(recording))
+
+
+def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
+    """Return the light of the touched reference frames and of the press frames; raises without dark frames."""
+    dark = recording.with_role("dark")
+    if not dark:
+        raise InvalidQuantity("dark frames", 0, "at least one", "record dark frames before the press")
+    factor = _binning(recording.camera.scale)
+    base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
+    per_count = 1 if recording.camera.bits == 8 else 1 / 256
+    reference, press = (_lights(recording, role, base, per_count, factor) for role in ("reference", "press"))
+    return reference, press
+
+
+def profile_of_lights(reference: RampLights, press: RampLights) -> PressProfile:
+    """Return the profile of lights above dark (counts of 8 bits); as `press_profile`, for light without a camera."""
+    _require_ramp("reference", reference.force_n)
+    press = _within(press, reference.force_n)
+    _require_ramp("press", press.force_n)
+    light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
+    weights = ring_weights(press.images[0].shape, press.scale)
+    everywhere = np.ones(press.images[0].shape, dtype=bool)
+    frames = [
+        weights.means(*contrast_and_valid(image, light, force))
+        for force, image in zip(press.force_n, press.images, strict=True)
+    ]
+    rings, residual = _at_profile_forces(press.force_n, frames)
+    bare = np.array([weights.means(light.at(force), everywhere).mean for force in PROFILE_FORCES_N])
+    return PressProfile(
+        force_n=PROFILE_FORCES_N,
+        contrast=rings.mean,
+        growth=np.log(bare[:-1] / bare[-1]),
+        offset=harmonic(rings, 1),
+        elongation=harmonic(rings, 2),
+        offset_at_force=harmonic_at_forces(rings, 1),
+        elongation_at_force=harmonic_at_forces(rings, 2),
+        second_harmonic=second_harmonic(rings),
+        residual=residual,
+    )
+
+
+def contrast_and_valid(image: Image, light: HeldLight | RampLight, force_n: float) -> tuple[Image, NDArray[np.bool_]]:
+    """Return the contrast of binned light against the reference at its force, and where that is bright enough."""
+    base = light.at(force_n)
+    valid = base >= FLOOR_COUNTS
+    return np.divide(image, base, out=np.ones_like(base), where=valid) - np.float32(1), valid
+
+
+def harmonic(rings: RingMeans, order: int) -> Array:
+    """Return the harmonic of an order [J - 1], mean over the forces, along its direction in the whole window.
+
+    `rings` holds means [K, J] and harmonics [K, 2, J].
+    """
+    cosine, sine = (part.mean(axis=0) for part in _waves(rings, order))
+    return _along(cosine, sine, _direction(cosine, sine))
+
+
+def harmonic_at_forces(rings: RingMeans, order: int) -> Array:
+    """Return the harmonic of an order [K, J - 1] at each force, along the direction of `harmonic`.
+
+    Its mean over the forces is that; a spot that moves to the other side has a negative one there.
+    """
+    cosine, sine = _waves(rings, order)
+    return _along(cosine, sine, _direction(cosine.mean(axis=0), sine.mean(axis=0)))
+
+
+def second_harmonic(rings: RingMeans) -> Array:
+    """Return the second harmonic [2, K, J - 2] at each force, along and across the direction of the bright side.
+
+    That direction is the first harmonic's of the whole window, mean over the forces. A round inclusion has none across.
+    The frame cuts the outermost ring at top and bottom: what is left there has a second harmonic of its own.
+    """
+    cosine, sine = (part[:, :-1] for part in _waves(rings, 2))
+    turned = 2 * _direction(*(part.mean(axis=0) for part in _waves(rings, 1)))
+    across = sine * np.cos(turned) - cosine * np.sin(turned)
+    return np.stack([_along(cosine, sine, turned), across])
+
+
+def _waves(rings: RingMeans, order: int) -> tuple[Array, Array]:
+    """Return cosine and sine [K, J - 1] of an order, without the ring in the middle, which has none."""
+    return rings.cosine[:, order - 1, 1:], rings.sine[:, order - 1, 1:]
+
+
+def _direction(cosine: Array, sine: Array) -> float:
+    return float(np.arctan2(sine @ RING_RADII_MM[1:], cosine @ RING_RADII_MM[1:]))
+
+
+def _along(cosine: Array, sine: Array, direction: float) -> Array:
+    return np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
+
+
+def _lights(recording: Recording, role: str, dark: Image, per_count: float, factor: tuple[int, int]) -> RampLights:
+    frames = [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > TOUCHED_N]
+    images = [(_binned(frame, factor) - dark) * np.float32(per_count) for frame in frames]
+    forces = np.array([frame.force_n for frame in frames])
+    return RampLights(forces, images, binned_scale(recording.camera.scale))
+
+
+def _within(press: RampLights, reference_n: Array) -> RampLights:
+    """Return the press frames whose force the reference's light follows; others have no flat field of their force."""
+    if not len(press.force_n):
+        return press
+    low, high = BEYOND_RATIO
+    kept = (press.force_n >= low * reference_n.min()) & (press.force_n <= high * reference_n.max())
+    images = [image for image, keep in zip(press.images, kept, strict=True) if keep]
+    return RampLights(press.force_n[kept], images, press.scale)
+
+
+def _binning(scale: PixelScale) -> tuple[int, int]:
+    return tuple(max(round(BINNED_MM / size), 1) for size in (scale.mm_per_px_x, scale.mm_per_px_y))  # type: ignore[return-value]
+
+
+def binned_scale(scale: PixelScale) -> PixelScale:
+    """Return the size of the pixels after binning."""
+    x, y = _binning(scale)
+    return PixelScale(x * scale.mm_per_px_x, y * scale.mm_per_px_y)
+
+
+def _binned(frame: Frame, factor: tuple[int, int]) -> Image:
+    """Return the frame's means over blocks of pixels; the rows and columns left over are dropped evenly."""
+    (height, width), (x, y) = frame.counts.shape, factor
+    top, left = height % y // 2, width % x // 2
+    counts = frame.counts[top : top + height // y * y, left : left + width // x * x].astype(np.float32)
+    return np.asarray(cv2.resize(counts, (width // x, height // y), interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+def _require_ramp(name: str, force_n: Array) -> None:
+    if not len(force_n):
+        raise InvalidQuantity(f"{name} frames", 0, f"at least {MIN_RAMP_FRAMES}", AGAIN)
+    require(f"{name} frames", len(force_n), Bound(MIN_RAMP_FRAMES, 1e6, "frames"), AGAIN)
+    require(f"smallest {name} force", float(min(force_n)), Bound(0.0, RAMP_LOW_N, "N"), AGAIN)
+    require(f"largest {name} force", float(max(force_n)), Bound(RAMP_HIGH_N, 1.0, "N"), AGAIN)
+    step_n = float(np.diff(np.sort(force_n)).max())
+    require(f"largest step of the {name} force", step_n, Bound(0.0, LARGEST_STEP_N, "N"), AGAIN)
+
+
+def _at_profile_forces(force_n: Array, frames: Sequence[RingMeans]) -> tuple[RingMeans, float]:
+    """Return polynomials' values at the profile's forces, and the root mean square of what they leave of the means."""
+    top = float(PROFILE_FORCES_N[-1])
+    powers = np.vander(force_n / top, RAMP_DEGREE + 1, increasing=True)
+    at = np.vander(PROFILE_FORCES_N / top, RAMP_DEGREE + 1, increasing=True)
+    onto = np.linalg.pinv(powers)
+    parts = [np.array(part) for part in zip(*frames, strict=True)]
+    fitted = RingMeans(*(np.tensordot(at @ onto, part, 1) for part in parts))
+    left = parts[0] - powers @ (onto @ parts[0])
+    return fitted, float(np.sqrt(np.mean(left**2)))

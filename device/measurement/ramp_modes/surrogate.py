@@ -1,0 +1,150 @@
+"""The forward model of a press in a millisecond: unknowns and nuisances to the row of the press profile.
+
+Polynomials in nine parameters, fitted to simulated presses by `host_tools train`. What is polynomial is the contrast
+over size^3 / distance^3, the strength of a small sphere far away, and the modulus enters by Eshelby's contrast: both
+take out what no polynomial follows well. Differentiable, so that a press can be fitted by Gauss-Newton.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.arrays import Array
+from device.measurement.parameters import HIGH, LOW, PARAMETERS, from_unit, slope_of_unit
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.legendre import LegendreSum
+from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
+from device.measurement.recording.ring_means import RINGS
+
+SIZE, DEPTH, MODULUS, TISSUE, OFFSET = (
+    PARAMETERS.index(name) for name in ("size_mm", "depth_mm", "youngs_modulus_kpa", "tissue_modulus_kpa", "offset_mm")
+)
+CONTRAST_COLUMNS = len(PROFILE_FORCES_N) * RINGS
+GROWTH_COLUMNS = (len(PROFILE_FORCES_N) - 1) * RINGS
+OFFSET_COLUMNS = RINGS - 1
+Number = TypeVar("Number", float, Array)
+ARRAYS = ("lump_degrees", "lump_coefficients", "bare_degrees", "bare_coefficients")
+UNREADABLE = (OSError, EOFError, KeyError, ValueError, BadZipFile)
+
+
+def stiffness_contrast(modulus_kpa: Array, tissue_kpa: Array) -> Array:
+    """Return (E - Et) / (E + 3/2 Et), the dipole strength of an incompressible sphere (Eshelby 1957)."""
+    return np.asarray((modulus_kpa - tissue_kpa) / (modulus_kpa + 1.5 * tissue_kpa))
+
+
+CONTRAST_RANGE = (
+    float(stiffness_contrast(LOW[MODULUS], HIGH[TISSUE])),
+    float(stiffness_contrast(HIGH[MODULUS], LOW[TISSUE])),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PressSurrogate:
+    """`inclusion`: contrast and offset over the strength; `bare`: growth of the inclusion-free light."""
+
+    inclusion_field: LegendreSum
+    bare: LegendreSum
+
+    def rows(self, unit: Array) -> Array:
+        """Return profile rows [n, P] at coordinates [n, 9] of `press_parameters.to_unit`."""
+        parameters = from_unit(unit)
+        at = polynomial_coordinates(unit, parameters)
+        factor = inclusion_factor(parameters)
+        return assemble(factor * self.inclusion_field.values(at), self.bare.values(at))
+
+    def rows_and_jacobian(self, unit: Array) -> tuple[Array, Array]:
+        """Return the row [P] at coordinates [9] and its derivatives [P, 9] by them."""
+        parameters = from_unit(unit[None])
+        at = polynomial_coordinates(unit[None], parameters)
+        factor, inclusion, bare = inclusion_factor(parameters), self.inclusion_field.values(at), self.bare.values(at)
+        inclusion_slope, bare_slope = (
+            _by_unit(field.gradient(at)[:, 0], parameters[0]) for field in (self.inclusion_field, self.bare)
+        )
+        inclusion_slope = factor * inclusion_slope + _factor_slope(parameters[0]) * inclusion
+        return assemble(factor * inclusion, bare)[0], assemble(inclusion_slope, bare_slope).T
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the polynomials by the names in `ARRAYS`, as a file holds them: single precision."""
+        values = (
+            self.inclusion_field.degrees,
+            self.inclusion_field.coefficients,
+            self.bare.degrees,
+            self.bare.coefficients,
+        )
+        kinds = (np.uint8, np.float32, np.uint8, np.float32)
+        return {name: np.asarray(value, kind) for name, value, kind in zip(ARRAYS, values, kinds, strict=True)}
+
+
+def load_surrogate(path: Path) -> PressSurrogate:
+    """Read a surrogate; raise `InvalidQuantity` when a part is missing or of another shape."""
+    action = "install the model bundle again"
+    try:
+        with path.open("rb") as stream, np.load(stream) as file:
+            a, b, c, d = (np.asarray(file[name]) for name in ARRAYS)
+    except UNREADABLE as error:
+        raise InvalidQuantity("surrogate", path, f"a .npz with {', '.join(ARRAYS)}", action) from error
+    inclusion, bare = LegendreSum(a, b.astype(np.float64)), LegendreSum(c, d.astype(np.float64))
+    for field, columns in ((inclusion, CONTRAST_COLUMNS + OFFSET_COLUMNS), (bare, GROWTH_COLUMNS)):
+        expected = (len(field.degrees), columns), (len(field.coefficients), len(PARAMETERS))
+        if (field.coefficients.shape, field.degrees.shape) != expected:
+            raise InvalidQuantity("surrogate's shape", field.coefficients.shape, str(expected[0]), action)
+    return PressSurrogate(inclusion, bare)
+
+
+def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
+    """Return size^3 / distance^3 of an inclusion's middle: how strong a small sphere's field is far away."""
+    return (size_mm / (depth_mm + size_mm / 2)) ** 3
+
+
+def polynomial_coordinates(unit: Array, parameters: Array) -> Array:
+    """Return coordinates [n, 9] in which presses are polynomials: the modulus' one is the contrast of stiffness."""
+    low, high = CONTRAST_RANGE
+    at = np.array(unit)
+    at[:, MODULUS] = 2 * (stiffness_contrast(parameters[:, MODULUS], parameters[:, TISSUE]) - low) / (high - low) - 1
+    return at
+
+
+def inclusion_factor(parameters: Array) -> Array:
+    """Return what multiplies the polynomials [n, contrast + offset columns]: strength, and for the offset its place."""
+    strength, offset = _strength(parameters), parameters[:, OFFSET] / HIGH[OFFSET]
+    return np.hstack([
+        np.repeat(strength[:, None], CONTRAST_COLUMNS, axis=1),
+        np.repeat((strength * offset)[:, None], OFFSET_COLUMNS, axis=1),
+    ])  # fmt: skip
+
+
+def assemble(inclusion: Array, bare: Array) -> Array:
+    """Return rows [n, P] in the order of `press_profile.ROW_NAMES`: contrast, growth, offset."""
+    return np.hstack([inclusion[:, :CONTRAST_COLUMNS], bare, inclusion[:, CONTRAST_COLUMNS:]])
+
+
+def _strength(parameters: Array) -> Array:
+    return np.asarray(far_field_strength(parameters[:, SIZE], parameters[:, DEPTH]))
+
+
+def _factor_slope(at: Array) -> Array:
+    """Return the derivatives [9, contrast + offset columns] of `inclusion_factor` by the coordinates."""
+    slope, by_unit = np.zeros((len(PARAMETERS), CONTRAST_COLUMNS + OFFSET_COLUMNS)), slope_of_unit(at)
+    strength, centre, place = float(_strength(at[None])[0]), at[DEPTH] + at[SIZE] / 2, at[OFFSET] / HIGH[OFFSET]
+    by_size, by_depth = 3 / at[SIZE] - 1.5 / centre, -3 / centre
+    both = np.repeat([1.0, place], [CONTRAST_COLUMNS, OFFSET_COLUMNS])
+    slope[SIZE], slope[DEPTH] = strength * by_size * by_unit[SIZE] * both, strength * by_depth * by_unit[DEPTH] * both
+    slope[OFFSET, CONTRAST_COLUMNS:] = strength / HIGH[OFFSET] * by_unit[OFFSET]
+    return slope
+
+
+def _by_unit(gradient: Array, at: Array) -> Array:
+    """Return derivatives [9, Q] by `unit` of derivatives by the polynomials' coordinates, at parameters [9]."""
+    (low, high), by_unit = CONTRAST_RANGE, slope_of_unit(at)
+    E, Et = at[MODULUS], at[TISSUE]
+    by_contrast = gradient[MODULUS] * 2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2
+    slope = gradient.copy()
+    slope[MODULUS] = by_contrast * Et * by_unit[MODULUS]
+    slope[TISSUE] = gradient[TISSUE] - by_contrast * E * by_unit[TISSUE]
+    return slope

@@ -1,0 +1,99 @@
+"""A recording: the frames of one press, how they were taken and where they came from.
+
+What probe, simulator, calibration and tests pass to each other; what is not finite or contradictory is refused with the
+field's name. Its file is in device/files/recording_file.py. Source: docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.tactile_image import Frame, TactileImage, reference, require_one_shape, tactile_image
+
+REPAIR = "record the press again, or correct the file"
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """How the frames were taken."""
+
+    width_px: int
+    height_px: int
+    bits: Literal[8, 16]
+    mm_per_px_x: float
+    mm_per_px_y: float
+    exposure_us: float
+    gain: float
+
+    def __post_init__(self) -> None:
+        for name in ("width_px", "height_px"):
+            require(f"camera.{name}", getattr(self, name), Bound(16, 10_000, "px"), REPAIR)
+        if self.bits not in (8, 16):
+            raise InvalidQuantity("camera.bits", self.bits, "8 or 16", REPAIR)
+        require("camera.exposure_us", self.exposure_us, Bound(0.0, 1e7, "us", low_included=False), REPAIR)
+        require("camera.gain", self.gain, Bound(0.0, 1e3, "", low_included=False), REPAIR)
+        self.scale  # noqa: B018 - refuses an impossible pixel size
+
+    @property
+    def scale(self) -> PixelScale:
+        """Size of a pixel on the face."""
+        return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
+
+
+@dataclass(frozen=True)
+class RecordedCell:
+    """How the load cell's counts became the forces: slope, and reading of the free probe at commissioning if known."""
+
+    counts_per_n: float
+    tare_counts: float | None = None
+
+    def __post_init__(self) -> None:
+        bound = Bound(0.0, 1e9, "counts/N", low_included=False)
+        require("cell.counts_per_n", self.counts_per_n, bound, REPAIR)
+        if self.tare_counts is not None:
+            require("cell.tare_counts", self.tare_counts, Bound(-1e12, 1e12, "counts"), REPAIR)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One press: frames of every role with their force, and where it came from.
+
+    `truth` only for phantoms, `phantom_serial` that of their set if it is known.
+    """
+
+    id: str
+    serial: str
+    software: str
+    started_at: str
+    camera: CameraSettings
+    frames: tuple[Frame, ...]
+    calibration_id: str | None = None
+    position_mm: tuple[float, float] = (0.0, 0.0)
+    truth: Inclusion | None = None
+    simulated: bool = False
+    cell: RecordedCell | None = None
+    phantom_serial: str = ""
+
+    def __post_init__(self) -> None:
+        require_one_shape(self.frames)
+        for frame in self.frames:
+            shape, expected = frame.counts.shape, (self.camera.height_px, self.camera.width_px)
+            if shape != expected:
+                found = f"{shape[1]} x {shape[0]} px"
+                raise InvalidQuantity("frame shape", found, f"{expected[1]} x {expected[0]} px as in camera", REPAIR)
+            bits = 8 * frame.counts.itemsize
+            if bits != self.camera.bits:
+                raise InvalidQuantity("camera.bits", self.camera.bits, f"{bits} as the frames have", REPAIR)
+
+    def with_role(self, role: str) -> list[Frame]:
+        """Return the frames of one role in order."""
+        return [f for f in self.frames if f.role == role]
+
+    def press_images(self) -> Iterator[TactileImage]:
+        """Yield the corrected image of each press frame."""
+        base = reference(self.frames)
+        return (tactile_image(frame, base, self.camera.scale) for frame in self.with_role("press"))

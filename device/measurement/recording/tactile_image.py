@@ -1,0 +1,118 @@
+"""Frames to a tactile image: (I - dark) / (reference - dark) - 1, how much brighter the inclusion makes each pixel.
+
+The reference is the inclusion-free press at the *force of the frame*: the hand never holds two presses equally hard,
+and 1 % of force is several per cent of an inclusion's contrast (`reference_light`). Source: docs/measurement.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording.led_sides import LedRatio
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.reference_light import HeldLight, RampLight, reference_light
+from device.measurement.recording.reference_light import Image as Image
+
+Counts = NDArray[np.uint8] | NDArray[np.uint16]
+Role = Literal["dark", "reference", "press"]
+
+FLOOR_COUNTS = 6.0
+"""A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One exposure with what was true while it was taken: role, force (N), time (s), light."""
+
+    counts: Counts
+    role: Role
+    t_s: float
+    force_n: float
+    led_ratio: LedRatio
+
+    def __post_init__(self) -> None:
+        if self.counts.ndim != 2 or self.counts.dtype not in (np.uint8, np.uint16):
+            found = f"{self.counts.dtype} of shape {self.counts.shape}"
+            raise InvalidQuantity("frame", found, "a mono image of 8 or 16 bit", "take mono frames")
+        if self.role not in ("dark", "reference", "press"):
+            raise InvalidQuantity("role", self.role, "dark, reference or press", "say what the frame shows")
+        require("force_n", self.force_n, Bound(-1e3, 1e3, "N"), "tare the load cell and take the frame again")
+        require("t_s", self.t_s, Bound(-1e12, 1e12, "s"), "give the frame's time")
+        for ratio in self.led_ratio:
+            require("led_ratio", ratio, Bound(0.0, 1.0, ""), "give the brightness of four sides")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The inclusion-free press: dark, and its light above dark at any force."""
+
+    dark: Image
+    light: HeldLight | RampLight
+
+    def above_dark(self, force_n: float) -> Image:
+        """Return reference minus dark at a force (counts)."""
+        return self.light.at(force_n)
+
+
+@dataclass(frozen=True)
+class TactileImage:
+    """Corrected contrast [height, width] and where it is valid."""
+
+    contrast: Image
+    valid: NDArray[np.bool_]
+    scale: PixelScale
+    force_n: float
+
+
+def _floor(counts: Counts) -> float:
+    return FLOOR_COUNTS if counts.dtype == np.uint8 else FLOOR_COUNTS * 256
+
+
+def _mean(frames: Sequence[Frame]) -> Image:
+    return np.asarray(np.mean([f.counts for f in frames], axis=0, dtype=np.float32))
+
+
+def reference(frames: Sequence[Frame]) -> Reference:
+    """Return the reference of a recording's dark and reference frames.
+
+    Raises `InvalidQuantity` when a role is missing or shapes differ.
+    """
+    by_role = {role: [f for f in frames if f.role == role] for role in ("dark", "reference")}
+    for role, found in by_role.items():
+        if not found:
+            raise InvalidQuantity(f"{role} frames", 0, "at least one", f"record {role} frames before the press")
+    require_one_shape(frames)
+    dark, lit = _mean(by_role["dark"]), by_role["reference"]
+    above = [np.asarray(frame.counts - dark, dtype=np.float32) for frame in lit]
+    return Reference(dark, reference_light([frame.force_n for frame in lit], above, _floor(lit[0].counts)))
+
+
+def require_one_shape(frames: Sequence[Frame]) -> None:
+    """Raise `InvalidQuantity` unless all frames have the shape of the first."""
+    shapes = {f.counts.shape for f in frames}
+    if len(shapes) > 1:
+        found = " and ".join(f"{w} x {h}" for h, w in sorted(shapes))
+        raise InvalidQuantity("frame shape", f"{found} px", "the same for all frames", "use one camera mode")
+
+
+def tactile_image(frame: Frame, reference: Reference, scale: PixelScale) -> TactileImage:
+    """Return the corrected image of a press frame; refuses a frame of another shape than the reference."""
+    if frame.counts.shape != reference.dark.shape:
+        found, expected = ("{1} x {0} px".format(*shape) for shape in (frame.counts.shape, reference.dark.shape))
+        raise InvalidQuantity("frame shape", found, f"{expected} like the reference", "use one camera mode")
+    base = reference.above_dark(frame.force_n)
+    valid = base >= _floor(frame.counts)
+    lit = frame.counts.astype(np.float32) - reference.dark
+    contrast = np.divide(lit, base, out=np.ones_like(base), where=valid) - np.float32(1.0)
+    return TactileImage(contrast=contrast, valid=valid, scale=scale, force_n=frame.force_n)
+
+
+def saturated_ratio(counts: Counts) -> float:
+    """Return the part of the pixels at full scale: 255, or in 16 bits what 10 bits can say at most, 1023 x 64."""
+    return float(np.count_nonzero(counts >= (255 if counts.dtype == np.uint8 else 1023 << 6)) / counts.size)

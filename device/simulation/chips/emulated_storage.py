@@ -1,0 +1,66 @@
+"""Storage that goes wrong: a disk that is full, read-only or silent, and a model bundle with one byte changed.
+
+A disk that fills up, with the kernel's own "no space left" from /dev/full, can only be read, or does not answer.
+
+Only what goes through the store's `Disk` is refused or held up; the database beside it is on the real disk. Linux only.
+Source: full(4); errno(3), EROFS, which Linux answers once it has remounted a failing card read-only.
+
+Model folders as they are installed, or with one byte of the network changed, as a worn card changes it.
+
+The installed files stay as they are: what is tampered with is a copy.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from pathlib import Path
+
+from device.files.durable import write_and_sync
+from device.simulation.faults import FaultTimeline
+
+FULL = Path("/dev/full")
+
+
+class EmulatedDisk:
+    """The disk of a scenario: full, read-only or frozen while it says so, else the real one.
+
+    Implements the store's `Disk`; while it is frozen no call returns.
+    """
+
+    def __init__(self, faults: FaultTimeline) -> None:
+        self._faults = faults
+
+    def free_bytes(self, folder: Path) -> int:
+        """Return the space that is left for a folder."""
+        self._faults.hold_up("disk_frozen")
+        return 0 if self._faults.is_active("disk_full") else shutil.disk_usage(folder).free
+
+    def write(self, path: Path, content: bytes) -> None:
+        """Write and synchronise a file; raise `OSError` ENOSPC while the disk is full, EROFS while it is read-only."""
+        self._faults.hold_up("disk_frozen")
+        if self._faults.is_active("disk_read_only"):
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+        write_and_sync(FULL if self._faults.is_active("disk_full") else path, content)
+
+
+NETWORK = "model.onnx"
+
+
+class EmulatedBundles:
+    """The model folders of a scenario; copies are made below `scratch`."""
+
+    def __init__(self, faults: FaultTimeline, scratch: Path) -> None:
+        self._faults, self._scratch = faults, scratch
+
+    def folder(self, installed: Path) -> Path:
+        """Return the folder to read instead of an installed one: itself unless it is tampered with now."""
+        if not (installed.is_dir() and self._faults.is_active("bundle_tampered")):
+            return installed
+        copy = self._scratch / installed.name
+        shutil.copytree(installed, copy, dirs_exist_ok=True)
+        network = bytearray((installed / NETWORK).read_bytes())
+        network[len(network) // 2] ^= 1
+        (copy / NETWORK).write_bytes(network)
+        return copy

@@ -1,0 +1,50 @@
+"""The patient's tissue under the probe: a slab's modulus and thickness, and how stiff an inclusion is against it.
+
+What an inclusion adds to the face depends on its contrast with the tissue, not on its modulus alone: for an
+incompressible sphere it is (E - Et) / (E + 3/2 Et), in which the field is all but linear; 0 for tissue, 1 for a rigid
+sphere. Source: Eshelby, Proc. R. Soc. A 241 (1957), on the contrast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from device.measurement.quantities import Bound, Inclusion, require
+
+
+@dataclass(frozen=True)
+class Slab:
+    """Homogeneous tissue on a rigid base: Young's modulus Et (4-6.25 kPa) and thickness (27-36 mm).
+
+    Raises `InvalidQuantity` outside these ranges, which are the virtual probe's tables'.
+    """
+
+    youngs_modulus_kpa: float = 5.0
+    thickness_mm: float = 30.0
+
+    def __post_init__(self) -> None:
+        action = "choose tissue inside the range of the virtual probe's tables"
+        require("tissue_modulus_kpa", self.youngs_modulus_kpa, Bound(4.0, 6.25, "kPa"), action)
+        require("slab_thickness_mm", self.thickness_mm, Bound(27.0, 36.0, "mm"), action)
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """Young's modulus over the nominal one: the force ratio at which this slab is indented as deeply."""
+        return self.youngs_modulus_kpa / NOMINAL_KPA
+
+    def contrast(self, youngs_modulus_kpa: float) -> float:
+        """Return an inclusion's contrast in this slab, (E - Et) / (E + 3/2 Et)."""
+        return (youngs_modulus_kpa - self.youngs_modulus_kpa) / (youngs_modulus_kpa + 1.5 * self.youngs_modulus_kpa)
+
+    def modulus_kpa(self, contrast: float) -> float:
+        """Return the Young's modulus of an inclusion of a contrast below 1 in this slab."""
+        return self.youngs_modulus_kpa * (1 + 1.5 * contrast) / (1 - contrast)
+
+    def nominal_twin(self, inclusion: Inclusion) -> Inclusion:
+        """Return the inclusion that has the same contrast in the nominal slab: its modulus over `stiffness_ratio`."""
+        return replace(inclusion, youngs_modulus_kpa=inclusion.youngs_modulus_kpa / self.stiffness_ratio)
+
+
+NOMINAL_KPA = 5.0
+"""Young's modulus of normal tissue in Lee & Won, IEEE JBHI 17(2), 2013, section III."""
+NOMINAL = Slab()

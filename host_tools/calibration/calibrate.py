@@ -1,0 +1,270 @@
+"""Phantom recordings with truth to a calibration certificate.
+
+Three straight lines map image features to deformation features; their leave-one-out residuals say how well. Those
+residuals, put on scenes of the whole box and sent through the network, give the held-out scenes behind every interval.
+Source: Lee & Won 2013, section III (regressions on nine phantoms).
+
+The sources that run, as one hash: what a certificate names beside the version, which many states of them share.
+
+Phantom recordings to what the untouched probe shows, dark and lit: what each later start is compared with.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from device import __version__
+from device.measurement.arrays import Array
+from device.measurement.calibration import (
+    VALID_DAYS,
+    Calibration,
+    Regression,
+    Validity,
+    certificate_id,
+    moment,
+    written,
+)
+from device.measurement.estimate import image_features
+from device.measurement.paper_mode.features import FeatureSettings
+from device.measurement.paper_mode.intervals import HeldOut
+from device.measurement.paper_mode.inversion import FEATURE_UNITS, ModelBundle
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording.recording import Recording
+from device.measurement.recording.tactile_image import Frame
+from device.measurement.recording.untouched_face import UntouchedFace, lit_counts, mean_led_ratio, side_levels, split
+from device.simulation.physics.surface_table import SurfaceTable
+from host_tools.calibration.gates import (
+    PHANTOMS_NEEDED,
+    Gate,
+    age_gate,
+    fit_gates,
+    number_gate,
+    recording_gates,
+    require_all,
+    unusable,
+)
+from host_tools.forward.deformation import Deformation, deformation
+from host_tools.forward.solve import solve
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("device", "host_tools")
+
+
+def source_sha256() -> str:
+    """Return the hash over names and contents of all Python files of both packages, in the order of their names."""
+    digest = hashlib.sha256()
+    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+        digest.update(f"{path.relative_to(ROOT).as_posix()}\0".encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+UNTOUCHED_RATIO = 0.05
+"""Reference frames at less than this part of the largest force are of the untouched probe."""
+
+
+def untouched_face(recordings: Sequence[Recording]) -> UntouchedFace:
+    """Return what the untouched probe showed: the mean over recordings, and how much a frame's level scatters.
+
+    Light is a sum over the LEDs, each in proportion to its brightness: so the mean of frames of different brightness is
+    that of the mean brightness, but scatters more.
+    Raises `InvalidQuantity` when a recording has no dark, no unloaded lit or no pressed reference frames.
+    """
+    dark_counts, side_counts, pressed_counts = [], [], []
+    untouched: list[Frame] = []
+    for recording in recordings:
+        lit = [frame for frame in recording.with_role("reference") if any(frame.led_ratio)]
+        highest_n = max((frame.force_n for frame in lit), default=0.0)
+        pressed = [frame for frame in lit if frame.force_n > UNTOUCHED_RATIO * highest_n]
+        unloaded = [frame for frame in lit if frame.force_n <= UNTOUCHED_RATIO * highest_n]
+        dark, unloaded = split([*recording.with_role("dark"), *unloaded])
+        without = side_levels(dark).mean(axis=0)
+        dark_counts.append(float(without.mean()))
+        side_counts.append(lit_counts(unloaded, without))
+        pressed_counts.append(float(lit_counts(pressed, without).mean()))
+        untouched += unloaded
+    levels, led_ratio = np.concatenate(side_counts), mean_led_ratio(untouched)
+    return UntouchedFace(
+        dark_counts=round(float(np.mean(dark_counts)), 4),
+        side_counts=tuple(round(float(level), 4) for level in levels.mean(axis=0)),
+        spread_counts=round(float(levels.std(axis=0, ddof=1).max()), 4),
+        pressed_counts=round(float(np.mean(pressed_counts)), 4),
+        led_ratio=led_ratio[0] if len(set(led_ratio)) == 1 else led_ratio,
+    )
+
+
+A_YEAR_DAYS = 365.0
+HELD_OUT_SCENES = 1000
+WEAKEST_PEAK_MM = 5e-4
+"""Inclusions with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What no recording knows: who calibrated, on which set of phantoms, when, and for how many days it is to hold.
+
+    Without `phantom_serial` it is what the recordings say, without `made_at` (RFC 3339) now; without `valid_days`, a
+    year, or of a simulated probe a hundred.
+    """
+
+    operator: str = ""
+    phantom_serial: str = ""
+    made_at: str | None = None
+    valid_days: float | None = None
+
+
+class Calibrated(NamedTuple):
+    """A certificate and the gates that it has passed."""
+
+    certificate: Calibration
+    gates: tuple[Gate, ...]
+
+
+class Fit(NamedTuple):
+    """Three lines, their leave-one-out residuals [phantoms, 3], and the deformation features [phantoms, 3]."""
+
+    lines: tuple[Regression, ...]
+    residuals: Array
+    features: Array
+
+
+class Measured(NamedTuple):
+    """What phantom recordings measure, once it has passed its gates."""
+
+    made_at: str
+    validity: Validity
+    untouched: UntouchedFace
+    fit: Fit
+    gates: tuple[Gate, ...]
+
+
+def calibrate(
+    recordings: Sequence[Recording],
+    bundle: ModelBundle,
+    table: SurfaceTable,
+    *,
+    force_n: float,
+    provenance: Provenance | None = None,
+    seed: int = 1,
+) -> Calibrated:
+    """Return the certificate of the probe that made the recordings.
+
+    Raises `CalibrationRejected`, an `InvalidQuantity`, with everything that the recordings do not hold.
+    """
+    stated = provenance or Provenance()
+    settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
+    measured = _measured(recordings, settings, force_n, stated)
+    errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
+    first = recordings[0]
+    assert first.cell is not None  # `unusable` has refused it otherwise
+    certificate = Calibration(
+        id="",
+        made_at=measured.made_at,
+        validity=measured.validity,
+        operator=stated.operator,
+        serial=first.serial,
+        phantom_serial=stated.phantom_serial or first.phantom_serial,
+        model_sha256=bundle.sha256,
+        model_card_sha256=bundle.card_sha256,
+        force_n=force_n,
+        camera=first.camera,
+        cell=first.cell,
+        untouched=measured.untouched,
+        settings=settings,
+        regressions=measured.fit.lines,
+        phantoms=len(recordings),
+        held_out=held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed),
+        software=__version__,
+        software_sha256=source_sha256(),
+        simulated=any(recording.simulated for recording in recordings),
+    )
+    return Calibrated(replace(certificate, id=certificate_id(certificate)), measured.gates)
+
+
+def _measured(
+    recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, stated: Provenance
+) -> Measured:
+    """Return what the recordings measure; raise `CalibrationRejected` when that is not good enough."""
+    problems = unusable(recordings, force_n)
+    if problems or len(recordings) < PHANTOMS_NEEDED:
+        require_all([number_gate(recordings)], problems)
+    made_at = stated.made_at or written(datetime.now(UTC))
+    validity = _validity(recordings, stated.valid_days)
+    untouched = untouched_face(recordings)
+    fit = _fit(recordings, settings, force_n)
+    of_recordings = recording_gates(recordings, untouched)
+    gates = (*of_recordings, age_gate(validity, made_at), *fit_gates(fit.lines, fit.features))
+    require_all(gates)
+    return Measured(made_at, validity, untouched, fit, gates)
+
+
+def _validity(recordings: Sequence[Recording], valid_days: float | None) -> Validity:
+    """Return the days from the first of the recordings: a calibration is as old as its oldest phantom."""
+    started = (moment(recording.started_at, f"started_at of {recording.id}") for recording in recordings)
+    is_ageless = all(recording.simulated for recording in recordings)
+    usual_days = VALID_DAYS.high if is_ageless else A_YEAR_DAYS
+    return Validity.of(written(min(started)), usual_days if valid_days is None else valid_days)
+
+
+def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: float) -> Fit:
+    image = np.array([image_features(recording, settings).mean(axis=0) for recording in recordings])
+    truths = [recording.truth for recording in recordings if recording.truth]
+    features = np.array([as_row(solve(Scene(truth, Press(force_n=force_n))).inclusion_field) for truth in truths])
+    lines, residuals = zip(*(fit_line(image[:, i], features[:, i]) for i in range(features.shape[1])), strict=True)
+    return Fit(lines, np.column_stack(residuals), features)
+
+
+def as_row(inclusion: Deformation) -> Array:
+    """Return the deformation features in the model's order."""
+    return np.array([getattr(inclusion, name) for name in FEATURE_UNITS])
+
+
+def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:
+    """Return the least-squares line y = slope x + intercept and its leave-one-out residuals e_i / (1 - h_ii)."""
+    if np.ptp(x) <= 1e-9 * np.abs(x).max():
+        raise InvalidQuantity("phantoms' features", "all equal", "different", "use phantoms of different inclusions")
+    design = np.column_stack([x, np.ones_like(x)])
+    (slope, intercept), *_ = np.linalg.lstsq(design, y, rcond=None)
+    error = y - design @ (slope, intercept)
+    leverage = np.sum(design @ np.linalg.inv(design.T @ design) * design, axis=1)
+    left_out = error / (1 - leverage)
+    r_squared = 1 - float(error @ error) / float(np.sum((y - y.mean()) ** 2))
+    return Regression(float(slope), float(intercept), r_squared, float(left_out.std(ddof=1))), left_out
+
+
+def table_features(table: SurfaceTable, inclusion: Inclusion, force_n: float) -> Array:
+    """Return the deformation features of an inclusion in small strain, the network's own, from the table of faces."""
+    inclusion_mm = table.inclusion_field(inclusion).at_small_strain(force_n).w_mm
+    total_mm3 = float(np.trapezoid(2 * np.pi * table.r_mm * inclusion_mm, table.r_mm))
+    return as_row(deformation(table.r_mm, inclusion_mm, total_mm3))
+
+
+def scaled_errors(residuals: Array, peak_mm: Array) -> Array:
+    """Return residuals [n, 3] as errors that do not depend on how strong the inclusion is.
+
+    A contrast error dc shifts the half-maximum contour by dc / slope, and the slope grows with the peak: so the area's
+    error times the peak is constant, while peak and sum err by the same amount for every inclusion.
+    """
+    peak, total, area = residuals.T
+    return np.column_stack([peak, total, area * peak_mm])
+
+
+def held_out_scenes(
+    bundle: ModelBundle, table: SurfaceTable, errors: Array, *, force_n: float, seed: int, scenes: int = HELD_OUT_SCENES
+) -> HeldOut:
+    """Return estimates of random scenes whose features carry errors like the calibration's own `scaled_errors`."""
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(PAPER_BOX_LOW, PAPER_BOX_HIGH, (scenes, 3))
+    exact = np.array([table_features(table, Inclusion(*map(float, row)), force_n) for row in truth])
+    drawn = rng.multivariate_normal(np.zeros(3), errors.T @ errors / len(errors), scenes)
+    drawn[:, 2] /= np.maximum(exact[:, 0], WEAKEST_PEAK_MM)
+    estimate = bundle.estimate(exact + drawn).estimate
+    return HeldOut(estimate, truth, box_low=np.array(PAPER_BOX_LOW), box_high=np.array(PAPER_BOX_HIGH))

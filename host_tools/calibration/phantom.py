@@ -1,0 +1,120 @@
+"""Simulated phantom recordings: what the probe would record on a phantom of known inclusion.
+
+The frames come from the virtual probe's own face, light and camera, so that a calibration or a score made from them
+holds for the frames that the daemon sees. Simulated: evidence of the method, never of a real probe's accuracy.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from device import __version__
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
+from device.measurement.recording.tactile_image import Frame, Role
+from device.simulation.hand import BESIDE_MM
+from device.simulation.physics.pressed_face import ProbePlacement
+from device.simulation.physics.surface_table import PressRamps
+from device.simulation.scenario import Scenario
+from device.simulation.virtual_probe import ProbeTables, VirtualProbe
+
+CAMERA = CameraSettings(
+    width_px=768, height_px=492, bits=8, mm_per_px_x=0.03125, mm_per_px_y=0.03646, exposure_us=4000.0, gain=1.0
+)
+LIT, DARK = (0.6, 0.6, 0.6, 0.6), (0.0, 0.0, 0.0, 0.0)
+UNLOADED_FRAMES, PRESS_FRAMES = 4, 10
+TARGET_N, HOLD_STD_N = 0.5, 0.006
+"""Force the hand aims at, and how far it strays while it holds: standard deviations."""
+
+
+@dataclass(frozen=True)
+class PhantomProtocol:
+    """How a phantom is pressed: `frames` at each of the forces, how far they stray, and where beside the lesion."""
+
+    forces_n: Sequence[float] = (TARGET_N,)
+    frames: int = PRESS_FRAMES
+    place: ProbePlacement = field(default_factory=ProbePlacement)
+    stray_n: float = HOLD_STD_N
+
+    def __post_init__(self) -> None:
+        action = "press a phantom as one would a patient"
+        if not self.forces_n:
+            raise InvalidQuantity("forces_n", "empty", "at least one force", action)
+        for force_n in self.forces_n:
+            require("forces_n", force_n, Bound(0.0, 5.0, "N", low_included=False), action)
+        require("stray_n", self.stray_n, Bound(0.0, 0.1, "N"), action)
+        require("frames", self.frames, Bound(1, 1000, "frames a force"), action)
+
+
+class _Recorder:
+    """Takes frames one after the other, each with its true force and the force that the cell reports."""
+
+    def __init__(self, probe: VirtualProbe, camera: CameraSettings, seed: int) -> None:
+        self.probe, self.camera, self.rng, self.number = probe, camera, np.random.default_rng(seed), 0
+        cell = probe.scenario.cell
+        self.force_noise_n = cell.noise_counts / cell.counts_per_n
+
+    def unloaded(self, role: Role) -> list[Frame]:
+        return [self._frame(role, 0.0, ProbePlacement(*BESIDE_MM)) for _ in range(UNLOADED_FRAMES)]
+
+    def pressed(self, role: Role, protocol: PhantomProtocol, place: ProbePlacement) -> list[Frame]:
+        loads = [force_n for force_n in protocol.forces_n for _ in range(protocol.frames)]
+        return [self._frame(role, force_n, place, protocol.stray_n) for force_n in loads]
+
+    def _frame(self, role: Role, target_n: float, place: ProbePlacement, stray_n: float = 0.0) -> Frame:
+        self.number += 1
+        force_n = max(0.0, self.rng.normal(target_n, stray_n)) if target_n else 0.0
+        light = DARK if role == "dark" else LIT
+        counts = self.probe.frame_counts(
+            force_n=force_n,
+            place=place,
+            led_ratio=light,
+            exposure_us=self.camera.exposure_us,
+            gain=self.camera.gain,
+            frame_number=self.number,
+        )
+        reported_n = force_n + float(self.rng.normal(0.0, self.force_noise_n))
+        return Frame(counts, role, self.number / 30.0, reported_n, light)
+
+
+def phantom_recording(
+    inclusion: Inclusion,
+    tables: ProbeTables,
+    *,
+    seed: int,
+    protocol: PhantomProtocol | None = None,
+    scenario: Scenario | None = None,
+    ramps: PressRamps | None = None,
+) -> Recording:
+    """Return the recording of one phantom: dark, unloaded, reference press and press, with its truth.
+
+    `scenario` says what the probe is made of (its inclusion and seed are not used), `ramps` how the face deforms where
+    the table does not say.
+    """
+    asked = protocol or PhantomProtocol()
+    made_of = replace(scenario or Scenario(), inclusion=inclusion, seed=seed)
+    camera = replace(CAMERA, bits=8 if made_of.sensor.bits == 8 else 16)
+    probe = VirtualProbe(made_of, tables, (camera.height_px, camera.width_px), camera.scale, ramps=ramps)
+    recorder = _Recorder(probe, camera, seed)
+    frames = [
+        *recorder.unloaded("dark"),
+        *recorder.unloaded("reference"),
+        *recorder.pressed("reference", asked, ProbePlacement(*BESIDE_MM)),
+        *recorder.pressed("press", asked, asked.place),
+    ]
+    return Recording(
+        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"phantom {made_of} {asked} {ramps is None}")),
+        serial=made_of.serial,
+        software=__version__,
+        started_at="1970-01-01T00:00:00.000Z",
+        camera=camera,
+        frames=tuple(frames),
+        position_mm=(asked.place.x_mm, asked.place.y_mm),
+        truth=inclusion,
+        simulated=True,
+        cell=RecordedCell(made_of.cell.counts_per_n, made_of.cell.zero_counts),
+    )

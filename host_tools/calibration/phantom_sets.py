@@ -1,0 +1,49 @@
+"""Named sets of phantoms to record: inclusions whose truth is published, and random ones.
+
+Source of the eight: Egorov & Sarvazyan, IEEE Trans. Medical Imaging 27 (2008), table II: models 35 mm thick of 5 kPa,
+spheres at 10 mm depth. They are solved each on its own, since the table is of a 30 mm slab and of other sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.surface_table import PressRamps
+from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Scene, Tissue
+
+BREAST_IMAGER_SIZE_KPA = ((5, 20), (5, 80), (10, 10), (10, 40), (14, 40), (14, 156), (18, 20), (18, 80))
+BREAST_IMAGER_DEPTH_MM, BREAST_IMAGER_SLAB_MM = 10.0, 35.0
+SMALLEST_RANDOM_MM = 2.0
+
+
+@dataclass(frozen=True)
+class Phantom:
+    """One phantom by name; `scene` only where the table of the virtual probe does not hold it."""
+
+    name: str
+    inclusion: Inclusion
+    scene: Scene | None = None
+
+    def ramps(self) -> PressRamps | None:
+        """Return how the face deforms, solved for this phantom alone, or None where the table says it."""
+        return press_ramps(self.scene) if self.scene else None
+
+
+def breast_imager() -> Iterator[Phantom]:
+    """Yield the eight published inclusions of the Breast Mechanical Imager."""
+    tissue = replace(Tissue(), thickness_mm=BREAST_IMAGER_SLAB_MM)
+    for number, (size_mm, modulus_kpa) in enumerate(BREAST_IMAGER_SIZE_KPA, start=1):
+        inclusion = Inclusion(float(size_mm), BREAST_IMAGER_DEPTH_MM, float(modulus_kpa))
+        yield Phantom(f"breast_imager{number}", inclusion, Scene(inclusion, tissue=tissue))
+
+
+def random_set(count: int, seed: int) -> Iterator[Phantom]:
+    """Yield phantoms drawn evenly from the paper's box, no smaller than 2 mm."""
+    low = (SMALLEST_RANDOM_MM, *PAPER_BOX_LOW[1:])
+    for number, row in enumerate(np.random.default_rng(seed).uniform(low, PAPER_BOX_HIGH, (count, 3)), start=1):
+        yield Phantom(f"random{number:03d}", Inclusion(*map(float, row)))

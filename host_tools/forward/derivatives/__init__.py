@@ -1,0 +1,6 @@
+"""How a press changes with everything that is not exactly known, from its equilibrium and not from differences.
+
+Modules in reading order: `equilibrium`, `mesh_velocity`, `sliding_parts`, `sensitivity`, `sensitive_presses`.
+
+Read by `host_tools.limits` alone.
+"""

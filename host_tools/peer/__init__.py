@@ -1,1 +1,0 @@
-"""Independent checks of the forward model: the same scene solved by another program."""

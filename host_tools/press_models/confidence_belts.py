@@ -1,0 +1,122 @@
+"""Simulated presses with noise to the bands behind every interval, one set for each unknown.
+
+Bounds are quantiles of (truth - mean) / spread over the presses nearest in truth and in the logarithm of the spread.
+Where they cover other presses more often than chance explains, bands are narrowed by one factor. Recordings hold what
+the forward model and its noise do not know of: where these are covered less often than chance explains, bands are
+widened by one factor. Source of both: split conformal prediction, Lei et al., JASA 113, 2018.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.arrays import Array
+from device.measurement.confidence_belt import COVERAGE, IDENTIFIABLE_RATIO, Bands
+from device.measurement.parameters import EVEN_STD
+from device.measurement.quantities import Bound, require
+
+TRUTHS, SPREADS = 17, 5
+TRUTH_LENGTH = 0.15
+"""Presses this far apart in truth are as unlike as those one standard deviation of the log spread apart."""
+FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.06
+"""Presses of which a bound is the quantile, and their share of all: 400 leave an error of 1.5 % of coverage."""
+FOLDS = 4
+"""Parts of the presses, each of which is covered by the bands of the others."""
+RAREST_RATIO = 0.05
+"""An unknown that fewer presses than this share determine is left undetermined: its bands could not be judged."""
+NARROWEST = 1e-9
+WIDE_OPEN = 1e6
+"""So many spreads hold all of the range."""
+
+
+def confidence_bands(truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
+    """Return bands for each unknown of truths, means and spreads [n, 3] in coordinates.
+
+    Only presses that determine an unknown count for it; where they are rare, the bands hold all of the range. Raises
+    `InvalidQuantity` when they are not rare, but too few to learn from.
+    """
+    return tuple(_bands(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
+
+
+def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
+    known = _determined(spread)
+    if known.mean() < RAREST_RATIO:
+        return _wide_open()
+    require("presses that determine an unknown", int(known.sum()), Bound(2 * FEWEST, np.inf, ""), "simulate more")
+    columns = truth[known], mean[known], spread[known]
+    return _scaled(_learned(*columns), min(1.0, _crossed_factor(*columns)))
+
+
+def _determined(spread: Array) -> NDArray[np.bool_]:
+    return np.asarray(spread < IDENTIFIABLE_RATIO * EVEN_STD)
+
+
+def _learned(truth: Array, mean: Array, spread: Array) -> Bands:
+    """Return the quantiles of presses that determine the unknown."""
+    neighbours = int(np.clip(NEIGHBOUR_RATIO * len(truth), FEWEST, MOST))
+    unusual, log_spread = (truth - mean) / spread, np.log(spread)
+    truths = -np.cos(np.pi * np.arange(TRUTHS) / (TRUTHS - 1))  # closer to each other at the ends of the range
+    spreads = np.quantile(log_spread, np.linspace(0.02, 0.98, SPREADS))
+    tails = (1 - COVERAGE) / 2, (1 + COVERAGE) / 2
+    table = np.empty((TRUTHS, SPREADS, 2))
+    for i, at in enumerate(truths):
+        for j, log in enumerate(spreads):
+            distance = np.hypot((truth - at) / TRUTH_LENGTH, (log_spread - log) / max(float(np.std(log_spread)), 1e-3))
+            near = np.argpartition(distance, neighbours - 1)[:neighbours]
+            table[i, j] = np.quantile(unusual[near], tails, method="weibull")  # covers the share, of few presses too
+    return Bands(truths, spreads, table[..., 0], table[..., 1])
+
+
+def _crossed_factor(truth: Array, mean: Array, spread: Array) -> float:
+    """Return the factor with which bands of some presses cover the others at most by chance more than promised.
+
+    Quantiles of few presses that are not quite alike lie too far out. The presses take turns in being the others.
+    """
+    fold = np.arange(len(truth)) % FOLDS
+    needed = [
+        _needed(_learned(*(column[fold != k] for column in (truth, mean, spread))), truth[fold == k], mean[fold == k],
+                spread[fold == k])
+        for k in range(FOLDS)
+    ]  # fmt: skip
+    return float(np.quantile(np.concatenate(needed), COVERAGE + _by_chance(len(truth))))
+
+
+def _wide_open() -> Bands:
+    ends = np.array([-1.0, 1.0])
+    return Bands(ends, ends, np.full((2, 2), -WIDE_OPEN), np.full((2, 2), WIDE_OPEN))
+
+
+def widened(bands: tuple[Bands, ...], truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
+    """Return bands wide enough, about their middles, for truths, means and spreads [n, 3] of recorded presses.
+
+    Wide enough is a coverage at most one standard error of chance below the promised one.
+    """
+    return tuple(_widened(one, *columns) for one, *columns in zip(bands, truth.T, mean.T, spread.T, strict=True))
+
+
+def _widened(bands: Bands, truth: Array, mean: Array, spread: Array) -> Bands:
+    known = _determined(spread)
+    if not known.any():
+        return bands
+    needed = _needed(bands, truth[known], mean[known], spread[known])
+    return _scaled(bands, max(1.0, float(np.quantile(needed, max(COVERAGE - _by_chance(len(needed)), 0.0)))))
+
+
+def _needed(bands: Bands, truth: Array, mean: Array, spread: Array) -> Array:
+    """Return by which factor [n] the bands must be widened to hold each press."""
+    ends = np.array([
+        np.ravel(bands.bounds(np.array([at]), float(width))) for at, width in zip(truth, spread, strict=True)
+    ])  # fmt: skip
+    middle, half = ends.mean(axis=1), np.diff(ends, axis=1)[:, 0] / 2
+    return np.asarray(np.abs((truth - mean) / spread - middle) / np.maximum(half, NARROWEST))
+
+
+def _by_chance(presses: int) -> float:
+    """Return the standard error of a coverage that is counted on so many presses."""
+    return float(np.sqrt(COVERAGE * (1 - COVERAGE) / presses))
+
+
+def _scaled(bands: Bands, factor: float) -> Bands:
+    middles, halves = (bands.low + bands.high) / 2, (bands.high - bands.low) / 2
+    return Bands(bands.truth, bands.log_spread, middles - factor * halves, middles + factor * halves)

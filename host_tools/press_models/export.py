@@ -1,0 +1,175 @@
+"""Turns the trained modes into model bundles: model.onnx and model.json, for the ramps surrogate, range and round spot.
+
+The same parts give the same bytes. Source of the format: the model bundle of docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from device.measurement.arrays import Array, SingleArray
+from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
+from device.measurement.paper_mode.inversion import HELD_UNITS, PROFILE_UNITS
+from device.measurement.parameters import NUISANCES, RANGES
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.ellipticity import COEFFICIENTS, DEGREES, ROUND_FILE, RoundSpot
+from device.measurement.ramp_modes.model import SURROGATE_FILE
+from device.measurement.ramp_modes.range_classifier import ENTRY, RANGE_FILE
+from host_tools.paper_network.export import write_folder
+from host_tools.press_models.mode_outcome import ModeOutcome
+from host_tools.press_models.mode_statistics import statistics
+from host_tools.press_models.onnx_networks import build_network, build_range_networks, golden_vectors, range_entry
+from host_tools.press_models.quick_training import QuickOutcome, TrainedQuick
+from host_tools.press_models.ramp_training import TrainedProfile
+from host_tools.press_models.seeds import derived_seed
+
+GOLDEN_ROWS = 8
+
+
+def export_profile(
+    trained: TrainedProfile, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
+) -> None:
+    """Write the bundle to `folder`, whole or not at all; raises `ExportRefused` when onnxruntime and NumPy differ.
+
+    `serials` are those of the probes whose light and tables it was trained with: it answers for no other.
+    """
+    rows = trained.samples.rows[:: len(trained.samples.rows) // GOLDEN_ROWS][:GOLDEN_ROWS].astype(np.float32)
+    network = build_network(trained.ensemble)
+    golden = golden_vectors(trained.ensemble, network, rows.astype(np.float64))
+    surrogate, ranges = _surrogate_file(trained), build_range_networks(trained.ranges.networks)
+    round_spot = round_file(trained.round_spot)
+    card = {
+        **_card(folder, network, serials, software_version, training_command),
+        "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
+        "round_sha256": hashlib.sha256(round_spot).hexdigest(),
+        "seed": trained.seed,
+        "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
+        "effort": asdict(trained.effort),
+        "features": [{"name": name, "unit": unit} for name, unit in PROFILE_UNITS.items()],
+        "training_range": _training_range(dict(zip(PROFILE_UNITS, trained.samples.rows.T, strict=True))),
+        "surrogate_error": _error(trained.surrogate_error),
+        "round_error": _error(trained.round_error),
+        "modes": {
+            mode: {
+                "misfit_ratio": outcome.misfit_ratio,
+                "elongation_deviations": outcome.elongation_deviations,
+                "outside_log_odds": outcome.outside_log_odds,
+                **_answers(outcome),
+            }
+            for mode, outcome in trained.outcomes.items()
+        },
+        ENTRY: range_entry(trained.ranges, ranges, np.array(golden["features"])),
+        "golden": golden,
+    }
+    files = {SURROGATE_FILE: surrogate, RANGE_FILE: ranges, ROUND_FILE: round_spot}
+    write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card), **files})
+
+
+def export_quick(
+    trained: TrainedQuick,
+    folder: Path,
+    *,
+    surrogate_sha256: str,
+    serials: tuple[str, ...],
+    software_version: str,
+    training_command: str,
+) -> None:
+    """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_profile`."""
+    rows = trained.pool.rows[:GOLDEN_ROWS]
+    network = build_network(trained.ensemble)
+    card = {
+        **_card(folder, network, serials, software_version, training_command),
+        "seed": trained.seed,
+        "dataset_sha256": hashlib.sha256(trained.pool.rows.tobytes()).hexdigest(),
+        "surrogate_sha256": surrogate_sha256,
+        "effort": vars(trained.effort),
+        "features": [{"name": name, "unit": unit} for name, unit in HELD_UNITS.items()],
+        "training_range": _training_range(dict(zip(HELD_UNITS, _usual(trained).T, strict=True))),
+        "modes": {
+            "quick": {
+                "faintest_contrast": list(trained.faintest_contrast),
+                "elongation_ratio": trained.outcome.elongation_ratio,
+                **_answers(trained.outcome),
+            }
+        },
+        "golden": golden_vectors(trained.ensemble, network, rows.astype(np.float64)),
+    }
+    write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card)})
+
+
+def _usual(trained: TrainedQuick) -> Array:
+    """Return the ends [2, 12] between which rows with noise lie, but for one in two thousand at each."""
+    pool = trained.pool
+    noisy = pool.noisy(
+        np.arange(len(pool.rows)), np.random.default_rng(derived_seed(trained.seed, "usual rows of quick"))
+    )
+    return np.quantile(noisy.astype(np.float64), [0.0005, 0.9995], axis=0)
+
+
+def _card(
+    folder: Path, network: bytes, serials: tuple[str, ...], software_version: str, training_command: str
+) -> dict[str, Any]:
+    """Return what every card says first."""
+    return {
+        "schema": SCHEMA,
+        "name": folder.resolve().name,
+        "sha256": hashlib.sha256(network).hexdigest(),
+        "software_version": software_version,
+        "training_command": training_command,
+        "serials": list(serials),
+        "unknowns": list(UNKNOWNS),
+    }
+
+
+def _training_range(columns: Mapping[str, Array | SingleArray]) -> dict[str, Any]:
+    return {
+        "features": {name: [float(column.min()), float(column.max())] for name, column in columns.items()},
+        "unknowns": {name: [RANGES[name].low, RANGES[name].high] for name in UNKNOWNS},
+        "nuisances": {name: [RANGES[name].low, RANGES[name].high] for name in NUISANCES},
+    }
+
+
+def _text(card: dict[str, Any]) -> bytes:
+    return (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
+
+
+def _surrogate_file(trained: TrainedProfile) -> bytes:
+    arrays: dict[str, Any] = trained.surrogate.arrays()
+    return _archive(arrays | {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()})
+
+
+def round_file(round_spot: RoundSpot) -> bytes:
+    """Return the content of `round.npz`: polynomials in single precision, and the camera's covariance of each mode."""
+    second = round_spot.second
+    arrays = {DEGREES: second.degrees.astype(np.uint8), COEFFICIENTS: second.coefficients.astype(np.float32)}
+    return _archive(arrays | {f"camera_{mode}": camera for mode, camera in round_spot.camera.items()})
+
+
+def _archive(arrays: dict[str, Any]) -> bytes:
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    return content.getvalue()
+
+
+def _error(of_columns: Array) -> dict[str, float]:
+    return {"largest": float(of_columns.max()), "mean": float(of_columns.mean())}
+
+
+def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
+    """Return bands and statistics of a mode."""
+    return {
+        "bands": {
+            name: {part: np.round(getattr(bands, part), 4).tolist() for part in ("truth", "log_spread", "low", "high")}
+            for name, bands in zip(UNKNOWNS, outcome.bands, strict=True)
+        },
+        "simulated": statistics(outcome.simulated, outcome.bands),
+        "recorded": statistics(outcome.recorded, outcome.bands),
+    }

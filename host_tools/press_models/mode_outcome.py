@@ -1,0 +1,155 @@
+"""What a mode makes of presses nobody has learned from: answers, bands of its intervals, coverage, and usual doubts.
+
+Bands come from one half of the simulated presses and are counted on the other. What is usual of each doubt
+comes from recordings, because only they hold all that a recording does to a profile; so does a factor that widens the
+bands where recordings need it, from one half of them; coverage is counted on the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.confidence_belt import Bands
+from device.measurement.mode import Mode
+from device.measurement.parameters import to_unit
+from device.measurement.quantities import UNKNOWNS, Bound, require
+from device.measurement.ramp_modes.ellipticity import RoundSpot
+from device.measurement.ramp_modes.estimate import stands_out
+from device.measurement.ramp_modes.model import ProfileAnswers, RampAnswer
+from device.measurement.ramp_modes.noise import PressNoise
+from host_tools.press_models.confidence_belts import confidence_bands, widened
+from host_tools.press_models.noisy_presses import Pool
+from host_tools.press_models.recorded_presses import RecordedPresses, in_parallel
+from host_tools.press_models.train_ensemble import DenseEnsemble
+from host_tools.press_models.train_range import RangeNetwork
+
+USUAL_RATIO = 0.9875
+"""Share of all recorded presses inside the trained ranges whose misfit counts as usual, and likewise the elongation; of
+the nine in ten in which an inclusion stands out, share of those whose odds of a size or depth outside do. What is left
+of the 5 % of false flags is for chance: with so many recordings their share is known to half a per cent.
+"""
+THREE = len(UNKNOWNS)
+EnsembleNetworks = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class Answered:
+    """Truth, mean and spread [n, 3] of presses, in coordinates."""
+
+    truth: Array
+    mean: Array
+    spread: Array
+
+    def part(self, chosen: slice) -> Answered:
+        """Return some of the presses."""
+        return Answered(self.truth[chosen], self.mean[chosen], self.spread[chosen])
+
+    def covered(self, bands: tuple[Bands, ...]) -> tuple[Array, Array]:
+        """Return, as booleans [n, 3], whether each interval holds the truth, and whether it narrows the range down."""
+        intervals = [
+            [one.interval(float(m), float(s)) for one, m, s in zip(bands, mean, spread, strict=True)]
+            for mean, spread in zip(self.mean, self.spread, strict=True)
+        ]
+        low, high, known = np.moveaxis(np.array(intervals), 2, 0)
+        return (low <= self.truth) & (self.truth <= high), known.astype(bool)
+
+
+@dataclass(frozen=True, eq=False)
+class ModeOutcome:
+    """Bands and usual doubts of a mode; `simulated` presses that the bands have not seen, and `recorded` ones."""
+
+    bands: tuple[Bands, ...]
+    misfit_ratio: float
+    elongation_deviations: float
+    outside_log_odds: float
+    simulated: Answered
+    recorded: Answered
+
+
+def judged_mode(
+    mode: Mode,
+    ensemble: DenseEnsemble,
+    answers: ProfileAnswers,
+    pool: Pool,
+    recorded: RecordedPresses,
+    round_spot: RoundSpot,
+    *,
+    outside_log_odds: float,
+    seed: int,
+    jobs: int = -1,
+) -> ModeOutcome:
+    """Return the outcome of a mode on a pool's presses with noise and on recorded ones, with its usual log odds."""
+    rows = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([seed, 1])).astype(np.float64)
+    truth = pool.unit[:, :THREE].astype(np.float64)
+    simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
+    half = len(rows) // 2
+    seen = simulated.part(slice(half))
+    bands = confidence_bands(seen.truth, seen.mean, seen.spread)
+    found = answers_to(mode, ensemble.estimate, answers, recorded.rows, jobs)
+    elongation = elongations(round_spot, recorded, found, mode)
+    return outcome_of(bands, simulated.part(slice(half, None)), recorded, found, elongation, outside_log_odds)
+
+
+def elongations(round_spot: RoundSpot, recorded: RecordedPresses, found: Sequence[RampAnswer], mode: Mode) -> Array:
+    """Return by how many standard deviations [n] recorded presses are not as round as their best fits."""
+    pairs = zip(recorded.second_harmonics, found, strict=True)
+    return np.array([round_spot.elongation_deviations(second, answer.best, mode) for second, answer in pairs])
+
+
+def usual_log_odds(ranges: RangeNetwork, rows: Array, noise: PressNoise) -> float:
+    """Return the largest usual log odds of recorded presses, rows [n, P], in which an inclusion stands out.
+
+    Raises `InvalidQuantity` where it stands out in none.
+    """
+    seen = rows[[stands_out(row, noise) for row in rows]]
+    require("presses in which an inclusion stands out", len(seen), Bound(1, np.inf, "presses"), "record more presses")
+    return float(np.quantile(ranges.log_odds(seen), USUAL_RATIO))
+
+
+def outcome_of(
+    bands: tuple[Bands, ...],
+    simulated: Answered,
+    recorded: RecordedPresses,
+    found: Sequence[RampAnswer],
+    elongation: Array,
+    outside_log_odds: float,
+) -> ModeOutcome:
+    """Return the outcome of a mode: bands of simulated presses, answers to recorded ones and their elongation [n]."""
+    usual = slice(len(found) // 2)
+    answered = Answered(
+        to_unit(recorded.parameters)[:, :THREE],
+        np.array([answer.mean for answer in found]),
+        np.array([answer.spread for answer in found]),
+    )
+    seen = answered.part(usual)
+    misfit = [answer.misfit_ratio for answer in found]
+    return ModeOutcome(
+        widened(bands, seen.truth, seen.mean, seen.spread),
+        float(np.quantile(misfit, USUAL_RATIO)),
+        float(np.quantile(elongation, USUAL_RATIO)),
+        outside_log_odds,
+        simulated,
+        answered.part(slice(usual.stop, None)),
+    )
+
+
+def answers_to(
+    mode: Mode, networks: EnsembleNetworks, answers: ProfileAnswers, rows: Array, jobs: int
+) -> list[RampAnswer]:
+    """Return what a mode makes of rows [n, P] for which `networks` give mean and spread, best fit and all."""
+    mean, spread = networks(rows)
+    return in_parallel(lambda i: answers.answer(rows[i], mode, mean[i], spread[i]), len(rows), jobs)
+
+
+def _answered(
+    mode: Mode, ensemble: DenseEnsemble, answers: ProfileAnswers, rows: Array, jobs: int
+) -> tuple[Array, Array]:
+    """Return mean and spread [n, 3]; mode standard needs no fit for them."""
+    if mode == "standard":
+        return ensemble.estimate(rows)
+    found = answers_to(mode, ensemble.estimate, answers, rows, jobs)
+    return np.array([answer.mean for answer in found]), np.array([answer.spread for answer in found])

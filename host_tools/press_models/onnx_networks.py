@@ -1,0 +1,135 @@
+"""Trained networks to ONNX: an ensemble to size, depth, modulus and their spread; the range classifier to log odds.
+
+A trained ensemble to ONNX: rows of a press to size, depth and modulus, and the spread of their coordinates.
+
+The network answers in mm, mm and kPa; its spread stays in coordinates, -1 to 1 over the trained range, in which the
+bands of a card are. Operators: the ONNX standard, opset 17.
+
+The networks that tell the ranges to ONNX: rows of a press to log odds, one output for each mode.
+
+Source of the format: `range.onnx` of a bundle, docs/contracts.md; operators: the ONNX standard, opset 17.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.mode import Mode
+from device.measurement.paper_mode.inversion import open_session
+from device.measurement.parameters import BY_RATIO, HIGH, LOW, unknowns_from_unit
+from device.measurement.quantities import UNKNOWNS
+from host_tools.paper_network.export import AGREEMENT, ExportRefused, OnnxGraph
+from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling
+from host_tools.press_models.train_ensemble import DenseEnsemble
+from host_tools.press_models.train_range import DEPTHS, SIZES, RangeNetwork, TrainedRange
+
+
+def build_network(ensemble: DenseEnsemble) -> bytes:
+    """Return the ensemble as serialised ONNX: features float32 [n, P] -> estimate, spread float32 [n, 3]."""
+    graph = OnnxGraph()
+    outputs = add_members(graph, ensemble.scaling, ensemble.members)  # [members, n, 6]
+    select = np.eye(2 * len(UNKNOWNS), dtype=np.float32)
+    means = graph.add("MatMul", outputs, select[:, : len(UNKNOWNS)])
+    log_variances = graph.add(
+        "Min", graph.add("MatMul", outputs, select[:, len(UNKNOWNS) :]), np.float32(LARGEST_LOG_VARIANCE)
+    )
+    mean = graph.add("ReduceMean", means, axes=[0], keepdims=0)
+    away = graph.add("Sub", means, mean)
+    within = graph.add("ReduceMean", graph.add("Exp", log_variances), axes=[0], keepdims=0)
+    between = graph.add("ReduceMean", graph.add("Mul", away, away), axes=[0], keepdims=0)
+    graph.add("Sqrt", graph.add("Add", within, between), output="spread")
+    _add_physical(graph, mean)
+    return graph.serialise(len(ensemble.scaling.mean))
+
+
+def add_members(graph: OnnxGraph, scaling: InputScaling, members: Sequence[list[DenseLayer]]) -> str:
+    """Add networks that share their inputs; return the name of their outputs [members, n, ...]."""
+    plain = graph.add("MatMul", graph.add("Sub", "features", scaling.mean), scaling.projection)
+    area_sine = graph.add("Div", graph.add("Asinh", plain), scaling.area_sine_spread)
+    signal = graph.add("Concat", graph.add("Div", plain, scaling.plain_spread), area_sine, axis=1)
+    *hidden, last = (
+        [np.stack([getattr(layers[i], part) for layers in members]) for part in ("weights", "biases")]
+        for i in range(len(members[0]))
+    )
+    for weights, biases in hidden:
+        signal = graph.add("Tanh", graph.add("Add", graph.add("MatMul", signal, weights), biases[:, None]))
+    return graph.add("Add", graph.add("MatMul", signal, last[0]), last[1][:, None])
+
+
+def _add_physical(graph: OnnxGraph, mean: str) -> None:
+    """Add the unknowns of coordinates: linear, and through the exponential where ratios count."""
+    count = len(UNKNOWNS)
+    by_ratio = BY_RATIO[:count].astype(np.float32)
+    low, high = (np.where(BY_RATIO[:count], np.log(ends[:count]), ends[:count]) for ends in (LOW, HIGH))
+    half, middle = (np.asarray(part, np.float32) for part in ((high - low) / 2, (high + low) / 2))
+    even = graph.add("Add", graph.add("Mul", mean, half), middle)
+    ratio = graph.add("Mul", graph.add("Exp", graph.add("Mul", even, by_ratio)), by_ratio)
+    graph.add("Add", graph.add("Mul", even, 1 - by_ratio), ratio, output="estimate")
+
+
+def physical_estimate(ensemble: DenseEnsemble, rows: Array) -> tuple[Array, Array]:
+    """Return estimate (mm, mm, kPa) and spread (coordinates) [n, 3], as the exported network gives them."""
+    mean, spread = ensemble.estimate(rows)
+    return unknowns_from_unit(mean), spread
+
+
+def golden_vectors(ensemble: DenseEnsemble, network: bytes, rows: Array) -> dict[str, list[list[float]]]:
+    """Return rows [n, P] and what the exported network answers; raises `ExportRefused` when NumPy answers otherwise."""
+    expected = physical_estimate(ensemble, rows)
+    found = open_session(network).run(["estimate", "spread"], {"features": rows.astype(np.float32)})
+    worst = max(float(np.max(np.abs(f - e) / np.abs(e))) for f, e in zip(found, expected, strict=True))
+    if not worst <= 20 * AGREEMENT:
+        found_and_bound = f"by {worst:.2g} relative, but must agree within {20 * AGREEMENT:.0g}"
+        raise ExportRefused(
+            f"The exported network differs from NumPy {found_and_bound}: nothing was written, train anew."
+        )
+    return {
+        "features": rows.tolist(),
+        "estimate": np.asarray(found[0], np.float64).tolist(),
+        "spread": np.asarray(found[1], np.float64).tolist(),
+    }
+
+
+def build_range_networks(networks: Mapping[Mode, RangeNetwork]) -> bytes:
+    """Return the networks as serialised ONNX: features float32 [n, P] -> one float32 [n, 1] named as each mode."""
+    graph, columns = OnnxGraph(), 0
+    for mode, network in networks.items():
+        columns = len(network.scaling.mean)
+        graph.add("ReduceMean", add_members(graph, network.scaling, network.members), axes=[0], keepdims=0, output=mode)
+    return graph.serialise(columns, dict.fromkeys(networks, 1))
+
+
+def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str, Any]:
+    """Return what the card says of the networks; `rows` [n, P] are the golden features of the bundle.
+
+    Raises `ExportRefused` when onnxruntime and NumPy differ.
+    """
+    return {
+        "sha256": hashlib.sha256(network).hexdigest(),
+        "size_mm": list(SIZES),
+        "depth_mm": list(DEPTHS),
+        "dataset_sha256": trained.dataset_sha256,
+        "effort": vars(trained.effort),
+        "surrogate_error": {
+            "largest": float(trained.surrogate_error.max()),
+            "mean": float(trained.surrogate_error.mean()),
+        },
+        "golden": {mode: _golden(mode, one, network, rows) for mode, one in trained.networks.items()},
+    }
+
+
+def _golden(mode: Mode, ours: RangeNetwork, network: bytes, rows: Array) -> list[float]:
+    found = np.asarray(open_session(network).run([mode], {"features": rows.astype(np.float32)})[0], np.float64)[:, 0]
+    expected = ours.log_odds(rows)
+    worst = float(np.max(np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)))
+    if not worst <= 20 * AGREEMENT:
+        raise ExportRefused(
+            f"The exported network of the ranges in mode {mode} differs from NumPy by {worst:.2g}, but must agree "
+            f"within {20 * AGREEMENT:.0g}: nothing was written, train anew."
+        )
+    return [float(one) for one in found]

@@ -1,0 +1,206 @@
+"""Everything behind mode quick: the surrogate of the ramps, read at one force, to a network of one held press.
+
+Two networks are enough: at one force the press says less than they could tell apart.
+
+Random held presses for mode quick's network: the surrogate's ramps read at one force, with noise of their own.
+
+The contrast at a force between the profile's is the cubic through them. Light and cell drift, and smooth errors add
+to it, as `press_noise` says for a ramp; the camera's part is measured on recordings of mode quick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from device.measurement.arrays import Array, SingleArray
+from device.measurement.confidence_belt import Bands
+from device.measurement.parameters import to_unit
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.quick_mode.model import SEEN_BY
+from device.measurement.quick_mode.profile import HELD_FORCES_N, HeldPress, held_press
+from device.measurement.ramp_modes.estimate import VISIBLE_DEVIATIONS
+from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, smooth_ring_errors
+from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, PressSurrogate
+from device.measurement.recording.reference_light import EXPONENT
+from device.measurement.recording.ring_means import RINGS
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.press_models.camera_noise import shrunk_covariance
+from host_tools.press_models.confidence_belts import confidence_bands, widened
+from host_tools.press_models.mode_outcome import Answered
+from host_tools.press_models.noisy_presses import Index, Pool, random_pool
+from host_tools.press_models.press_samples import draw_parameters, profile_rows
+from host_tools.press_models.recorded_presses import EXACT, in_parallel, recorded_press
+from host_tools.press_models.seeds import derived_seed, press_seed
+from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
+
+
+@dataclass(frozen=True, eq=False)
+class HeldPool:
+    """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
+
+    unit: SingleArray
+    rows: SingleArray
+    camera: Array
+    levels: ErrorLevels = field(default_factory=ErrorLevels)
+
+    def noisy(self, index: Index, rng: np.random.Generator) -> SingleArray:
+        """Return the rows [m, 12] of an index [m], with fresh noise on the contrast and the force."""
+        rows = self.rows[index]
+        light, force_n = 1 + rows[:, :RINGS], rows[:, RINGS]
+        camera, smooth = (
+            rng.standard_normal((len(rows), RINGS)) @ np.linalg.cholesky(part).T
+            for part in (self.camera, self._smooth())
+        )
+        zero_n = self.levels.zero_n * rng.standard_normal(len(rows))
+        drift = self.levels.gain_ratio * rng.standard_normal(len(rows)) - EXPONENT * zero_n / force_n
+        contrast = rows[:, :RINGS] + light * (camera + smooth + drift[:, None])
+        return np.column_stack([contrast, force_n + zero_n]).astype(np.float32)
+
+    def typical_noise(self) -> Array:
+        """Return the covariance [12, 12] of the noise of a row without an inclusion."""
+        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(HELD_FORCES_N))
+        covariance = np.zeros((RINGS + 1, RINGS + 1))
+        covariance[:RINGS, :RINGS] = self.camera + self._smooth() + self.levels.gain_ratio**2 + zero_ratio**2
+        covariance[RINGS, RINGS] = self.levels.zero_n**2
+        return covariance
+
+    def _smooth(self) -> Array:
+        flat, model = smooth_ring_errors(self.levels, harmonic=0)
+        return flat + model + 1e-14 * np.eye(RINGS)
+
+
+def held_pool(pool: Pool, camera: Array, seed: int) -> HeldPool:
+    """Return a pool of ramps as held presses, each at a random force."""
+    force_n = np.random.default_rng([seed, 2]).uniform(*HELD_FORCES_N, len(pool.rows))
+    return HeldPool(pool.unit, held_rows(pool.rows, force_n).astype(np.float32), camera)
+
+
+def held_rows(rows: SingleArray | Array, force_n: Array) -> Array:
+    """Return the rows [n, 12] of presses held at forces [n], for profile rows [n, P]."""
+    powers = np.vander(PROFILE_FORCES_N, increasing=True)
+    weights = np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers)
+    at_forces = np.asarray(rows[:, :CONTRAST_COLUMNS], np.float64).reshape(len(rows), -1, RINGS)
+    return np.column_stack([np.einsum("nk,nkj->nj", weights, at_forces), force_n])
+
+
+USUAL_RATIO = 0.985
+"""Share of recorded presses inside the trained ranges whose elongation counts as usual: the only doubt of its kind in
+mode quick, which has neither a best fit nor networks of the ranges."""
+
+
+@dataclass(frozen=True)
+class QuickEffort:
+    """How many presses go into each step; the defaults take some five minutes on two cores."""
+
+    recordings: int = 300
+    pool: int = 60_000
+    members: int = 2
+    steps: int = 5_000
+    judged: int = 30_000
+    test_recordings: int = 600
+
+
+@dataclass(frozen=True, eq=False)
+class QuickOutcome:
+    """Bands and usual elongation; `simulated` presses that the bands have not seen, and `recorded` ones."""
+
+    bands: tuple[Bands, ...]
+    elongation_ratio: float
+    simulated: Answered
+    recorded: Answered
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedQuick:
+    """All parts of the bundle."""
+
+    ensemble: DenseEnsemble
+    pool: HeldPool
+    faintest_contrast: tuple[float, ...]
+    outcome: QuickOutcome
+    effort: QuickEffort
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedHolds:
+    """Parameters [n, 9], rows [n, 12] and elongation ratios [n] of recorded held presses."""
+
+    parameters: Array
+    rows: Array
+    elongation: Array
+
+
+def train_quick(
+    tables: ProbeTables,
+    surrogate: PressSurrogate,
+    noise: PressNoise,
+    *,
+    effort: QuickEffort | None = None,
+    seed: int = 1,
+    jobs: int = -1,
+    say: Callable[[str], None] = lambda step: None,
+) -> TrainedQuick:
+    """Return the trained parts; `noise` is of mode standard, whose camera's part is replaced by that of one frame."""
+    asked = effort or QuickEffort()
+
+    def held(count: int, purpose: str) -> HeldPool:
+        drawn = derived_seed(seed, purpose)
+        return held_pool(random_pool(surrogate, noise, count, drawn), camera, drawn)
+
+    say(f"{asked.recordings} recordings of held presses")
+    camera = _camera(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)
+    say(f"{asked.members} networks")
+    pool = held(asked.pool, "training presses of quick")
+    ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
+    say(f"{asked.judged} presses and {asked.test_recordings} recordings for the limits")
+    fresh = held(asked.judged, "judged presses of quick")
+    noisy = fresh.noisy(np.arange(asked.judged), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
+    simulated = _answered(ensemble, noisy.astype(np.float64), fresh.unit.astype(np.float64))
+    recording = derived_seed(seed, "judged recordings of quick")
+    recorded = recorded_holds(tables, asked.test_recordings, recording, ErrorLevels(), jobs)
+    none = pool.typical_noise()[:RINGS, :RINGS]
+    faintest = tuple(VISIBLE_DEVIATIONS * float(np.sqrt(weights @ none @ weights)) for weights in SEEN_BY)
+    return TrainedQuick(ensemble, pool, faintest, _outcome(ensemble, simulated, recorded), asked, seed)
+
+
+def recorded_holds(tables: ProbeTables, count: int, seed: int, levels: ErrorLevels, jobs: int) -> RecordedHolds:
+    """Return what mode quick reads of random presses that are recorded."""
+    parameters = draw_parameters(count, np.random.default_rng(seed))
+
+    def read(i: int) -> HeldPress:
+        return held_press(recorded_press(tables, parameters[i], "quick", press_seed(seed, i), levels=levels))
+
+    rows, elongation = zip(*in_parallel(read, count, jobs), strict=True)
+    return RecordedHolds(parameters, np.array(rows), np.array(elongation))
+
+
+def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
+    """Return the covariance [11, 11] of recorded contrast about the exact one, at the force that was reported."""
+    recorded = recorded_holds(tables, count, seed, EXACT, jobs)
+    parameters = recorded.parameters
+    ramps = np.array(in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], count, jobs))
+    exact = held_rows(ramps, recorded.rows[:, RINGS])
+    return shrunk_covariance((recorded.rows - exact)[:, :RINGS] / (1 + exact[:, :RINGS]))
+
+
+def _outcome(ensemble: DenseEnsemble, simulated: Answered, recorded: RecordedHolds) -> QuickOutcome:
+    """Return bands and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
+    half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
+    seen, answered = simulated.part(slice(half)), _answered(ensemble, recorded.rows, to_unit(recorded.parameters))
+    first = answered.part(usual)
+    bands = confidence_bands(seen.truth, seen.mean, seen.spread)
+    return QuickOutcome(
+        widened(bands, first.truth, first.mean, first.spread),
+        float(np.quantile(recorded.elongation[usual], USUAL_RATIO)),
+        simulated.part(slice(half, None)),
+        answered.part(slice(usual.stop, None)),
+    )
+
+
+def _answered(ensemble: DenseEnsemble, rows: Array, unit: Array) -> Answered:
+    return Answered(unit[:, : len(UNKNOWNS)], *ensemble.estimate(rows))

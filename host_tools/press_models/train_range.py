@@ -1,0 +1,193 @@
+"""Random presses in and around the trained ranges to the networks that tell them apart, one for each ramp mode.
+
+Random presses of inclusions in and around the trained ranges, to rows of the press profile.
+
+As `press_samples` and `fit_surrogate`, with a size and depth that may lie outside: polynomials over the wide ranges,
+in the same terms. Only what may lie inside or outside is drawn wide; the modulus and all that nobody tells the probe
+stay in their ranges.
+
+The network that tells inclusions outside the trained ranges from those within: a profile row to log odds.
+
+As `dense_network`, with one output and the logistic loss, which makes it the logarithm of the odds that size or depth
+lies outside, when inclusions are drawn as the training presses are. By Neyman and Pearson no number of a row tells more
+of the ones, at as many false flags of the others, than the exact odds, which these networks approach. Source: Bishop,
+Pattern Recognition and Machine Learning, 2006, section 4.3.4, on the loss.
+
+Random presses in and around the trained ranges to the networks that tell them apart, one for each ramp mode.
+
+Faces of inclusions around the ranges are those of `wide_table`; their presses make polynomials, and these endless
+training presses with the noise of each mode, as for the networks of the unknowns.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from device.measurement.arrays import Array, SingleArray
+from device.measurement.mode import Mode
+from device.measurement.parameters import PARAMETERS, to_unit
+from device.measurement.ramp_modes.legendre import LegendreSum
+from device.measurement.ramp_modes.noise import PressNoise
+from device.measurement.ramp_modes.surrogate import DEPTH, SIZE, assemble, inclusion_factor, polynomial_coordinates
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.press_models.dense_network import DenseLayer, InputScaling, activations_of, backward
+from host_tools.press_models.fit_surrogate import INCLUSION_REACH, fit_polynomials
+from host_tools.press_models.noisy_presses import BLOCK, NoiseSampler, Pool
+from host_tools.press_models.press_samples import NEAREST_MM, PressSamples, draw_parameters, sample_presses
+from host_tools.press_models.seeds import derived_seed
+from host_tools.press_models.train_ensemble import Lesson, train_members
+from host_tools.probe_tables.out_of_range_table import SHALLOWEST_MM, SIZES_MM, WideTable, deepest_mm
+
+SIZES, DEPTHS = (1.5, SIZES_MM[1]), (SHALLOWEST_MM, deepest_mm(1.5))
+"""Wide ranges of size and depth, mm; smaller inclusions show nowhere."""
+PLACE = slice(SIZE, DEPTH + 1)
+THICKNESS = PARAMETERS.index("slab_thickness_mm")
+ENDS: Array = np.array([SIZES, DEPTHS])
+
+
+def draw_wide_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
+    """Return parameters [count, 9] as `press_samples.draw_parameters`, size and depth even over the wide ranges."""
+    values = draw_parameters(count, rng, inclusions_a_skin=inclusions_a_skin)
+    again = np.full(count, True)
+    while again.any():
+        values[again, PLACE] = rng.uniform(ENDS[:, 0], ENDS[:, 1], (int(again.sum()), 2))
+        size_mm, depth_mm = values[:, PLACE].T
+        deepest = np.minimum([deepest_mm(size) for size in size_mm], values[:, THICKNESS] - NEAREST_MM - size_mm)
+        again = depth_mm > deepest
+    return values
+
+
+def is_outside(unit: Array | SingleArray) -> NDArray[np.bool_]:
+    """Return whether size or depth lies outside its trained range [n], for coordinates [n, 9] of `to_unit`."""
+    return np.asarray((np.abs(unit[:, PLACE]) > 1).any(axis=1))
+
+
+def wide_coordinates(parameters: Array) -> Array:
+    """Return the coordinates [n, 9] in which wide presses are polynomials: -1 to 1 over the wide ranges."""
+    at = polynomial_coordinates(to_unit(parameters), parameters)
+    low, high = ENDS.T
+    at[:, PLACE] = 2 * (parameters[:, PLACE] - low) / (high - low) - 1
+    return at
+
+
+@dataclass(frozen=True, eq=False)
+class WideSurrogate:
+    """`press_surrogate.PressSurrogate` over the wide ranges."""
+
+    inclusion_field: LegendreSum
+    bare: LegendreSum
+
+    def rows(self, parameters: Array) -> Array:
+        """Return profile rows [n, P] at parameters [n, 9]."""
+        at = wide_coordinates(parameters)
+        return assemble(inclusion_factor(parameters) * self.inclusion_field.values(at), self.bare.values(at))
+
+
+@dataclass(frozen=True, eq=False)
+class RangeNetwork:
+    """Networks that share one scaling of the inputs; their log odds are averaged."""
+
+    scaling: InputScaling
+    members: tuple[list[DenseLayer], ...]
+
+    def log_odds(self, rows: Array) -> Array:
+        """Return the log odds [n] that size or depth lies outside, for rows [n, P]."""
+        inputs = self.scaling.inputs(rows.astype(np.float32))
+        return np.asarray(np.mean([activations_of(layers, inputs)[-1][:, 0] for layers in self.members], axis=0))
+
+
+def logistic_loss_and_gradient(
+    layers: list[DenseLayer], inputs: SingleArray, is_outside: SingleArray
+) -> tuple[float, list[DenseLayer]]:
+    """Return the mean of -ln(probability of what is so), and its gradient; `is_outside` [n] is 0 or 1."""
+    activations = activations_of(layers, inputs)
+    log_odds = activations[-1][:, 0]
+    loss = float(np.mean(np.logaddexp(0, log_odds) - is_outside * log_odds))
+    by_output = ((expit(log_odds) - is_outside) / np.float32(len(log_odds)))[:, None]
+    return loss, backward(layers, activations, by_output.astype(np.float32))
+
+
+REACH, HIGHEST = INCLUSION_REACH | {"size_mm": 22.0, "depth_mm": 20.0}, {"size_mm": 11, "depth_mm": 11}
+"""Degrees as those of the probe's own surrogate, higher ones in size and depth, whose ranges are wider; still higher
+ones follow presses kept apart worse, where the largest and deepest inclusions are few."""
+
+
+@dataclass(frozen=True)
+class RangeEffort:
+    """How many presses go into each step; the defaults take some twenty minutes on two cores."""
+
+    presses: int = 8_000
+    held_out: int = 300
+    pool: int = 200_000
+    members: int = 2
+    steps: int = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedRange:
+    """A network of each mode, and the root mean square error [P] of the polynomials on presses kept apart.
+
+    `dataset_sha256`: of the rows of all presses in and around the ranges.
+    """
+
+    networks: dict[Mode, RangeNetwork]
+    surrogate_error: Array
+    dataset_sha256: str
+    effort: RangeEffort
+
+
+def train_range(
+    tables: ProbeTables,
+    wide: WideTable,
+    noise: Mapping[Mode, PressNoise],
+    *,
+    effort: RangeEffort | None = None,
+    seed: int = 1,
+    jobs: int = -1,
+    say: Callable[[str], None] = lambda step: None,
+) -> TrainedRange:
+    """Return the networks; `say` hears what begins. The same seed gives the same ones whatever `jobs`."""
+    asked = effort or RangeEffort()
+    say(f"{asked.presses} random presses in and around the ranges")
+    samples = sample_presses(
+        wide.around(tables),
+        asked.presses + asked.held_out,
+        seed=derived_seed(seed, "wide presses"),
+        draw=draw_wide_parameters,
+        jobs=jobs,
+    )
+    learned, kept = samples.split(asked.presses)
+    surrogate = wide_surrogate(learned)
+    say(f"{asked.members} networks for the ranges of each mode")
+    presses = wide_pool(surrogate, noise["standard"], asked.pool, seed)
+    networks = {
+        mode: train_network(replace(presses, sampler=NoiseSampler(of_mode)), seed, asked, jobs)
+        for mode, of_mode in noise.items()
+    }
+    error = np.sqrt(np.mean((surrogate.rows(kept.parameters) - kept.rows) ** 2, axis=0))
+    return TrainedRange(networks, error, hashlib.sha256(samples.rows.tobytes()).hexdigest(), asked)
+
+
+def wide_surrogate(samples: PressSamples) -> WideSurrogate:
+    """Return the polynomials of presses in and around the ranges; raises as `fit_polynomials`."""
+    return WideSurrogate(*fit_polynomials(samples, wide_coordinates(samples.parameters), REACH, HIGHEST))
+
+
+def wide_pool(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int) -> Pool:
+    """Return random presses in and around the ranges; coordinates of those outside lie outside -1 to 1."""
+    rng = np.random.default_rng(derived_seed(seed, "training presses around the ranges"))
+    parameters = draw_wide_parameters(count, rng)
+    rows = [surrogate.rows(parameters[start : start + BLOCK]) for start in range(0, count, BLOCK)]
+    return Pool(to_unit(parameters).astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))
+
+
+def train_network(pool: Pool, seed: int, effort: RangeEffort, jobs: int) -> RangeNetwork:
+    """Return the networks trained on a pool's rows; raises as `train_members`."""
+    lesson = Lesson(1, is_outside(pool.unit).astype(np.float32), logistic_loss_and_gradient)
+    return RangeNetwork(*train_members(pool, lesson, seed=seed, members=effort.members, steps=effort.steps, jobs=jobs))

@@ -1,0 +1,134 @@
+"""Builds the virtual probe's table of inclusions off the axis, and of a tilted probe, from solves in three dimensions.
+
+Small strain, on the coarse mesh (0.6 % of the peak). Between the points (5 x 4 x 2 x 6) the fields hold 5 % of the peak
+for stiff inclusions under the face, 10 % for soft ones and 15 % at its rim, as
+`tests/host_tools/probe_tables/test_off_axis_table.py` measures against fresh solves.
+
+A probe that is tilted while it touches: its back turns about y by one degree, in small strain and closed contact.
+
+Linear, so it adds to any press; where the sum of the pressures would pull, the face has lifted, and closed contact no
+longer holds. The field is a cosine of the angle, so the ray along +x says it all.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+from ngsolve import x
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.chebyshev import points_with_ends
+from device.simulation.physics.off_axis_table import OffAxisTable
+from device.simulation.physics.slab import NOMINAL
+from host_tools.forward.face_state import FaceState, Rays
+from host_tools.forward.materials import baseline, with_inclusion
+from host_tools.forward.meshes.solid_mesh import SolidResolution, solid_mesh
+from host_tools.forward.plan import model_plan
+from host_tools.forward.sampling import FaceSampler
+from host_tools.forward.small_strain.contact import contact_pressure_kpa
+from host_tools.forward.small_strain.linear_press import LinearPress
+from host_tools.forward.symmetry import SOLID
+from host_tools.forward.tiers import build
+from host_tools.probe_tables.surface_table import inclusion_axes, ring_means
+from host_tools.scenes.scene import Placement, Press, Scene
+
+ORDER = 3
+
+
+def tilt_per_degree(
+    scene: Scene, *, resolution: SolidResolution | None = None, order: int = ORDER
+) -> tuple[Array, Array, Array]:
+    """Return r_mm, w_mm and p_kpa [R] along +x for one degree that lowers the +x side, without an inclusion."""
+    mesh = solid_mesh(scene, symmetry="half", order=order, resolution=resolution or SolidResolution())
+    rays = Rays.over(scene.waveguide)
+    sampler = FaceSampler(mesh, rays, "half")
+    press, materials = LinearPress(mesh, SOLID, order), baseline(scene)
+    sinking_mm = math.tan(math.radians(1.0)) * x
+    u = press.displacement(materials, sinking_mm)
+    probe, _ = press.contact.bodies(u.components)
+    pressure = contact_pressure_kpa(mesh, SOLID, order, press.stress_of_probe(u, materials))
+    return rays.r_mm[0], sampler(probe.u[-1] + sinking_mm)[0], sampler(pressure)[0]
+
+
+POINTS = (5, 4, 2, 6)
+"""Points in size, depth, contrast and offset."""
+SMALLEST_SIZE_MM = 2.0
+OFFSETS_MM = (2.0, 16.0)
+MODES = 11
+"""Cosines kept: the twelfth of the narrowest inclusion is below a thousandth of its peak."""
+EVERY = 4
+"""Every which of the face's radii is kept: 0.2 mm apart."""
+
+
+def off_axis_scene(inclusion: Inclusion, offset_mm: float, *, force_n: float = 1.0) -> Scene:
+    """Return the default scene with the inclusion off the axis, along +x."""
+    return Scene(inclusion, Press(force_n=force_n), placement=Placement(offset_x_mm=offset_mm))
+
+
+def cosine_modes(field: Array) -> Array:
+    """Return the cosine series [K, R] of a field [A, R] on evenly spaced rays, symmetric in the angle."""
+    series = np.fft.rfft(field, axis=0).real / len(field)
+    series[1:] *= 2
+    return np.asarray(series[:MODES])
+
+
+def inclusions_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, contrasts: Array) -> Array:
+    """Return the modes [M, 2, K, R] of one geometry at all contrasts, over these too, on one mesh."""
+    moduli_kpa = [NOMINAL.modulus_kpa(float(contrast)) for contrast in contrasts]
+    scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm)
+    meshed = build(scene, replace(model_plan(scene), grading="coarse"))
+    bare, *pressed = (
+        meshed.model.press(materials, [scene.press], estimate_error=False)[0].state
+        for materials in (baseline(scene), *(with_inclusion(_with_modulus(scene, E)) for E in moduli_kpa))
+    )
+    modes = np.stack([face_modes(meshed.rays.r_mm[0], face, bare) for face in pressed])
+    return modes / size_mm**3 / contrasts[:, None, None, None]
+
+
+def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
+    assert scene.inclusion is not None  # off_axis_scene has given it one
+    return replace(scene, inclusion=replace(scene.inclusion, youngs_modulus_kpa=modulus_kpa))
+
+
+def face_modes(r_mm: Array, face: FaceState, bare: FaceState) -> Array:
+    """Return the cosine series [2, K, R] of what an inclusion adds to deformation and pressure, on the radii of the
+    table.
+    """
+    p_kpa = np.array([ring_means(r_mm, ray) for ray in face.p_kpa - bare.p_kpa])
+    return np.stack([cosine_modes(face.w_mm - bare.w_mm), cosine_modes(p_kpa)])[..., ::EVERY]
+
+
+def build_off_axis_table(
+    *,
+    points: tuple[int, int, int, int] = POINTS,
+    jobs: int = -1,
+    on_point: Callable[[int, int], None] = lambda done, n: None,
+) -> OffAxisTable:
+    """Solve every point of the table (about twenty minutes on two cores); `on_point` hears done and total."""
+    axes = inclusion_axes(points[:3], SMALLEST_SIZE_MM)
+    offset = points_with_ends(*OFFSETS_MM, points[3])
+    r_mm, tilt_w_mm, tilt_p_kpa = tilt_per_degree(Scene(None))
+    tilt = np.stack([tilt_w_mm, ring_means(r_mm, tilt_p_kpa)])[:, ::EVERY]
+    inclusion_field = np.zeros((*points, 2, MODES, tilt.shape[-1]))
+    grid = list(product(range(points[0]), range(points[1]), range(points[3])))
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    solved = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.contrast) for i, j, m in grid
+    )
+    for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
+        inclusion_field[i, j, :, m] = modes
+        on_point(done, len(grid))
+    return OffAxisTable(*axes, offset, r_mm[::EVERY], np.moveaxis(inclusion_field, 4, 0), tilt)
+
+
+def write_off_axis_table(table: OffAxisTable, folder: Path) -> None:
+    """Write the table with the surroundings it was solved for."""
+    table.save(folder, {"scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(), "strain": "small"})

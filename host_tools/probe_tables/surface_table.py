@@ -1,0 +1,209 @@
+"""Builds the virtual probe's table of faces from finite-element force ramps in finite strain.
+
+Chebyshev points in size, depth, contrast and force: 7 x 7 x 3 x 5 hold 0.5 % of an inclusion's largest deformation
+between the points and 1 % of its largest pressure, ring means both
+(`tests/host_tools/probe_tables/test_surface_table.py`, fresh solves), because what is interpolated is the inclusion
+field over the force, the size cubed and the contrast. What other slabs change is solved as a star: one modulus or one
+thickness apart from the nominal slab, at every second size and depth, and each as the difference of two solves on one
+mesh.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise, product
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.chebyshev import points_inside, points_with_ends
+from device.simulation.physics.inclusion_axes import InclusionAxes
+from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.surface_table import COARSE, PressRamps, Ramp, SurfaceTable
+from host_tools.forward.accuracy import Level
+from host_tools.forward.plan import model_plan
+from host_tools.forward.solution import Solution
+from host_tools.forward.solve import solve_ramp
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Tissue, TissueLayer
+
+POINTS = (7, 7, 3)
+"""Points in size, depth and contrast."""
+CONTRASTS = (0.1, 0.96)
+"""8-200 kPa in tissue of 4-6.25 kPa, with a little to spare; 6.4-305 kPa in the nominal slab."""
+SLAB_MODULI_KPA = (4.0, 5.0, 6.25)
+SLAB_THICKNESSES_MM = (27.5, 30.0, 36.0)
+"""The star, nominal in the middle; in the thinnest slab the deepest and largest inclusion just clears the base."""
+RIGID_KPA = 1e6
+"""Modulus of what stands in for the base."""
+SMALLEST_SIZE_MM = 1.0
+FORCES_N = points_inside(0.0, 0.8, 5)
+"""Up to some 4 mm of indentation; no solve at 0 N, where a field over the force has no value."""
+EVERY = 2
+"""Every which of the face's radii is kept: 0.1 mm apart."""
+RING_MM = 1.0
+"""Pressures are kept as means over rings of this width: at points they ring inside the elements by some 2 % of an
+inclusion's peak, their forces do not. Light spreads as far in the skin.
+"""
+BARE = Level("blunt_fine", 3)
+"""The level of the ramps without an inclusion."""
+
+
+def ramp(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Solution, ...]:
+    """Return the scene's solutions at ascending forces, in finite strain with true sliding."""
+    presses = [Press(force_n=float(force)) for force in forces_n]
+    plan = model_plan(scene.with_press(presses[-1]), strain="finite")
+    if level:
+        plan = replace(plan, grading=level.grading, order=level.order)
+    return solve_ramp(scene, presses, plan)
+
+
+def fields(solution: Solution) -> tuple[Array, Array]:
+    """Return (w, p) [2, R] without the inclusion, and what the inclusion adds, at the radii that the table keeps."""
+    bare, pressed = solution.baseline, solution.pressed
+    without, inclusion_materials = (
+        np.stack([face.w_mm[0], ring_means(solution.r_mm, face.p_kpa[0])]) for face in (bare, pressed)
+    )
+    return without[:, ::EVERY], (inclusion_materials - without)[:, ::EVERY]
+
+
+def ring_means(r_mm: Array, p_kpa: Array) -> Array:
+    """Return the mean pressure over the ring `RING_MM` wide around every radius, cut at the rim."""
+    density = r_mm * p_kpa
+    force = np.concatenate([[0.0], np.cumsum(np.diff(r_mm) * (density[1:] + density[:-1]) / 2)])
+    inner, outer = np.maximum(r_mm - RING_MM / 2, 0.0), np.minimum(r_mm + RING_MM / 2, r_mm[-1])
+    return np.asarray((np.interp(outer, r_mm, force) - np.interp(inner, r_mm, force)) * 2 / (outer**2 - inner**2))
+
+
+def _ramps_per_n(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Array, Array]:
+    """Return both kinds of fields over the force, each [2, F, R]."""
+    bare, inclusion_field = zip(*(fields(solution) for solution in ramp(scene, forces_n, level)), strict=True)
+    over = forces_n[None, :, None]
+    return np.stack(bare, axis=1) / over, np.stack(inclusion_field, axis=1) / over
+
+
+def press_ramps(scene: Scene) -> PressRamps:
+    """Return the ramps of one scene, solved for it alone: for what the table does not hold."""
+    bare, inclusion_field = _ramps_per_n(scene)
+    r_mm = np.linspace(0.0, scene.waveguide.radius_mm, bare.shape[-1])
+    return PressRamps(r_mm, Ramp(FORCES_N, bare), Ramp(FORCES_N, inclusion_field))
+
+
+def scene_in(slab: Slab, inclusion: Inclusion | None = None) -> Scene:
+    """Return the default scene in another slab."""
+    tissue = replace(Tissue(), youngs_modulus_kpa=slab.youngs_modulus_kpa, thickness_mm=slab.thickness_mm)
+    return Scene(inclusion, tissue=tissue)
+
+
+def scene_on_one_mesh(
+    slab: Slab, inclusion: Inclusion | None = None, thicknesses_mm: Sequence[float] = SLAB_THICKNESSES_MM
+) -> Scene:
+    """Return the scene in the layers of a slab that is as thick as the last of the ascending `thicknesses_mm`.
+
+    Those below `slab`, whose thickness is one of them, are as good as rigid: slabs of all these thicknesses have one
+    mesh. Pressures near the rim differ by some 5 % of an inclusion's from mesh to mesh, more than the thickness changes
+    them.
+    """
+    depths_mm = (0.0, *thicknesses_mm)
+    layers = [
+        TissueLayer(f"to_{base:g}_mm", base - top, slab.youngs_modulus_kpa if base <= slab.thickness_mm else RIGID_KPA)
+        for top, base in pairwise(depths_mm)
+    ]
+    bulk_kpa = layers.pop().youngs_modulus_kpa
+    tissue = replace(Tissue(), youngs_modulus_kpa=bulk_kpa, thickness_mm=depths_mm[-1], layers=tuple(layers))
+    return Scene(inclusion, tissue=tissue)
+
+
+SOFT, STIFF = (Slab(youngs_modulus_kpa=modulus) for modulus in SLAB_MODULI_KPA[::2])
+THIN, THICK = (Slab(thickness_mm=thickness) for thickness in SLAB_THICKNESSES_MM[::2])
+SOLVED = (
+    (scene_in, NOMINAL),
+    (scene_in, SOFT),
+    (scene_in, STIFF),
+    (scene_on_one_mesh, NOMINAL),
+    (scene_on_one_mesh, THIN),
+    (scene_on_one_mesh, THICK),
+)
+"""The slabs of the star and how each is meshed: changes with the modulus are from the first slab, those with the
+thickness from the fourth."""
+SceneOf = Callable[[Slab, Inclusion | None], Scene]
+
+
+def _bare_per_n(scene_of: SceneOf, slab: Slab) -> Array:
+    return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BARE)[0]
+
+
+def lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, contrast: float) -> Array:
+    """Return what an inclusion adds [2, F, R] over force, size cubed and contrast, at forces that indent alike."""
+    scene = scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(contrast)))
+    return _ramps_per_n(scene, FORCES_N * slab.stiffness_ratio)[1] / size_mm**3 / contrast
+
+
+def inclusion_axes(points: tuple[int, int, int], smallest_size_mm: float) -> InclusionAxes:
+    """Return Chebyshev points over the sizes and depths of the paper's box and over `CONTRASTS`."""
+    low, high = PAPER_BOX_LOW, PAPER_BOX_HIGH
+    return InclusionAxes(
+        points_with_ends(smallest_size_mm, high[0], points[0]),
+        points_with_ends(low[1], high[1], points[1]),
+        points_with_ends(*CONTRASTS, points[2]),
+    )
+
+
+def build_surface_table(
+    *,
+    points: tuple[int, int, int] = POINTS,
+    jobs: int = -1,
+    on_point: Callable[[int, int], None] = lambda done, n: None,
+) -> SurfaceTable:
+    """Solve every point of the table (about half an hour on two cores); `on_point` hears done and total."""
+    axes = inclusion_axes(points, SMALLEST_SIZE_MM)
+    places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid)]
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    bare = Parallel(n_jobs=jobs)(delayed(_bare_per_n)(*one) for one in SOLVED)
+    solving = Parallel(n_jobs=jobs, return_as="generator")(delayed(lump_per_n_mm3)(*place) for place in places)
+    inclusion_field = []
+    for field in solving:
+        inclusion_field.append(field)
+        on_point(len(inclusion_field), len(places))
+    return assembled(axes, bare, inclusion_field)
+
+
+def _grids(axes: InclusionAxes) -> list[InclusionAxes]:
+    """Return the points of each of `SOLVED`: all of them in the nominal slab, the coarse ones for the star."""
+    coarse = InclusionAxes(axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.contrast)
+    return [axes, *[coarse] * (len(SOLVED) - 1)]
+
+
+def assembled(axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array]) -> SurfaceTable:
+    """Return the table of the fields [2, F, R] in the order of `SOLVED`, each inclusion's grid with the contrast
+    fastest.
+    """
+    remaining, inclusions = iter(lump_per_n_mm3), []
+    for grid in _grids(axes):
+        fields_on_grid = np.array([next(remaining) for _ in product(*grid)])
+        shape = [len(points) for points in grid]
+        inclusions.append(np.moveaxis(fields_on_grid.reshape(*shape, *fields_on_grid.shape[1:]), 3, 0))
+    return SurfaceTable(
+        *axes,
+        slab_modulus_kpa=np.array(SLAB_MODULI_KPA),
+        slab_thickness_mm=np.array(SLAB_THICKNESSES_MM),
+        force_n=FORCES_N,
+        r_mm=np.linspace(0.0, Scene(None).waveguide.radius_mm, inclusions[0].shape[-1]),
+        bare_per_n=bare_per_n[0],
+        lump_per_n_mm3=inclusions[0],
+        bare_change_per_n=_changes(*bare_per_n),
+        lump_change_per_n_mm3=_changes(inclusions[0][:, COARSE, COARSE], *inclusions[1:]),
+    )
+
+
+def _changes(nominal: Array, soft: Array, stiff: Array, layered: Array, thin: Array, thick: Array) -> Array:
+    return np.stack([soft - nominal, stiff - nominal, thin - layered, thick - layered])
+
+
+def write_surface_table(table: SurfaceTable, folder: Path) -> None:
+    """Write the table with the surroundings it was solved for."""
+    table.save(folder, {"scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(), "strain": "finite"})

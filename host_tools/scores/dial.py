@@ -1,0 +1,177 @@
+"""Speed and accuracy as one dial: how many frames each mode takes, what it computes, and how far off it is.
+
+The same inclusions, skins and tissues are recorded in the frames of each mode, with every drift. Times are of this
+machine.
+
+Speed and accuracy of a bundle's modes into its model card, so that a probe can say what each mode is worth.
+
+Every bundle is measured on the same presses. Times are of the machine that trained, which the card names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from device.measurement.calibration import Calibration
+from device.measurement.estimate import SPOKEN, Estimate, Quantity
+from device.measurement.mode import FRAMES, Mode
+from device.measurement.mode_models import ModeModels
+from device.measurement.model_card import CARD_FILE
+from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.parameters import EVEN_STD, HIGH, LOW
+from device.measurement.quantities import UNKNOWNS, Inclusion
+from device.measurement.ramp_modes.noise import ErrorLevels
+from device.measurement.ramp_modes.surrogate import TISSUE
+from device.measurement.recording.recording import Recording
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.pages.benchmark import Chapter, Table, at_most
+from host_tools.paper_network.export import write_folder
+from host_tools.press_models.press_samples import draw_parameters
+from host_tools.press_models.recorded_presses import recorded_press
+from host_tools.press_models.seeds import derived_seed, press_seed
+
+PRESSES = 48
+CALLS, LONGEST_CALL_S = 200, 0.5e-3
+GAUSSIAN_90 = 1.645
+"""Nine in ten of a Gaussian's values lie within so many standard deviations."""
+
+
+class TimedAnswers(NamedTuple):
+    """One press's truth, modulus of its tissue, answer, and the time (s) that the answer took."""
+
+    truth: Inclusion
+    tissue_kpa: float
+    estimate: Estimate
+    seconds: float
+
+
+def dial_chapter(
+    models: ModeModels, network: ModelBundle, calibration: Calibration, tables: ProbeTables, *, seed: int = 1
+) -> Chapter:
+    """Return error and time of each mode on the same inclusions, and the time of the ensemble `network` alone."""
+
+    answer = partial(models.estimate, calibration=calibration)
+    seen = {mode: timed_presses(answer, mode, tables, seed=seed) for mode in models.modes}
+    header = ("mode", "frames a press", "compute (ms)", "answered", *_columns("error"), *_columns("determined"))
+    return Chapter(
+        title="Speed and accuracy",
+        claim=(
+            f"{PRESSES} random presses over the trained ranges (10-160 kPa), the same ones in every mode: median error "
+            "of what is answered, and how often the unknown is called determined. The last row guesses the median "
+            "of the truths."
+        ),
+        source="host_tools/scores/dial.py; seconds of a press: `GET /api/v1/device`",
+        benchmarks=(at_most("ensemble of one press", "median time of one call (ms)", *_network_ms(network)),),
+        tables=(
+            Table("The dial", header, (*(_row(mode, found) for mode, found in seen.items()), _guess(seen))),
+            Table(
+                "The patient's tissue, which the press beside the lesion tells mode precise",
+                ("answered", "RMS error (kPa)", "stated spread (kPa)", "spread of the range (kPa)", "truth in 90 %"),
+                (_tissue_row(seen["precise"]),),
+            ),
+        ),
+    )
+
+
+def timed_presses(
+    answer: Callable[[Recording, Mode], Estimate], mode: Mode, tables: ProbeTables, *, seed: int = 1
+) -> list[TimedAnswers]:
+    """Return the answers of a mode to recordings of random presses, one after the other; alike for every mode."""
+    of_presses = derived_seed(seed, "dial")
+    parameters = draw_parameters(PRESSES, np.random.default_rng(of_presses))
+    timed = []
+    for number, at in enumerate(parameters):
+        recording = recorded_press(tables, at, mode, press_seed(of_presses, number), levels=ErrorLevels())
+        began = time.perf_counter()
+        estimate = answer(recording, mode)
+        seconds = time.perf_counter() - began
+        timed.append(TimedAnswers(Inclusion(*map(float, at[:TISSUE])), float(at[TISSUE]), estimate, seconds))
+    return timed
+
+
+def dial_entry(mode: Mode, found: Sequence[TimedAnswers]) -> dict[str, Any]:
+    """Return what a mode's model card says of the dial: frames, compute time, and median errors of what is answered."""
+    answered = [one for one in found if one.estimate.size_mm.value is not None]
+    pairs = {name: [(getattr(one.truth, name), getattr(one.estimate, name)) for one in answered] for name in UNKNOWNS}
+    return {
+        "presses": len(found),
+        "answered": len(answered),
+        "frames": FRAMES[mode].count,
+        "compute_ms": round(1e3 * float(np.median([one.seconds for one in found])), 1),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+        "median_percent": {name: _median_percent(of_unknown) for name, of_unknown in pairs.items()},
+        "determined": {
+            name: round(float(np.mean([quantity.identifiable for _, quantity in of_unknown])), 4)
+            for name, of_unknown in pairs.items()
+        },
+    }
+
+
+def _median_percent(pairs: Sequence[tuple[float, Quantity]]) -> float:
+    """Return the median error of pairs of truth and answer."""
+    return round(float(np.median([100 * abs((quantity.value or 0.0) / truth - 1) for truth, quantity in pairs])), 2)
+
+
+def _network_ms(bundle: ModelBundle) -> tuple[float, float]:
+    """Return the median time of one call of the exported networks, and its bound."""
+    row = np.array(bundle.card["golden"]["features"][:1])
+    seconds = []
+    for _ in range(CALLS):
+        began = time.perf_counter()
+        bundle.estimate(row)
+        seconds.append(time.perf_counter() - began)
+    return 1e3 * float(np.median(seconds)), 1e3 * LONGEST_CALL_S
+
+
+def _columns(what: str) -> tuple[str, ...]:
+    return tuple(f"{SPOKEN[name]} {what}" for name in UNKNOWNS)
+
+
+def _row(mode: Mode, found: Sequence[TimedAnswers]) -> tuple[str, ...]:
+    entry = dial_entry(mode, found)
+    errors = (f"{percent:.1f} %" for percent in entry["median_percent"].values())
+    known = (f"{share:.0%}" for share in entry["determined"].values())
+    answered = f"{entry['answered']} of {entry['presses']}"
+    return mode, f"{entry['frames']}", f"{entry['compute_ms']:.0f}", answered, *errors, *known
+
+
+def _tissue_row(found: Sequence[TimedAnswers]) -> tuple[str, ...]:
+    """Return how well the tissue's modulus is told; its 90 % interval is that of a Gaussian of the stated spread."""
+    told = np.array([
+        (one.estimate.features["tissue_modulus_kpa"] - one.tissue_kpa, one.estimate.features["tissue_modulus_std_kpa"])
+        for one in found
+        if "tissue_modulus_kpa" in one.estimate.features
+    ])  # fmt: skip
+    error, spread = told.T
+    inside = np.mean(np.abs(error) < GAUSSIAN_90 * spread)
+    of_range = (HIGH[TISSUE] - LOW[TISSUE]) / 2 * EVEN_STD
+    stated = float(np.sqrt(np.mean(spread**2)))
+    rms = float(np.sqrt(np.mean(error**2)))
+    return f"{len(told)}", f"{rms:.2f}", f"{stated:.2f}", f"{of_range:.2f}", f"{inside:.0%}"
+
+
+def _guess(seen: dict[Mode, list[TimedAnswers]]) -> tuple[str, ...]:
+    truths = np.array([one.truth.as_tuple() for one in seen["standard"]])
+    errors = np.median(100 * np.abs(np.median(truths, axis=0) / truths - 1), axis=0)
+    return ("a guess", "0", "0", "", *(f"{error:.1f} %" for error in errors), "", "", "")
+
+
+def publish_dial(
+    folder: Path, modes: Sequence[Mode], answer: Callable[[Recording, Mode], Estimate], tables: ProbeTables
+) -> None:
+    """Measure modes of the bundle in a folder, and write what was found to its card; whole or not at all."""
+    files = {path.name: path.read_bytes() for path in folder.iterdir()}
+    card = json.loads(files[CARD_FILE])
+    for mode in modes:
+        card["modes"][mode]["dial"] = dial_entry(mode, timed_presses(answer, mode, tables))
+    files[CARD_FILE] = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
+    write_folder(folder, files)

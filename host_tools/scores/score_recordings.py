@@ -1,0 +1,214 @@
+"""Recordings that carry truth to a score: errors, coverage and refusals, over all presses and by octiles of the truth.
+
+What is scored is what the device would say: values clipped to their intervals, and only presses that it answers.
+Errors are compared with the Cramer-Rao bound in coordinates, which run from -1 to 1 over the trained range, the modulus
+by its logarithm: there the range bounds what a press that tells nothing adds, in per cent it would be all of the mean.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from device.measurement.arrays import Array
+from device.measurement.estimate import SPOKEN, Estimate
+from device.measurement.mode import Mode, mode_named
+from device.measurement.parameters import NOMINAL, unknowns_to_unit
+from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
+from device.measurement.recording.recording import Recording
+from host_tools.press_models.mode_statistics import OCTILES, octile_ends, octile_of
+
+FEWEST_A_OCTILE = 5
+
+
+class Sample(NamedTuple):
+    """A recording to score: what messages call it, how it is read, and what is known of its tissue, skin and place."""
+
+    name: str
+    read: Callable[[], Recording]
+    nuisances: Mapping[str, float] = NOMINAL
+
+
+LeastErrors = Callable[[Mode, Inclusion, Mapping[str, float]], Array]
+"""Mode, truth and nuisances to the least errors [3] of any estimate, in coordinates; nan where nothing bounds them."""
+
+
+def unbounded(mode: Mode, truth: Inclusion, nuisances: Mapping[str, float]) -> Array:
+    """Return that nothing bounds the errors of a press."""
+    return np.full(len(UNKNOWNS), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredPress:
+    """What a press was of, what the device said, and the least errors [3] of any estimate, as `LeastErrors`."""
+
+    truth: Inclusion
+    estimate: Estimate
+    least_errors: Array
+
+    def coordinate_errors(self) -> Array:
+        """Return the errors [3] in coordinates of a press that is answered."""
+        found = np.array([getattr(self.estimate, name).value for name in UNKNOWNS])
+        return unknowns_to_unit(found) - unknowns_to_unit(np.array(self.truth.as_tuple()))
+
+
+@dataclass(frozen=True)
+class Score:
+    """The presses that carry truth and can be read, and how many others there were."""
+
+    presses: tuple[ScoredPress, ...]
+    left_out: int = 0
+
+
+def score(
+    samples: Iterable[Sample],
+    estimate: Callable[[Recording], Estimate],
+    on_excluded: Callable[[str], None] = lambda sentence: None,
+    least_errors: LeastErrors = unbounded,
+) -> Score:
+    """Return the score of recordings; `on_excluded` hears of every one that is left out, and why."""
+    presses, left_out = [], 0
+    for sample in samples:
+        try:
+            presses.append(_scored(sample, estimate, least_errors))
+        except InvalidQuantity as error:
+            on_excluded(f"{sample.name} is left out: {error}")
+            left_out += 1
+    return Score(tuple(presses), left_out)
+
+
+def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_errors: LeastErrors) -> ScoredPress:
+    recording = sample.read()
+    if recording.truth is None:
+        raise InvalidQuantity("truth", "missing", "that of a phantom", "score recordings of phantoms")
+    found = estimate(recording)
+    return ScoredPress(recording.truth, found, least_errors(mode_named(found.mode), recording.truth, sample.nuisances))
+
+
+def print_score(scored: Score, out: Console) -> None:
+    """Print the score; raises `InvalidQuantity` when there is no press to score."""
+    presses = scored.presses
+    if not presses:
+        raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
+    status = Counter(press.estimate.status for press in presses)
+    headline = f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common())
+    out.print(headline + (f"; {scored.left_out} left out" if scored.left_out else ""))
+    answered = [press for press in presses if press.estimate.size_mm.value is not None]
+    if answered:
+        out.print(_overall(answered))
+        octiles = _by_octiles(answered)
+        if octiles.row_count:
+            out.print(octiles)
+
+
+def _overall(presses: Sequence[ScoredPress]) -> Table:
+    table = Table("", *(SPOKEN[name] for name in UNKNOWNS), title=f"{len(presses)} answered presses")
+    columns = [_Column(presses, name) for name in UNKNOWNS]
+    for spoken, part in (
+        ("mean error", np.mean),
+        ("standard deviation", np.std),
+        ("smallest error", np.min),
+        ("largest error", np.max),
+    ):
+        table.add_row(spoken, *(f"{part(column.percent):.2f} %" for column in columns))
+    table.add_row("error / stated spread", *(f"{column.error_over_spread:.2f}" for column in columns))
+    table.add_row("skill against the range", *(f"{column.skill:.2f}" for column in columns))
+    table.add_row("determined", *(f"{column.known.mean():.1%}" for column in columns))
+    table.add_row("truth inside 90 % intervals of these", *(column.coverage() for column in columns))
+    for row in _bound_rows(columns):
+        table.add_row(*row)
+    return table
+
+
+def _bound_rows(columns: Sequence[_Column]) -> Iterator[tuple[str, ...]]:
+    """Yield how near the answers come to the best that any could be; nothing where no press has a bound.
+
+    Root mean squares over all answered presses that have one, determined or not. Whether an unknown is determined is
+    read off the same noisy press as its value, and presses chosen by their own noise are not those of the bound.
+    """
+    counted, presses = columns[0].bounded.sum(), len(columns[0].bounded)
+    if not counted:
+        return
+    of = "" if counted == presses else f", {counted} of {presses}"
+    errors, least = zip(*(column.rms() for column in columns), strict=True)
+    yield f"RMS error, range as -1 to 1{of}", *(f"{value:.3f}" for value in errors)
+    yield f"least RMS error (bound){of}", *(f"{value:.3f}" for value in least)
+    yield f"RMS error / bound{of}", *(column.error_over_bound() for column in columns)
+
+
+def _by_octiles(presses: Sequence[ScoredPress]) -> Table:
+    columns = [_Column(presses, name) for name in UNKNOWNS]
+    beside_bound = ["RMS error / bound"] if any(column.bounded.any() for column in columns) else []
+    table = Table("octile of the truth", "from", "to", "mean error", "determined", "covered", *beside_bound)
+    for name, column in zip(UNKNOWNS, columns, strict=True):
+        if len(column.truth) < OCTILES * FEWEST_A_OCTILE:
+            continue
+        ends, octile = octile_ends(column.truth), octile_of(column.truth)
+        for number in range(OCTILES):
+            inside = octile == number
+            if not inside.any():  # equal truths, all in one octile
+                continue
+            table.add_row(
+                f"{SPOKEN[name]} {number + 1}",
+                *(f"{end:.3g}" for end in ends[number : number + 2]),
+                f"{column.percent[inside].mean():.2f} %",
+                f"{column.known[inside].mean():.0%}",
+                column.coverage(inside),
+                *(column.error_over_bound(inside) for _ in beside_bound),
+            )
+    return table
+
+
+class _Column:
+    """Truths, errors and intervals [n] of one unknown."""
+
+    def __init__(self, presses: Sequence[ScoredPress], name: str) -> None:
+        found = [getattr(press.estimate, name) for press in presses]
+        self.truth = np.array([getattr(press.truth, name) for press in presses])
+        value, low, high, std = (
+            np.array([getattr(one, part) for one in found], dtype=float) for part in ("value", "low", "high", "std")
+        )
+        self.known = np.array([one.identifiable for one in found])
+        self.covered = (low <= self.truth) & (self.truth <= high)
+        self.percent = 100 * np.abs(value - self.truth) / self.truth
+        self._error, self._std = value - self.truth, std
+        unknown = UNKNOWNS.index(name)
+        self._coordinate_error = np.array([press.coordinate_errors()[unknown] for press in presses])
+        self._least = np.array([press.least_errors[unknown] for press in presses])
+        self.bounded = np.isfinite(self._least)
+
+    @property
+    def error_over_spread(self) -> float:
+        """Root mean square error over that of the spreads that the device states: 1 is honest."""
+        return float(np.sqrt(np.mean(self._error**2) / np.mean(self._std**2))) if self._std.any() else float("nan")
+
+    @property
+    def skill(self) -> float:
+        """1 - root mean square error over that of the middle of these truths."""
+        guess = np.sqrt(np.mean((self.truth - self.truth.mean()) ** 2))
+        return float(1 - np.sqrt(np.mean(self._error**2)) / guess) if guess > 0 else float("nan")
+
+    def coverage(self, chosen: NDArray[np.bool_] | None = None) -> str:
+        """Return the covered share of the determined presses among those chosen."""
+        counted = self.known if chosen is None else self.known & chosen
+        return f"{self.covered[counted].mean():.1%} of {counted.sum()}" if counted.any() else "-"
+
+    def rms(self, chosen: NDArray[np.bool_] | None = None) -> tuple[float, float]:
+        """Return root mean squares of errors and of their bounds, in coordinates, over the bounded presses chosen."""
+        counted = self.bounded if chosen is None else self.bounded & chosen
+        error, least = (np.sqrt(np.mean(part[counted] ** 2)) for part in (self._coordinate_error, self._least))
+        return float(error), float(least)
+
+    def error_over_bound(self, chosen: NDArray[np.bool_] | None = None) -> str:
+        """Return the first over the second; no press that has a bound, no number."""
+        if not (self.bounded if chosen is None else self.bounded & chosen).any():
+            return "-"
+        error, least = self.rms(chosen)
+        return f"{error / least:.2f}"

@@ -1,0 +1,87 @@
+"""The chapters of the verification by name, in the order of the document.
+
+Chapters that take long or judge the model's promises: the ends of every range, and how honest stated errors are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import host_tools.forward.solve  # noqa: F401 - sets the number of threads before the mesher starts any
+from host_tools.pages.benchmark import Chapter, Table, at_least, at_most
+from host_tools.verification import (
+    balance,
+    basis,
+    eshelby,
+    hayes,
+    hertz,
+    incompressible,
+    mechanics,
+    patch,
+    rates,
+    scene_rates,
+    smoothness,
+    symmetries,
+)
+
+CHAPTERS: dict[str, Callable[[bool], Chapter]] = {
+    "patch": patch.chapter,
+    "eshelby": eshelby.chapter,
+    "hayes": hayes.chapter,
+    "hertz": hertz.chapter,
+    "rates": rates.chapter,
+    "scene_rates": scene_rates.chapter,
+    "incompressible": incompressible.chapter,
+    "symmetries": symmetries.chapter,
+    "balance": balance.chapter,
+    "smoothness": smoothness.chapter,
+    "basis": basis.chapter,
+    "calculix": mechanics.chapter,
+}
+"""Each function takes whether to be quick."""
+
+
+def extremes_chapter() -> Chapter:
+    """Return the chapter on scenes at the ends of every range; minutes."""
+    from host_tools.verification.extremes import run_extremes
+
+    found = run_extremes()
+    rows = [
+        (
+            case.name,
+            case.outcome,
+            f"{case.force_n:.4g}",
+            f"{case.max_deformation_mm:.3g}",
+            f"{case.stated_error:.1e}",
+            case.message,
+        )
+        for case in found
+    ]
+    failures = sum(not case.passed for case in found)
+    return Chapter(
+        "Extremes",
+        "Scenes at the ends of what can be asked, each in a process of its own: a result whose forces balance, or a "
+        "refusal that names the quantity; never a hang, a crash or a number that is none.",
+        "No reference.",
+        (at_most(f"{len(found)} scenes", "scenes without a result or a named refusal", failures, 0.0),),
+        (Table("What became of each", ("scene", "outcome", "force (N)", "O1 (mm)", "stated error", ""), tuple(rows)),),
+    )
+
+
+def effectivity_chapter() -> Chapter:
+    """Return the chapter on stated against true errors; minutes."""
+    from host_tools.verification.effectivity import REQUIRED_SHARE, measure_effectivity
+
+    found = measure_effectivity()
+    rows = [(e.kind, e.feature, f"{e.held_share:.2f}", f"{e.median_ratio:.1f}", f"{e.worst_true:.1e}") for e in found]
+    header = ("kind", "feature", "held", "median of stated over true", "worst true error")
+    return Chapter(
+        "Stated errors",
+        "Random scenes, their stated error against the true one: the difference from the finest tier.",
+        "No reference: the finest tier of the same model.",
+        tuple(at_least(e.kind, f"{e.feature}: share of scenes held", e.held_share, REQUIRED_SHARE) for e in found),
+        (Table("By kind of solution and feature", header, tuple(rows)),),
+    )
+
+
+EXTRA_CHAPTERS: dict[str, Callable[[], Chapter]] = {"extremes": extremes_chapter, "effectivity": effectivity_chapter}

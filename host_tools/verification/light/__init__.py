@@ -1,0 +1,8 @@
+"""Does the light do what light does? The ray tracer and the lookup model against optics on paper, Mitsuba, and each
+other.
+
+Modules in reading order: `scenes`, `angles`, `on_paper`, `trapping`, `statistics`, `dimple`, `contact`, `press`,
+`construction`, `lookup`, `cross_check`, `pictures`, `chapters`, `verdict`.
+
+No table is made here.
+"""

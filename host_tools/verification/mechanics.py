@@ -1,0 +1,183 @@
+"""The same scene in another program, side by side in one run: CalculiX with a real contact pair against ours.
+
+Small strain, and finite strain (neo-Hookean) with true sliding, where our sliding and paired variants stand beside it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Inclusion
+from host_tools.forward.plan import ModelPlan, model_plan
+from host_tools.forward.solve import solve_ramp
+from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_most, relative
+from host_tools.scenes.scene import Press, Scene
+from host_tools.verification.peer.calculix import CalculixFailed, ccx_available, ccx_version, solve_with_calculix
+from host_tools.verification.peer.calculix_deck import Process
+
+SCENE = Scene(Inclusion(10.0, 6.0, 80.0))
+INDENTATIONS_MM, RADII_MM = (1.0, 2.0, 3.0), (0.0, 3.0, 6.0, 9.0)
+FINE, COARSE = 2.0, 1.5
+"""Refinements of CalculiX's mesh; finite strain takes a hundred times as long, so it gets the coarse one."""
+PROCESS = Process()
+"""How CalculiX gets there: the defaults of its own module."""
+SMALL_BOUND, FORCE_BOUND, INCLUSION_BOUND = 0.01, 0.01, 0.03
+
+
+class ProgramRamp(NamedTuple):
+    """One program's answer: force in N [indentation], w and inclusion field in mm [indentation, radius], wall time in
+    s.
+    """
+
+    force_n: Array
+    w_mm: Array
+    inclusion_mm: Array
+    seconds: float
+
+
+def ours(plan: ModelPlan) -> ProgramRamp:
+    """Solve by the forward model."""
+    began = time.perf_counter()
+    solutions = solve_ramp(SCENE, [Press(indentation_mm=value) for value in INDENTATIONS_MM], plan)
+    seconds = time.perf_counter() - began
+    w_mm = np.array([np.interp(RADII_MM, s.r_mm, s.w_mm) for s in solutions])
+    bare_mm = np.array([np.interp(RADII_MM, s.r_mm, s.w_baseline_mm) for s in solutions])
+    return ProgramRamp(np.array([s.force_n for s in solutions]), w_mm, w_mm - bare_mm, seconds)
+
+
+def calculix(refinement: float, *, finite_strain: bool) -> ProgramRamp:
+    """Solve by CalculiX, with the inclusion and with the inclusion filled with tissue."""
+    pressed, bare = (
+        solve_with_calculix(
+            SCENE,
+            INDENTATIONS_MM,
+            finite_strain=finite_strain,
+            homogeneous=homogeneous,
+            refinement=refinement,
+            process=PROCESS,
+        )
+        for homogeneous in (False, True)
+    )
+    w_mm, bare_mm = (np.array([[s.w_at_mm(r) for r in RADII_MM] for s in states]) for states in (pressed, bare))
+    seconds = pressed[0].seconds + bare[0].seconds
+    return ProgramRamp(np.array([s.force_n for s in pressed]), w_mm, w_mm - bare_mm, seconds)
+
+
+SMALL, SMALL_BLUNT = "small strain, ours", "small strain, ours, mesh of finite strain"
+PEER_SMALL, PEER_COARSE = "small strain, CalculiX", "small strain, CalculiX, coarse"
+SLIDING, PAIRED = "finite strain, ours, sliding", "finite strain, ours, paired"
+EDGE = "finite strain, ours, sliding, with the force of the edge"
+PEER_SLIDING = "finite strain, CalculiX, sliding, coarse"
+RUNS: dict[str, Callable[[], ProgramRamp]] = {
+    SMALL: lambda: ours(model_plan(SCENE)),
+    SMALL_BLUNT: lambda: ours(replace(model_plan(SCENE), grading=model_plan(SCENE, strain="finite").grading)),
+    PEER_SMALL: lambda: calculix(FINE, finite_strain=False),
+    PEER_COARSE: lambda: calculix(COARSE, finite_strain=False),
+    SLIDING: lambda: ours(model_plan(SCENE, strain="finite")),
+    EDGE: lambda: ours(replace(model_plan(SCENE, strain="finite"), contact="true_sliding_with_edge_force")),
+    PAIRED: lambda: ours(model_plan(SCENE, strain="finite", paired=True)),
+    PEER_SLIDING: lambda: calculix(COARSE, finite_strain=True),
+}
+ProgramsFound = dict[str, ProgramRamp]
+
+
+def benchmarks(found: ProgramsFound) -> tuple[Benchmark, ...]:
+    """Return ours against CalculiX: force, w and inclusion field in small strain and in finite strain with true
+    sliding.
+    """
+    small, peer = found[SMALL], found[PEER_SMALL]
+    case = f"small strain, {INDENTATIONS_MM[0]:g} mm"
+    rows = [
+        relative(case, "force (N)", small.force_n[0], peer.force_n[0], SMALL_BOUND),
+        relative(case, "w at r = 0 (mm)", small.w_mm[0, 0], peer.w_mm[0, 0], SMALL_BOUND),
+        relative(case, "inclusion field at r = 0 (mm)", small.inclusion_mm[0, 0], peer.inclusion_mm[0, 0], SMALL_BOUND),
+    ]
+    mine, theirs = found[SLIDING], found[PEER_SLIDING]
+    for i, indentation_mm in enumerate(INDENTATIONS_MM):
+        case = f"finite strain, sliding, {indentation_mm:g} mm"
+        rows += [
+            relative(case, "force (N)", mine.force_n[i], theirs.force_n[i], FORCE_BOUND),
+            relative(case, "w at r = 0 (mm)", mine.w_mm[i, 0], theirs.w_mm[i, 0], SMALL_BOUND),
+            relative(
+                case,
+                "inclusion field at r = 0 (mm)",
+                mine.inclusion_mm[i, 0],
+                theirs.inclusion_mm[i, 0],
+                INCLUSION_BOUND,
+            ),
+        ]
+    return tuple(rows)
+
+
+def _tables(found: ProgramsFound) -> tuple[Table, ...]:
+    header = (
+        "model",
+        "force (N)",
+        *(f"w({r:g}) (mm)" for r in RADII_MM),
+        *(f"inclusion({r:g}) (mm)" for r in RADII_MM),
+    )
+    tables = []
+    for i, indentation_mm in enumerate(INDENTATIONS_MM):
+        rows = tuple(
+            (name, f"{ramp.force_n[i]:.5f}", *(f"{v:.5f}" for v in (*ramp.w_mm[i], *ramp.inclusion_mm[i])))
+            for name, ramp in found.items()
+        )
+        tables.append(Table(f"Pressed by {indentation_mm:g} mm; the face at radii of 0 to 9 mm", header, rows))
+    return (*tables, _times(found))
+
+
+def _times(found: ProgramsFound) -> Table:
+    rows = []
+    for name, ramp in found.items():
+        peer = found[PEER_SLIDING if name.startswith("finite") else PEER_SMALL]
+        rows.append((name, f"{ramp.seconds:.2f}", f"{peer.seconds / ramp.seconds:.1f}"))
+    caption = "Wall time of all loads, with the inclusion and without it, meshing included"
+    return Table(caption, ("model", "seconds", "CalculiX over it"), tuple(rows))
+
+
+def _figure(found: ProgramsFound) -> Figure:
+    def draw(figure: Any) -> None:
+        axes = figure.subplots()
+        for name, ramp in found.items():
+            line = "s--" if "CalculiX" in name else "o-"
+            axes.plot(INDENTATIONS_MM, 1e3 * ramp.inclusion_mm[:, 0] / INDENTATIONS_MM, line, label=name)
+        axes.set_xlabel("indentation (mm)")
+        axes.set_ylabel("inclusion field in the middle\nover indentation (µm/mm)")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="small")
+
+    return Figure("verification_sliding.svg", "What finite strain, sliding and pairing do to the inclusion field", draw)
+
+
+TITLE = "Another program: CalculiX"
+CLAIM = (
+    "A revolved sector of C3D20 and C3D15 elements, probe and tissue apart, with a surface-to-surface contact pair "
+    "(penalty), against our shared face. In finite strain both are neo-Hookean and the tissue slides; `paired` ignores "
+    "the slip. No column is exact: `exact` is CalculiX's number, and its mesh in finite strain is a coarse one. At the "
+    "sharp rim there are two readings: contact of the faces alone (ours by default, and CalculiX's), and one that is "
+    "stationary in the slip of the rim too, so that the edge drives the tissue out; the tables hold both."
+)
+SOURCE = "Dhondt, CalculiX CrunchiX User's Manual, version 2.20: another code, another mesh, another contact law."
+
+
+def chapter(quick: bool) -> Chapter:
+    """Return the chapter; it is skipped when quick, since it takes minutes, and where CalculiX is not installed."""
+    if quick or not ccx_available():
+        why = "left out of a quick run" if quick else "the program ccx is not installed"
+        return Chapter(TITLE, CLAIM, SOURCE, skipped=f"{why}; `host_tools verify --only calculix` measures it")
+    claim = (
+        f"{CLAIM} CalculiX {ccx_version()}; load increments of {PROCESS.increment_mm:g} mm, "
+        f"re-pairings of the contact after each load: {PROCESS.repairings}."
+    )
+    try:
+        found = {name: run() for name, run in RUNS.items()}
+    except CalculixFailed as failed:
+        return Chapter(TITLE, claim, SOURCE, (at_most("CalculiX", str(failed), nan, 0.0),))
+    return Chapter(TITLE, claim, SOURCE, benchmarks(found), _tables(found), (_figure(found),))

@@ -1,0 +1,73 @@
+"""What a probe can answer: the modes whose model is there, and none other by default."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.assembly.answers import Answers, answers_for
+from device.assembly.opened_parts import StartFailed
+from device.assembly.probe import open_simulated_probe
+from device.config import simulated_config
+from device.errors import ConfigError, ModelError
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.estimate import estimate_recording
+from device.measurement.mode import MODES
+from device.measurement.paper_mode.inversion import Raw
+from device.settings.press_section import PressSection
+from device.simulation.scenario import Scenario
+
+
+def test_the_estimate_of_a_paper_press_is_that_of_its_model(bundle, calibration, recording):
+    answers = answers_for(replace(simulated_config(), press=PressSection(mode="paper")), bundle, calibration)
+    assert "paper" in answers.modes
+    assert answers.estimator(recording, "paper") == estimate_recording(recording, bundle, calibration)
+
+
+def test_the_simulated_probe_answers_in_every_mode_and_the_one_of_the_papers_light_in_that_only(bundle, calibration):
+    assert answers_for(simulated_config(), bundle, calibration).modes == MODES
+    assert answers_for(simulated_config("SIM-LINEAR"), bundle, calibration).modes == ("paper",)
+
+
+def test_a_probe_without_their_models_has_the_papers_mode_only(bundle, calibration, tmp_path):
+    config = replace(
+        simulated_config("SIM-LINEAR"), serial="SIM-0001", profile_model=tmp_path / "a", quick_model=tmp_path / "b"
+    )
+    assert answers_for(config, bundle, calibration).modes == ("paper",)
+
+
+def test_a_mode_without_a_model_is_no_default():
+    answers = Answers(("quick", "paper"), lambda recording, mode: None)
+    answers.require("quick")
+    with pytest.raises(ConfigError, match=r"press\.mode is precise, but .* models for quick, paper only") as refusal:
+        answers.require("precise")
+    assert refusal.value.code == "E001"
+
+
+def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tmp_path):
+    config = replace(simulated_config(), data=tmp_path, profile_model=tmp_path / "none")
+    with pytest.raises(StartFailed, match=r"press\.mode is standard, but this probe has models for quick, paper only"):
+        open_simulated_probe(config, Scenario())
+
+
+def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle, calibration, monkeypatch):
+    answers = answers_for(simulated_config(), bundle, calibration)
+    answers.prove()
+    wrong = Raw(np.zeros((9, 3)), np.zeros((9, 3)))
+    monkeypatch.setattr(bundle, "_run", lambda rows: wrong)
+    with pytest.raises(ModelError, match=r"golden\.estimate") as refusal:
+        answers.prove()
+    assert refusal.value.code == "E401"
+
+
+def test_every_run_of_a_watched_answer_is_progress_of_the_inference():
+    now_s, begun = [0.0], []
+    progress = ProgressBoard(lambda: now_s[0])
+    answers = Answers(("paper",), lambda recording, mode: mode).watched(progress, lambda: begun.append(now_s[0]))
+    now_s[0] = 40.0
+    assert answers.estimator(None, "paper") == "paper"
+    assert "inference" not in progress.stall(15.0).parts
+    now_s[0] = 80.0
+    answers.prove()
+    assert "inference" not in progress.stall(15.0).parts
+    assert begun == [40.0, 80.0]

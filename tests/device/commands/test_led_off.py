@@ -1,0 +1,170 @@
+"""No light is left on by a daemon that was killed: its process is gone, and another one darkens the chip."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from cpu_time import ended_cpu_s
+from daemon_process import ROOT
+from i2c_over_socket import served
+from supervisor import DARK_WITHIN_S
+
+from device.__main__ import main as daemon_main
+from device.commands import led_off as led_off_module
+from device.commands.led_off import PAUSE_S, led_off, main
+from device.hardware.led_driver import led_driver
+from device.settings.last_good import NAME
+from device.settings.light_section import LightSection
+from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
+from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.tlc59116_chip import Tlc59116Chip
+from device.simulation.faults import FaultTimeline, ScriptedFault
+
+DARK = (0.0, 0.0, 0.0, 0.0)
+SETTINGS = {"tlc59116": "", "pca9685": '[light]\nchip = "pca9685"\n[camera]\nexposure_us = 3932\n'}
+CHIPS: dict[str, tuple[int, Callable[[], EmulatedLedChip]]] = {
+    "tlc59116": (0x60, Tlc59116Chip),
+    "pca9685": (0x40, Pca9685Chip),
+}
+
+
+class Board:
+    """An LED board on a bus of its own, and programs that are run on it one after the other."""
+
+    def __init__(self, folder: Path, kind: str, *faults: ScriptedFault) -> None:
+        self.folder, address = folder, CHIPS[kind][0]
+        self.chip = CHIPS[kind][1]()
+        self.bus = EmulatedI2cBus({address: self.chip}, faults=FaultTimeline(faults))
+        (folder / "probe.toml").write_text(SETTINGS[kind])
+
+    def start(self, *program: str) -> subprocess.Popen[str]:
+        path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+        return subprocess.Popen(
+            [sys.executable, str(ROOT / "tests" / "i2c_over_socket.py"), str(self.folder / "i2c"), *program],
+            cwd=self.folder, env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    def kill_while_lit(self) -> None:
+        process = self.start("lit_process", "probe.toml")
+        assert process.stdout is not None
+        assert process.stdout.readline() == "lit\n"
+        assert min(self.chip.led_ratio()) > 0.5
+        process.kill()
+        process.communicate(timeout=60)
+        assert min(self.chip.led_ratio()) > 0.5, "a killed process switches nothing off"
+
+    def run(self, *program: str) -> tuple[int, str]:
+        process = self.start(*program)
+        _, errors = process.communicate(timeout=60)
+        return process.returncode, errors
+
+
+@pytest.fixture
+def board_of(tmp_path: Path) -> Iterator[Callable[..., Board]]:
+    with ExitStack() as serving:
+
+        def board(kind: str, *faults: ScriptedFault) -> Board:
+            made = Board(tmp_path, kind, *faults)
+            serving.enter_context(served(made.bus, tmp_path / "i2c"))
+            return made
+
+        yield board
+
+
+@pytest.mark.parametrize("program", [("device.commands.led_off", "--config"), ("device", "--config")])
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_the_light_that_a_killed_daemon_left_on_goes_off(board_of, kind, program):
+    board = board_of(kind)
+    board.kill_while_lit()
+    command = ("led-off",) if program[0] == "device" else ()
+    assert board.run(*program, "probe.toml", *command) == (0, "")
+    assert board.chip.led_ratio() == DARK
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_the_light_of_a_killed_daemon_is_off_within_a_second_of_the_processors_time(board_of, kind):
+    """The second counts on an idle probe; here other programs run, so the child's CPU time stands for the wall's.
+
+    What is left of the wall's time is the machine's, and the program's own pauses, which the next test adds up.
+    `make bench` takes the time on the wall, from the kill to the chip's darkness (tests/bench_darkness.py).
+    """
+    board = board_of(kind)
+    board.kill_while_lit()
+    with board.start("device.commands.led_off", "--config", "probe.toml") as process:
+        cpu_s = ended_cpu_s(process)
+    assert cpu_s < DARK_WITHIN_S
+    assert board.chip.led_ratio() == DARK
+
+
+def test_it_loads_no_numpy_which_would_be_half_of_its_time():
+    program = "import sys, device.commands.led_off; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+@pytest.mark.parametrize("nacks", [0, 2])
+def test_it_pauses_only_for_the_chips_oscillator_and_before_it_asks_again(board_of, monkeypatch, kind, nacks):
+    board, pauses_s = board_of(kind), list[float]()
+    board.chip.nacks_to_come = nacks
+    monkeypatch.setattr(time, "sleep", pauses_s.append)
+    monkeypatch.setattr(led_off_module, "open_led_driver", lambda light: led_driver(light, board.bus))
+    led_off(LightSection(chip=kind))
+    assert sum(pauses_s) <= nacks * PAUSE_S + 0.01
+    assert board.chip.led_ratio() == DARK
+
+
+def test_settings_that_have_gone_bad_since_the_start_leave_no_light_on(board_of, tmp_path):
+    board = board_of("pca9685")
+    board.kill_while_lit()
+    (tmp_path / NAME).write_text(SETTINGS["pca9685"])
+    (tmp_path / "probe.toml").write_text('data = "."\n[light]\nchip = "pca9686"\n')
+    code, _ = board.run("device.commands.led_off", "--config", "probe.toml")
+    assert code == 0
+    assert board.chip.led_ratio() == DARK
+
+
+def test_where_nothing_is_lit_it_is_dark_again(board_of):
+    board = board_of("tlc59116")
+    assert board.run("device.commands.led_off") == (0, "")
+    assert board.chip.led_ratio() == DARK
+
+
+def test_a_chip_that_does_not_acknowledge_at_first_is_asked_again(board_of):
+    board = board_of("tlc59116")
+    board.kill_while_lit()
+    board.chip.nacks_to_come = 2
+    assert board.run("device.commands.led_off") == (0, "")
+    assert board.chip.led_ratio() == DARK
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [("i2c_nack", "LED chip 0x60 does not answer"), ("i2c_stuck", "bus of the LED chip is stuck")]
+)
+def test_a_chip_or_bus_that_does_not_answer_is_one_sentence_and_exit_1(board_of, kind, words):
+    board = board_of("tlc59116", ScriptedFault(kind))
+    code, errors = board.run("device.commands.led_off")
+    assert code == 1
+    [line] = errors.splitlines()
+    assert words in line
+
+
+def test_a_bus_that_is_not_there_is_one_sentence_and_exit_1(capsys, tmp_path):
+    (tmp_path / "probe.toml").write_text("[light]\nbus = 254\n")
+    assert main(["--config", str(tmp_path / "probe.toml")]) == 1
+    [line] = capsys.readouterr().err.splitlines()
+    assert "I2C bus 254 cannot be opened" in line
+
+
+def test_the_emulated_probe_has_no_light_to_darken(capsys):
+    with pytest.raises(SystemExit) as usage:
+        daemon_main(["--simulate", "led-off"])
+    assert usage.value.code == 2
+    assert "leave out --simulate" in capsys.readouterr().err

@@ -1,0 +1,64 @@
+"""Every code of the table is provoked: by a scenario of the virtual probe, or by the test that is named here.
+
+A new code without either fails with what to add.
+"""
+
+import ast
+from functools import cache
+
+import pytest
+from daemon_process import ROOT
+
+from device.fault_table import FAULTS
+from device.simulation.scenario import read_scenario
+
+PROVOKED_BY = {
+    "E000": "device/web/test_problems.py::test_an_error_that_nobody_foresaw_tells_the_client_nothing_of_the_inside",
+    "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
+    "E002": "device/settings/test_last_good.py::"
+    "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
+    "E801": "test_press_to_result.py::"
+    "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
+    "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
+    "E803": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
+    "E804": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
+    "E805": "device/web/test_app.py::test_a_mode_without_a_model_is_refused_with_its_own_code",
+    "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
+}
+"""What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""
+NO_PARTS = {"0": "settings files and the daemon itself", "8": "requests", "9": "a restart"}
+
+
+@cache
+def codes_of_scenarios():
+    """tests/device/test_scenarios.py runs each of these and waits for its code."""
+    return {read_scenario(path).expects for path in (ROOT / "scenarios").glob("*.toml")} - {""}
+
+
+@pytest.mark.parametrize("code", [fault.code for fault in FAULTS])
+def test_a_code_is_provoked_by_a_scenario_or_by_a_named_test(code):
+    assert code in codes_of_scenarios() | set(PROVOKED_BY), (
+        f'Nothing provokes {code}: add a scenarios/*.toml with `expects = "{code}"` and its row in '
+        "docs/simulated_probe.md, or, where no scene can, a test that provokes it and names it, "
+        f"and put that test into PROVOKED_BY of {__file__}."
+    )
+
+
+@pytest.mark.parametrize("code", sorted(PROVOKED_BY))
+def test_a_test_that_is_named_for_a_code_exists_and_names_it(code):
+    file, _, name = PROVOKED_BY[code].partition("::")
+    text = (ROOT / "tests" / file).read_text(encoding="utf-8")
+    tests = {node.name: node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
+    assert name in tests, f"{file} has no test {name}"
+    with_marks = [tests[name], *tests[name].decorator_list]
+    assert any(f'"{code}' in (ast.get_source_segment(text, node) or "") for node in with_marks), f"it names no {code}"
+
+
+def test_every_fault_of_a_part_of_the_probe_has_a_scenario():
+    assert {code[1] for code in PROVOKED_BY} <= set(NO_PARTS)
+    assert {fault.code for fault in FAULTS if fault.code[1] not in NO_PARTS} <= codes_of_scenarios()
+
+
+def test_a_code_is_not_named_in_both_places_and_only_if_it_exists():
+    assert not codes_of_scenarios() & set(PROVOKED_BY)
+    assert codes_of_scenarios() | set(PROVOKED_BY) <= {fault.code for fault in FAULTS}

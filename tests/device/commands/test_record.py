@@ -1,0 +1,132 @@
+"""`python -m device record` of the virtual probe, as typed, without certificate or model: a folder that calibrates."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from daemon_process import QUICK_HAND, ROOT
+
+from device.__main__ import main
+from device.files.recording_file import read_recording
+from device.measurement.quantities import Inclusion
+from device.measurement.recording.recording import RecordedCell
+from host_tools.calibration.gates import unusable
+
+PHANTOM = ("--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80")
+OUT = Path("phantoms/1")
+NEW_PROBE = 'serial = "SIM-0001"\ncalibration = "calibrations"\nmodel = "none"\ndata = "var"\n'
+
+
+@pytest.fixture(autouse=True)
+def new_probe(tmp_path, monkeypatch):
+    """Settings whose folder of certificates is empty and whose model is not there, in the current folder."""
+    (tmp_path / "calibrations").mkdir()
+    (tmp_path / "probe.toml").write_text(NEW_PROBE)
+    monkeypatch.chdir(tmp_path)
+
+
+def command(*arguments, scene=""):
+    Path("scene.toml").write_text(QUICK_HAND + scene)
+    return ["--config", "probe.toml", "record", "--simulate", "--scene", "scene.toml", *arguments]
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command line; return its exit code and the lines of stdout and stderr."""
+
+    def run_line(arguments):
+        try:
+            code = main(arguments)
+        except SystemExit as usage:
+            code = usage.code
+        captured = capsys.readouterr()
+        return code, captured.out.splitlines(), captured.err.splitlines()
+
+    return run_line
+
+
+def test_a_probe_that_was_never_calibrated_records_a_phantom_once(run):
+    arguments = command(*PHANTOM, "--phantom-serial", "PH-3", "--out", str(OUT))
+    code, out, told = run(arguments)
+    assert (code, out) == (0, [str(OUT)]), told
+    steps = ["Keep the probe free", "Press beside the lesion", "Lift the probe", "Press on the lesion", "Done"]
+    assert [line for line in told if line in steps] == steps
+
+    recording = read_recording(OUT)
+    assert unusable([recording], force_n=0.5) == []
+    assert (recording.truth, recording.phantom_serial) == (Inclusion(10.0, 6.0, 80.0), "PH-3")
+    assert (recording.serial, recording.simulated, recording.calibration_id) == ("SIM-0001", True, None)
+    assert recording.cell == RecordedCell(100_000.0, 8_200.0)
+    assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 4 + 10, 10]
+    assert list(OUT.parent.iterdir()) == [OUT]
+
+    before = (OUT / "recording.json").stat().st_mtime_ns
+    code, out, [refusal] = run(arguments)  # nobody is told to keep the probe free: nothing is opened
+    assert (code, out) == (1, [])
+    assert refusal == f"out is {OUT}, but must be a new folder: a recording is never replaced: give another name."
+    assert (OUT / "recording.json").stat().st_mtime_ns == before
+
+
+def test_a_fault_ends_the_press_with_its_code_and_leaves_nothing(run):
+    dead = '[[faults]]\nkind = "led_dead"\nside = "+x"\nfrom_press = 1\n'
+    code, out, told = run(command(*PHANTOM, "--out", str(OUT), scene=dead))
+    assert (code, out) == (1, [])
+    assert told[-2] == "The probe has a fault"
+    assert told[-1].startswith("E203 ")
+    assert list(OUT.parent.iterdir()) == []
+
+
+def test_ctrl_c_cancels_the_press_and_leaves_nothing():
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    arguments = command(*PHANTOM, "--out", str(OUT))
+    with subprocess.Popen(
+        [sys.executable, "-m", "device", *arguments], env=environment, stderr=subprocess.PIPE, text=True
+    ) as process:
+        told = []
+        for line in process.stderr:
+            told.append(line.rstrip())
+            if told[-1] == "Press beside the lesion":
+                process.send_signal(signal.SIGINT)
+    assert process.returncode == 1
+    assert told[-2:] == ["Press rejected", "Cancelled by the operator."]
+    assert list(OUT.parent.iterdir()) == []
+
+
+def test_a_real_probe_lists_every_part_that_failed_and_asks_for_no_model(run, tmp_path):
+    parts = f'[light]\nbus = 97\n[camera]\nindex = 97\n[cell]\ndevice = "{tmp_path}/none"\n'
+    Path("probe.toml").write_text(NEW_PROBE + parts)
+    code, out, told = run(["--root", ".", "--config", "probe.toml", "record", *PHANTOM, "--out", str(OUT)])
+    assert (code, out) == (1, [])
+    assert sorted(line.split()[0] for line in told if line.startswith("E")) == ["E101", "E201", "E304"]
+
+
+def test_a_phantom_that_cannot_be_is_refused_before_anything_is_opened(run):
+    code, out, [refusal] = run(command(*PHANTOM, "--size-mm", "-1", "--out", str(OUT)))
+    assert (code, out) == (1, [])
+    assert refusal.startswith("size_mm is -1")
+    assert not Path("var").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_opened(run):
+    code, out, [refusal] = run(command(*PHANTOM, "--out", "scene.toml/1"))
+    assert (code, out) == (1, [])
+    assert refusal.startswith("E601 scene.toml cannot be made")
+    assert not Path("var").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["record", *PHANTOM],
+        ["record", *PHANTOM[:4], "--out", "1"],
+        ["record", *PHANTOM, "--out", "1", "--mode", "slow"],
+        ["record", *PHANTOM, "--out", "1", "--scene", "scene.toml"],
+    ],
+)
+def test_wrong_usage_is_exit_code_2(run, arguments):
+    code, out, told = run(arguments)
+    assert (code, out) == (2, [])
+    assert told[0].startswith("usage: python -m device")

@@ -1,0 +1,299 @@
+"""A recording comes back as it was written, and is refused by the name of the field that is wrong."""
+
+import json
+import shutil
+import zipfile
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from device.files.durable import write_and_sync
+from device.files.recording_file import read_recording, write_recording
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
+from device.measurement.recording.tactile_image import Frame
+
+CAMERA = CameraSettings(
+    width_px=32, height_px=24, bits=8, mm_per_px_x=0.03, mm_per_px_y=0.04, exposure_us=4000.0, gain=1.5
+)
+ROLES = ("dark", "reference", "press", "press")
+
+
+def small_recording(bits=8):
+    counts = np.random.default_rng(1).integers(0, 2**bits, (4, 24, 32)).astype(f"uint{bits}")
+    return Recording(
+        id="one-press",
+        serial="TSIS-0007",
+        software="1.0",
+        started_at="2026-01-02T03:04:05.678Z",
+        camera=replace(CAMERA, bits=bits),
+        frames=tuple(Frame(counts[i], role, 0.1 * i, 0.25 * i, (0.0, 0.2, 0.4, 1.0)) for i, role in enumerate(ROLES)),
+        calibration_id="certificate",
+        position_mm=(6.0, -1.5),
+        truth=Inclusion(10.0, 5.0, 80.0),
+        simulated=True,
+        cell=RecordedCell(100_000.0, -8200.0),
+        phantom_serial="PH-3",
+    )
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_recording(small_recording(), tmp_path / "press")
+    return tmp_path / "press"
+
+
+def zipped(folder, prefix=""):
+    path = folder.with_suffix(".zip")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+            archive.write(file, prefix + str(file.relative_to(folder)))
+    return path
+
+
+def edited(folder, change):
+    path = folder / "recording.json"
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record))
+    return folder
+
+
+def with_value(folder, path, value):
+    """Set the field at a dotted path, or remove it when the value is `...`."""
+
+    def change(record):
+        *way, last = (int(key) if key.isdigit() else key for key in path.split("."))
+        for key in way:
+            record = record[key]
+        if value is ...:
+            del record[last]
+        else:
+            record[last] = value
+
+    return edited(folder, change)
+
+
+def assert_same(found, expected):
+    for a, b in zip(found.frames, expected.frames, strict=True):
+        np.testing.assert_array_equal(a.counts, b.counts, strict=True)
+        assert (a.role, a.t_s, a.force_n, a.led_ratio) == (b.role, b.t_s, b.force_n, b.led_ratio)
+    assert replace(found, frames=()) == replace(expected, frames=())
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_folder_comes_back_as_it_was_written(tmp_path, bits):
+    write_recording(small_recording(bits), tmp_path / "press")
+    assert_same(read_recording(tmp_path / "press"), small_recording(bits))
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("prefix", ["", "press/"])
+def test_a_zip_of_the_folder_or_of_its_content_comes_back_too(tmp_path, bits, prefix):
+    write_recording(small_recording(bits), tmp_path / "press")
+    assert_same(read_recording(zipped(tmp_path / "press", prefix)), small_recording(bits))
+
+
+def test_what_need_not_be_known_may_be_absent(folder):
+    for name in ("truth", "position_mm", "calibration_id", "simulated", "cell", "phantom_serial"):
+        with_value(folder, name, ...)
+    found = read_recording(folder)
+    assert (found.truth, found.position_mm, found.calibration_id, found.simulated) == (None, (0.0, 0.0), None, False)
+    assert (found.cell, found.phantom_serial) == (None, "")
+
+
+def test_a_tare_that_is_not_known_is_null(folder):
+    assert read_recording(with_value(folder, "cell.tare_counts", None)).cell == RecordedCell(100_000.0)
+
+
+def test_the_file_on_disk_is_the_contract(folder):
+    record = json.loads((folder / "recording.json").read_text())
+    assert record["schema"] == "tsis.recording/1"
+    assert record["device"] == {"serial": "TSIS-0007", "software": "1.0"}
+    assert record["frames"][1] == {
+        "file": "frames/001.png", "role": "reference", "t_s": 0.1, "force_n": 0.25, "led_ratio": [0.0, 0.2, 0.4, 1.0]
+    }  # fmt: skip
+    assert record["cell"] == {"counts_per_n": 100000.0, "tare_counts": -8200.0}
+    assert record["truth"] == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
+    assert record["phantom_serial"] == "PH-3"
+    assert sorted(p.name for p in (folder / "frames").iterdir()) == ["000.png", "001.png", "002.png", "003.png"]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "quantity"),
+    [
+        ("schema", ..., "schema"),
+        ("schema", "tsis.recording/2", "schema"),
+        ("id", ..., "id"),
+        ("id", 7, "id"),
+        ("device", ..., "device"),
+        ("device.serial", ..., "device.serial"),
+        ("device.software", 1.0, "device.software"),
+        ("started_at", ..., "started_at"),
+        ("started_at", "yesterday", "started_at"),
+        ("camera", ..., "camera"),
+        ("camera", [], "camera"),
+        ("camera.gain", ..., "camera.gain"),
+        ("camera.gain", "1", "camera.gain"),
+        ("camera.gain", True, "camera.gain"),
+        ("camera.gain", float("nan"), "camera.gain"),
+        ("camera.exposure_us", 0, "camera.exposure_us"),
+        ("camera.bits", 12, "camera.bits"),
+        ("camera.bits", 16, "camera.bits"),
+        ("camera.width_px", 15, "camera.width_px"),
+        ("camera.width_px", 33, "frame shape"),
+        ("camera.mm_per_px_x", 0.0, "mm_per_px_x"),
+        ("frames", ..., "frames"),
+        ("frames", {}, "frames"),
+        ("frames.1", "frames/001.png", "frames[1].file"),
+        ("frames.1.file", ..., "frames[1].file"),
+        ("frames.1.file", "frames/none.png", "frames[1].file"),
+        ("frames.1.file", "frames", "frames[1].file"),
+        ("frames.1.file", "recording.json", "frames[1].file"),
+        ("frames.1.role", ..., "frames[1].role"),
+        ("frames.1.role", "flat", "role"),
+        ("frames.1.force_n", ..., "frames[1].force_n"),
+        ("frames.1.force_n", None, "frames[1].force_n"),
+        ("frames.1.force_n", "0.5", "frames[1].force_n"),
+        ("frames.1.force_n", float("nan"), "frames[1].force_n"),
+        ("frames.1.force_n", float("inf"), "frames[1].force_n"),
+        ("frames.1.force_n", 1001.0, "frames[1].force_n"),
+        ("frames.1.t_s", ..., "frames[1].t_s"),
+        ("frames.1.t_s", float("nan"), "t_s"),
+        ("frames.1.led_ratio", ..., "frames[1].led_ratio"),
+        ("frames.1.led_ratio", [0.6, 0.6, 0.6], "frames[1].led_ratio"),
+        ("frames.1.led_ratio", [0.6, 0.6, 0.6, 1.2], "led_ratio"),
+        ("frames.1.led_ratio", [0.6, 0.6, 0.6, "x"], "led_ratio"),
+        ("calibration_id", 3, "calibration_id"),
+        ("position_mm", 3.0, "position_mm"),
+        ("position_mm", [1.0], "position_mm"),
+        ("position_mm", [1.0, float("nan")], "position_mm"),
+        ("position_mm", ["1", "2"], "position_mm"),
+        ("simulated", "no", "simulated"),
+        ("simulated", 1, "simulated"),
+        ("cell", 5, "cell"),
+        ("cell.counts_per_n", ..., "cell.counts_per_n"),
+        ("cell.counts_per_n", 0.0, "cell.counts_per_n"),
+        ("cell.tare_counts", "8200", "cell.tare_counts"),
+        ("cell.tare_counts", float("nan"), "cell.tare_counts"),
+        ("truth", 5, "truth.size_mm"),
+        ("truth", {}, "truth.size_mm"),
+        ("truth.depth_mm", ..., "truth.depth_mm"),
+        ("truth.depth_mm", float("nan"), "depth_mm"),
+        ("truth.youngs_modulus_kpa", -80, "youngs_modulus_kpa"),
+    ],
+)
+def test_a_wrong_field_is_refused_by_its_name(folder, path, value, quantity):
+    with pytest.raises(InvalidQuantity) as refusal:
+        read_recording(with_value(folder, path, value))
+    assert refusal.value.quantity == quantity
+
+
+@pytest.mark.parametrize("way", ["../outside.png", "frames/../../outside.png", "/{}/outside.png"])
+def test_a_frame_outside_the_recording_is_not_read(folder, way):
+    shutil.copy(folder / "frames/000.png", folder.parent / "outside.png")
+    with pytest.raises(InvalidQuantity, match="a path inside the recording"):
+        read_recording(with_value(folder, "frames.1.file", way.format(folder.parent)))
+
+
+def test_a_missing_png_is_refused_in_a_zip_as_in_a_folder(folder):
+    (folder / "frames/002.png").unlink()
+    for path in (folder, zipped(folder)):
+        with pytest.raises(InvalidQuantity, match=r"^frames\[2\]\.file is frames/002\.png, but must be a readable PNG"):
+            read_recording(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"no picture"])
+def test_what_is_no_png_is_refused(folder, content):
+    (folder / "frames/002.png").write_bytes(content)
+    with pytest.raises(InvalidQuantity, match=r"^frames\[2\]\.file"):
+        read_recording(folder)
+
+
+def test_a_png_that_ends_early_is_refused(folder):
+    path = folder / "frames/002.png"
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InvalidQuantity, match=r"^frames\[2\]\.file"):
+        read_recording(folder)
+
+
+def test_a_colour_picture_is_refused(folder):
+    cv2.imwrite(str(folder / "frames/002.png"), np.zeros((24, 32, 3), np.uint8))
+    with pytest.raises(InvalidQuantity, match=r"a mono image"):
+        read_recording(folder)
+
+
+def test_a_frame_of_another_shape_is_refused_with_both(folder):
+    cv2.imwrite(str(folder / "frames/002.png"), np.zeros((20, 30), np.uint8))
+    with pytest.raises(InvalidQuantity, match=r"frame shape is .*30 x 20.*32 x 24|frame shape is .*32 x 24.*30 x 20"):
+        read_recording(folder)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "7"])
+def test_a_description_that_is_none_is_refused(folder, text):
+    (folder / "recording.json").write_text(text)
+    with pytest.raises(InvalidQuantity, match=r"^(recording|schema) is"):
+        read_recording(folder)
+
+
+@pytest.mark.parametrize("name", ["none", "none.zip"])
+def test_a_missing_recording_is_refused_by_its_path(tmp_path, name):
+    with pytest.raises(InvalidQuantity, match=name):
+        read_recording(tmp_path / name)
+
+
+def test_a_zip_that_is_none_is_refused(tmp_path):
+    (tmp_path / "press.zip").write_bytes(b"no archive")
+    with pytest.raises(InvalidQuantity, match=r"press\.zip, but must be a readable \.zip"):
+        read_recording(tmp_path / "press.zip")
+
+
+@pytest.mark.parametrize(("file", "quantity"), [("recording.json", "recording"), ("frames/002.png", "frames[2].file")])
+def test_a_zip_with_a_damaged_file_is_refused(folder, file, quantity):
+    path = zipped(folder)
+    with zipfile.ZipFile(path) as archive:
+        begin = archive.getinfo(file).header_offset + 30 + len(file)
+    content = bytearray(path.read_bytes())
+    content[begin + 20 : begin + 40] = bytes(20)
+    path.write_bytes(content)
+    with pytest.raises(InvalidQuantity) as refusal:
+        read_recording(path)
+    assert refusal.value.quantity == quantity
+
+
+def fail_at(call):
+    """Return a stand-in for the durable write that fails at its n-th call, as a full disk does."""
+    calls = []
+
+    def write(path, content):
+        calls.append(path)
+        if len(calls) == call:
+            raise OSError(28, "No space left on device")
+        write_and_sync(path, content)
+
+    return write
+
+
+@pytest.mark.parametrize("call", [1, 3, 5])
+def test_a_failing_disk_leaves_nothing_half_written(tmp_path, call):
+    """The first frame, a later one, and the description after all four frames."""
+    with pytest.raises(OSError, match="No space left"):
+        write_recording(small_recording(), tmp_path / "press", write=fail_at(call))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_an_earlier_crash_left_behind_does_not_get_into_the_recording(tmp_path):
+    stale = tmp_path / "press.tmp" / "frames"
+    stale.mkdir(parents=True)
+    (stale / "099.png").write_bytes(b"stale")
+    write_recording(small_recording(), tmp_path / "press")
+    assert not (tmp_path / "press" / "frames" / "099.png").exists()
+    assert_same(read_recording(tmp_path / "press"), small_recording())
+
+
+def test_a_recording_is_never_written_over(folder):
+    with pytest.raises(OSError, match="not empty"):
+        write_recording(replace(small_recording(), serial="another"), folder)
+    assert_same(read_recording(folder), small_recording())

@@ -1,0 +1,61 @@
+"""What a press's frames say is kept whole, recording and measurement, or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_certificate import small_certificate
+
+from device.config import Config
+from device.errors import DimLightError
+from device.files.recording_file import read_recording
+from device.instrument.press.record import Estimator, PressAnswers
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.instrument.watch.progress import ProgressBoard
+from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording.tactile_image import Frame
+from device.records.store import Store
+from device.settings.camera_section import CameraSection
+
+CONFIG = Config(camera=CameraSection(width_px=64, height_px=64))
+FRAMES = [Frame(np.full((64, 64), 9, np.uint8), role, 0.0, 0.5, (0.6,) * 4) for role in ("dark", "reference", "press")]
+ANSWER = Estimate(*[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {})
+STARTED_AT = "2026-01-02T03:04:05.000Z"
+
+
+def answers(store: Store, estimator: Estimator, truth: Inclusion | None = None) -> PressAnswers:
+    return PressAnswers(CONFIG, CalibrationWatch(small_certificate()), estimator, store, ProgressBoard(), truth)
+
+
+def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Path) -> None:
+    store, warning = Store(tmp_path), DimLightError("Side +x is dim.", "Look at it.")
+    kept = answers(store, lambda recording, mode: ANSWER).keep(FRAMES, "quick", STARTED_AT, [warning])
+    assert store.measurement(kept["id"]) == kept
+    assert (kept["mode"], kept["taken_at"], kept["warnings"]) == ("quick", STARTED_AT, [warning.as_record()])
+    recording = read_recording(store.recording_folder(kept["recording_id"]))
+    assert [frame.role for frame in recording.frames] == ["dark", "reference", "press"]
+    assert recording.calibration_id == small_certificate().id
+    store.close()
+
+
+def test_frames_that_an_estimator_refuses_leave_nothing_behind(tmp_path: Path) -> None:
+    def refuse(recording: object, mode: object) -> Estimate:
+        raise InvalidQuantity("force_n", 0.1, "at least 0.2 N", "press harder")
+
+    store = Store(tmp_path)
+    with pytest.raises(InvalidQuantity, match="press harder"):
+        answers(store, refuse).keep(FRAMES, "quick", STARTED_AT, [])
+    assert store.measurements(before_seq=1000, limit=10) == []
+    store.close()
+
+
+def test_a_probe_whose_truth_is_known_is_a_simulated_one(tmp_path: Path) -> None:
+    store, found = Store(tmp_path), []
+    for truth in (None, Inclusion(10.0, 5.0, 80.0)):
+        probe = answers(store, lambda recording, mode: found.append(recording) or ANSWER, truth)
+        probe.keep(FRAMES, "quick", STARTED_AT, [])
+        assert (probe.is_simulated, found[-1].simulated, found[-1].truth) == (truth is not None,) * 2 + (truth,)
+    store.close()

@@ -1,0 +1,200 @@
+"""Estimates of recorded force ramps by the committed model: numbers for one round inclusion, and for nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.estimate import doubts_about, estimate_profile
+from device.measurement.ramp_modes.model import RAMP_MODES, ModeLimits
+from device.measurement.ramp_modes.radial_profile import press_profile
+from device.simulation.physics.neighbour import Neighbour
+
+LIMITS = ModeLimits(bands=(), misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
+
+
+@pytest.fixture(scope="module")
+def ramp(pressed):
+    return pressed("standard")
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(
+    pressed, profile_model, calibration, mode
+):
+    estimate = estimate_profile(pressed(mode), mode, profile_model, calibration)
+    assert (estimate.mode, estimate.model) == (mode, "standard")
+    for name, truth, share in (("size_mm", 12.0, 0.1), ("depth_mm", 6.0, 0.1), ("youngs_modulus_kpa", 60.0, None)):
+        quantity = getattr(estimate, name)
+        assert quantity.low <= quantity.value <= quantity.high
+        assert quantity.low <= truth <= quantity.high
+        if share:
+            assert quantity.identifiable
+            assert quantity.value == pytest.approx(truth, rel=share)
+
+
+@pytest.mark.parametrize("tissue_kpa", [4.3, 5.7])
+def test_the_press_beside_the_lesion_tells_the_patients_tissue(pressed, profile_model, calibration, tissue_kpa):
+    recording = pressed("precise", tissue_modulus_kpa=tissue_kpa)
+    features = estimate_profile(recording, "precise", profile_model, calibration).features
+    assert features["tissue_modulus_std_kpa"] < 0.4
+    assert features["tissue_modulus_kpa"] == pytest.approx(tissue_kpa, abs=3 * features["tissue_modulus_std_kpa"])
+
+
+def test_the_same_recording_gives_the_same_estimate_again(ramp, profile_model, calibration):
+    first, again = (estimate_profile(ramp, "precise", profile_model, calibration) for _ in range(2))
+    assert first == again
+
+
+def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, profile_model, calibration):
+    """A deep small inclusion says nothing of its modulus: 10-160 kPa are left."""
+    estimate = estimate_profile(pressed("standard", (9.0, 9.0, 100.0)), "standard", profile_model, calibration)
+    modulus = estimate.youngs_modulus_kpa
+    assert (modulus.low, modulus.high) == (10.0, 160.0)  # exactly: the truth may be one of them
+    assert not modulus.identifiable
+    assert modulus.low_is_open
+    assert modulus.high_is_open
+    assert estimate.status == "not_identifiable"
+    assert "Young's modulus" in estimate.reason
+
+
+def test_an_interval_is_open_only_where_the_trained_range_ends(ramp, profile_model, calibration):
+    """12 mm of at most 15, 6 mm deep of 4-12: both are told from the ends."""
+    estimate = estimate_profile(ramp, "standard", profile_model, calibration)
+    for quantity, (lowest, highest) in ((estimate.size_mm, (2.0, 15.0)), (estimate.depth_mm, (4.0, 12.0))):
+        assert quantity.low_is_open == (quantity.low <= lowest)
+        assert quantity.high_is_open == (quantity.high >= highest)
+    assert not estimate.size_mm.low_is_open
+
+
+def test_nothing_under_the_skin_gets_no_numbers(pressed, profile_model, calibration):
+    estimate = estimate_profile(pressed("standard", (0.0, 6.0, 60.0)), "standard", profile_model, calibration)
+    assert estimate.status == "not_identifiable"
+    assert estimate.size_mm.value is None
+
+
+def test_two_inclusions_get_no_numbers_and_a_reason(pressed, profile_model, calibration):
+    two = pressed("standard", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
+    estimate = estimate_profile(two, "standard", profile_model, calibration)
+    assert estimate.status == "outside_range"
+    assert "not round" in estimate.reason or "No single round inclusion" in estimate.reason
+    assert estimate.size_mm.value is None
+
+
+def test_gel_on_the_face_gets_no_numbers(pressed, profile_model, calibration):
+    wet = pressed("standard", wet_ratio=0.4)
+    assert estimate_profile(wet, "standard", profile_model, calibration).size_mm.value is None
+
+
+def test_what_is_at_its_limit_is_usual():
+    assert doubts_about(1.2, 3.0, 0.5, LIMITS) == []
+
+
+@pytest.mark.parametrize(
+    ("doubtful", "sentence"),
+    [
+        ((1.31, 3.0, 0.5), "No single round inclusion explains this press: misfit 1.31, above the usual 1.20."),
+        (
+            (1.2, 4.26, 0.5),
+            "The inclusion is not round: its elongation is 4.3 standard deviations from a round one's, above the usual 3.0.",
+        ),
+        ((1.2, 3.0, 0.6), "Size or depth rather lies outside its trained range: log odds 0.6, above the usual 0.5."),
+    ],
+)
+def test_every_doubt_is_said_in_its_own_sentence(doubtful, sentence):
+    assert doubts_about(*doubtful, LIMITS) == [sentence]
+
+
+def test_all_doubts_are_said_and_what_is_no_number_is_doubted_too():
+    for everything in ((2.0, 9.0, 1.0), (float("nan"),) * 3):
+        found = doubts_about(*everything, LIMITS)
+        assert [sentence.split(":")[0] for sentence in found] == [
+            "No single round inclusion explains this press",
+            "The inclusion is not round",
+            "Size or depth rather lies outside its trained range",
+        ]
+
+
+def stretched_spot(recording, contrast):
+    """Return the recording with the second harmonic of a Gaussian spot of 3 mm that is stretched along the x-axis.
+
+    `contrast` is the largest of that harmonic, where r^2 = 2 s^2. Counts are whole numbers again by chance, so that
+    their means are what they would be without.
+    """
+    rng = np.random.default_rng(1)
+    x, y = recording.camera.scale.coordinates_mm(recording.frames[0].counts.shape)
+    r2 = (x**2 + y**2) / (2 * 3.0**2)
+    share = 1 + contrast * r2 * np.exp(1 - r2) * np.cos(2 * np.arctan2(y, x))
+    return replace(
+        recording,
+        frames=tuple(
+            replace(f, counts=np.floor(f.counts * share + rng.random(share.shape)).astype(np.uint8))
+            if f.role == "press"
+            else f
+            for f in recording.frames
+        ),
+    )
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_an_oblong_spot_gets_no_numbers_and_a_reason(pressed, profile_model, calibration, mode):
+    """2 % of the light, ten times what flat field and model leave open; the rings' means stay as they were."""
+    oblong = stretched_spot(pressed(mode), 0.02)
+    rings, as_before = (press_profile(recording).contrast for recording in (oblong, pressed(mode)))
+    np.testing.assert_allclose(rings, as_before, atol=2e-3)
+    estimate = estimate_profile(oblong, mode, profile_model, calibration)
+    assert estimate.status == "outside_range"
+    assert "The inclusion is not round" in estimate.reason
+    assert estimate.size_mm.value is None
+
+
+def test_a_round_inclusions_elongation_is_told_beside_the_other_features(ramp, profile_model, calibration):
+    features = estimate_profile(ramp, "standard", profile_model, calibration).features
+    assert 0 < features["elongation_deviations"] < profile_model.limits["standard"].elongation_deviations
+    assert "elongation_ratio" not in features
+
+
+def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, profile_model):
+    """2 mm aside the second harmonic of a sphere is far above noise; its best fit's is as large."""
+    aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
+    best, spot = profile_model.answer(aside.as_row(), "precise").best, profile_model.round_spot
+    assert np.abs(aside.second_harmonic).max() > 0.005
+    limit = profile_model.limits["precise"].elongation_deviations
+    assert spot.elongation_deviations(aside.second_harmonic, best, "precise") < limit
+    on_axis = best.copy()
+    on_axis[-1] = -1.0
+    assert spot.elongation_deviations(aside.second_harmonic, on_axis, "precise") > limit
+
+
+def test_full_scale_pixels_are_refused(ramp, profile_model, calibration):
+    frames = tuple(
+        replace(frame, counts=np.full_like(frame.counts, 255)) if frame.role == "press" else frame
+        for frame in ramp.frames
+    )
+    estimate = estimate_profile(replace(ramp, frames=frames), "standard", profile_model, calibration)
+    assert estimate.status == "saturated"
+    assert "lower the light" in estimate.reason
+
+
+@pytest.mark.parametrize(
+    ("change", "mode", "words"),
+    [
+        ({"serial": "TSIS-0042"}, "standard", "serial is TSIS-0042, but must be one of SIM-0001"),
+        ({}, "paper", "mode is paper, but must be one of standard, precise"),
+    ],
+)
+def test_what_the_model_is_not_for_is_refused(ramp, profile_model, calibration, change, mode, words):
+    with pytest.raises(InvalidQuantity, match=words):
+        estimate_profile(replace(ramp, **change), mode, profile_model, calibration)
+
+
+def test_frames_of_another_pixel_size_are_refused(ramp, profile_model, calibration):
+    camera = replace(ramp.camera, mm_per_px_x=0.04)
+    with pytest.raises(InvalidQuantity, match="mm_per_px"):
+        estimate_profile(replace(ramp, camera=camera), "standard", profile_model, calibration)
+
+
+def test_a_hold_is_no_ramp(pressed, profile_model, calibration):
+    with pytest.raises(InvalidQuantity, match="press slowly harder"):
+        estimate_profile(pressed("paper"), "standard", profile_model, calibration)

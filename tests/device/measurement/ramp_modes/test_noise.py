@@ -1,0 +1,175 @@
+"""The noise model against direct averages over the angle, and what each kind of drift does to a row."""
+
+import numpy as np
+import pytest
+from small_surrogate import COLUMNS, EXACT, white_noise
+
+from device.measurement.ramp_modes.noise import (
+    ErrorLevels,
+    PressNoise,
+    circle_correlation,
+    drift_directions,
+    light_ratio,
+    ring_correlation,
+    smooth_errors,
+    smooth_second_harmonics,
+)
+from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
+from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS, ring_weights
+
+POWER = 0.8
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+
+
+@pytest.fixture
+def row() -> np.ndarray:
+    """A random contrast on light that grows as the force to the power of 0.8."""
+    row = np.random.default_rng(1).uniform(0.0, 0.5, COLUMNS)
+    row[GROWTH] = np.repeat(POWER * np.log(PROFILE_FORCES_N[:-1] / PROFILE_FORCES_N[-1]), RINGS)
+    return row
+
+
+def test_the_covariance_is_symmetric_and_positive_definite(row):
+    covariance = white_noise(1e-4, ErrorLevels()).covariance(row)
+    np.testing.assert_allclose(covariance, covariance.T, rtol=1e-12)
+    assert np.linalg.eigvalsh(covariance).min() > 0.9e-8
+
+
+def test_without_drift_and_smooth_errors_only_the_camera_is_left(row):
+    """As large as the light is: white noise of 1e-3 where there is no contrast."""
+    noise, light = white_noise(1e-3), light_ratio(row)
+    np.testing.assert_allclose(noise.covariance(row), np.outer(light, light) * noise.camera, rtol=1e-14, atol=1e-30)
+
+
+@pytest.mark.parametrize("length_mm", [1.0, 2.5, 6.0])
+@pytest.mark.parametrize("harmonic", [0, 1, 2])
+def test_the_correlation_of_circles_is_the_fields_averaged_over_both_angles(length_mm, harmonic):
+    """They are a(r) = mean of 2 f(r, angle) cos(k angle), or without the 2 cos; trapezia are exact on a circle."""
+    angle = 2 * np.pi * np.arange(256) / 256
+    basis = np.ones_like(angle) if harmonic == 0 else 2 * np.cos(harmonic * angle)
+    x, y = np.multiply.outer(RING_RADII_MM, (np.cos(angle), np.sin(angle))).transpose(1, 0, 2)
+    expected = np.empty((RINGS, RINGS))
+    for i in range(RINGS):
+        for j in range(RINGS):
+            distance2 = np.subtract.outer(x[i], x[j]) ** 2 + np.subtract.outer(y[i], y[j]) ** 2
+            expected[i, j] = basis @ np.exp(-distance2 / (2 * length_mm**2)) @ basis / len(angle) ** 2
+    found = circle_correlation(RING_RADII_MM, length_mm, harmonic=harmonic)
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("length_mm", [2.0, 3.0])
+@pytest.mark.parametrize("harmonic", [0, 1, 2])
+def test_the_correlation_of_rings_is_that_of_what_the_profile_reads_of_a_smooth_field(length_mm, harmonic):
+    """The profile's own rings of every pixel's picture, times the field's correlation between any two pixels."""
+    scale = PixelScale(0.3, 0.3)
+    shape = 68, 68
+    x, y = (part.ravel() for part in np.broadcast_arrays(*scale.coordinates_mm(shape)))
+    rings, everywhere = ring_weights(shape, scale), np.ones(shape, bool)
+    pixels = [rings.means(one.reshape(shape), everywhere) for one in np.eye(x.size, dtype=np.float32)]
+    read = np.array([one.mean if harmonic == 0 else one.cosine[harmonic - 1] for one in pixels]).T
+    seen = np.hypot(x, y) < RINGS * RING_MM
+    distance2 = np.subtract.outer(x[seen], x[seen]) ** 2 + np.subtract.outer(y[seen], y[seen]) ** 2
+    expected = read[:, seen] @ np.exp(-distance2 / (2 * length_mm**2)) @ read[:, seen].T
+    np.testing.assert_allclose(ring_correlation(length_mm, harmonic=harmonic), expected, atol=0.01)
+
+
+def test_a_field_that_is_the_same_everywhere_moves_all_rings_and_no_harmonic():
+    np.testing.assert_allclose(ring_correlation(1e5, harmonic=0), 1.0, atol=1e-7)
+    for harmonic in (1, 2):
+        np.testing.assert_allclose(ring_correlation(1e5, harmonic=harmonic), 0.0, atol=1e-7)
+
+
+def test_a_short_field_averages_out_along_a_circle_but_not_in_the_middle():
+    """Far above its length a circle of radius r holds some sqrt(2 pi) r / length patches of their own."""
+    length_mm = 0.05
+    variance = np.diag(circle_correlation(RING_RADII_MM, length_mm, harmonic=0))
+    assert variance[0] == 1.0
+    np.testing.assert_allclose(variance[1:], length_mm / (np.sqrt(2 * np.pi) * RING_RADII_MM[1:]), rtol=1e-3)
+
+
+def test_more_light_moves_a_contrast_by_the_light_that_is_there(row):
+    """(1 + g) (1 + c) - 1 = c + g (1 + c); growth is a ratio that it leaves, an offset a part of the contrast."""
+    gain, _ = drift_directions(row)
+    np.testing.assert_allclose(gain[:CONTRAST_COLUMNS], 1 + row[:CONTRAST_COLUMNS], rtol=1e-14)
+    np.testing.assert_array_equal(gain[GROWTH], 0.0)
+    np.testing.assert_array_equal(gain[GROWTH.stop :], row[GROWTH.stop :])
+
+
+def test_an_offsets_light_is_the_mean_over_the_loads_at_its_ring(row):
+    contrast = row[:CONTRAST_COLUMNS].reshape(-1, RINGS)
+    np.testing.assert_allclose(light_ratio(row)[GROWTH.stop :], 1 + contrast.mean(axis=0)[1:], rtol=1e-14)
+
+
+def test_a_drift_of_the_cells_zero_looks_up_the_reference_at_another_force(row):
+    """The reference's light is F^0.8: the contrast seen is (1 + c) (F / (F + dz))^0.8 - 1, to first order."""
+    zero, step_n = drift_directions(row)[1][:CONTRAST_COLUMNS], 1e-6
+    force_n = np.repeat(PROFILE_FORCES_N, RINGS)
+    moved = (1 + row[:CONTRAST_COLUMNS]) * ((force_n / (force_n + step_n)) ** POWER - 1) / step_n
+    np.testing.assert_allclose(zero, moved, rtol=1e-4)
+
+
+def test_a_drift_of_the_cells_zero_matters_most_at_the_smallest_load(row):
+    row[:CONTRAST_COLUMNS] = 0.0
+    bare = np.abs(drift_directions(row)[1][:CONTRAST_COLUMNS]).reshape(-1, RINGS)
+    assert (np.diff(bare, axis=0) < 0).all()
+
+
+def test_drifts_of_many_rows_are_those_of_each(row):
+    rows = np.stack([row, 0.5 * row])
+    for together, alone in zip(drift_directions(rows), zip(*map(drift_directions, rows), strict=True), strict=True):
+        np.testing.assert_allclose(together, np.stack(alone), rtol=1e-12)
+
+
+def test_drifts_enter_the_covariance_with_their_levels(row):
+    levels = ErrorLevels(gain_ratio=0.02, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
+    light = 1 + row[:CONTRAST_COLUMNS]
+    covariance = white_noise(1e-3, levels).covariance(row)[:CONTRAST_COLUMNS, :CONTRAST_COLUMNS]
+    expected = np.outer(light, light) * (4e-4 + 1e-6 * np.eye(CONTRAST_COLUMNS))
+    np.testing.assert_allclose(covariance, expected, atol=1e-15)
+
+
+def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones_own():
+    first, second = slice(0, RINGS), slice(RINGS, 2 * RINGS)
+    flat = smooth_errors(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))
+    model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
+    np.testing.assert_array_equal(flat[first, second], flat[first, first])
+    assert flat[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().flat_field_mm, harmonic=0)[0, 0])
+    np.testing.assert_array_equal(model[first, second], 0.0)
+    assert model[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0])
+
+
+def test_in_second_harmonics_too_the_flat_field_is_common_and_the_models_error_each_loads_own():
+    """Without the ring in the middle, which has none, and the outermost one: nine rings of four loads are left."""
+    flat = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))
+    model = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.02))
+    of_flat, of_model = (
+        ratio**2 * ring_correlation(length_mm, harmonic=2)[1:-1, 1:-1]
+        for ratio, length_mm in ((0.01, ErrorLevels().flat_field_mm), (0.02, ErrorLevels().model_mm))
+    )
+    assert flat.shape == model.shape == (36, 36)
+    for load in range(4):
+        for other in range(4):
+            block = np.s_[9 * load : 9 * load + 9, 9 * other : 9 * other + 9]
+            np.testing.assert_allclose(flat[block], of_flat, rtol=1e-14)
+            np.testing.assert_allclose(model[block], of_model if other == load else 0.0, rtol=1e-14)
+    both = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.02))
+    np.testing.assert_allclose(both, flat + model, rtol=1e-14)
+
+
+def test_growth_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
+    model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
+    middle = model[GROWTH, GROWTH][::RINGS, ::RINGS]
+    in_the_middle = ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0]
+    np.testing.assert_allclose(middle, 1e-4 * in_the_middle * (np.eye(3) + 1), rtol=1e-12)
+
+
+def test_smooth_errors_grow_with_the_light_they_are_a_ratio_of():
+    levels = ErrorLevels(gain_ratio=0.0, zero_n=0.0)
+    camera = np.zeros((COLUMNS, COLUMNS))
+    dark, bright = (PressNoise(camera, levels).covariance(np.full(COLUMNS, c)) for c in (0.0, 0.5))
+    np.testing.assert_allclose(np.diag(bright)[:CONTRAST_COLUMNS], 2.25 * np.diag(dark)[:CONTRAST_COLUMNS], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[GROWTH], np.diag(dark)[GROWTH], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[GROWTH.stop :], 2.25 * np.diag(dark)[GROWTH.stop :], rtol=1e-12)
+    assert np.diag(PressNoise(camera, EXACT).covariance(np.ones(COLUMNS))).max() == 0

@@ -1,0 +1,89 @@
+"""The posterior of a linear forward model with Gaussian noise is known on paper; nothing here is a real press."""
+
+import numpy as np
+import pytest
+from linear_press import NOISE, START, TOLD, TRUTH, noisy_row, on_paper, random_slopes
+from small_surrogate import linear_surrogate
+
+from device.measurement.parameters import EVEN_STD, PARAMETERS
+from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.posterior import FEWEST_EFFECTIVE, PressFit, sample_press
+from device.measurement.ramp_modes.surrogate import MODULUS
+
+
+@pytest.fixture(scope="module")
+def slopes() -> np.ndarray:
+    return random_slopes()
+
+
+@pytest.fixture(scope="module")
+def row(slopes) -> np.ndarray:
+    return noisy_row(slopes)
+
+
+@pytest.fixture(scope="module")
+def fit(row, slopes) -> PressFit:
+    return sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), START)
+
+
+def test_the_posterior_of_a_linear_model_is_the_gaussian_of_linear_algebra(fit, row, slopes):
+    mean, covariance = on_paper(row, slopes)
+    spread = np.sqrt(np.diag(covariance))
+    assert (np.abs(mean) + 4 * spread < 1).all()
+    np.testing.assert_allclose(fit.spread[TOLD], spread, rtol=0.05)
+    assert np.abs((fit.mean[TOLD] - mean) / spread).max() < 5 / np.sqrt(fit.effective_samples)
+
+
+def test_what_the_row_does_not_tell_keeps_the_spread_of_its_even_prior(fit):
+    assert fit.spread[MODULUS] == pytest.approx(EVEN_STD, rel=0.05)
+    assert fit.mean[MODULUS] == pytest.approx(0.0, abs=5 * EVEN_STD / np.sqrt(fit.effective_samples))
+
+
+def test_the_samples_are_worth_enough(fit):
+    assert 200 < fit.effective_samples <= 6000
+
+
+def test_the_same_row_twice_gives_the_same_answer(fit, row, slopes):
+    again = sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), START)
+    np.testing.assert_array_equal(again.mean, fit.mean)
+    np.testing.assert_array_equal(again.spread, fit.spread)
+
+
+def test_a_parameter_at_the_end_of_its_range_is_not_estimated_beyond_it(slopes):
+    truth = TRUTH.copy()
+    truth[0] = 1.0
+    row = linear_surrogate(slopes).rows(truth[None])[0]
+    fit = sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), START)
+    mean, covariance = on_paper(row, slopes)
+    assert mean[0] == pytest.approx(1.0)
+    spread = np.sqrt(covariance[0, 0])
+    assert fit.mean[0] == pytest.approx(1 - spread * np.sqrt(2 / np.pi), abs=0.1 * spread)
+    assert fit.spread[0] == pytest.approx(spread * np.sqrt(1 - 2 / np.pi), rel=0.1)
+
+
+def test_a_start_outside_the_ranges_is_brought_inside(fit, row, slopes):
+    outside = sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), np.full(len(PARAMETERS), 1.7))
+    np.testing.assert_allclose(outside.best, fit.best, atol=1e-3)
+
+
+def test_a_row_that_drives_the_fit_into_a_corner_tells_nothing_and_is_never_not_a_number(slopes):
+    """Coordinates of 40 in all that shows: no sample has a density that counts, or only a few have."""
+    row = linear_surrogate(slopes).rows(40 * np.sign(TRUTH)[None])[0]
+    fit = sample_press(PressPosterior(row, linear_surrogate(slopes), NOISE), START)
+    assert fit.effective_samples < FEWEST_EFFECTIVE
+    np.testing.assert_array_equal(fit.spread, EVEN_STD)
+    np.testing.assert_array_equal(fit.mean, fit.best)
+
+
+@pytest.mark.parametrize("inside", [0, 1])
+def test_samples_that_all_miss_the_ranges_but_for_one_tell_nothing(inside, row, slopes, monkeypatch):
+    posterior = PressPosterior(row, linear_surrogate(slopes), NOISE)
+    density = posterior.log_density
+
+    def of_few(unit: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(len(unit)) < inside, density(unit), -np.inf) if len(unit) > 1 else density(unit)
+
+    monkeypatch.setattr(posterior, "log_density", of_few)
+    fit = sample_press(posterior, START)
+    assert fit.effective_samples <= inside
+    np.testing.assert_array_equal(fit.spread, EVEN_STD)

@@ -1,0 +1,226 @@
+"""A recording of two force ramps to contrast on rings: synthetic recordings whose contrast is known on paper."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from daemon_process import ROOT
+
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.radial_profile import (
+    LARGEST_STEP_N,
+    MIN_RAMP_FRAMES,
+    PROFILE_FORCES_N,
+    ROW_NAMES,
+    harmonic,
+    harmonic_at_forces,
+    press_profile,
+)
+from device.measurement.recording.recording import CameraSettings, Recording
+from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RingMeans
+from device.measurement.recording.tactile_image import Frame
+
+SIZE_PX, PITCH_MM, DARK = 192, 0.125, 1000
+RAMP_N = np.linspace(0.08, 0.6, 10)
+LIT = (0.6, 0.6, 0.6, 0.6)
+AT_MM = (np.arange(SIZE_PX) - (SIZE_PX - 1) / 2) * PITCH_MM
+X, Y = AT_MM[None, :], AT_MM[:, None]
+R = np.hypot(X, Y)
+
+
+def light(force_n):
+    """The inclusion-free light above dark (counts of 16 bits): a cubic of the force that differs from place to
+    place.
+    """
+    return (60_000 * force_n - 30_000 * force_n**2 - 4_000 * force_n**3) * (1 - 0.02 * R)
+
+
+def cone(force_n):
+    """A contrast that falls linearly with the radius and with the force."""
+    return (0.3 - 0.02 * R) * (1 - force_n)
+
+
+def frame(role, force_n, counts):
+    return Frame(np.rint(counts).astype(np.uint16), role, 0.0, float(force_n), LIT)
+
+
+def recording(contrast=cone, reference_n=RAMP_N, press_n=RAMP_N):
+    frames = [frame("dark", 0.0, np.full(R.shape, DARK))] * 2
+    frames += [frame("reference", f, DARK + light(f)) for f in reference_n]
+    frames += [frame("press", f, DARK + light(f) * (1 + contrast(f))) for f in press_n]
+    return recording_of(frames)
+
+
+def recording_of(frames, pitch_mm=PITCH_MM):
+    height, width = frames[0].counts.shape
+    bits = 8 * frames[0].counts.itemsize
+    camera = CameraSettings(width, height, bits, pitch_mm, pitch_mm, exposure_us=4000.0, gain=1.0)
+    return Recording("one", "SIM", "test", "2026-01-01T00:00:00Z", camera, tuple(frames))
+
+
+def without(asked, role):
+    return replace(asked, frames=tuple(f for f in asked.frames if f.role != role))
+
+
+def test_a_contrast_linear_in_force_and_radius_comes_back_at_every_force_and_ring():
+    """The ring at r sees a mean radius of r + h^2 / 6r, the one in the middle h / 2 (`test_ring_means`)."""
+    radius = np.append(RING_MM / 2, RING_RADII_MM[1:] + RING_MM**2 / (6 * RING_RADII_MM[1:]))
+    found = press_profile(recording())
+    np.testing.assert_array_equal(found.force_n, PROFILE_FORCES_N)
+    expected = (0.3 - 0.02 * radius) * (1 - PROFILE_FORCES_N[:, None])
+    np.testing.assert_allclose(found.contrast, expected, atol=1e-3)
+    assert found.residual < 1e-4
+
+
+def test_growth_is_the_logarithm_of_the_inclusion_free_light_over_that_at_the_largest_force():
+    """The same at every ring, since the light's cubic is one times a factor of the place."""
+    bare = np.array([light(f)[0, 0] for f in PROFILE_FORCES_N])
+    found = press_profile(recording()).growth
+    np.testing.assert_allclose(
+        found, np.repeat(np.log(bare[:-1] / bare[-1])[:, None], len(RING_RADII_MM), 1), atol=1e-3
+    )
+
+
+def test_a_press_that_looks_like_the_reference_has_no_contrast_and_no_harmonics():
+    found = press_profile(recording(lambda force_n: 0.0))
+    for values in (found.contrast, found.offset, found.elongation, found.second_harmonic):
+        np.testing.assert_allclose(values, 0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("towards", [0.0, 2.0, -2.5])
+def test_the_harmonics_are_lengths_along_their_own_direction(towards):
+    """0.01 cos(angle - towards) and 0.02 cos(2 angle - towards) on every ring, wherever they point."""
+    angle = np.arctan2(Y, X)
+    found = press_profile(recording(lambda _: 0.01 * np.cos(angle - towards) + 0.02 * np.cos(2 * angle - towards)))
+    np.testing.assert_allclose(found.offset, 0.01, atol=5e-4)
+    np.testing.assert_allclose(found.elongation, 0.02, atol=5e-4)
+
+
+def test_a_harmonic_is_known_at_each_force_too():
+    """(0.01 + 0.02 F) cos(angle - 2): the polynomials of the force hold a straight line."""
+    angle = np.arctan2(Y, X)
+    found = press_profile(recording(lambda force_n: (0.01 + 0.02 * force_n) * np.cos(angle - 2)))
+    expected = np.repeat(0.01 + 0.02 * PROFILE_FORCES_N[:, None], len(RING_RADII_MM) - 1, 1)
+    np.testing.assert_allclose(found.offset_at_force, expected, atol=5e-4)
+    np.testing.assert_allclose(found.elongation_at_force, 0.0, atol=5e-4)
+
+
+@pytest.mark.parametrize("bright", [0.0, 0.7, -2.5])
+@pytest.mark.parametrize("stretched", [0.0, 0.7, 1.4])
+def test_the_second_harmonic_is_told_along_and_across_the_bright_side(bright, stretched):
+    """0.02 cos(2 (angle - s)) has 0.02 cos(2 (s - t)) along t and 0.02 sin(2 (s - t)) across, at every force."""
+    angle = np.arctan2(Y, X)
+    found = press_profile(
+        recording(lambda _: 0.01 * np.cos(angle - bright) + 0.02 * np.cos(2 * (angle - stretched)))
+    ).second_harmonic
+    assert found.shape == (2, len(PROFILE_FORCES_N), len(RING_RADII_MM) - 2)
+    np.testing.assert_allclose(found[0], 0.02 * np.cos(2 * (stretched - bright)), atol=5e-4)
+    np.testing.assert_allclose(found[1], 0.02 * np.sin(2 * (stretched - bright)), atol=5e-4)
+
+
+def test_the_second_harmonic_is_known_at_each_force_and_ring():
+    """A line in the force times one in the radius; the bright side turns, and along is that of the forces' mean."""
+    angle = np.arctan2(Y, X)
+
+    def contrast(force_n):
+        turning = np.cos(angle) + 3 * (force_n - PROFILE_FORCES_N.mean()) * np.sin(angle)
+        return 0.02 * turning + (0.01 + 0.02 * force_n) * (1 - R / 20) * np.cos(2 * angle)
+
+    found = press_profile(recording(contrast)).second_harmonic
+    radius = RING_RADII_MM[1:-1] + RING_MM**2 / (6 * RING_RADII_MM[1:-1])
+    expected = (0.01 + 0.02 * PROFILE_FORCES_N[:, None]) * (1 - radius / 20)
+    np.testing.assert_allclose(found[0], expected, atol=5e-4)
+    np.testing.assert_allclose(found[1], 0.0, atol=5e-4)
+
+
+def random_rings(seed):
+    rng, forces, rings = np.random.default_rng(seed), len(PROFILE_FORCES_N), len(RING_RADII_MM)
+    return RingMeans(*(rng.normal(size=shape) for shape in ((forces, rings), *[(forces, 2, rings)] * 2)))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_mean_harmonic_is_to_the_bit_the_one_that_the_networks_have_learnt_from(order):
+    """Amplitudes averaged over the forces first, then turned: another order of sums would round otherwise."""
+    rings = random_rings(order)
+    cosine, sine = (part[:, order - 1, 1:].mean(axis=0) for part in (rings.cosine, rings.sine))
+    direction = np.arctan2(sine @ RING_RADII_MM[1:], cosine @ RING_RADII_MM[1:])
+    learnt = np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
+    assert harmonic(rings, order).tobytes() == learnt.tobytes()
+    np.testing.assert_allclose(harmonic_at_forces(rings, order).mean(axis=0), learnt, atol=1e-12)
+
+
+def test_the_row_of_the_networks_is_contrast_growth_and_mean_offset_and_nothing_else():
+    found = press_profile(recording(lambda force_n: cone(force_n) + 0.01 * X / (1 + R)))
+    row = np.concatenate([found.contrast.ravel(), found.growth.ravel(), found.offset])
+    assert found.as_row().tobytes() == row.tobytes()
+    card = json.loads((ROOT / "models" / "standard" / "model.json").read_text(encoding="utf-8"))
+    assert [feature["name"] for feature in card["features"]] == list(ROW_NAMES)
+    assert len(card["golden"]["features"][0]) == len(row)
+
+
+def test_a_row_has_a_name_for_every_number():
+    found = press_profile(recording())
+    row = dict(zip(ROW_NAMES, found.as_row(), strict=True))
+    assert row["contrast_0.25_n_1.8_mm"] == found.contrast[1, 2]
+    assert row["growth_0.12_n_9.0_mm"] == found.growth[0, -1]
+    assert row["offset_0.9_mm"] == found.offset[0]
+
+
+def test_frames_of_eight_and_of_sixteen_bits_agree():
+    """Counts of 16 bits that are 256 times those of 8."""
+    eight = [replace(f, counts=(f.counts // 256).astype(np.uint8)) for f in recording().frames]
+    sixteen = [replace(f, counts=f.counts.astype(np.uint16) * 256) for f in eight]
+    one, other = (press_profile(recording_of(frames)) for frames in (eight, sixteen))
+    np.testing.assert_allclose(one.as_row(), other.as_row(), atol=1e-6)
+
+
+def test_noise_of_the_pixels_does_not_raise_the_contrast():
+    """Noise of a fifth of the reference: the ratio of unbinned pixels would be 0.4 x 0.2^2 x 1.2 = 2 % too high."""
+    random, shape = np.random.default_rng(5), (4 * SIZE_PX, 4 * SIZE_PX)
+
+    def noisy(role, force_n, level):
+        counts = 20_000 + level * (1 + 0.2 * random.standard_normal(shape, dtype=np.float32))
+        return Frame(np.rint(counts).astype(np.uint16), role, 0.0, force_n, LIT)
+
+    frames = [noisy("dark", 0.0, 0.0)]
+    frames += [noisy("reference", f, 10_000 + 5_000 * f) for f in RAMP_N]
+    frames += [noisy("press", f, 1.2 * (10_000 + 5_000 * f)) for f in RAMP_N]
+    found = press_profile(recording_of(frames, PITCH_MM / 4)).contrast
+    assert float(found[1:, 3:].mean()) == pytest.approx(0.2, abs=3e-3)
+
+
+def test_press_frames_weaker_or_stronger_than_the_reference_count_nothing():
+    """From the first touch on: there is no reference at 0.01 N, and the one at 0.06 N is five times as bright."""
+    press_n = np.concatenate([[0.0, 0.01, 0.03, 0.05], RAMP_N, [0.9]])
+    found = press_profile(recording(press_n=press_n))
+    np.testing.assert_allclose(found.contrast, press_profile(recording()).contrast, atol=1e-6)
+
+
+def test_reference_frames_of_the_untouched_face_count_nothing():
+    reference_n = np.concatenate([[0.0, 0.0, 0.001], RAMP_N])
+    found = press_profile(recording(reference_n=reference_n))
+    np.testing.assert_allclose(found.as_row(), press_profile(recording()).as_row(), atol=1e-6)
+
+
+@pytest.mark.parametrize("role", ["dark", "reference", "press"])
+def test_a_missing_role_is_refused_by_its_name(role):
+    with pytest.raises(InvalidQuantity, match=f"^{role} frames is 0, but must be at least"):
+        press_profile(without(recording(), role))
+
+
+@pytest.mark.parametrize("name", ["reference", "press"])
+@pytest.mark.parametrize(
+    ("forces_n", "quantity"),
+    [
+        (RAMP_N[:: len(RAMP_N) // (MIN_RAMP_FRAMES - 2)], "{} frames"),
+        (np.full(10, 0.5), "smallest {} force"),
+        (np.linspace(0.18, 0.6, 10), "smallest {} force"),
+        (np.linspace(0.08, 0.48, 10), "largest {} force"),
+        ([0.1] * 5 + [0.6] * 5, "largest step of the {} force"),
+        ([0.1, 0.12, 0.15, 0.16 + LARGEST_STEP_N, 0.45, 0.6], "largest step of the {} force"),
+    ],
+)
+def test_a_press_that_is_no_ramp_is_refused_with_what_it_lacks(name, forces_n, quantity):
+    with pytest.raises(InvalidQuantity, match=f"^{quantity.format(name)} is .*press slowly harder"):
+        press_profile(recording(**{f"{name}_n": forces_n}))

@@ -1,0 +1,125 @@
+"""The committed networks of the ranges: what they say of presses, and that a damaged file is refused."""
+
+import hashlib
+import json
+import pickle
+import shutil
+
+import numpy as np
+import pytest
+from daemon_process import ROOT
+from onnx import TensorProto, helper, numpy_helper
+
+from device.measurement.mode_models import ModeModels
+from device.measurement.model_card import BundleRefused
+from device.measurement.parameters import PARAMETERS
+from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.ramp_modes.range_classifier import RANGE_FILE
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return shutil.copytree(ROOT / "models" / "standard", tmp_path / "standard")
+
+
+def card_of(folder):
+    return json.loads((folder / "model.json").read_text(encoding="utf-8"))
+
+
+def write_card(folder, card):
+    (folder / "model.json").write_text(json.dumps(card), encoding="utf-8")
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_an_inclusion_in_the_middle_of_the_ranges_lies_inside(profile_model, mode):
+    rows = profile_model.answers.surrogate.rows(np.zeros((1, len(PARAMETERS))))
+    assert profile_model.ranges.log_odds(rows, mode)[0] < min(0.0, profile_model.limits[mode].outside_log_odds)
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_an_inclusion_is_the_likelier_outside_the_larger_it_is(profile_model, mode):
+    """Stiff and shallow ones, of 8.5, 13 and 15 mm."""
+    unit = np.zeros((3, len(PARAMETERS)))
+    unit[:, 0], unit[:, 1], unit[:, 2] = (0.0, 0.7, 1.0), -0.5, 0.5
+    odds = profile_model.ranges.log_odds(profile_model.answers.surrogate.rows(unit), mode)
+    assert odds[0] < odds[1] < odds[2]
+
+
+def test_it_goes_to_another_process_whole(profile_model):
+    again = pickle.loads(pickle.dumps(profile_model.ranges))
+    rows = np.array(profile_model.bundle.card["golden"]["features"])
+    for mode in RAMP_MODES:
+        np.testing.assert_array_equal(again.log_odds(rows, mode), profile_model.ranges.log_odds(rows, mode))
+
+
+def test_a_missing_file_is_refused(folder):
+    (folder / RANGE_FILE).unlink()
+    with pytest.raises(BundleRefused, match=r"range.onnx is unreadable"):
+        ProfileModel.load(folder)
+
+
+def test_a_changed_bit_is_refused(folder):
+    content = bytearray((folder / RANGE_FILE).read_bytes())
+    content[len(content) // 2] ^= 1
+    (folder / RANGE_FILE).write_bytes(content)
+    with pytest.raises(BundleRefused, match=r"range.onnx is [0-9a-f]{64}, but must be [0-9a-f]{64} as model.json"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_without_the_entry_is_refused(folder):
+    card = card_of(folder)
+    del card["range"]
+    write_card(folder, card)
+    with pytest.raises(BundleRefused, match="range is missing"):
+        ProfileModel.load(folder)
+
+
+@pytest.mark.parametrize(
+    ("golden", "words"),
+    [
+        ({"standard": [0.0] * 8, "precise": [0.0] * 8}, "off, but must be at most 0.0001 from the golden log odds"),
+        ({"standard": [0.0] * 3, "precise": [0.0] * 3}, "inf off"),
+        ({"standard": [0.0] * 8}, "unusable .*precise"),
+        ({"standard": "none", "precise": "none"}, "unusable"),
+        ([], "unusable"),
+    ],
+)
+def test_golden_log_odds_that_it_does_not_give_are_refused(folder, golden, words):
+    card = card_of(folder)
+    card["range"]["golden"] = golden
+    write_card(folder, card)
+    with pytest.raises(BundleRefused, match=rf"range\.onnx is .*{words}"):
+        ProfileModel.load(folder)
+
+
+def network(modes: tuple[str, ...], *, rows: str | int = "n", columns: int = 1) -> bytes:
+    """Return a network whose log odds are the first of its 87 features."""
+    first = numpy_helper.from_array(np.eye(87, columns, dtype=np.float32), "first")
+    nodes = [helper.make_node("MatMul", ["features", "first"], [mode]) for mode in modes]
+    ports = [helper.make_tensor_value_info(mode, TensorProto.FLOAT, [rows, columns]) for mode in modes]
+    taken = helper.make_tensor_value_info("features", TensorProto.FLOAT, [rows, 87])
+    graph = helper.make_graph(nodes, "ranges", [taken], ports, [first])
+    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8).SerializeToString()
+
+
+@pytest.mark.parametrize(
+    "other", [network(("standard",)), network(RAMP_MODES, rows=8), network(RAMP_MODES, columns=3), network(("a", "b"))]
+)
+def test_a_network_of_other_outputs_or_of_so_many_rows_is_refused(folder, other):
+    """Hash and golden log odds are right: what is wrong would show with the first press."""
+    card = card_of(folder)
+    first = [row[0] for row in card["golden"]["features"]]
+    card["range"] |= {"sha256": hashlib.sha256(other).hexdigest(), "golden": dict.fromkeys(RAMP_MODES, first)}
+    (folder / RANGE_FILE).write_bytes(other)
+    write_card(folder, card)
+    with pytest.raises(BundleRefused, match=r"(in|out)puts of range\.onnx"):
+        ProfileModel.load(folder)
+
+
+def test_it_is_proved_again_with_the_other_models(folder, bundle):
+    profile = ProfileModel.load(folder)
+    models = ModeModels(bundle, profile=profile)
+    models.prove()
+    profile.ranges._golden = dict.fromkeys(RAMP_MODES, np.zeros(8))
+    with pytest.raises(BundleRefused, match="golden log odds"):
+        models.prove()

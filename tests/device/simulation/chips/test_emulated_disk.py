@@ -1,0 +1,50 @@
+"""A disk that is full for a while, as the kernel says itself, or that cannot be written."""
+
+import errno
+
+import pytest
+
+from device.simulation import faults
+from device.simulation.chips.emulated_storage import EmulatedDisk
+from device.simulation.faults import FaultTimeline, ScriptedFault
+
+
+def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_again(tmp_path):
+    now_s = [0.0]
+    disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_full", until_s=1.0)], clock=lambda: now_s[0]))
+    assert disk.free_bytes(tmp_path) == 0
+    with pytest.raises(OSError, match="No space left") as full:
+        disk.write(tmp_path / "frame", b"counts")
+    assert full.value.errno == errno.ENOSPC
+    assert list(tmp_path.iterdir()) == []
+    now_s[0] = 1.0
+    disk.write(tmp_path / "frame", b"counts")
+    assert (tmp_path / "frame").read_bytes() == b"counts"
+    assert disk.free_bytes(tmp_path) > 0
+
+
+def test_a_read_only_disk_takes_nothing_and_still_has_space(tmp_path):
+    disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_read_only")]))
+    with pytest.raises(OSError, match="Read-only file system") as refused:
+        disk.write(tmp_path / "frame", b"counts")
+    assert refused.value.errno == errno.EROFS
+    assert list(tmp_path.iterdir()) == []
+    assert disk.free_bytes(tmp_path) > 0
+
+
+@pytest.mark.parametrize("call", ["write", "free_bytes"])
+def test_a_frozen_disk_answers_when_it_thaws_and_not_before(call, tmp_path, monkeypatch):
+    now_s, waits = [0.0], []
+
+    def wait(seconds):
+        waits.append(list(tmp_path.iterdir()))
+        now_s[0] += 1.0
+
+    monkeypatch.setattr(faults.time, "sleep", wait)
+    disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_frozen", until_s=3.0)], clock=lambda: now_s[0]))
+    if call == "write":
+        disk.write(tmp_path / "frame", b"counts")
+        assert (tmp_path / "frame").read_bytes() == b"counts"
+    else:
+        assert disk.free_bytes(tmp_path) > 0
+    assert waits == [[], [], []]

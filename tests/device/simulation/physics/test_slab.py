@@ -1,0 +1,44 @@
+"""The tissue under the probe: its bounds, and the contrast of an inclusion in it on paper."""
+
+import pytest
+
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.simulation.physics.slab import NOMINAL, Slab
+
+
+def test_the_nominal_slab_is_the_papers_tissue_30_mm_thick():
+    assert (NOMINAL.youngs_modulus_kpa, NOMINAL.thickness_mm, NOMINAL.stiffness_ratio) == (5.0, 30.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("tissue", "quantity"),
+    [
+        ({"youngs_modulus_kpa": 3.9}, "tissue_modulus_kpa"),
+        ({"youngs_modulus_kpa": 6.3}, "tissue_modulus_kpa"),
+        ({"thickness_mm": 26.9}, "slab_thickness_mm"),
+        ({"thickness_mm": float("nan")}, "slab_thickness_mm"),
+    ],
+)
+def test_tissue_outside_the_tables_is_refused_by_what_is_outside(tissue, quantity):
+    with pytest.raises(InvalidQuantity, match=f"^{quantity} is .*range of the virtual probe's tables"):
+        Slab(**tissue)
+
+
+def test_the_contrast_is_none_for_tissue_and_one_for_a_rigid_sphere():
+    assert Slab(4.0).contrast(4.0) == 0.0
+    assert Slab(4.0).contrast(1e9) == pytest.approx(1.0)
+    assert NOMINAL.contrast(30.0) == pytest.approx(25.0 / 37.5)
+
+
+@pytest.mark.parametrize("modulus_kpa", [8.0, 60.0, 200.0])
+def test_a_modulus_comes_back_from_its_contrast(modulus_kpa):
+    slab = Slab(6.0, 28.0)
+    assert slab.modulus_kpa(slab.contrast(modulus_kpa)) == pytest.approx(modulus_kpa)
+
+
+def test_the_nominal_twin_has_the_same_contrast_and_place():
+    slab, inclusion = Slab(4.0), Inclusion(9.0, 5.0, 60.0)
+    twin = slab.nominal_twin(inclusion)
+    assert twin == Inclusion(9.0, 5.0, 75.0)
+    assert NOMINAL.contrast(twin.youngs_modulus_kpa) == pytest.approx(slab.contrast(60.0))
+    assert NOMINAL.nominal_twin(inclusion) == inclusion

@@ -1,0 +1,151 @@
+"""The table of faces: exact for polynomials, and refused when it is not what its description says."""
+
+import json
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.simulation.physics.chebyshev import points_inside, points_with_ends
+from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.surface_table import COARSE, SurfaceTable, load_surface_table
+
+R_MM = np.linspace(0.0, 11.0, 12)
+FORCE_N = points_inside(0.0, 0.8, 3)
+SLAB_KPA, SLAB_MM = np.array([4.0, 5.0, 6.25]), np.array([28.5, 30.0, 36.0])
+
+
+def polynomial(size_mm, depth_mm, contrast, force_n):
+    """A polynomial of degree 2, 2, 2 and 2 in size, depth, contrast and force, different at every radius."""
+    smooth = (1 + size_mm - 0.1 * size_mm**2) * (2 - depth_mm**2 / 50) * (contrast**2 - 3 * contrast)
+    return np.multiply.outer(smooth * (1 + force_n - 2 * force_n**2), 1 + R_MM)
+
+
+def slab_effect(modulus_kpa, thickness_mm):
+    """Quadratic in the logarithm of the modulus and in one over the thickness; none in the nominal slab."""
+    stiffness, thinness = np.log(modulus_kpa / 5.0), 1 / thickness_mm - 1 / 30.0
+    return 0.3 * stiffness - stiffness**2 + 20 * thinness + 900 * thinness**2
+
+
+@pytest.fixture
+def small_table():
+    axes = points_with_ends(1.0, 15.0, 5), points_with_ends(4.0, 12.0, 5), points_with_ends(0.1, 0.96, 3)
+    grid = np.meshgrid(*axes, FORCE_N, indexing="ij")
+    bare = np.stack([0.4 + R_MM / 20, 2 + R_MM])[:, None] * np.ones((3, 1))
+    inclusion_field = np.stack([polynomial(*grid), 3 * polynomial(*grid)])
+    star = slab_effect(np.array([4.0, 6.25, 5.0, 5.0]), np.array([30.0, 30.0, 28.5, 36.0]))
+    return SurfaceTable(
+        *axes,
+        slab_modulus_kpa=SLAB_KPA,
+        slab_thickness_mm=SLAB_MM,
+        force_n=FORCE_N,
+        r_mm=R_MM,
+        bare_per_n=bare,
+        lump_per_n_mm3=inclusion_field,
+        bare_change_per_n=np.multiply.outer(star, bare),
+        lump_change_per_n_mm3=np.multiply.outer(star, inclusion_field[:, COARSE, COARSE]),
+    )
+
+
+@pytest.mark.parametrize("inclusion", [(3.3, 7.7, 55.0), (15.0, 4.0, 200.0), (1.0, 12.0, 8.0), (9.0, 5.0, 99.0)])
+def test_an_inclusion_field_is_interpolated_in_size_depth_contrast_and_force(small_table, inclusion):
+    size, depth, modulus = inclusion
+    face = small_table.inclusion_field(Inclusion(*inclusion)).at(0.37)
+    contrast = NOMINAL.contrast(modulus)
+    expected = 0.37 * size**3 * contrast * polynomial(size, depth, contrast, 0.37)
+    np.testing.assert_allclose(face.w_mm, expected, rtol=1e-9)
+    np.testing.assert_allclose(face.p_kpa, 3 * expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("slab", [Slab(4.4, 27.6), Slab(6.25, 30.0), Slab(5.0, 36.0), Slab(5.8, 33.0)])
+def test_another_slab_adds_its_change_at_the_same_contrast_and_scaled_force(small_table, slab):
+    ramps = small_table.ramps(Inclusion(9.0, 5.0, 99.0), slab)
+    contrast, nominal_n = slab.contrast(99.0), 0.3
+    force_n = nominal_n * slab.youngs_modulus_kpa / 5.0
+    changed = 1 + slab_effect(slab.youngs_modulus_kpa, slab.thickness_mm)
+    expected = changed * force_n * 9.0**3 * contrast * polynomial(9.0, 5.0, contrast, nominal_n)
+    np.testing.assert_allclose(ramps.inclusion_field.at(force_n).w_mm, expected, rtol=1e-9)
+    np.testing.assert_allclose(ramps.bare.at(force_n).w_mm, changed * force_n * (0.4 + R_MM / 20), rtol=1e-9)
+
+
+def test_the_nominal_slab_has_no_change_and_is_its_own_reference(small_table):
+    """Changes a million times too large would show."""
+    inclusion = Inclusion(9.0, 5.0, 99.0)
+    before = small_table.ramps(inclusion)
+    small_table.bare_change_per_n[:] *= 1e6
+    small_table.lump_change_per_n_mm3[:] *= 1e6
+    after = small_table.ramps(inclusion, Slab(5.0, 30.0))
+    np.testing.assert_array_equal(after.bare.fields_per_n, before.bare.fields_per_n)
+    np.testing.assert_array_equal(after.inclusion_field.fields_per_n, before.inclusion_field.fields_per_n)
+    assert after.nominal_inclusion_field is None
+
+
+def test_in_another_slab_the_reference_is_the_inclusion_of_the_same_contrast_in_the_nominal_one(small_table):
+    reference = small_table.ramps(Inclusion(9.0, 5.0, 80.0), Slab(4.0)).nominal_inclusion_field
+    expected = small_table.inclusion_field(Inclusion(9.0, 5.0, 100.0))
+    np.testing.assert_allclose(reference.fields_per_n, expected.fields_per_n, rtol=1e-12)
+
+
+def test_an_inclusion_smaller_than_the_tables_smallest_shrinks_with_its_volume(small_table):
+    small, smallest = (small_table.inclusion_field(Inclusion(d, 6.0, 80.0)).at(0.5).w_mm for d in (0.5, 1.0))
+    np.testing.assert_allclose(small, smallest / 8, rtol=1e-9)
+    assert not small_table.inclusion_field(Inclusion(0.0, 6.0, 80.0)).at(0.5).w_mm.any()
+
+
+def test_beyond_the_largest_force_the_face_grows_in_proportion(small_table):
+    ramp = small_table.inclusion_field(Inclusion(5.0, 6.0, 80.0))
+    last = float(FORCE_N[-1])
+    np.testing.assert_allclose(ramp.at(2 * last).w_mm, 2 * ramp.at(last).w_mm, rtol=1e-9)
+
+
+def test_small_strain_is_the_smallest_force_in_proportion(small_table):
+    ramp = small_table.inclusion_field(Inclusion(5.0, 6.0, 80.0))
+    first = float(FORCE_N[0])
+    np.testing.assert_allclose(ramp.at_small_strain(0.5).p_kpa, 0.5 / first * ramp.at(first).p_kpa, rtol=1e-9)
+
+
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(4.0, 27.0), Slab(6.25, 27.0), Slab(4.0, 36.0), Slab(6.25, 36.0)])
+def test_the_committed_table_holds_every_corner_of_its_range_in_every_slab(table, slab):
+    for size_mm in (0.0, 15.0):
+        for depth_mm in (4.0, 12.0):
+            for modulus_kpa in (8.0, 200.0):
+                ramps = table.ramps(Inclusion(size_mm, depth_mm, modulus_kpa), slab)
+                assert np.isfinite([ramp.at(0.5) for ramp in (ramps.bare, ramps.inclusion_field)]).all()
+
+
+def test_an_inclusion_outside_the_table_is_refused_in_its_slab(small_table):
+    with pytest.raises(InvalidQuantity, match="^youngs_modulus_kpa is 7.9.*inside the table's range"):
+        small_table.ramps(Inclusion(10.0, 6.0, 7.9), Slab(6.25))
+
+
+def test_a_table_comes_back_as_it_was_saved(small_table, tmp_path):
+    small_table.save(tmp_path / "t", {"made_by": "a test"})
+    found = load_surface_table(tmp_path / "t")
+    for name in SurfaceTable.__dataclass_fields__:
+        np.testing.assert_allclose(getattr(found, name), getattr(small_table, name), rtol=1e-6)
+    assert json.loads((tmp_path / "t" / "surface_table.json").read_text())["made_by"] == "a test"
+
+
+def test_a_table_with_one_changed_byte_is_refused(small_table, tmp_path):
+    small_table.save(tmp_path, {})
+    content = bytearray((tmp_path / "surface_table.npz").read_bytes())
+    content[1000] ^= 1
+    (tmp_path / "surface_table.npz").write_bytes(content)
+    with pytest.raises(InvalidQuantity, match="^surface table's hash is [0-9a-f]{12}, but must be [0-9a-f]{12} as"):
+        load_surface_table(tmp_path)
+
+
+@pytest.mark.parametrize("file", ["surface_table.npz", "surface_table.json"])
+def test_a_missing_file_is_refused_with_the_command_that_makes_it(small_table, tmp_path, file):
+    small_table.save(tmp_path, {})
+    (tmp_path / file).unlink()
+    with pytest.raises(InvalidQuantity, match="host_tools table"):
+        load_surface_table(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"schema": "tsis.surface_table/2"}'])
+def test_a_description_that_is_none_is_refused(small_table, tmp_path, text):
+    small_table.save(tmp_path, {})
+    (tmp_path / "surface_table.json").write_text(text)
+    with pytest.raises(InvalidQuantity, match="^surface table"):
+        load_surface_table(tmp_path)

@@ -1,0 +1,88 @@
+"""`host_tools simulate`: options and scene files, the plan explained, and refusals in one sentence."""
+
+import json
+import re
+
+import pytest
+from toolkit_process import run_toolkit
+
+from device.measurement.quantities import Inclusion
+from host_tools.scenes.scene import Press, Scene, Tissue
+from host_tools.scenes.scene_file import read_scene, write_scene
+
+INCLUSION = ("--size-mm", 10, "--depth-mm", 6, "--modulus-kpa", 80)
+
+
+def test_explain_prints_each_choice_with_its_reason_and_the_error_of_each_number():
+    done = run_toolkit("simulate", *INCLUSION, "--tolerance", "1%", "--explain")
+    assert done.returncode == 0, done.stderr
+    for words in (
+        "symmetry     axisymmetric",
+        "contact      closed_sliding",
+        "the fastest level that holds 1 %",
+        "predicted",
+    ):
+        assert words in done.stdout
+    assert re.search(r"max_deformation_mm +0\.0216\d* +mm +\+- 0\.\d+ %", done.stdout)
+
+
+def test_a_scene_file_is_solved_and_options_change_it(tmp_path):
+    write_scene(Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2)), tmp_path / "scene.toml")
+    whole = json.loads(run_toolkit("simulate", "--scene", str(tmp_path / "scene.toml"), "--json").stdout)
+    softer = json.loads(
+        run_toolkit("simulate", "--scene", str(tmp_path / "scene.toml"), "--tissue-modulus-kpa", "2.5", "--json").stdout
+    )
+    assert whole["force_n"] == softer["force_n"] == pytest.approx(0.2)
+    assert softer["indentation_mm"] > 1.8 * whole["indentation_mm"]
+
+
+def test_the_scene_that_was_asked_for_is_saved_with_every_key_and_solved_again_from_its_file(tmp_path):
+    path = tmp_path / "scene.toml"
+    options = ("--tissue-modulus-kpa", 2.5, "--force-n", 0.2, "--json")
+    asked = json.loads(run_toolkit("simulate", *INCLUSION, *options, "--save-scene", path).stdout)
+    assert read_scene(path) == Scene(
+        Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2), tissue=Tissue(youngs_modulus_kpa=2.5)
+    )
+    assert "thickness_mm = 30.0" in path.read_text()
+    again = json.loads(run_toolkit("simulate", "--scene", path, "--json").stdout)
+    assert again["max_deformation_mm"] == pytest.approx(asked["max_deformation_mm"], rel=1e-9)
+
+
+def test_a_scene_is_saved_as_toml_alone(tmp_path):
+    refused = run_toolkit("simulate", *INCLUSION, "--save-scene", tmp_path / "scene.yaml")
+    assert refused.returncode != 0
+    assert "but must be of type .toml" in refused.stderr
+
+
+def test_the_poisson_ratio_of_everything_can_be_given():
+    options = ("simulate", *INCLUSION, "--poisson", "0.4995", "--json")
+    assert json.loads(run_toolkit(*options).stdout)["plan"]["formulation"] == "mixed"
+
+
+def test_finite_strain_on_request_is_true_sliding_with_its_plan_in_the_json():
+    options = (*INCLUSION, "--indentation-mm", 0.5)
+    record = json.loads(run_toolkit("simulate", *options, "--strain", "finite", "--json").stdout)
+    assert (record["plan"]["strain"], record["plan"]["contact"]) == ("finite", "true_sliding")
+    assert 0 < record["stated_error"]["max_deformation_mm"] < 0.01
+    assert record["contact_force_n"] == pytest.approx(record["force_n"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--size-mm", "10"), "without depth, modulus"),
+        (("--size-mm", "10", "--depth-mm", "25", "--modulus-kpa", "80"), "35 mm"),
+        ((*INCLUSION, "--tolerance", "tight"), "0.5%"),
+        ((*INCLUSION, "--tolerance", "0"), "above 0"),
+        (
+            (*INCLUSION, "--offset-mm", "4", "--strain", "finite"),
+            "strain is finite",
+        ),
+        (("--scene", "nowhere.toml"), "nowhere.toml"),
+    ],
+)
+def test_what_cannot_be_solved_is_refused_in_one_sentence(options, words):
+    done = run_toolkit("simulate", *options)
+    assert done.returncode == 1
+    assert words in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,340 @@
+"""The bundle of the ramp modes: the network NumPy has, surrogate and round spot of its training, both modes' limits."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import pytest
+from small_surrogate import COLUMNS, random_surrogate, white_noise
+
+from device.measurement.confidence_belt import Bands
+from device.measurement.model_card import BundleRefused
+from device.measurement.parameters import NUISANCES, PARAMETERS, RANGES
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.ellipticity import ROUND_FILE, SECOND_COLUMNS, RoundSpot
+from device.measurement.ramp_modes.legendre import LegendreSum
+from device.measurement.ramp_modes.model import RAMP_MODES, SURROGATE_FILE, ProfileModel
+from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, ROW_NAMES
+from device.measurement.ramp_modes.range_classifier import RANGE_FILE
+from device.measurement.ramp_modes.surrogate import PressSurrogate
+from device.measurement.recording.ring_means import RINGS
+from host_tools.paper_network.export import ExportRefused
+from host_tools.press_models import export as exporting
+from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling, initial_layers
+from host_tools.press_models.export import GOLDEN_ROWS, export_profile
+from host_tools.press_models.mode_outcome import Answered, ModeOutcome
+from host_tools.press_models.onnx_networks import build_network, build_range_networks, physical_estimate
+from host_tools.press_models.press_samples import PressSamples, draw_parameters
+from host_tools.press_models.ramp_training import QUICK_EFFORT, TrainedProfile
+from host_tools.press_models.train_ensemble import DenseEnsemble
+from host_tools.press_models.train_range import DEPTHS, SIZES, RangeNetwork, TrainedRange
+
+SERIALS = ("SIM-0001", "SIM-0002")
+PRESSES = 40
+
+
+def made_ensemble(rows: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble:
+    scaling = InputScaling.fit(rows, np.eye(COLUMNS))
+    members = []
+    for seed in (1, 2):
+        *hidden, last = initial_layers(2 * scaling.projection.shape[1], np.random.default_rng(seed))
+        biases = np.repeat(np.float32([0.1, log_variance]), len(UNKNOWNS))
+        members.append([*hidden, DenseLayer(0.5 * last.weights, biases)])
+    return DenseEnsemble(scaling, tuple(members))
+
+
+def made_outcome(misfit_ratio: float) -> ModeOutcome:
+    ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
+    bands = tuple(Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
+    truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
+    seen = Answered(truth, truth + 0.05, np.full((64, 3), 0.1))
+    return ModeOutcome(bands, misfit_ratio, 2.0 + misfit_ratio, 0.3, seen, seen)
+
+
+def made_round_spot(surrogate: PressSurrogate) -> RoundSpot:
+    rng = np.random.default_rng(12)
+    second = LegendreSum(
+        rng.integers(0, 4, (6, len(PARAMETERS))).astype(np.uint8), rng.normal(size=(6, SECOND_COLUMNS))
+    )
+    factors = {mode: rng.normal(0, 1e-3, (SECOND_COLUMNS, SECOND_COLUMNS)) for mode in RAMP_MODES}
+    return RoundSpot(surrogate, second, {mode: factor @ factor.T for mode, factor in factors.items()})
+
+
+def made_ranges(rows: np.ndarray) -> TrainedRange:
+    scaling, rng = InputScaling.fit(rows, np.eye(COLUMNS)), np.random.default_rng(3)
+    networks = {
+        mode: RangeNetwork(
+            scaling, tuple(initial_layers(2 * scaling.projection.shape[1], rng, outputs=1) for _ in "ab")
+        )
+        for mode in RAMP_MODES
+    }
+    return TrainedRange(networks, np.array([2e-4, 4e-4]), "0123", QUICK_EFFORT.ranges)
+
+
+@pytest.fixture(scope="module")
+def trained() -> TrainedProfile:
+    rng = np.random.default_rng(5)
+    rows = rng.normal(0, 0.2, (PRESSES, COLUMNS))
+    surrogate = random_surrogate()
+    return TrainedProfile(
+        surrogate=surrogate,
+        surrogate_error=np.array([1e-4, 3e-4]),
+        round_error=np.array([2e-4, 5e-4]),
+        noise={"standard": white_noise(2e-3), "precise": white_noise(1e-3)},
+        ensemble=made_ensemble(rows),
+        ranges=made_ranges(rows),
+        round_spot=made_round_spot(surrogate),
+        outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
+        samples=PressSamples(draw_parameters(PRESSES, rng), rows, np.zeros((PRESSES, SECOND_COLUMNS))),
+        effort=QUICK_EFFORT,
+        seed=11,
+    )
+
+
+def write(trained: TrainedProfile, folder: Path) -> Path:
+    export_profile(trained, folder, serials=SERIALS, software_version="1.2.3", training_command="host_tools train x")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(trained: TrainedProfile, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(trained, tmp_path_factory.mktemp("models") / "demo")
+
+
+@pytest.fixture(scope="module")
+def model(folder: Path) -> ProfileModel:
+    return ProfileModel.load(folder)
+
+
+def run(network: bytes, rows: np.ndarray) -> list[np.ndarray]:
+    session = onnxruntime.InferenceSession(network, providers=["CPUExecutionProvider"])
+    return session.run(["estimate", "spread"], {"features": rows.astype(np.float32)})
+
+
+def test_the_exported_network_computes_what_numpy_does(trained: TrainedProfile) -> None:
+    """Single precision all along: a few of its roundings of 6e-8."""
+    rows = np.random.default_rng(8).normal(0, 0.3, (200, COLUMNS)).astype(np.float32)
+    found = run(build_network(trained.ensemble), rows)
+    for theirs, ours in zip(found, physical_estimate(trained.ensemble, rows.astype(float)), strict=True):
+        assert theirs.dtype == np.float32
+        np.testing.assert_allclose(theirs, ours, rtol=2e-5)
+        assert np.std(ours, axis=0).min() > 0
+
+
+def test_what_nobody_knows_is_held_at_the_largest_variance_in_both(trained: TrainedProfile) -> None:
+    """So a spread is exp(1/2), or more where the members disagree."""
+    ensemble = made_ensemble(trained.samples.rows, log_variance=9.0)
+    found = run(build_network(ensemble), trained.samples.rows)[1]
+    expected = physical_estimate(ensemble, trained.samples.rows.astype(np.float32).astype(float))[1]
+    np.testing.assert_allclose(found, expected, rtol=2e-5)
+    assert found.min() == pytest.approx(np.exp(LARGEST_LOG_VARIANCE / 2), rel=0.1)
+    assert found.min() >= np.exp(LARGEST_LOG_VARIANCE / 2) - 1e-5
+
+
+def test_coordinates_of_the_network_are_millimetres_and_kilopascals(trained: TrainedProfile) -> None:
+    """Networks that always say 0.1: size 8.5 + 0.65, depth 8 + 0.4, modulus 40 x 4 to the power 0.1."""
+    still = [
+        [*layers[:-1], DenseLayer(0 * layers[-1].weights, layers[-1].biases)] for layers in trained.ensemble.members
+    ]
+    ensemble = replace(trained.ensemble, members=tuple(still))
+    estimate, spread = run(build_network(ensemble), trained.samples.rows)
+    np.testing.assert_allclose(estimate, np.tile([9.15, 8.4, 40 * 4**0.1], (PRESSES, 1)), rtol=1e-5)
+    np.testing.assert_allclose(spread, np.exp(-1), rtol=1e-5)
+
+
+def test_the_device_gets_back_the_networks_coordinates(trained: TrainedProfile, model: ProfileModel) -> None:
+    rows = trained.samples.rows
+    for found, expected in zip(model.networks(rows), trained.ensemble.estimate(rows), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_the_device_gets_back_surrogate_and_noise(trained: TrainedProfile, model: ProfileModel) -> None:
+    """The surrogate to single precision."""
+    unit = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
+    expected = trained.surrogate.rows(unit)
+    np.testing.assert_allclose(model.answers.surrogate.rows(unit), expected, atol=1e-5 * np.abs(expected).max())
+    for mode, noise in trained.noise.items():
+        np.testing.assert_array_equal(model.answers.noise[mode].camera, noise.camera)
+
+
+def test_the_device_gets_back_what_is_round(trained: TrainedProfile, model: ProfileModel) -> None:
+    """Second harmonics to single precision, the camera's covariances exactly."""
+    unit = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
+    expected = trained.round_spot.second_harmonics(unit)
+    found = model.round_spot.second_harmonics(unit)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    assert set(model.round_spot.camera) == set(RAMP_MODES)
+    for mode, camera in trained.round_spot.camera.items():
+        np.testing.assert_array_equal(model.round_spot.camera[mode], camera)
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_the_device_tells_as_many_deviations_from_round_as_the_training(trained, model, mode) -> None:
+    """To single precision of surrogate and second harmonics."""
+    second = np.random.default_rng(10).normal(0, 0.1, (2, len(PROFILE_FORCES_N), RINGS - 2))
+    best = np.random.default_rng(11).uniform(-0.5, 0.5, len(PARAMETERS))
+    found, expected = (one.round_spot.elongation_deviations(second, best, mode) for one in (model, trained))
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert expected > 1
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_the_device_gets_back_the_log_odds_of_each_mode(trained: TrainedProfile, model: ProfileModel, mode) -> None:
+    rows = np.random.default_rng(8).normal(0, 0.3, (50, COLUMNS)).astype(np.float32).astype(float)
+    found, expected = model.ranges.log_odds(rows, mode), trained.ranges.networks[mode].log_odds(rows)
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+    assert np.std(expected) > 0.01
+
+
+def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, folder, model) -> None:
+    entry = model.bundle.card["range"]
+    assert entry["sha256"] == hashlib.sha256((folder / RANGE_FILE).read_bytes()).hexdigest()
+    assert (entry["size_mm"], entry["depth_mm"]) == (list(SIZES), list(DEPTHS))
+    assert (entry["dataset_sha256"], entry["effort"]) == ("0123", vars(QUICK_EFFORT.ranges))
+    assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
+    for mode in RAMP_MODES:
+        expected = trained.ranges.networks[mode].log_odds(np.array(model.bundle.card["golden"]["features"]))
+        np.testing.assert_allclose(entry["golden"][mode], expected, atol=2e-5)
+
+
+def test_networks_of_the_ranges_that_differ_from_numpy_are_refused(trained, tmp_path, monkeypatch) -> None:
+    other = made_ranges(trained.samples.rows * 1.01).networks
+    wrong = build_range_networks(other)
+    monkeypatch.setattr(exporting, "build_range_networks", lambda networks: wrong)
+    with pytest.raises(ExportRefused, match="ranges in mode standard differs from NumPy"):
+        write(trained, tmp_path / "demo")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedProfile, model: ProfileModel) -> None:
+    assert (model.limits["standard"].misfit_ratio, model.limits["precise"].misfit_ratio) == (1.3, 1.2)
+    assert (model.limits["standard"].elongation_deviations, model.limits["precise"].elongation_deviations) == (3.3, 3.2)
+    for limits in model.limits.values():
+        assert limits.outside_log_odds == 0.3
+        assert [bands.high[0, 0] for bands in limits.bands] == [1.5, 1.6, 1.7]
+        assert [bands.low[1, 1] for bands in limits.bands] == [-1.5, -1.6, -1.7]
+    assert model.limits["standard"].bands[0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
+
+
+def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trained, folder, model) -> None:
+    card = model.bundle.card
+    assert tuple(card["serials"]) == tuple(card["serials"]) == SERIALS
+    assert (card["name"], card["software_version"], card["seed"]) == ("demo", "1.2.3", 11)
+    assert card["training_command"] == "host_tools train x"
+    assert card["effort"]["members"] == QUICK_EFFORT.members
+    assert card["dataset_sha256"] == hashlib.sha256(trained.samples.rows.tobytes()).hexdigest()
+    assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
+    assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()
+    assert (card["surrogate_error"]["largest"], card["surrogate_error"]["mean"]) == pytest.approx((3e-4, 2e-4))
+    assert card["round_sha256"] == hashlib.sha256((folder / ROUND_FILE).read_bytes()).hexdigest()
+    assert (card["round_error"]["largest"], card["round_error"]["mean"]) == pytest.approx((5e-4, 3.5e-4))
+    ranges = card["training_range"]
+    assert {name: tuple(ends) for name, ends in (ranges["unknowns"] | ranges["nuisances"]).items()} == {
+        name: (RANGES[name].low, RANGES[name].high) for name in (*UNKNOWNS, *NUISANCES)
+    }
+    name, column = ROW_NAMES[-1], trained.samples.rows[:, -1]
+    assert ranges["features"][name] == [column.min(), column.max()]
+    assert tuple(feature["name"] for feature in card["features"]) == ROW_NAMES
+
+
+def test_the_card_states_each_modes_errors_on_simulated_and_on_recorded_presses(model: ProfileModel) -> None:
+    """Answers 0.05 of a coordinate too high: 0.2 mm of the depth."""
+    for mode in ("standard", "precise"):
+        entry = model.bundle.card["modes"][mode]
+        for kind in ("simulated", "recorded"):
+            assert entry[kind]["presses"] == 64
+            assert entry[kind]["depth_mm"]["skill"] == pytest.approx(1 - 0.05 * np.sqrt(3), rel=1e-3)
+
+
+def test_golden_rows_are_of_the_training_and_spread_over_it(trained: TrainedProfile, model: ProfileModel) -> None:
+    golden = model.bundle.card["golden"]
+    features = np.array(golden["features"])
+    assert features.shape == (GOLDEN_ROWS, COLUMNS)
+    expected = trained.samples.rows[:: PRESSES // GOLDEN_ROWS].astype(np.float32)
+    np.testing.assert_array_equal(features, expected)
+    np.testing.assert_allclose(golden["estimate"], physical_estimate(trained.ensemble, features)[0], rtol=1e-4)
+    np.testing.assert_allclose(golden["spread"], physical_estimate(trained.ensemble, features)[1], rtol=1e-4)
+
+
+def test_the_same_parts_give_the_same_bytes(trained: TrainedProfile, folder: Path, tmp_path: Path) -> None:
+    twice = folder, write(trained, tmp_path / "demo")
+    first, again = ({path.name: path.read_bytes() for path in at.iterdir()} for at in twice)
+    assert first == again
+    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE, RANGE_FILE, ROUND_FILE}
+
+
+def changed(trained: TrainedProfile, tmp_path: Path, file: str) -> Path:
+    folder = write(trained, tmp_path / "demo")
+    content = bytearray((folder / file).read_bytes())
+    content[len(content) // 2] ^= 1
+    (folder / file).write_bytes(bytes(content))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("file", "named"),
+    [
+        (SURROGATE_FILE, "surrogate.npz is [0-9a-f]{64}"),
+        (RANGE_FILE, "range.onnx is [0-9a-f]{64}"),
+        (ROUND_FILE, "round.npz is [0-9a-f]{64}"),
+        ("model.onnx", "sha256"),
+    ],
+)
+def test_a_changed_bit_is_refused_by_the_device(trained, tmp_path, file, named) -> None:
+    with pytest.raises(BundleRefused, match=named):
+        ProfileModel.load(changed(trained, tmp_path, file))
+
+
+@pytest.mark.parametrize("file", [SURROGATE_FILE, ROUND_FILE])
+def test_a_missing_file_is_refused_by_the_device(trained: TrainedProfile, tmp_path: Path, file: str) -> None:
+    folder = write(trained, tmp_path / "demo")
+    (folder / file).unlink()
+    with pytest.raises(BundleRefused, match=f"{file} is missing, but must be [0-9a-f]{{64}}"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_that_states_no_hash_of_the_round_spot_is_refused_by_the_device(trained, tmp_path) -> None:
+    """As one of before there was a round spot, which does not hold the file either."""
+    folder = write(trained, tmp_path / "demo")
+    card = json.loads((folder / "model.json").read_text())
+    del card["round_sha256"]
+    (folder / "model.json").write_text(json.dumps(card))
+    (folder / ROUND_FILE).unlink()
+    with pytest.raises(BundleRefused, match=r"hash of round.npz is missing, but must be in the card: use a bundle"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_without_a_modes_usual_elongation_is_refused_by_the_device(trained, tmp_path) -> None:
+    folder = write(trained, tmp_path / "demo")
+    card = json.loads((folder / "model.json").read_text())
+    del card["modes"]["precise"]["elongation_deviations"]
+    (folder / "model.json").write_text(json.dumps(card))
+    with pytest.raises(BundleRefused, match="elongation_deviations"):
+        ProfileModel.load(folder)
+
+
+def test_a_card_without_limits_is_refused_by_the_device(trained, tmp_path) -> None:
+    folder = write(trained, tmp_path / "demo")
+    card = json.loads((folder / "model.json").read_text())
+    del card["modes"]
+    (folder / "model.json").write_text(json.dumps(card))
+    with pytest.raises(BundleRefused, match="incomplete .*modes"):
+        ProfileModel.load(folder)
+
+
+def test_a_network_that_differs_from_numpy_is_refused_and_nothing_is_written(trained, tmp_path, monkeypatch) -> None:
+    """An output bias off by 1e-2 moves a size of some 8.5 mm by 65 um: nearly a hundredth."""
+    members = [
+        [*layers[:-1], DenseLayer(layers[-1].weights, layers[-1].biases + np.float32(1e-2))]
+        for layers in trained.ensemble.members
+    ]
+    wrong = build_network(replace(trained.ensemble, members=tuple(members)))
+    monkeypatch.setattr(exporting, "build_network", lambda ensemble: wrong)
+    with pytest.raises(ExportRefused, match="differs from NumPy by"):
+        write(trained, tmp_path / "demo")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,71 @@
+"""What mode quick's training makes of recordings and of answers; the networks are toys that read their answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from device.measurement.parameters import PARAMETERS, from_unit
+from device.measurement.quick_mode.profile import held_press
+from device.measurement.ramp_modes.noise import ErrorLevels
+from device.measurement.recording.ring_means import RINGS
+from host_tools.press_models import quick_training
+from host_tools.press_models.mode_outcome import Answered
+from host_tools.press_models.quick_training import USUAL_RATIO, RecordedHolds, recorded_holds
+from host_tools.press_models.recorded_presses import EXACT, recorded_press
+from host_tools.press_models.seeds import press_seed
+
+STD, SIMULATED, RECORDED = 0.1, 6000, 200
+
+
+class FirstColumns:
+    """In place of an ensemble: the first three columns are the coordinates, whose spread is known."""
+
+    def estimate(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return rows[:, :3], np.full((len(rows), 3), STD)
+
+
+def answers(error: float) -> tuple[Answered, RecordedHolds]:
+    """Simulated answers with Gaussian errors of the stated spread, and recordings whose errors are so much larger."""
+    rng = np.random.default_rng(1)
+    truth = rng.uniform(-1, 1, (SIMULATED, 3))
+    simulated = Answered(truth, truth + rng.normal(0, STD, truth.shape), np.full(truth.shape, STD))
+    unit = rng.uniform(-0.9, 0.9, (RECORDED, len(PARAMETERS)))
+    rows = np.zeros((RECORDED, RINGS + 1))
+    rows[:, :3] = unit[:, :3] + rng.normal(0, error * STD, (RECORDED, 3))
+    return simulated, RecordedHolds(from_unit(unit), rows, np.arange(1.0, RECORDED + 1))
+
+
+@pytest.mark.parametrize("error", [1.0, 1.6])
+def test_bands_cover_recordings_also_where_simulated_presses_promise_too_much(error):
+    outcome = quick_training._outcome(FirstColumns(), *answers(error))
+    covered, known = outcome.recorded.covered(outcome.bands)
+    assert known.all()
+    assert covered.mean() == pytest.approx(0.9, abs=0.05)
+
+
+def test_limits_come_from_the_first_half_of_the_recordings_and_the_second_is_kept_to_count_on():
+    simulated, recorded = answers(1.0)
+    outcome = quick_training._outcome(FirstColumns(), simulated, recorded)
+    half = RECORDED // 2
+    assert outcome.elongation_ratio == pytest.approx(1 + USUAL_RATIO * (half - 1))
+    np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[half:, :3])
+    np.testing.assert_array_equal(outcome.simulated.truth, simulated.truth[SIMULATED // 2 :])
+
+
+def test_recordings_are_those_of_each_press_with_its_own_seed(tables):
+    found = recorded_holds(tables, 2, 17, ErrorLevels(), jobs=1)
+    for number in range(2):
+        alone = recorded_press(tables, found.parameters[number], "quick", press_seed(17, number), levels=ErrorLevels())
+        row, ratio = held_press(alone)
+        np.testing.assert_array_equal(found.rows[number], row)
+        assert found.elongation[number] == ratio
+
+
+def test_the_cameras_part_of_the_noise_is_that_of_recordings_without_drift(tables):
+    """Less than the drift of 1 % that is added on top of it, and not nothing."""
+    std = np.sqrt(np.diag(quick_training._camera(tables, 3, 5, 1)))
+    assert std.shape == (RINGS,)
+    assert (std > 1e-4).all()
+    assert (std < ErrorLevels().gain_ratio).all()
+    assert recorded_holds(tables, 1, 5, EXACT, 1).rows[0, RINGS] == pytest.approx(0.5, abs=0.06)

@@ -1,0 +1,108 @@
+"""On rows that show size and depth with white noise, the networks tell what lies outside about as well as can be."""
+
+import numpy as np
+import pytest
+from scipy.special import expit
+from scipy.stats import norm
+from small_surrogate import COLUMNS, white_noise
+
+from device.measurement.parameters import to_unit
+from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS
+from host_tools.press_models import train_range
+from host_tools.press_models.fit_surrogate import INCLUSION_HIGHEST, INCLUSION_REACH
+from host_tools.press_models.noisy_presses import NoiseSampler, Pool
+from host_tools.press_models.press_samples import PressSamples
+from host_tools.press_models.train_range import (
+    RangeEffort,
+    RangeNetwork,
+    WideSurrogate,
+    draw_wide_parameters,
+    is_outside,
+    train_network,
+    wide_pool,
+    wide_surrogate,
+)
+
+STD, COUNT = 0.3, 20_000
+GROWTH = slice(44, 77)
+EFFORT = RangeEffort(members=1, steps=700)
+
+
+@pytest.fixture(scope="module")
+def pool() -> Pool:
+    """Columns 44 and 45, whose noise does not depend on the light, are the coordinates of size and depth."""
+    unit = to_unit(draw_wide_parameters(COUNT, np.random.default_rng(1)))
+    rows = np.zeros((COUNT, COLUMNS), np.float32)
+    rows[:, 44:46] = unit[:, :2]
+    return Pool(unit.astype(np.float32), rows, NoiseSampler(white_noise(STD)))
+
+
+@pytest.fixture(scope="module")
+def network(pool) -> RangeNetwork:
+    return train_network(pool, 1, EFFORT, 1)
+
+
+def seen_at(size: float, depth: float, count: int = 1) -> np.ndarray:
+    rows = np.zeros((count, COLUMNS))
+    rows[:, 44:46] = size, depth
+    return rows
+
+
+def on_paper(seen: np.ndarray) -> np.ndarray:
+    """Return the probability [n] of lying outside, of places seen [n, 2] with white noise, the prior being even."""
+    inside = norm.cdf((1 - seen) / STD) - norm.cdf((-1 - seen) / STD)
+    return 1 - inside.prod(axis=1)
+
+
+def test_the_odds_are_nearly_as_good_as_can_be(pool, network):
+    """Mean of -ln(probability of what is so), on fresh noise, against that of the exact probability."""
+    rows = pool.noisy(np.arange(COUNT), np.random.default_rng(9)).astype(float)
+    outside = is_outside(pool.unit)
+    found, exact = expit(network.log_odds(rows)), np.clip(on_paper(rows[:, 44:46]), 1e-9, 1 - 1e-9)
+    losses = [-np.mean(np.log(np.where(outside, p, 1 - p))) for p in (found, exact)]
+    assert losses[1] < 0.4 < np.log(2)
+    assert losses[0] < losses[1] + 0.03
+
+
+def test_the_farther_beyond_an_end_the_larger_the_odds(network):
+    for way in ((1.0, 0.0), (0.0, 1.0)):
+        odds = network.log_odds(np.concatenate([seen_at(*np.multiply(way, far)) for far in (0.0, 0.7, 1.0, 1.4)]))
+        assert (np.diff(odds) > 0).all()
+        assert odds[0] < -1 < 1 < odds[-1]
+
+
+def test_the_same_seed_gives_the_same_network(pool):
+    few = RangeEffort(members=2, steps=3)
+    first, again, other = (train_network(pool, seed, few, 1).log_odds(seen_at(1.0, 0.0)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).all()
+
+
+@pytest.fixture(scope="module")
+def surrogate() -> WideSurrogate:
+    """Of presses whose contrast is the far field's strength, and nothing else."""
+    parameters = draw_wide_parameters(3200, np.random.default_rng(2), inclusions_a_skin=3)
+    with pytest.MonkeyPatch.context() as patch:  # terms of the probe's own surrogate are half as many, and enough here
+        patch.setattr(train_range, "REACH", INCLUSION_REACH)
+        patch.setattr(train_range, "HIGHEST", INCLUSION_HIGHEST)
+        return wide_surrogate(PressSamples(parameters, far_rows(parameters), np.zeros((3200, SECOND_COLUMNS))))
+
+
+def far_rows(parameters: np.ndarray) -> np.ndarray:
+    rows = np.zeros((len(parameters), COLUMNS))
+    size_mm, depth_mm = parameters[:, 0], parameters[:, 1]
+    rows[:, :44] = ((size_mm / (depth_mm + size_mm / 2)) ** 3)[:, None]
+    return rows
+
+
+def test_polynomials_follow_what_is_one_around_the_ranges_as_well(surrogate):
+    apart = draw_wide_parameters(200, np.random.default_rng(3))
+    assert is_outside(to_unit(apart)).any()
+    np.testing.assert_allclose(surrogate.rows(apart), far_rows(apart), atol=1e-6)
+
+
+def test_a_pool_keeps_coordinates_outside_and_is_drawn_anew_by_another_seed(surrogate):
+    first, other = (wide_pool(surrogate, white_noise(STD), 300, seed) for seed in (1, 2))
+    assert 0.3 < is_outside(first.unit).mean() < 0.7
+    np.testing.assert_allclose(first.rows[:, :44].std(axis=1), 0, atol=1e-5)
+    assert (first.unit != other.unit).all()

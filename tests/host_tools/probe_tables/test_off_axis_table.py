@@ -1,0 +1,75 @@
+"""The committed table of inclusions off the axis against a fresh solve in three dimensions, and its parts on paper."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
+from host_tools.forward.plan import model_plan
+from host_tools.forward.solve import solve
+from host_tools.probe_tables.off_axis_table import MODES, cosine_modes, off_axis_scene
+from host_tools.probe_tables.surface_table import ring_means
+
+FORCE_N = 0.02
+"""Small strain: the solve's, and the table's smallest."""
+
+
+TRUTHS = [
+    ((10.0, 5.0, 80.0), 1.5, 0.05),
+    ((7.0, 7.0, 100.0), 9.0, 0.05),
+    ((12.0, 6.0, 10.0), 5.0, 0.10),
+    ((12.0, 6.0, 60.0), 10.0, 0.15),
+]
+"""Inclusion, offset (mm) and the share of the peak that is held: less for soft inclusions, and at the face's rim."""
+
+
+@pytest.mark.parametrize(("truth", "offset_mm", "bound_ratio"), TRUTHS)
+def test_the_face_off_the_axis_is_within_a_few_percent_of_the_inclusions_peak(tables, truth, offset_mm, bound_ratio):
+    """Deformation within the bound anywhere in the central window; ring means of pressure within 6 % rms, no better."""
+    inclusion = Inclusion(*truth)
+    scene = off_axis_scene(inclusion, offset_mm, force_n=FORCE_N)
+    solution = solve(scene, replace(model_plan(scene), grading="coarse"))
+    inclusion_mm = solution.pressed.w_mm - solution.baseline.w_mm
+    rays_kpa = solution.pressed.p_kpa - solution.baseline.p_kpa
+    inclusion_kpa = np.array([ring_means(solution.r_mm, ray) for ray in rays_kpa])
+    x_mm, y_mm = (axis.reshape(1, -1).astype(np.float32) for axis in solution.rays.xy_mm)
+
+    def fields(one, place):
+        face = PressedFace(tables.centred.ramps(one), tables.off_axis, one, x_mm, y_mm)
+        return (field.reshape(inclusion_mm.shape) for field in face.at(FORCE_N, place))
+
+    inside = solution.r_mm <= 9.9
+    found_mm, found_kpa = (
+        one - none
+        for one, none in zip(
+            fields(inclusion, ProbePlacement(x_mm=-offset_mm)),
+            fields(Inclusion(0.0, 5.0, 80.0), ProbePlacement()),
+            strict=True,
+        )
+    )
+    assert np.abs(found_mm - inclusion_mm)[:, inside].max() < bound_ratio * inclusion_mm[:, inside].max()
+    error_kpa = (found_kpa - inclusion_kpa)[:, inside]
+    assert np.sqrt((error_kpa**2).mean()) < 0.06 * inclusion_kpa[:, inside].max()
+
+
+def test_cosine_modes_of_a_cosine_series_are_its_coefficients():
+    angle = 2 * np.pi * np.arange(48) / 48
+    modes = cosine_modes((3 + 2 * np.cos(angle) - 0.5 * np.cos(4 * angle))[:, None])
+    expected = np.zeros(MODES)
+    expected[[0, 1, 4]] = 3, 2, -0.5
+    np.testing.assert_allclose(modes[:, 0], expected, atol=1e-14)
+
+
+def test_moving_the_centred_field_aside_would_be_wrong(tables):
+    """10 mm, 5 mm deep, 80 kPa, 2 mm off the axis: a probe that cannot turn answers with a moment."""
+    inclusion = Inclusion(10.0, 5.0, 80.0)
+    x_mm = np.linspace(-9.9, 9.9, 199, dtype=np.float32)[None, :]
+    inside = np.hypot(x_mm, x_mm.T) <= 9.9
+    ramps = tables.centred.ramps(inclusion)
+    face = PressedFace(ramps, tables.off_axis, inclusion, x_mm, x_mm.T)
+    solved = face.at(FORCE_N, ProbePlacement(-2.0, 0.0))[0] - face.at(FORCE_N, ProbePlacement(40.0, 0.0))[0]
+    inclusion_mm = ramps.inclusion_field.at(FORCE_N).w_mm
+    moved = np.interp(np.hypot(x_mm - 2.0, x_mm.T), ramps.r_mm, inclusion_mm)
+    assert np.abs(moved - solved)[inside].max() > 0.15 * inclusion_mm.max()

@@ -1,0 +1,136 @@
+"""The virtual probe's committed table against fresh finite-element force ramps in finite strain."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.surface_table import COARSE
+from host_tools.probe_tables.surface_table import (
+    BARE,
+    FORCES_N,
+    RING_MM,
+    SOLVED,
+    assembled,
+    fields,
+    inclusion_axes,
+    ramp,
+    ring_means,
+    scene_in,
+    scene_on_one_mesh,
+)
+
+TRUTHS = [
+    (10.0, 5.0, 80.0),
+    (3.7, 6.6, 104.0),
+    (14.3, 11.2, 47.0),
+    (12.0, 9.0, 20.0),
+    (6.0, 5.0, 150.0),
+]
+IN_SLABS = [((9.0, 7.0, 60.0), Slab(4.4, 27.6)), ((11.0, 5.0, 20.0), Slab(5.8, 33.0))]
+"""Between the points of the star and aside of its arms, the first in thinner tissue than any that was solved."""
+FORCES_SEEN_N = np.array([0.05, 0.6])
+
+
+def worst_over_peak(found, fresh, inside):
+    """The largest departure in the central window, over the largest value there."""
+    return np.abs(found - fresh)[inside].max() / np.abs(fresh[inside]).max()
+
+
+@pytest.mark.parametrize("truth", TRUTHS)
+def test_the_table_is_within_half_a_percent_of_the_inclusions_deformation_and_one_of_its_pressure(table, truth):
+    """What the inclusion adds, over its own peak in the central window: deformation 0.5 %, ring means of pressure 1
+    %.
+    """
+    inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
+    for force_n, solution in zip(FORCES_SEEN_N, ramp(scene_in(NOMINAL, inclusion), FORCES_SEEN_N), strict=True):
+        fresh, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
+        for name, value, bound in (("w_mm", 0, 0.005), ("p_kpa", 1, 0.01)):
+            assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
+
+
+@pytest.mark.parametrize(("truth", "slab"), IN_SLABS)
+def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, truth, slab):
+    """What the slab changes in the inclusion's deformation and pressure, over the inclusion's peaks, from solves on one
+    mesh.
+    """
+    inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
+    thicknesses_mm = sorted([slab.thickness_mm, 30.0])
+    solved, known = [], []
+    for one in (slab, NOMINAL):
+        scene = scene_on_one_mesh(one, inclusion, thicknesses_mm)
+        solved.append([fields(solution)[1] for solution in ramp(scene, FORCES_SEEN_N)])
+        known.append([table.inclusion_field(inclusion, one).at(force_n) for force_n in FORCES_SEEN_N])
+    change, expected = np.array(known[0]) - known[1], np.array(solved[0]) - solved[1]
+    peaks = np.abs(solved[1])[..., inside].max(axis=-1)
+    assert (np.abs(change - expected)[..., inside].max(axis=-1) < 0.01 * peaks).all()
+
+
+@pytest.mark.parametrize(("truth", "slab"), IN_SLABS[:1])
+def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(table, truth, slab):
+    """Within 1 % of its peak; pressures near the rim differ by more from mesh to mesh."""
+    inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
+    for force_n, solution in zip(FORCES_SEEN_N, ramp(scene_in(slab, inclusion), FORCES_SEEN_N), strict=True):
+        fresh_mm, found_mm = fields(solution)[1][0], table.inclusion_field(inclusion, slab).at(force_n).w_mm
+        assert worst_over_peak(found_mm, fresh_mm, inside) < 0.01, force_n
+
+
+def test_the_inclusion_free_face_is_the_models(table):
+    """At a force between the table's, on the same mesh: 0.1 % of the peak."""
+    bare = table.ramps(Inclusion(0.0, 6.0, 80.0)).bare.at(0.3)
+    fresh = fields(ramp(scene_in(NOMINAL), np.array([0.3]), BARE)[0])[0]
+    for value in (0, 1):
+        assert worst_over_peak(bare[value], fresh[value], slice(None)) < 1e-3
+
+
+def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table):
+    """From solves on one mesh, over the peak in the central window: 0.3 %."""
+    known, solved, inside, slab = [], [], table.r_mm <= 9.9, Slab(5.8, 33.0)
+    for one in (slab, NOMINAL):
+        scene = scene_on_one_mesh(one, thicknesses_mm=sorted([slab.thickness_mm, 30.0]))
+        solved.append(fields(ramp(scene, np.array([0.3]), BARE)[0])[0])
+        known.append(table.ramps(Inclusion(0.0, 6.0, 80.0), one).bare.at(0.3))
+    departure = (np.array(known[0]) - known[1]) - (solved[0] - solved[1])
+    assert (np.abs(departure)[:, inside].max(axis=1) < 0.003 * np.abs(solved[1])[:, inside].max(axis=1)).all()
+
+
+def test_layers_that_stand_in_for_the_base_give_the_slabs_own_deformation():
+    """1 mm less of a slab of 30 mm: the layer below it is as good as rigid, 0.1 % of the peak."""
+    layered, own = (
+        fields(ramp(scene, np.array([0.3]), BARE)[0])[0][0]
+        for scene in (scene_on_one_mesh(Slab(thickness_mm=29.0), None, (29.0, 30.0)), scene_in(Slab(thickness_mm=29.0)))
+    )
+    inside = np.linspace(0.0, 11.0, len(own)) <= 9.9
+    assert worst_over_peak(layered, own, inside) < 0.001
+
+
+def test_solves_are_assembled_on_their_axes():
+    """Fields that say size, depth, contrast and slab: at a point that was solved the table gives back what it was."""
+    axes = inclusion_axes((5, 3, 2), 1.0)
+    coarse = (axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.contrast)
+
+    def field(slab, size_mm, depth_mm, contrast):
+        said = size_mm + 100 * depth_mm + 1e4 * contrast + slab.youngs_modulus_kpa * slab.thickness_mm
+        return np.full((2, len(FORCES_N), 4), said) * np.array([1.0, 3.0])[:, None, None]
+
+    grids = [axes, *[coarse] * (len(SOLVED) - 1)]
+    inclusion_field = [
+        field(slab, *place) for (_, slab), grid in zip(SOLVED, grids, strict=True) for place in product(*grid)
+    ]
+    table = assembled(axes, [field(slab, 0.0, 0.0, 0.0) for _, slab in SOLVED], inclusion_field)
+    for _, slab in SOLVED:
+        place = float(coarse[0][1]), float(coarse[1][0]), 0.96
+        ramps = table.ramps(Inclusion(*place[:2], slab.modulus_kpa(0.96 - 1e-12)), slab)
+        expected = place[0] ** 3 * 0.96 * field(slab, *place)
+        np.testing.assert_allclose(ramps.inclusion_field.fields_per_n, expected, rtol=1e-9)
+        np.testing.assert_allclose(ramps.bare.fields_per_n, field(slab, 0.0, 0.0, 0.0), rtol=1e-9)
+
+
+def test_ring_means_keep_the_force_of_what_they_smooth():
+    """A parabola p = 1 - r^2/121: its mean over a ring from a to b is 1 - (a^2 + b^2)/242."""
+    r_mm = np.linspace(0, 11, 2201)
+    mean = ring_means(r_mm, 1 - r_mm**2 / 121)
+    inner, outer = np.maximum(r_mm - RING_MM / 2, 0), np.minimum(r_mm + RING_MM / 2, 11.0)
+    np.testing.assert_allclose(mean, 1 - (inner**2 + outer**2) / 242, atol=1e-6)

@@ -1,0 +1,118 @@
+"""The page's chapters and verdicts say what the study found, and a verdict stands only while its numbers do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import InvalidQuantity
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.pages.benchmark import Chapter
+from host_tools.paper_network import train as training
+from host_tools.paper_network.train import TrainingRows
+from host_tools.replication import study as paper_study
+from host_tools.replication.chapters import letter, paper_chapters
+from host_tools.replication.protocol import ProtocolStep, Views
+from host_tools.replication.study import PaperStudy
+from host_tools.replication.verdict import cover, findings
+
+
+def fake_views(truth: Array, exact: Array, light: str, tables: ProbeTables, *, presses: int) -> Views:
+    """Images on straight lines, bent in traced light, and frames with noise of 2 %."""
+    image = exact if light == "linear" else np.sqrt(exact)
+    noise = np.random.default_rng(1).normal(1.0, 0.02, (presses, *exact.shape[:1], 2, 3))
+    return Views(exact, image, image[None, :, None] * noise)
+
+
+@pytest.fixture(scope="module")
+def rows() -> TrainingRows:
+    """Scenes whose features give size and depth away, and little of Young's modulus."""
+    rng = np.random.default_rng(7)
+    truth = rng.uniform((3.0, 4.0, 40.0), (15.0, 12.0, 120.0), (80, 3))
+    size, depth, modulus = truth.T
+    features = np.column_stack([0.01 * size, size * depth * modulus**0.02, 10.0 * size])
+    names = ("max_deformation_mm", "central_deformation_mm3", "deformation_area_mm2")
+    return TrainingRows(names, features, truth, np.arange(9), "ab" * 32, {}, 0)
+
+
+@pytest.fixture(scope="module")
+def study(rows: TrainingRows) -> Iterator[PaperStudy]:
+    """Two short trials a network."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training, "MAX_ITERATIONS", 100)
+        patch.setattr(training, "LM_MAX_ITERATIONS", 30)
+        patch.setattr(paper_study, "views", fake_views)
+        yield PaperStudy(rows, None, seeds=2, presses=3)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def chapters(study: PaperStudy) -> dict[str, Chapter]:
+    return {name: chapter() for name, chapter in paper_chapters(study).items()}
+
+
+def test_on_straight_lines_the_image_costs_nothing_and_noise_does(study: PaperStudy) -> None:
+    exact = study.mean_percent("linear", ProtocolStep.FEATURES)
+    assert study.mean_percent("linear", ProtocolStep.LETTER) == pytest.approx(exact)
+    assert study.mean_percent("linear", ProtocolStep.REFITTED) == pytest.approx(exact)
+    assert not np.allclose(study.mean_percent("linear", ProtocolStep.NOISE), exact)
+    assert len(study.errors("linear", ProtocolStep.NOISE).percent) == 27
+
+
+def test_each_phantom_is_left_out_of_its_own_networks_only(study: PaperStudy) -> None:
+    for phantom, networks in enumerate(study.left_one_out):
+        truth = networks.problem.scenes.truth
+        assert len(truth) == 79
+        assert not (truth == study.phantoms.truth[phantom]).all(axis=1).any()
+    assert len(study.left_nine_out) == 4
+    assert {len(sets[0].problem.scenes.truth) for sets in study.left_nine_out.values()} == {71}
+
+
+def test_the_papers_figures_stand_beside_ours(study: PaperStudy, chapters: dict[str, Chapter]) -> None:
+    table = chapters["letter"].tables[0]
+    assert table.header[:4] == ("", "size, the paper", "size, linear light", "size, traced light")
+    papers = [(row[0], *row[1::3]) for row in table.rows]
+    assert papers[::3] == [("mean", "7.0", "7.2", "5.1"), ("max", "20.0", "26.4", "11.7")]
+    means = study.errors("physical", ProtocolStep.LETTER).totals()["mean"]
+    assert table.rows[0][3::3] == tuple(f"{mean:.1f}" for mean in means)
+
+
+def test_every_table_has_a_cell_under_every_heading(chapters: dict[str, Chapter]) -> None:
+    tables = [table for chapter in chapters.values() for table in chapter.tables]
+    assert len(tables) == 9
+    for table in tables:
+        assert {len(row) for row in table.rows} == {len(table.header)}
+
+
+def test_both_methods_and_every_failure_are_in_the_side_by_side(chapters: dict[str, Chapter]) -> None:
+    for table in chapters["methods"].tables:
+        assert table.header == ("", "SCG", "LM")
+        assert sum(row[0].startswith("failed:") for row in table.rows) == 3
+        assert table.rows[-1][:2] == ("time, SCG = 1", "1")
+
+
+def test_a_verdict_that_the_numbers_do_not_bear_is_open(study: PaperStudy, monkeypatch: pytest.MonkeyPatch) -> None:
+    good, bad = np.array([1.0, 1.0, 500.0]), np.array([50.0, 50.0, 1.0])
+    for means, supported in ((good, True), (bad, False)):
+        monkeypatch.setattr(study, "mean_percent", lambda *_, means=means: means)
+        assert [finding.supported for finding in findings(study)[:2]] == [supported, supported]
+        assert [benchmark.passed for benchmark in letter(study).benchmarks[:3]] == [supported] * 3
+
+
+def test_the_page_opens_with_the_verdicts_and_says_that_all_is_simulated(study: PaperStudy) -> None:
+    page = cover(study)
+    assert sum(line.startswith("| ") for line in page.opening) == 1 + len(findings(study))
+    assert any("80 are used; 0, failed or without a number" in line for line in page.opening)
+    assert any("is simulated" in line for line in page.opening)
+    assert any("not known to us" in limit for limit in page.limits)
+
+
+def test_rows_that_cannot_train_and_a_single_trial_are_refused(rows: TrainingRows, tables: ProbeTables) -> None:
+    few = replace(rows, features=rows.features[:60], truth=rows.truth[:60])
+    with pytest.raises(InvalidQuantity, match="training rows is 51, but must be at least 60"):
+        PaperStudy(few, tables)
+    with pytest.raises(InvalidQuantity, match="seeds is 1, but must be at least 2"):
+        PaperStudy(rows, tables, seeds=1)

@@ -1,0 +1,53 @@
+"""`host_tools verify`: which chapters run, what is written, and the exit code."""
+
+import pytest
+from typer.testing import CliRunner
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.__main__ import app
+from host_tools.pages.benchmark import Chapter, at_most
+from host_tools.verification import chapters
+
+
+def run(*words):
+    return CliRunner().invoke(app, ["verify", *words])
+
+
+@pytest.fixture
+def fakes(monkeypatch):
+    """Two chapters, of which the second misses its bound."""
+    asked = []
+
+    def fake(name, error):
+        def chapter(quick):
+            asked.append((name, quick))
+            return Chapter(name, "", "", (at_most("case", "noise", error, 1.0),))
+
+        return chapter
+
+    monkeypatch.setattr(chapters, "CHAPTERS", {"good": fake("good", 0.5), "bad": fake("bad", 2.0)})
+    return asked
+
+
+def test_a_missed_bound_is_exit_code_1(fakes):
+    assert run().exit_code == 1
+    assert fakes == [("good", False), ("bad", False)]
+
+
+def test_only_the_chapters_asked_for_are_run(fakes):
+    assert run("--only", "good", "--quick").exit_code == 0
+    assert fakes == [("good", True)]
+
+
+def test_an_unknown_chapter_is_refused_before_anything_runs(fakes):
+    result = run("--only", "good", "--only", "nothing")
+    assert isinstance(result.exception, InvalidQuantity)
+    assert "nothing" in str(result.exception)
+    assert "good, bad" in str(result.exception)
+    assert fakes == []
+
+
+def test_the_document_repeats_the_command(fakes, tmp_path):
+    out = tmp_path / "verification.md"
+    run("--only", "good", "--quick", "--out", str(out))
+    assert "`host_tools verify --only good --quick --out verification.md`" in out.read_text()
