@@ -1,9 +1,8 @@
-"""The models of a probe to its answers: the modes in which it can be pressed, and what estimates a recording of each.
+"""The models and the certificate of a probe to its answers: in which modes it can be pressed, and what estimates each.
 
 A mode is offered only when its model is there; the mode of the settings must be one of those. Between presses the
 models prove themselves on their golden vectors: an inference that hangs or errs is known before a press needs it.
-
-The certificate a start uses: the active one, once it is for this probe, its model and its settings.
+The certificate is the active one, once it is for this probe, its model and its settings.
 """
 
 from __future__ import annotations

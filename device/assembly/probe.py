@@ -1,12 +1,7 @@
 """Puts the daemon together: real chips, or emulated ones under the very same drivers, and the hand that presses them.
 
-Lets the virtual hand read the guidance of whatever leads its presses.
-
-Opens a probe for presses on phantoms: as the daemon does, but without model and certificate.
-
-Puts the daemon together: real chips, or emulated ones under the very same drivers.
-
-Every part that fails to open is listed at once: device/assembly/opened_parts.py.
+Every part that fails to open is listed at once: device/assembly/opened_parts.py. The virtual hand reads the guidance of
+whatever leads its presses. For presses on phantoms a probe is opened without model and certificate.
 """
 
 from __future__ import annotations

@@ -1,9 +1,6 @@
-"""`python -m device faults`: every fault code with its meaning, as a listing or as the page docs/faults.md. Exit code
-0.
+"""`python -m device faults`: every fault code with its meaning, as a listing or as the page docs/faults.md.
 
-The table of faults as the page docs/faults.md.
-
-`python -m device faults`: every fault code with its meaning. Exit code 0.
+Exit code 0.
 """
 
 from __future__ import annotations

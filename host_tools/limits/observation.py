@@ -1,19 +1,17 @@
-"""Sights of all presses to numbers with their derivatives and errors: the contrasts, one press after the other.
+"""What is seen under all loads to numbers with derivatives and errors: contrasts, the paper's scalars, reference light.
 
 What the camera adds is white: shot noise, read noise and counting. What optics and models add is smooth over the face
-and stays, however many frames are taken.
-Source of the camera's noise: EMVA Standard 1288; figures of `device/simulation/physics/sensor.py`.
+and stays, however many frames are taken. Source of the camera's noise: EMVA Standard 1288; figures of
+`device/simulation/physics/sensor.py`.
 
-Contrasts of a ramp to contrasts and growth: how the light of the press without the inclusion grows from load to load.
+How the light of the press without the inclusion grows from load to load is the logarithm of the reference over that at
+the largest load, ring by ring: the pattern of LEDs and lens drops out, and what is left knows of tissue and skin. Its
+noise is that which the contrasts have of the same reference frames. The probe reads it too
+(`device/measurement/ramp_modes/radial_profile.py`).
 
-It is the logarithm of the reference over that at the largest load, ring by ring: the pattern of LEDs and lens drops
-out, and what is left knows of tissue and skin. Its noise is that which the contrasts have of the same reference frames.
-The probe reads it too: `growth` of `device/measurement/ramp_modes/radial_profile.py`.
-
-Contrast on rings to the paper's three scalars, with derivatives and errors carried along to first order.
-
-As the probe takes them from its image (`device/measurement/paper_mode/features.py`): smoothed contrast at the centre,
-its integral over the window, and the area where it exceeds half of the first.
+The paper's three scalars are taken as the probe does (`device/measurement/paper_mode/features.py`): smoothed contrast
+at the centre, its integral over the window, and the area where it exceeds half of the first; derivatives and errors are
+carried along to first order.
 """
 
 from __future__ import annotations

@@ -1,14 +1,8 @@
 """Random presses to the surrogate and to the second harmonics of round inclusions: polynomials by least squares.
 
-Random presses to the surrogate: which terms its polynomials have, and their least squares.
-
 Size and depth get nearly every product of theirs, since contact follows them steeply; skin, tissue and offset little.
-The error that counts is the one on presses kept apart.
-
-Random presses to the second harmonics of round inclusions: polynomials as those of the surrogate, by least squares.
-
-The offset is the reason of a second harmonic and enters by its square; the rest bends it little. What counts is the
-error on presses kept apart, against the 1e-3 that flat field and model leave open.
+The offset is the reason of a second harmonic and enters by its square; the rest bends it little. The error that counts
+is the one on presses kept apart: for second harmonics against the 1e-3 that flat field and model leave open.
 """
 
 from __future__ import annotations

@@ -1,13 +1,8 @@
 """Trained networks to ONNX: an ensemble to size, depth, modulus and their spread; the range classifier to log odds.
 
-A trained ensemble to ONNX: rows of a press to size, depth and modulus, and the spread of their coordinates.
-
-The network answers in mm, mm and kPa; its spread stays in coordinates, -1 to 1 over the trained range, in which the
-bands of a card are. Operators: the ONNX standard, opset 17.
-
-The networks that tell the ranges to ONNX: rows of a press to log odds, one output for each mode.
-
-Source of the format: `range.onnx` of a bundle, docs/contracts.md; operators: the ONNX standard, opset 17.
+The ensemble answers in mm, mm and kPa; its spread stays in coordinates, -1 to 1 over the trained range, in which the
+belts of a card are. The classifier has one output for each mode (`range.onnx` of a bundle, docs/contracts.md).
+Operators: the ONNX standard, opset 17.
 """
 
 from __future__ import annotations

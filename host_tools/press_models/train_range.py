@@ -1,22 +1,12 @@
 """Random presses in and around the trained ranges to the networks that tell them apart, one for each ramp mode.
 
-Random presses of inclusions in and around the trained ranges, to rows of the press profile.
+Faces of inclusions around the ranges are those of `out_of_range_table`; their presses make polynomials over the wide
+ranges, and these endless training presses with the noise of each mode. Only size and depth are drawn wide: the modulus
+and all that nobody tells the probe stay in their ranges.
 
-As `press_samples` and `fit_surrogate`, with a size and depth that may lie outside: polynomials over the wide ranges,
-in the same terms. Only what may lie inside or outside is drawn wide; the modulus and all that nobody tells the probe
-stay in their ranges.
-
-The network that tells inclusions outside the trained ranges from those within: a profile row to log odds.
-
-As `dense_network`, with one output and the logistic loss, which makes it the logarithm of the odds that size or depth
-lies outside, when inclusions are drawn as the training presses are. By Neyman and Pearson no number of a row tells more
-of the ones, at as many false flags of the others, than the exact odds, which these networks approach. Source: Bishop,
-Pattern Recognition and Machine Learning, 2006, section 4.3.4, on the loss.
-
-Random presses in and around the trained ranges to the networks that tell them apart, one for each ramp mode.
-
-Faces of inclusions around the ranges are those of `wide_table`; their presses make polynomials, and these endless
-training presses with the noise of each mode, as for the networks of the unknowns.
+The network is `dense_network` with one output and the logistic loss: the log odds that size or depth lies outside. By
+Neyman and Pearson no number of a row tells more of the ones, at as many false flags of the others, than the exact odds,
+which these networks approach. Source: Bishop, Pattern Recognition and Machine Learning, 2006, section 4.3.4.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """Speed and accuracy as one dial: how many frames each mode takes, what it computes, and how far off it is.
 
-The same inclusions, skins and tissues are recorded in the frames of each mode, with every drift. Times are of this
-machine.
-
-Speed and accuracy of a bundle's modes into its model card, so that a probe can say what each mode is worth.
-
-Every bundle is measured on the same presses. Times are of the machine that trained, which the card names.
+The same inclusions, skins and tissues are recorded in the frames of each mode, with every drift. The dial of a bundle's
+modes goes into its model card, so that a probe can say what each mode is worth. Times are of the machine that measured,
+which the card names.
 """
 
 from __future__ import annotations

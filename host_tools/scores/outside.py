@@ -1,12 +1,9 @@
-"""Presses that are not of one inclusion inside the trained ranges, and ordinary ones, to be recorded.
+"""How often each mode refuses numbers for presses that are not of one round inclusion inside the trained ranges.
 
 Skin, tissue and slab are random for all of them. Large inclusions and shallow ones are not in the virtual probe's
-tables and are solved by finite elements, each on its own. Inclusions that are not round: `mode_oblong`.
-
-How often each mode refuses numbers for presses that are not of one round inclusion inside the trained ranges.
-
-The refusals of ordinary presses are the false ones. All are recorded through the simulated camera with every drift,
-and answered as the device answers them.
+tables and are solved by finite elements, each on its own. Inclusions that are not round: `ellipsoids`. The refusals of
+ordinary presses are the false ones. All are recorded through the simulated camera with every drift, and answered as the
+device answers them.
 """
 
 from __future__ import annotations

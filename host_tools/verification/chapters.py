@@ -1,6 +1,6 @@
 """The chapters of the verification by name, in the order of the document.
 
-Chapters that take long or judge the model's promises: the ends of every range, and how honest stated errors are.
+The last ones take long or judge the model's promises: the ends of every range, and how honest stated errors are.
 """
 
 from __future__ import annotations

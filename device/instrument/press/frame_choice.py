@@ -1,16 +1,9 @@
 """The frames that a press of a mode wants: those of one held force, or the nearest to each force of a ramp.
 
-The frames of a press that holds one force: those that count, until enough of them are alike.
-
-Which frame counts is for the press machine to say. Source: Lee & Won 2013, section IV: ten frames a lesion, averaged.
-
-The frames of a press that grows slowly: for each of evenly spaced forces the frame that comes nearest to it.
-
-A frame that counts (the press machine says so: its force is known at the exposure) is kept for a target within half a
-spacing, on the way up or down. A ramp is complete when every target has its frame and the hand is at the top, where it
-then holds. Which forces an estimate needs: device/measurement/mode.py.
-
-The frames that a press of a mode wants: what holds and ramps have in common, and which of the two a mode takes.
+Which frame counts is for the press machine to say. A hold wants ten that are alike (Lee & Won 2013, section IV: ten
+frames a lesion, averaged). A ramp keeps a frame for a target within half a spacing, on the way up or down; it is
+complete when every target has its frame and the hand is at the top, where it then holds. Which forces an estimate
+needs: device/measurement/mode.py.
 """
 
 from __future__ import annotations

@@ -1,13 +1,8 @@
 """Frames that are unlike the others of their press: a flash, a bubble, a slip. To the worst of a hold or of a ramp.
 
-Frames of a hold that are unlike the others: a flash, a bubble, a slip. To the worst of them, or none.
-
-Compared is the light above dark in blocks of the face, brought to one force by the power that contact follows; so both
-the mean level and the profile count. Frames of a ramp are compared otherwise:
-device/instrument/press/frame_outliers.py. Source: median and median absolute deviation, Rousseeuw & Croux, J. Am. Stat.
-Assoc. 88 (1993).
-
-The frame of a ramp that is unlike what all others say of its force: a flash, a bubble, a slip. Or none.
+Of a hold, the light above dark in blocks of the face is compared, brought to one force by the power that contact
+follows; so both the mean level and the profile count. Source: median and median absolute deviation, Rousseeuw & Croux,
+J. Am. Stat. Assoc. 88 (1993).
 
 No two frames of a ramp are alike, but the light of each block of the face follows the force smoothly: light over the
 power of the force that contact follows is a cubic in the root of the force, to 3 % for any inclusion of the trained

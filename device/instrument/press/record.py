@@ -1,17 +1,8 @@
-"""What a press leaves behind: its job while it is under way, the recording of its frames, its answer, both kept.
+"""What a press leaves behind: its job while it is under way, the recording of its frames, and its answer, all kept.
 
-What a press leaves behind: the recording of its frames, and the record of what was measured.
-
-The record says in which mode the press was taken; the estimate in it, which mode's model answered. They are kept by
-`device.records.store` and described in docs/contracts.md.
-
-Frames of a press to its answer, kept: the recording of the frames, what the estimator says of it, both in the store.
-
-An estimate without numbers is kept too: it says why there are none.
-
-What is kept of the press under way besides its frames: its job, its warnings, how it failed, and the light it took.
-
-The store first, then the board: whoever reads that a press has changed finds it kept.
+The record says in which mode the press was taken; the estimate in it, which mode's model answered. An estimate without
+numbers is kept too: it says why there are none. The store comes first, then the board: whoever reads that a press has
+changed finds it kept. Formats: `device.records.store` and docs/contracts.md.
 """
 
 from __future__ import annotations

@@ -1,12 +1,7 @@
-"""The states of a press, which of them follow which, and what the operator is told in each: codes, sentences, reasons.
+"""The states of a press as one table: which follow which, what the operator is told in each, and why a press is rejected.
 
-The states of a press and which of them follow which: the whole procedure as one table.
-
-One measurement runs through them twice, beside the lesion and on it. docs/press.md shows the table; a test compares.
-
-Why a press is rejected, in one sentence for the operator: what was seen, its bound, and what to do.
-
-What the operator should do now: one code for machines, one sentence for the screen.
+One measurement runs through them twice, beside the lesion and on it. Guidance is one code for machines and one sentence
+for the screen; a reason says what was seen, its bound, and what to do. docs/press.md shows the table; a test compares.
 """
 
 from __future__ import annotations

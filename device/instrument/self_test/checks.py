@@ -1,25 +1,15 @@
 """The checks of the self-test: each measures one part, and says within which bound it must be and what to do if not.
 
-Dark frames to the state of the camera: their level, noise from frame to frame, and pixels that are never dark.
+Camera: a noise below half a count is hidden by the rounding to whole counts and is given as half a count. Source: EMVA
+Standard 1288, temporal noise from the difference of two images of equal exposure, no reliable estimate below 0.24
+counts^2.
 
-A noise below half a count is hidden by the rounding to whole counts and is given as half a count. Source: EMVA Standard
-1288, temporal noise from the difference of two images of equal exposure, no reliable estimate below 0.24 counts^2.
+Sides, each lit alone on a face that is held on the reference block: the half of the image that is nearer to an LED is
+brighter than the opposite one, at the target force by a third; at a tenth of it the far half is brighter, so the test
+needs the force. Where the block touches does not matter: each side's light is compared with that of all sides
+together. An untouched face is dark by total reflection and tells nothing.
 
-Whether each LED lights its own side: of a face that is held on the reference block, each side lit alone.
-
-The half of the image that is nearer to an LED is brighter than the opposite one, at the target force by a third; at a
-tenth of it the far half is brighter, so the test needs the force. Where the block touches does not matter: each side's
-light is compared with that of all sides together. An untouched face is dark by total reflection and tells nothing.
-
-Forces that are known to what the load cell says: nothing at rest, and a weight where the operator puts one on.
-
-The wall clock to a verdict: does it run as the monotonic clock does, is its date possible, who keeps it right.
-
-The disk below the store to a verdict: what is left of it, and whether it gives back what it took.
-
-Installed model bundles to a verdict: each is read from the disk again and computes its golden vectors.
-
-The network in use was proved at the start; this proves that the next start will find it as it was.
+Models: the network in use was proved at the start; this proves that the next start will find it as it was.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""What a self-test found, check by check, and the self-test as one resource: what was asked for and how far it is.
+"""What a self-test found, and the self-test as one resource: what it was asked for, how far it is, and what it says.
 
-What a check of the self-test found: the measured value, the bound it must be in, and what to do if it is not.
-
-One self-test as a resource: what it was asked for, how far it is, and what it found.
+A check found a measured value, the bound it must be in, and what to do if it is not.
 """
 
 from __future__ import annotations

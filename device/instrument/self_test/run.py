@@ -1,8 +1,7 @@
 """Runs the self-test on the bench: every check one after the other, also when one before it has failed.
 
-It runs on the procedure's thread, which owns light and camera, between presses. It ends dark.
-
-Waits for what the operator does in a self-test: keep the probe free, hold it on a block, put a weight on it.
+It runs on the procedure's thread, which owns light and camera, between presses. It waits for what the operator does:
+keep the probe free, hold it on a block, put a weight on it. It ends dark.
 """
 
 from __future__ import annotations

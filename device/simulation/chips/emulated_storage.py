@@ -1,13 +1,8 @@
 """Storage that goes wrong: a disk that is full, read-only or silent, and a model bundle with one byte changed.
 
-A disk that fills up, with the kernel's own "no space left" from /dev/full, can only be read, or does not answer.
-
-Only what goes through the store's `Disk` is refused or held up; the database beside it is on the real disk. Linux only.
-Source: full(4); errno(3), EROFS, which Linux answers once it has remounted a failing card read-only.
-
-Model folders as they are installed, or with one byte of the network changed, as a worn card changes it.
-
-The installed files stay as they are: what is tampered with is a copy.
+Only what goes through the store's `Disk` is refused or held up, with the kernel's own "no space left" from /dev/full;
+the database beside it is on the real disk. Linux only. Source: full(4); errno(3), EROFS, which Linux answers once it
+has remounted a failing card read-only. What is tampered with is a copy of the bundle, changed as a worn card does.
 """
 
 from __future__ import annotations
