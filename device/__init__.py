@@ -1,6 +1,6 @@
 """The probe's daemon: light, camera and force in; size, depth and Young's modulus out.
 
-Modules in reading order: `config`, `errors`, `fault_table`.
+Modules in reading order: `config`, `config_chips`, `errors`, `fault_table`.
 
 Rooms in the order of a press: `commands` (a verb a file), `assembly` (opens the parts), `hardware` (drivers),
 `simulation` (what stands below them when nothing is there), `instrument` (leads the press), `measurement` (what it

@@ -41,8 +41,7 @@ from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.records.calibrations import Calibrations
 from device.settings.last_good import StartSettings, start_settings
-from device.settings.layers import ROOT, layer_files, read_config, read_layers
-from device.settings.override import overridden
+from device.settings.layers import ROOT, layer_files, overridden, read_config, read_layers
 from device.simulation.scenario import Scenario, read_scenario
 from device.web.app import create_app
 
@@ -129,8 +128,7 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
         settings = replace(settings, config=overridden(settings.config, scenario.settings))
     if options.port is None:
         return settings
-    config = settings.config
-    return replace(settings, config=replace(config, server=replace(config.server, port=options.port)))
+    return replace(settings, config=overridden(settings.config, {"server": {"port": options.port}}))
 
 
 def _analyse(options: argparse.Namespace) -> int:

@@ -1,76 +1,356 @@
-"""All settings of the daemon by section: each with its type, default, unit, range and one sentence, as data.
+"""All settings of the daemon by section: each with its type, unit, range, default and one sentence, as data.
 
 Out-of-range values are refused, never clipped. Paths are relative to where the daemon is started. docs/settings.md is
-made from here; which files are read, and in which order, is in device/settings/layers.py.
+made from here; which files are read, and in which order, is in device/settings/layers.py. What has to fit together is
+compared when each setting holds alone. No NumPy is loaded: what darkens the LEDs has to be quick
+(device/commands/led_off.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations
 from pathlib import Path
+from typing import Annotated, Literal
 
-from device.measurement.mode import Mode
-from device.measurement.quantities import Bound
-from device.settings.camera_section import CameraSection
-from device.settings.cell_section import CellSection
-from device.settings.light_section import LightSection
-from device.settings.press_section import PressSection
-from device.settings.setting import Conflict, Section, setting
+from pydantic.dataclasses import dataclass
+from typing_extensions import Doc
+
+from device.config_chips import CHIP_ADDRESSES, INTERNAL_HZ, LightChip, PwmClock, RawFormat, RawMode
+from device.files.toml_record import STRICT, InvalidRecord
+from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N, Mode
+from device.measurement.quantities import Bound, InvalidQuantity
+from device.measurement.recording.pixel_scale import PixelScale
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 SIMULATED_PROBE = MODELS / "simulated_probe"
 
+SideRatio = Annotated[float, Bound(0.0, 1.0, "", low_included=False)]
+SideCounts = Annotated[float, Bound(1.0, 255.0, "counts")]
+CellProtocol = Literal["openscale", "mantracourt"]
+HEXADECIMAL = "hexadecimal"
+"""Marks a number that is written so."""
+SensorPixels = Annotated[int, Bound(64, 8192, "px")]
+LightRatio = Annotated[float, Bound(0.01, 0.9, "")]
 
-@dataclass(frozen=True)
+
+class Conflict(InvalidQuantity):
+    """A value that holds alone but not beside `others`, the full names of the settings it has to fit."""
+
+    def __init__(self, quantity: str, value: object, bound: str, others: tuple[str, ...], action: str = "") -> None:
+        super().__init__(quantity, value, bound, action or f"correct it or {' or '.join(others)}")
+        self.others = others
+
+
+def conflict(name: str, value: float, bound: Bound, *others: str) -> Iterator[Conflict]:
+    """Yield a `Conflict` when a value lies outside the bound that the settings `others` leave it."""
+    if not bound.holds(value):
+        yield Conflict(name, value, str(bound), others)
+
+
+class Section:
+    """Base of a record of settings; raises `InvalidRecord` when those that hold alone do not fit together."""
+
+    def __post_init__(self) -> None:
+        if problems := list[InvalidQuantity](self.conflicts()):
+            raise InvalidRecord(problems)
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield what does not fit together of settings that hold alone."""
+        yield from ()
+
+
+@dataclass(frozen=True, config=STRICT)
+class CameraSection(Section):
+    """The camera: frame size, pixel size on the face, fixed exposure and gain, frame rate.
+
+    A frame may be made of a larger mode of the sensor: of its middle, each pixel the mean over an area.
+    """
+
+    width_px: Annotated[int, Bound(64, 4096, "px"), Doc("Columns of a frame.")] = 768
+    height_px: Annotated[int, Bound(64, 4096, "px"), Doc("Rows of a frame.")] = 492
+    mm_per_px_x: Annotated[float, Bound(1e-4, 1.0, "mm"), Doc("Width of a frame's pixel on the sensing face.")] = (
+        0.03125
+    )
+    mm_per_px_y: Annotated[float, Bound(1e-4, 1.0, "mm"), Doc("Height of a frame's pixel on the sensing face.")] = (
+        0.03646
+    )
+    raw_format: Annotated[RawFormat, Doc("Unpacked raw format of the sensor; frames have 8 bits all the same.")] = "R8"
+    sensor_width_px: Annotated[
+        SensorPixels | None, Doc("Columns of the sensor's mode; those of a frame unless given.")
+    ] = None
+    sensor_height_px: Annotated[
+        SensorPixels | None, Doc("Rows of the sensor's mode; those of a frame unless given.")
+    ] = None
+    crop_width_px: Annotated[
+        SensorPixels | None, Doc("Columns in the sensor's middle that a frame is made of; all unless given.")
+    ] = None
+    crop_height_px: Annotated[
+        SensorPixels | None, Doc("Rows in the sensor's middle that a frame is made of; all unless given.")
+    ] = None
+    exposure_us: Annotated[int, Bound(10, 1e6, "us"), Doc("Exposure time of every frame, at most one frame long.")] = (
+        4000
+    )
+    gain: Annotated[float, Bound(1.0, 16.0, ""), Doc("Analogue gain of every frame.")] = 1.0
+    frame_rate_hz: Annotated[float, Bound(1.0, 240.0, "Hz"), Doc("Frames a second.")] = 30.0
+    index: Annotated[int, Bound(0, 99, ""), Doc("Number of the camera on this board.")] = 0
+    max_restarts: Annotated[
+        int,
+        Bound(0, 100, ""),
+        Doc("How often in a minute the camera's process, when it hung or died, is started again."),
+    ] = 5
+    late_frames: Annotated[
+        float, Bound(1.5, 100.0, "frame times"), Doc("A frame begun this long after it was asked for is late.")
+    ] = 3.0
+    tear_counts: Annotated[
+        float,
+        Bound(0.5, 255.0, "counts"),
+        Doc("A step between two rows, compared with the frame before, above which one of the two frames is torn."),
+    ] = 10.0
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield an exposure longer than a frame, and a part of the sensor that is not on it or less than a frame."""
+        bound = Bound(10, 1e6 / self.frame_rate_hz, "us, one frame")
+        yield from conflict("camera.exposure_us", self.exposure_us, bound, "camera.frame_rate_hz")
+        mode = self.raw_mode
+        for number, side in enumerate(("width_px", "height_px")):
+            sensor_px, crop_px, frame_px = mode.sensor_px[number], mode.crop_px[number], mode.frame_px[number]
+            sensor, crop, frame = f"camera.sensor_{side}", f"camera.crop_{side}", f"camera.{side}"
+            too_small = [*conflict(sensor, sensor_px, Bound(frame_px, 8192, "px, a frame's or more"), frame)]
+            within = Bound(frame_px, sensor_px, "px, from a frame's to the sensor's")
+            yield from too_small or conflict(crop, crop_px, within, frame, sensor)
+
+    @property
+    def scale(self) -> PixelScale:
+        """Size of a frame's pixel on the face."""
+        return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
+
+    @property
+    def sensor_scale(self) -> PixelScale:
+        """Size of a sensor's pixel on the face."""
+        (crop_x, crop_y), (width, height) = self.raw_mode.crop_px, self.raw_mode.frame_px
+        return PixelScale(self.mm_per_px_x * width / crop_x, self.mm_per_px_y * height / crop_y)
+
+    @property
+    def raw_mode(self) -> RawMode:
+        """The sensor's mode and what a frame is made of."""
+        frame_px = (self.width_px, self.height_px)
+        sensor_px = (self.sensor_width_px or self.width_px, self.sensor_height_px or self.height_px)
+        crop_px = (self.crop_width_px or sensor_px[0], self.crop_height_px or sensor_px[1])
+        return RawMode(sensor_px, crop_px, frame_px, self.raw_format)
+
+
+@dataclass(frozen=True, config=STRICT)
+class LightSection(Section):
+    """The LED driver: chip, I2C bus and address, the brightness of the four sides while measuring, when light is right.
+
+    Lists have one number a side: +x, +y, -x, -y.
+    """
+
+    chip: Annotated[LightChip, Doc("LED driver on the board: a pca9685 needs an exposure of whole PWM periods.")] = (
+        "tlc59116"
+    )
+    bus: Annotated[int, Bound(0, 255, ""), Doc("I2C bus of the LED driver.")] = 1
+    address: Annotated[
+        int | None,
+        Bound(0x08, 0x77, ""),
+        HEXADECIMAL,
+        Doc("I2C address of the LED driver; 0x60 of a tlc59116 and 0x40 of a pca9685 unless given."),
+    ] = None
+    pwm_hz: Annotated[float, Bound(24.0, 1526.0, "Hz"), Doc("Frequency of the brightness of a pca9685.")] = 1526.0
+    oscillator_hz: Annotated[float, Bound(20e6, 30e6, "Hz"), Doc("Oscillator of a pca9685, as measured.")] = INTERNAL_HZ
+    ratio: Annotated[
+        tuple[SideRatio, SideRatio, SideRatio, SideRatio],
+        Doc("Brightness of each side while measuring, of the first press if it is held at light.target_counts."),
+    ] = (0.6, 0.6, 0.6, 0.6)
+    target_counts: Annotated[
+        float | None,
+        Bound(1.0, 150.0, "counts"),
+        Doc(
+            "Mean counts above dark at the target force that the light is held at from press to press; "
+            "unless given the brightness stays."
+        ),
+    ] = None
+    max_dark_counts: Annotated[
+        float,
+        Bound(0.0, 100.0, "counts"),
+        Doc("Mean of a frame without light, black level included, above which something shines."),
+    ] = 12.0
+    min_side_ratio: Annotated[
+        LightRatio, Doc("A side that alone gives less than this part of the brightest one's light is dark.")
+    ] = 0.3
+    max_dimming_ratio: Annotated[
+        LightRatio, Doc("Loss of a side's light, against commissioning or the first presses, that is warned of.")
+    ] = 0.07
+    commissioned_counts: Annotated[
+        tuple[SideCounts, SideCounts, SideCounts, SideCounts] | None,
+        Doc("Mean counts above dark at the target force of each side alone at full brightness."),
+    ] = None
+    min_contrast_ratio: Annotated[
+        LightRatio, Doc("How much of a press's light must have come with the force; gel and sweat leave less.")
+    ] = 0.3
+    max_on_s: Annotated[
+        float,
+        Bound(1.0, 3600.0, "s"),
+        Doc("Time with light in one press, both of its parts together, after which the light goes off."),
+    ] = 300.0
+
+    @property
+    def chip_address(self) -> int:
+        """The chip's I2C address: as given, or with its address pins as they come."""
+        return CHIP_ADDRESSES[self.chip].default if self.address is None else self.address
+
+    @property
+    def pwm_clock(self) -> PwmClock:
+        """The period of a PCA9685."""
+        return PwmClock.nearest(self.pwm_hz, self.oscillator_hz)
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield an address that the chip cannot have, or that is not its own."""
+        taken = CHIP_ADDRESSES[self.chip]
+        bound = Bound(taken.first, taken.last, f"of a {self.chip}")
+        yield from conflict("light.address", self.chip_address, bound, "light.chip")
+        if self.chip_address in taken.shared:
+            other = f"not one that every {self.chip} answers at"
+            yield Conflict("light.address", f"{self.chip_address:#04x}", other, ("light.chip",))
+
+    def exposure_conflicts(self, exposure_us: float, frame_us: float) -> Iterator[Conflict]:
+        """Yield an exposure of the chip's flashes that would differ from frame to frame."""
+        if self.chip != "pca9685" or self.pwm_clock.is_whole(exposure_us):
+            return
+        period_us = self.pwm_clock.period_us
+        nearest_us = self.pwm_clock.nearest_whole_us(exposure_us, frame_us)
+        if nearest_us:
+            bound = f"a whole number of the pca9685's periods of {period_us:.2f} us"
+            others = "light.chip", "light.pwm_hz", "light.oscillator_hz"
+            yield Conflict("camera.exposure_us", exposure_us, bound, others, f"set the nearest one, {nearest_us}")
+        else:
+            bound = f"one whose period, {period_us:.0f} us, fits into a frame of {frame_us:.0f} us"
+            action = "raise it, or lower camera.frame_rate_hz"
+            yield Conflict("light.pwm_hz", self.pwm_hz, bound, ("light.chip", "camera.frame_rate_hz"), action)
+
+
+@dataclass(frozen=True, config=STRICT)
+class CellSection(Section):
+    """The load cell: its serial line, its sensitivity, and what it bears.
+
+    The zero of commissioning and that of each start are two: how far they may lie apart tells a cell that was bent.
+    """
+
+    device: Annotated[str, Doc("Serial line of the load cell's amplifier.")] = "/dev/tsis-force"
+    baud: Annotated[int, Bound(300, 4_000_000, "baud"), Doc("Speed of the serial line.")] = 115_200
+    protocol: Annotated[
+        CellProtocol, Doc("What the load cell's amplifier speaks; a mantracourt has a station, and a count of 1 nV/V.")
+    ] = "openscale"
+    station: Annotated[int, Bound(1, 999, ""), Doc("Station number of a mantracourt.")] = 1
+    sensitivity_counts_per_n: Annotated[
+        float, Bound(1.0, 1e7, "counts/N"), Doc("Change of the amplifier's reading by one newton.")
+    ] = 100_000.0
+    tare_spread_n: Annotated[
+        float,
+        Bound(0.0001, 1.0, "N"),
+        Doc("Readings that spread more than this while taring are not of an untouched probe."),
+    ] = 0.02
+    commissioned_tare_counts: Annotated[
+        float | None,
+        Bound(-(2.0**23), 2.0**23, "counts"),
+        Doc("Reading of the free probe at commissioning; without it that of each start stands in."),
+    ] = None
+    tare_drift_n: Annotated[
+        float, Bound(0.01, 5.0, "N"), Doc("How far from the commissioning tare the tare of a start may be.")
+    ] = 0.2
+    max_load_n: Annotated[
+        float, Bound(1.0, 100.0, "N"), Doc("Load, from the commissioning tare, that is an overload.")
+    ] = 5.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class PressSection(Section):
+    """The press: mode unless asked otherwise, target force and its band, what is contact, steady, and too much."""
+
+    mode: Annotated[Mode, Doc("How a press is measured unless it is asked for in another mode.")] = "paper"
+    target_n: Annotated[float, Bound(0.1, 20.0, "N"), Doc("Force of a hold.")] = 0.5
+    band_ratio: Annotated[
+        float, Bound(0.005, 0.2, ""), Doc("Frames of a hold are taken this near to the target, as a part of it.")
+    ] = 0.05
+    contact_n: Annotated[
+        float, Bound(0.005, 0.75 * RAMP_FROM_N, "N"), Doc("Force that is contact, at most half the target.")
+    ] = 0.05
+    steady_n: Annotated[float, Bound(0.001, 1.0, "N"), Doc("Change of force within which a hold is steady.")] = 0.02
+    overload_n: Annotated[
+        float, Bound(1.2 * RAMP_TO_N, 50.0, "N"), Doc("Force that is too much, at least a fifth above the target.")
+    ] = 1.0
+    max_rate_n_per_s: Annotated[
+        float,
+        Bound(0.05, 5.0, "N/s"),
+        Doc("A ramp's force may not change faster, or it would not be known at the exposure."),
+    ] = 0.35
+    max_offset_mm: Annotated[
+        float,
+        Bound(0.5, 30.0, "mm"),
+        Doc(
+            "An inclusion whose bright spot lies further off the middle of the face is off-centre: the press is rejected."
+        ),
+    ] = 2.5
+    timeout_s: Annotated[float, Bound(1.0, 3600.0, "s"), Doc("A press that takes longer is given up.")] = 60.0
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a contact that is too near to the target from below, and an overload from above."""
+        contact = Bound(0.005, self.target_n / 2, "N, half the target")
+        yield from conflict("press.contact_n", self.contact_n, contact, "press.target_n")
+        overload = Bound(1.2 * self.target_n, 50.0, "N, a fifth above the target")
+        yield from conflict("press.overload_n", self.overload_n, overload, "press.target_n")
+
+    @property
+    def band_n(self) -> tuple[float, float]:
+        """Forces between which frames are taken."""
+        return self.target_n * (1 - self.band_ratio), self.target_n * (1 + self.band_ratio)
+
+
+@dataclass(frozen=True, config=STRICT)
 class StoreSection(Section):
     """The disk: how much must be left before a press is taken."""
 
-    prefix = "store."
-
-    min_free_mb: float = setting(50.0, "Space that must be left before a press is taken.", Bound(1.0, 1e6, "MB"))
+    min_free_mb: Annotated[float, Bound(1.0, 1e6, "MB"), Doc("Space that must be left before a press is taken.")] = 50.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class ClockSection(Section):
     """The wall clock: by how much it may be set before `taken_at` is doubted."""
 
-    prefix = "clock."
-
-    max_jump_s: float = setting(
-        2.0, "The clock may be set by so much before the time of a press is doubted.", Bound(0.1, 3600.0, "s")
-    )
+    max_jump_s: Annotated[
+        float, Bound(0.1, 3600.0, "s"), Doc("The clock may be set by so much before the time of a press is doubted.")
+    ] = 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class ServerSection(Section):
     """Where the screen and the REST API are served; loopback unless told otherwise."""
 
-    prefix = "server."
+    host: Annotated[str, Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network.")] = (
+        "127.0.0.1"
+    )
+    port: Annotated[int, Bound(0, 65535, ""), Doc("Port of screen and REST API; 0 takes any free one.")] = 8000
 
-    host: str = setting("127.0.0.1", "Address at which screen and REST API are served; 0.0.0.0 serves the network.")
-    port: int = setting(8000, "Port of screen and REST API; 0 takes any free one.", Bound(0, 65535, ""))
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Config(Section):
     """All settings of the daemon."""
 
-    serial: str = setting("TSIS-0000", "Serial number of this probe; model and certificate are for it.")
-    model: Path = setting(MODELS / "paper", "Folder of the model that answers in mode paper.")
-    quick_model: Path = setting(
-        MODELS / "quick", "Folder of the model of mode quick, offered where it is installed and for this probe."
-    )
-    profile_model: Path = setting(
-        MODELS / "standard",
-        "Folder of the model of modes standard and precise, offered where it is installed and for this probe.",
-    )
-    calibration: Path = setting(
-        Path("/var/lib/tsis/calibrations"),
-        "Folder of this probe's certificates, of which one is active; or one certificate, NAME.json.",
-    )
-    data: Path = setting(Path("/var/lib/tsis"), "Folder of measurements and recordings.")
+    serial: Annotated[str, Doc("Serial number of this probe; model and certificate are for it.")] = "TSIS-0000"
+    model: Annotated[Path, Doc("Folder of the model that answers in mode paper.")] = MODELS / "paper"
+    quick_model: Annotated[
+        Path, Doc("Folder of the model of mode quick, offered where it is installed and for this probe.")
+    ] = MODELS / "quick"
+    profile_model: Annotated[
+        Path,
+        Doc("Folder of the model of modes standard and precise, offered where it is installed and for this probe."),
+    ] = MODELS / "standard"
+    calibration: Annotated[
+        Path, Doc("Folder of this probe's certificates, of which one is active; or one certificate, NAME.json.")
+    ] = Path("/var/lib/tsis/calibrations")
+    data: Annotated[Path, Doc("Folder of measurements and recordings.")] = Path("/var/lib/tsis")
     camera: CameraSection = field(default_factory=CameraSection)
     light: LightSection = field(default_factory=LightSection)
     cell: CellSection = field(default_factory=CellSection)

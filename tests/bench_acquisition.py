@@ -22,7 +22,7 @@ import numpy as np
 
 from device.assembly.camera import emulated_camera
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared
-from device.config import Config, simulated_config
+from device.config import CameraSection, Config, simulated_config
 from device.instrument.acquisition.bench import Bench
 from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.acquisition.frame_check import TearWatch
@@ -30,7 +30,6 @@ from device.instrument.press.capture import Capture
 from device.instrument.press.machine import PressRules, PressUnderWay
 from device.instrument.status import StatusBoard
 from device.measurement.recording.tactile_image import Frame
-from device.settings.camera_section import CameraSection
 from device.simulation.chips.camera_server import CameraServer
 from device.simulation.chips.virtual_camera import VirtualPicamera2
 from device.simulation.faults import NO_FAULTS

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from device.assembly.camera import emulated_camera
+from device.config import CameraSection
 from device.hardware.camera_process import CameraProcess
 from device.hardware.interfaces import CameraFrame
 from device.hardware.restart_limit import RestartLimit
-from device.settings.camera_section import CameraSection
 from device.simulation.chips.camera_server import CameraServer
 from device.simulation.chips.virtual_camera import VirtualPicamera2
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from device.config import Config
+from device.config import CameraSection, Config
 from device.errors import DeviceError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.acquisition import bench as bench_module
@@ -25,7 +25,6 @@ from device.instrument.status import StatusBoard
 from device.measurement.mode import Mode
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Frame
-from device.settings.camera_section import CameraSection
 from device.simulation.hand import HandSettings, VirtualHand
 
 SHAPE, SCALE = (44, 64), PixelScale(0.35, 0.36)

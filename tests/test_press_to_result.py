@@ -16,12 +16,11 @@ from daemon_process import QUICK_HAND, Daemon
 from device.assembly.answers import answers_for
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
-from device.config import simulated_config
+from device.config import PressSection, simulated_config
 from device.errors import StorageError
 from device.files.recording_file import read_recording
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.records.store import Store
-from device.settings.press_section import PressSection
 from device.simulation.scenario import Scenario
 
 

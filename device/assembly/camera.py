@@ -8,13 +8,13 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from device.config import CameraSection
 from device.errors import DeviceError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.camera_process import WINDOW_S, CameraProcess
 from device.hardware.camera_worker import CameraOpener
 from device.hardware.restart_limit import RestartLimit
 from device.measurement.quantities import InvalidQuantity
-from device.settings.camera_section import CameraSection
 from device.simulation.chips.remote_camera import RemotePicamera2
 
 

@@ -19,10 +19,10 @@ from device.assembly.camera import emulated_camera, real_camera
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.opened_parts import OpenedParts
 from device.config import SIMULATED_PROBE, Config
+from device.config_chips import RAW_BITS
 from device.errors import ConfigError
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
-from device.hardware.raw_mode import RAW_BITS
 from device.instrument.acquisition.bench import Bench
 from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.acquisition.frame_check import FramePace

@@ -77,10 +77,10 @@ def _show(layers: Layers, *, only_changed: bool, as_json: bool) -> None:
 
 def _record(known: Known, value: Any, layers: Layers) -> dict[str, Any]:
     file = layers.origins.get(known.name)
-    unit = known.setting.unit
+    unit = known.unit
     return {"setting": known.name, "value": value, "unit": unit, "default": known.default, "file": file}
 
 
 def _row(known: Known, value: Any, layers: Layers) -> tuple[str, ...]:
     file = str(layers.origins.get(known.name, "default"))
-    return known.name, known.written(value), known.setting.unit, known.written(known.default), file
+    return known.name, known.written(value), known.unit, known.written(known.default), file

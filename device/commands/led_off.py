@@ -13,11 +13,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from device.config import LightSection
 from device.errors import DeviceError, LightError
 from device.hardware.led_driver import open_led_driver
 from device.settings.last_good import start_settings
 from device.settings.layers import layer_files, read_layers
-from device.settings.light_section import LightSection
 
 TRY_FOR_S = 0.5
 """A transaction that the killed daemon was in may spoil the next one; beyond this a chip that is silent stays so."""

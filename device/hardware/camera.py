@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from device.config_chips import RAW_BITS, RawMode
 from device.errors import CameraError
 from device.hardware.interfaces import CameraFrame
-from device.hardware.raw_mode import RAW_BITS, RawMode
 from device.measurement.quantities import Bound, InvalidQuantity, require
 
 

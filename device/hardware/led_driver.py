@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from smbus2 import SMBus
 
+from device.config import LightSection
 from device.errors import LightError
 from device.hardware.i2c_chip import I2cBus
 from device.hardware.interfaces import Lights
 from device.hardware.pca9685 import Pca9685
 from device.hardware.tlc59116 import Tlc59116
-from device.settings.light_section import LightSection
 
 
 def led_driver(light: LightSection, bus: I2cBus) -> Lights:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import time
 from enum import IntEnum
 
+from device.config_chips import STEPS, PwmClock
 from device.errors import LightError
 from device.hardware.i2c_chip import REMEDY, I2cBus, I2cChip, brightness_counts
 from device.hardware.interfaces import LED_COUNT
-from device.hardware.pwm_clock import STEPS, PwmClock
 from device.measurement.recording.led_sides import LedRatio
 
 

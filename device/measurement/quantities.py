@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 UNKNOWNS = ("size_mm", "depth_mm", "youngs_modulus_kpa")
 """Order of the unknowns in every array of estimates or truths."""
@@ -49,6 +50,20 @@ class Bound:
         above = value >= self.low if self.low_included else value > self.low
         below = value <= self.high if self.high_included else value < self.high
         return math.isfinite(value) and above and below
+
+    def __get_pydantic_core_schema__(self, kind: Any, schema_of: Any) -> Any:
+        """Let a record declare a number with its range, as `Annotated[float, Bound(0.0, 5.0, "N")]`, or `float | None`.
+
+        Called by pydantic alone, when it makes the check of such a record.
+        """
+        from pydantic_core import PydanticCustomError, core_schema
+
+        def held(value: float | None) -> float | None:
+            if value is None or self.holds(value):
+                return value
+            raise PydanticCustomError("bound", "{bound}", {"bound": str(self)})
+
+        return core_schema.no_info_after_validator_function(held, schema_of(kind))
 
 
 def require(quantity: str, value: object, bound: Bound, action: str) -> float:

@@ -1,7 +1,6 @@
 """The settings of the daemon: what each one is, the files they come from, and the last ones that were good.
 
-Modules in reading order: `setting`, `camera_section`, `cell_section`, `light_section`, `press_section`, `catalogue`,
-`layers`, `override`, `last_good`, `page`.
+Modules in reading order: `layers`, `catalogue`, `last_good`, `page`.
 
 No part of the probe is opened here.
 """

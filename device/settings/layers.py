@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
-from device.config import Config
+from device.config import Config, Conflict
 from device.errors import ConfigError
-from device.files.toml_record import from_table, read_table, table_problems
+from device.files.toml_record import as_table, from_table, read_table, table_problems
 from device.measurement.quantities import InvalidQuantity
 from device.settings.catalogue import SETTINGS
-from device.settings.setting import Conflict, InvalidSettings
 
 ROOT = Path("/")
 VENDOR, LOCAL, DROP_INS = "usr/lib/tsis/config.toml", "etc/tsis/config.toml", "etc/tsis/config.d"
@@ -101,6 +100,18 @@ def read_config(path: Path) -> Config:
     return read_layers([path]).config()
 
 
+def overridden(config: Config, table: Mapping[str, Any]) -> Config:
+    """Return a configuration in which the settings of a table, as a settings file has them, stand for its own.
+
+    Raises `InvalidQuantity` for a setting that is not known, of another type, out of its range, or that does not fit.
+    """
+    own = as_table(config)
+    for name, stated in table.items():
+        is_section = isinstance(stated, Mapping) and isinstance(own.get(name), dict)
+        own[name] = own[name] | stated if is_section else stated
+    return from_table(Config, own)
+
+
 def read_layers(files: Iterable[Path]) -> Layers:
     """Return what these files set, each over those before it, and everything that is wrong with them."""
     read: list[Path] = []
@@ -114,7 +125,7 @@ def read_layers(files: Iterable[Path]) -> Layers:
         except InvalidQuantity as error:
             problems.append(SettingProblem(path, error))
             continue
-        wrong = list(_table_problems(table))
+        wrong = [what for what in table_problems(Config, table) if not isinstance(what, Conflict)]
         problems += [SettingProblem(path, error) for error in wrong]
         held = {name: value for name, value in _flat(table) if name not in _names(wrong)}
         values |= held
@@ -128,41 +139,28 @@ def read_layers(files: Iterable[Path]) -> Layers:
     return Layers(tuple(read), values, origins, tuple(problems))
 
 
-def _table_problems(table: Mapping[str, Any]) -> Iterator[InvalidQuantity]:
-    """Yield unknown keys, wrong types and values out of their bounds."""
-    mistyped = list(table_problems(Config, table))
-    yield from mistyped
-    for name, value in _flat(table):
-        if name not in _names(mistyped):
-            yield from SETTINGS[name].setting.problems(name, value)
-
-
 def _names(problems: Iterable[InvalidQuantity]) -> set[str]:
     """Return the settings that have problems; an item of a list is named by its number, as `light.ratio[2]`."""
     return {problem.quantity.partition("[")[0] for problem in problems}
 
 
-def _conflicts(table: dict[str, Any]) -> Iterator[Conflict]:
-    """Yield what does not fit together inside each section, then between those that hold."""
-    types, broken = get_type_hints(Config), set()
-    for section, part in table.items():
-        if isinstance(part, Mapping):
-            found = _conflicts_of(types[section], part)
-            yield from found
-            broken |= {section} if found else set()
+def _conflicts(table: Mapping[str, Any]) -> list[Conflict]:
+    """Return what does not fit together inside each section, then between those that hold."""
+    found = _misfits(table)
+    broken = {name for name, *others in map(_sections, found) if not others}
+    if not broken:
+        return found
     held = {name: part for name, part in table.items() if name not in broken}
-    for conflict in _conflicts_of(Config, held):
-        involved = (conflict.quantity, *conflict.others)
-        if broken.isdisjoint(name.partition(".")[0] for name in involved):
-            yield conflict
+    return found + [conflict for conflict in _misfits(held) if broken.isdisjoint(_sections(conflict))]
 
 
-def _conflicts_of(kind: type, table: Mapping[str, Any]) -> list[Conflict]:
-    try:
-        from_table(kind, table)
-    except InvalidSettings as error:
-        return [problem for problem in error.problems if isinstance(problem, Conflict)]
-    return []
+def _misfits(table: Mapping[str, Any]) -> list[Conflict]:
+    """Return the conflicts of the sections, or, when there are none, those between them."""
+    return [problem for problem in table_problems(Config, table) if isinstance(problem, Conflict)]
+
+
+def _sections(conflict: Conflict) -> set[str]:
+    return {name.partition(".")[0] for name in (conflict.quantity, *conflict.others)}
 
 
 def _flat(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -58,5 +58,5 @@ def _row(known: Known) -> str:
     default = known.default
     if isinstance(default, Path) and default.is_relative_to(MODELS.parent):
         default = default.relative_to(MODELS.parent)  # where the program is installed is not the reader's business
-    cells = known.name, known.written(default), known.setting.unit, known.range, known.setting.sentence
+    cells = known.name, known.written(default), known.unit, known.range, known.sentence
     return f"| `{cells[0]}` | `{cells[1]}` | {' | '.join(cells[2:])} |\n"

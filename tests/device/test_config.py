@@ -1,28 +1,30 @@
 """Settings: the defaults hold, both ends of every bound are taken, and what lies beyond is refused by its name."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import pytest
+from pydantic import ValidationError
+from pydantic.dataclasses import dataclass
 
-from device.config import ClockSection, Config, ServerSection, StoreSection, simulated_config
+from device.config import (
+    CameraSection,
+    Config,
+    Conflict,
+    LightSection,
+    PressSection,
+    Section,
+    conflict,
+    simulated_config,
+)
+from device.config_chips import RawMode
 from device.errors import ConfigError
-from device.measurement.quantities import InvalidQuantity
-from device.settings.camera_section import CameraSection
-from device.settings.cell_section import CellSection
+from device.files.toml_record import STRICT, InvalidRecord, from_table
+from device.measurement.quantities import Bound, InvalidQuantity
 from device.settings.layers import read_config
-from device.settings.light_section import LightSection
-from device.settings.press_section import PressSection
 
-SECTIONS = {
-    "camera": CameraSection,
-    "light": LightSection,
-    "cell": CellSection,
-    "press": PressSection,
-    "store": StoreSection,
-    "clock": ClockSection,
-    "server": ServerSection,
-}
 BOUNDS = [
     ("camera.width_px", 64, 4096),
     ("camera.height_px", 64, 4096),
@@ -64,7 +66,7 @@ BOUNDS = [
 
 def section_with(name, value):
     section, _, key = name.partition(".")
-    return getattr(SECTIONS[section](**{key: value}), key)
+    return getattr(getattr(from_table(Config, {section: {key: value}}), section), key)
 
 
 @pytest.fixture
@@ -120,13 +122,13 @@ def test_beyond_its_bound_every_setting_is_refused_by_its_name(name, low, high):
 
 def test_the_mode_is_one_of_those_there_are(read):
     assert read('[press]\nmode = "precise"\n').press.mode == "precise"
-    with pytest.raises(ConfigError, match="press.mode is 'fast', but must be one of quick, standard, precise, paper"):
+    with pytest.raises(ConfigError, match="press.mode is 'fast', but must be 'quick', .* or 'paper'"):
         read('[press]\nmode = "fast"\n')
 
 
 def test_the_load_cells_protocol_is_one_of_those_there_are(read):
     assert read('[cell]\nprotocol = "mantracourt"\n').cell.protocol == "mantracourt"
-    with pytest.raises(ConfigError, match="cell.protocol is 'modbus', but must be one of openscale, mantracourt"):
+    with pytest.raises(ConfigError, match="cell.protocol is 'modbus', but must be 'openscale' or 'mantracourt'"):
         read('[cell]\nprotocol = "modbus"\n')
 
 
@@ -150,7 +152,7 @@ def test_the_period_is_that_of_the_oscillator_as_measured(read):
 
 
 def test_a_period_longer_than_a_frame_is_refused(read):
-    with pytest.raises(ConfigError, match=r"light\.pwm_hz is 24, .* fits into a frame of 33333 us"):
+    with pytest.raises(ConfigError, match=r"light\.pwm_hz is 24\.0, .* fits into a frame of 33333 us"):
         read('[light]\nchip = "pca9685"\npwm_hz = 24\n')
 
 
@@ -164,19 +166,20 @@ def test_a_tlc59116_takes_any_exposure(read):
     [
         ("[camera]\nexposure_ms = 4\n", r"camera\.exposure_ms .*did you mean camera\.exposure_us"),
         ("[pres]\ntarget_n = 0.5\n", "did you mean press"),
-        ("[camera]\nwidth_px = 768.0\n", r"camera\.width_px is 768\.0, but must be of type int"),
+        ("[camera]\nwidth_px = 768.0\n", r"camera\.width_px is 768\.0, but must be a valid integer"),
         ("[camera]\nmm_per_px_x = 0.0\n", "mm_per_px_x is 0"),
-        ('[light]\nchip = "tlc59108"\n', r"light\.chip is 'tlc59108', but must be one of tlc59116, pca9685"),
+        ('[light]\nchip = "tlc59108"\n', r"light\.chip is 'tlc59108', but must be 'tlc59116' or 'pca9685'"),
         ("[light]\nchip = []\n", r"light\.chip is \[\]"),
         ("[light]\naddress = 0x68\n", r"light\.address is 0x68, but must be not one that every tlc59116 answers at"),
         ("[light]\naddress = 0x40\n", r"light\.address is 64, but must be at least 96 and at most 111 of a tlc59116"),
         ('[light]\nchip = "pca9685"\naddress = 0x70\n', r"light\.address is 0x70, .*every pca9685"),
-        ("[light]\nratio = [0.6, 0.6, 0.6]\n", r"light\.ratio is .*4 numbers"),
-        ("[light]\nratio = 0.6\n", r"light\.ratio is 0\.6, but must be of type list"),
-        ("[light]\nratio = [0.6, 0.6, 0.6, 0.0]\n", r"light\.ratio is 0\.0, but must be above 0"),
-        ("[light]\nratio = [0.6, 0.6, 0.6, 1.1]\n", r"light\.ratio is 1\.1"),
-        ("[light]\ncommissioned_counts = [50, 50, 50]\n", r"light\.commissioned_counts is .*4 numbers"),
-        ("[light]\ncommissioned_counts = [50, 50, 50, 0.9]\n", r"light\.commissioned_counts is 0\.9"),
+        ("[light]\nratio = [0.6, 0.6, 0.6]\n", r"light\.ratio\[3\] is missing"),
+        ("[light]\nratio = [0.6, 0.6, 0.6, 0.6, 0.6]\n", r"light\.ratio is .*at most 4 items"),
+        ("[light]\nratio = 0.6\n", r"light\.ratio is 0\.6, but must be a valid array"),
+        ("[light]\nratio = [0.6, 0.6, 0.6, 0.0]\n", r"light\.ratio\[3\] is 0\.0, but must be above 0"),
+        ("[light]\nratio = [0.6, 0.6, 0.6, 1.1]\n", r"light\.ratio\[3\] is 1\.1"),
+        ("[light]\ncommissioned_counts = [50, 50, 50]\n", r"light\.commissioned_counts\[3\] is missing"),
+        ("[light]\ncommissioned_counts = [50, 50, 50, 0.9]\n", r"light\.commissioned_counts\[3\] is 0\.9"),
         ("[press]\ntarget_n = nan\n", r"press\.target_n is nan"),
         ("[press]\noverload_n = 0.71\n", r"press\.overload_n is 0\.71, but must be at least 0\.72"),
         ("[server]\nport = 65536\n", r"server\.port is 65536"),
@@ -196,14 +199,117 @@ def test_a_missing_file_is_refused_by_its_path(tmp_path):
         read_config(tmp_path / "none.toml")
 
 
-@pytest.mark.parametrize("address", [0x60, None])
+@dataclass(frozen=True, config=STRICT)
+class TwoChips(Config):
+    """A probe with a second LED driver."""
+
+    more_light: LightSection = LightSection(bus=0)
+
+
+@pytest.mark.parametrize("address", [{"address": 0x60}, {}])
 def test_two_chips_at_one_address_of_one_bus_are_refused_by_both_names(address):
-    chips = {"light": LightSection(bus=1, address=0x60), "cell": LightSection(bus=1, address=address)}
-    with pytest.raises(InvalidQuantity, match=r"^cell\.address is 0x60, .*correct it or light\.address"):
-        Config(**chips)
+    chips = {"light": {"bus": 1, "address": 0x60}, "more_light": {"bus": 1} | address}
+    with pytest.raises(InvalidQuantity, match=r"^more_light\.address is 0x60, .*correct it or light\.address"):
+        from_table(TwoChips, chips)
 
 
 @pytest.mark.parametrize("other", [{"bus": 2, "address": 0x62}, {"bus": 1, "address": 0x63}])
 def test_chips_may_share_a_bus_or_an_address(other):
-    chips = {"light": LightSection(bus=1, address=0x62), "cell": LightSection(**other)}
-    assert Config(**chips).cell.bus == other["bus"]
+    chips = {"light": LightSection(bus=1, address=0x62), "more_light": LightSection(**other)}
+    assert TwoChips(**chips).more_light.bus == other["bus"]
+
+
+def test_settings_made_by_the_program_are_checked_as_those_of_a_file():
+    for wrong in ({"frame_rate_hz": 0.9}, {"frame_rate_hz": "30"}, {"frame_rate": 30.0}, {"exposure_us": 40_000}):
+        with pytest.raises(ValidationError):
+            CameraSection(**wrong)
+    with pytest.raises(ValidationError):
+        replace(CameraSection(), frame_rate_hz=0.9)
+
+
+def test_an_exposure_longer_than_a_frame_is_refused_with_the_frames_duration():
+    with pytest.raises(InvalidQuantity, match="at most 10000 us, one frame"):
+        from_table(Config, {"camera": {"frame_rate_hz": 100.0, "exposure_us": 10_001}})
+
+
+def test_a_frame_is_the_whole_sensor_pixel_by_pixel_unless_told_otherwise():
+    assert CameraSection().raw_mode == RawMode.whole(768, 492)
+    assert CameraSection().sensor_scale == CameraSection().scale
+
+
+def test_a_larger_sensor_has_smaller_pixels_on_the_face():
+    """1070 of its columns are 768 of a frame, of 0.03125 mm; 800 rows are 492 of 0.03646 mm: square within 0.03 %."""
+    camera = CameraSection(sensor_width_px=1280, sensor_height_px=800, crop_width_px=1070, raw_format="R10")
+    assert camera.raw_mode == RawMode((1280, 800), (1070, 800), (768, 492), "R10")
+    assert camera.sensor_scale.mm_per_px_x == pytest.approx(0.0224299, abs=1e-7)
+    assert camera.sensor_scale.mm_per_px_y == pytest.approx(0.0224229, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"sensor_width_px": 640}, r"camera.sensor_width_px is 640, but must be at least 768 and .*frame's or more"),
+        ({"sensor_height_px": 400, "crop_height_px": 300}, "camera.sensor_height_px is 400, but must be at least 492"),
+        ({"crop_width_px": 800}, r"camera.crop_width_px is 800, but must be at least 768 and at most 768 px"),
+        ({"sensor_height_px": 800, "crop_height_px": 400}, "camera.crop_height_px is 400, but must be at least 492"),
+        ({"raw_format": "R10_CSI2P"}, "camera.raw_format is 'R10_CSI2P', but must be 'R8', 'R10', 'R12' or 'R16'"),
+    ],
+)
+def test_a_part_of_the_sensor_that_is_not_on_it_or_less_than_a_frame_is_refused(settings, message):
+    with pytest.raises(InvalidQuantity, match=message):
+        from_table(Config, {"camera": settings})
+
+
+def test_the_band_lies_around_the_target_by_its_ratio():
+    assert PressSection(target_n=0.8, band_ratio=0.1).band_n == pytest.approx((0.72, 0.88))
+
+
+@pytest.mark.parametrize("target_n", [0.1, 20.0])
+def test_both_ends_of_the_targets_bound_are_taken(target_n):
+    assert PressSection(target_n=target_n, contact_n=0.01, overload_n=50.0).target_n == target_n
+
+
+@pytest.mark.parametrize("target_n", [0.09, 20.1])
+def test_a_target_beyond_its_bound_is_refused(target_n):
+    with pytest.raises(InvalidQuantity, match=r"^press\.target_n is"):
+        from_table(Config, {"press": {"target_n": target_n, "contact_n": 0.01, "overload_n": 50.0}})
+
+
+def test_the_overload_lies_above_the_hold_and_the_contact_below_half_of_it():
+    with pytest.raises(InvalidQuantity, match=r"^press\.overload_n is 0\.95, but must be at least 0\.96 "):
+        from_table(Config, {"press": {"target_n": 0.8, "overload_n": 0.95}})
+    with pytest.raises(InvalidQuantity, match=r"^press\.contact_n is 0\.055, but must be .* at most 0\.05 "):
+        from_table(Config, {"press": {"target_n": 0.1, "contact_n": 0.055}})
+
+
+@dataclass(frozen=True, config=STRICT)
+class Tank(Section):
+    level_mm: Annotated[float, Bound(1.0, 100.0, "mm")] = 20.0
+    height_mm: Annotated[float, Bound(10.0, 200.0, "mm")] = 50.0
+
+    def conflicts(self) -> Iterator[Conflict]:
+        yield from conflict("tank.level_mm", self.level_mm, Bound(1.0, self.height_mm, "mm"), "tank.height_mm")
+
+
+def problems_of(**table):
+    with pytest.raises(InvalidRecord) as refusal:
+        from_table(Tank, table)
+    return refusal.value.problems
+
+
+def test_what_does_not_fit_together_names_the_setting_and_those_it_has_to_fit():
+    [problem] = problems_of(level_mm=60.0)
+    assert isinstance(problem, Conflict)
+    assert problem.others == ("tank.height_mm",)
+    assert str(problem).endswith("at most 50 mm: correct it or tank.height_mm.")
+
+
+def test_what_does_not_fit_together_may_say_better_what_to_do():
+    assert str(Conflict("tank.level_mm", 60, "below the wall", ("tank.height_mm",), "drain it")) == (
+        "tank.level_mm is 60, but must be below the wall: drain it."
+    )
+
+
+def test_settings_that_do_not_hold_alone_are_not_compared():
+    [problem] = problems_of(height_mm=5.0)
+    assert problem.quantity == "height_mm"

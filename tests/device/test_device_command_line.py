@@ -74,7 +74,7 @@ def test_a_port_in_use_is_one_sentence_with_the_port_before_anything_is_opened(r
         (None, "scene.toml, but must be readable"),
         ("[inclusion]\nsize_cm = 1.0\n", "did you mean inclusion.size_mm"),
         ("[inclusion]\nsize_mm = -1\ndepth_mm = 5\nyoungs_modulus_kpa = 80\n", "size_mm is -1"),
-        ("[inclusion]\n", "inclusion is incomplete"),
+        ("[inclusion]\nsize_mm = 1\ndepth_mm = 5\n", "inclusion.youngs_modulus_kpa is missing"),
     ],
 )
 def test_a_scene_that_cannot_be_used_is_one_sentence(run, tmp_path, scene, words):
@@ -84,6 +84,12 @@ def test_a_scene_that_cannot_be_used_is_one_sentence(run, tmp_path, scene, words
     assert code == 1
     [line] = errors
     assert words in line
+
+
+def test_a_port_that_cannot_be_is_one_sentence(run):
+    code, _, [line] = run("--simulate", "--port", 65_536)
+    assert code == 1
+    assert line.startswith("server.port is 65536, but must be at least 0 and at most 65535")
 
 
 def test_an_inclusion_outside_the_table_is_one_sentence(run, tmp_path):

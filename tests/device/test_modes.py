@@ -20,7 +20,7 @@ import pytest
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
-from device.config import simulated_config
+from device.config import CameraSection, PressSection, simulated_config
 from device.instrument.press.frame_choice import ramp_targets_n
 from device.instrument.press.states import PressState
 from device.instrument.procedure import Procedure
@@ -28,8 +28,6 @@ from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.mode import FRAMES, MODES, Mode
 from device.measurement.recording.recording import Recording
 from device.records.store import ENDED
-from device.settings.camera_section import CameraSection
-from device.settings.press_section import PressSection
 from device.simulation import virtual_probe
 from device.simulation.faults import ScriptedFault
 from device.simulation.hand import HandSettings, VirtualHand

@@ -19,7 +19,7 @@ from daemon_process import ROOT
 
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
-from device.config import simulated_config
+from device.config import CameraSection, LightSection, PressSection, simulated_config
 from device.errors import DeviceError, LightBudgetError, MissingCalibration, StalledError, ZeroShiftError
 from device.files.recording_file import read_recording
 from device.files.toml_record import from_table
@@ -34,10 +34,7 @@ from device.instrument.watch.watchdog import Watchdog
 from device.measurement.mode import Mode
 from device.measurement.recording.recording import Recording
 from device.records.store import ENDED
-from device.settings.camera_section import CameraSection
-from device.settings.light_section import LightSection
-from device.settings.override import overridden
-from device.settings.press_section import PressSection
+from device.settings.layers import overridden
 from device.simulation.faults import PARAMETERS, ScriptedFault
 from device.simulation.hand import HandSettings
 from device.simulation.physics.sensor import Sensor

@@ -109,7 +109,7 @@ class Capture:
     def __init__(self, bench: Bench, config: Config, board: StatusBoard, progress: ProgressBoard | None = None) -> None:
         self._progress = progress or ProgressBoard()
         self.bench, self.config, self.press, self.light, self.board = bench, config, config.press, config.light, board
-        self.lit = (self.light.ratio[0], self.light.ratio[1], self.light.ratio[2], self.light.ratio[3])
+        self.lit = self.light.ratio
         self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
         self.machine = PressUnderWay()
         self._tears = TearWatch(config.camera.tear_counts)

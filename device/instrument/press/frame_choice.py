@@ -12,12 +12,12 @@ from typing import Protocol
 
 import numpy as np
 
+from device.config import PressSection
 from device.instrument.acquisition.frame_check import TearWatch
 from device.instrument.press.frame_outliers import Outlier, ramp_outlier, worst_outlier
 from device.instrument.press.states import HELD_GUIDANCE, Guidance, PressState
 from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.recording.tactile_image import Frame, Role
-from device.settings.press_section import PressSection
 
 TOUCH_RATIO = 0.7
 """A frame on the way to the hold, at less than this part of its force, shows what the force does to the image."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from math import hypot
 from typing import Any, Literal
 
+from device.config import PressSection
 from device.instrument.press.states import (
     ACTIVE,
     SEEING,
@@ -22,7 +23,6 @@ from device.instrument.press.states import (
 )
 from device.measurement.estimate import SATURATED_RATIO
 from device.measurement.recording.tactile_image import Role
-from device.settings.press_section import PressSection
 
 Ending = Literal["rejected", "cancelled", "failed"]
 

@@ -8,13 +8,12 @@ import pytest
 from device.assembly.answers import Answers, answers_for
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
-from device.config import simulated_config
+from device.config import PressSection, simulated_config
 from device.errors import ConfigError, ModelError
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.estimate import estimate_recording
 from device.measurement.mode import MODES
 from device.measurement.paper_mode.inversion import Raw
-from device.settings.press_section import PressSection
 from device.simulation.scenario import Scenario
 
 

@@ -6,12 +6,9 @@ import pytest
 from small_certificate import small_certificate
 
 from device.assembly.answers import active_calibration
-from device.config import Config
+from device.config import CameraSection, CellSection, Config, PressSection
 from device.errors import ForeignCalibration, MissingCalibration
 from device.records.calibrations import Calibrations
-from device.settings.camera_section import CameraSection
-from device.settings.cell_section import CellSection
-from device.settings.press_section import PressSection
 
 CERTIFICATE = small_certificate()
 

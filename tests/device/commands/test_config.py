@@ -68,7 +68,7 @@ def test_problems_are_data_for_a_program(run, write):
                 "setting": "camera.gain",
                 "value": "99",
                 "bound": "at least 1 and at most 16",
-                "hint": "correct the setting",
+                "hint": "correct it",
             }
         ],
     }

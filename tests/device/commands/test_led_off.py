@@ -19,9 +19,9 @@ from supervisor import DARK_WITHIN_S
 from device.__main__ import main as daemon_main
 from device.commands import led_off as led_off_module
 from device.commands.led_off import PAUSE_S, led_off, main
+from device.config import LightSection
 from device.hardware.led_driver import led_driver
 from device.settings.last_good import NAME
-from device.settings.light_section import LightSection
 from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.chips.pca9685_chip import Pca9685Chip
 from device.simulation.chips.tlc59116_chip import Tlc59116Chip

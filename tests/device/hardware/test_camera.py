@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from device.config_chips import RawMode
 from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera, open_camera
-from device.hardware.raw_mode import RawMode
 from device.hardware.tlc59116 import Tlc59116
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.led_sides import LedRatio

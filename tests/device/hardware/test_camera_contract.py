@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from device.config_chips import RawMode
 from device.errors import CameraError
 from device.hardware.camera import RawMonoCamera
-from device.hardware.raw_mode import RawMode
 from device.simulation.chips.virtual_camera import VirtualPicamera2
 
 SIZE = WIDTH_PX, HEIGHT_PX = 768, 492

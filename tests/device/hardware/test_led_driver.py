@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from device.config import LightSection
 from device.errors import LightError
 from device.hardware.led_driver import led_driver, open_led_driver
-from device.settings.light_section import LightSection
 from device.simulation.chips.i2c_bus import EmulatedI2cBus
 from device.simulation.chips.pca9685_chip import Pca9685Chip
 from device.simulation.chips.tlc59116_chip import Tlc59116Chip

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
+from device.config_chips import PwmClock
 from device.errors import LightError
 from device.hardware.pca9685 import Pca9685
-from device.hardware.pwm_clock import PwmClock
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.chips.i2c_bus import EmulatedI2cBus
 from device.simulation.chips.pca9685_chip import Pca9685Chip

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from device.config_chips import RawMode
 from device.hardware.camera import frame_of_rows
-from device.hardware.raw_mode import RawMode
 
 
 def rows_of(counts: np.ndarray, stride_bytes: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_certificate import small_certificate
 
-from device.config import Config
+from device.config import CameraSection, Config, PressSection
 from device.errors import (
     BusyError,
     CalibrationEndsSoon,
@@ -36,8 +36,6 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.tactile_image import Frame
 from device.measurement.recording.untouched_face import UntouchedFace
 from device.records.store import ENDED, Store
-from device.settings.camera_section import CameraSection
-from device.settings.press_section import PressSection
 
 AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
 DARK_FACE = UntouchedFace(4.0, (0.0, 0.0, 0.0, 0.0), 0.0, 60.0, 0.6)

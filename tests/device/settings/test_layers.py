@@ -7,12 +7,11 @@ import pytest
 import tomli_w
 from hypothesis import HealthCheck, given, settings
 
-from device.config import Config
+from device.config import CameraSection, Config, LightSection, conflict
 from device.errors import ConfigError
-from device.measurement.quantities import Bound
+from device.measurement.quantities import Bound, InvalidQuantity
 from device.settings.catalogue import SETTINGS
-from device.settings.layers import DROP_INS, LOCAL, VENDOR, layer_files, read_layers
-from device.settings.setting import conflict
+from device.settings.layers import DROP_INS, LOCAL, VENDOR, layer_files, overridden, read_layers
 
 SCALARS = st.one_of(st.integers(-10, 10**6), st.floats(), st.booleans(), st.text(max_size=5), st.just("paper"))
 VALUES = st.one_of(SCALARS, st.lists(SCALARS, max_size=5), st.dictionaries(st.sampled_from(["bus", "x"]), SCALARS))
@@ -70,11 +69,12 @@ def test_every_problem_of_every_file_is_told_at_once_with_its_file(write):
     third = write("c.toml", "[light]\nratio = [0.5, true, 2.0, 0.5]\n[cell]\nbaud = 9600.5\n")
     assert problems_of(first, second, third) == [
         (first, "sreial"),
-        (first, "press.band_ratio"),
-        (first, "press.target_n"),
         (first, "camera.gain"),
+        (first, "press.target_n"),
+        (first, "press.band_ratio"),
         (second, "file"),
         (third, "light.ratio[1]"),
+        (third, "light.ratio[2]"),
         (third, "cell.baud"),
     ]
 
@@ -86,9 +86,7 @@ def test_the_refusal_says_file_setting_value_bound_and_hint_in_a_line_for_each_p
     unknown, out_of_range = refusal.value.cause.splitlines()
     assert unknown.startswith(f"{path}: camera.gian is 2, but must be one of ")
     assert unknown.endswith("did you mean camera.gain.")
-    assert out_of_range == (
-        f"{path}: press.target_n is 99, but must be at least 0.1 and at most 20 N: correct the setting."
-    )
+    assert out_of_range == (f"{path}: press.target_n is 99, but must be at least 0.1 and at most 20 N: correct it.")
     assert refusal.value.code == "E001"
 
 
@@ -100,7 +98,7 @@ def test_a_bad_value_is_a_problem_also_where_a_later_file_overrides_it(write):
 def test_what_does_not_fit_together_is_told_for_every_section(write):
     low = write("low.toml", "[press]\ntarget_n = 2.0\n[camera]\nexposure_us = 20000\n")
     high = write("high.toml", "[camera]\nframe_rate_hz = 100\n")
-    assert problems_of(low, high) == [(low, "press.overload_n"), (low, "camera.exposure_us")]
+    assert problems_of(low, high) == [(low, "camera.exposure_us"), (low, "press.overload_n")]
 
 
 @pytest.fixture
@@ -125,6 +123,12 @@ def test_a_section_that_does_not_hold_is_not_compared_with_others(write, between
     path = write("a.toml", "[light]\nbus = 2\n[camera]\nexposure_us = 20000\nframe_rate_hz = 100\n")
     [problem] = read_layers([path]).problems
     assert problem.what.bound.endswith("one frame")
+
+
+def test_sections_that_hold_are_compared_also_when_another_does_not(write):
+    """Light and camera do not fit together here, whatever is wrong with the press."""
+    path = write("a.toml", '[light]\nchip = "pca9685"\npwm_hz = 24\n[press]\ntarget_n = 2.0\n')
+    assert problems_of(path) == [(path, "press.overload_n"), (path, "light.pwm_hz")]
 
 
 def test_a_default_that_no_longer_fits_is_told_at_the_file_that_changed_the_other_setting(write):
@@ -179,3 +183,31 @@ def test_any_file_is_settings_that_hold_or_a_refusal_that_names_it(write, entrie
         assert {problem.file for problem in layers.problems} == {path}
     else:
         assert set(table) <= set(vars(layers.config()))
+
+
+OWN = Config(serial="TSIS-0007", camera=CameraSection(frame_rate_hz=100.0), light=LightSection(max_on_s=60.0))
+
+
+def test_what_a_scene_states_replaces_its_own_setting_and_nothing_else():
+    table = {"calibration": "somewhere", "light": {"ratio": [0.1, 0.2, 0.3, 0.4]}}
+    config = overridden(OWN, table)
+    assert config.calibration == Path("somewhere")
+    assert config.light == LightSection(max_on_s=60.0, ratio=(0.1, 0.2, 0.3, 0.4))
+    assert (config.serial, config.camera) == ("TSIS-0007", OWN.camera)
+    assert overridden(OWN, {}) == OWN
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"light": {"max_on": 1.0}}, "light.max_on is 1.0.*did you mean light.max_on_s"),
+        ({"light": 1.0}, "light is 1.0, but must be a table"),
+        ({"light": {"max_on_s": "long"}}, "light.max_on_s is 'long', but must be a valid number"),
+        ({"light": {"max_on_s": 0.0}}, "light.max_on_s is 0.0, but must be at least 1 "),
+        ({"camera": {"exposure_us": 20_000}}, "camera.exposure_us is 20000.*10000"),
+        ({"lihgt": {"max_on_s": 1.0}}, "did you mean light"),
+    ],
+)
+def test_a_scenes_setting_that_is_unknown_mistyped_out_of_range_or_does_not_fit_is_refused_by_its_name(table, words):
+    with pytest.raises(InvalidQuantity, match=words):
+        overridden(OWN, table)

@@ -82,7 +82,7 @@ def test_an_unknown_key_is_refused_with_what_was_meant(read, text, key, action):
         ("tissue_modulus_kpa = 7", "tissue_modulus_kpa"),
         ("slab_thickness_mm = 26", "slab_thickness_mm"),
         ("[inclusion]\nsize_mm = -1\ndepth_mm = 5\nyoungs_modulus_kpa = 80", "size_mm"),
-        ("[inclusion]\nsize_mm = 10", "inclusion"),
+        ("[inclusion]\nsize_mm = 10", "inclusion.depth_mm"),
         ("[hand]\nrate_n_per_s = 0", "hand.rate_n_per_s"),
         ("[optics]\nled_distance_mm = 5", "optics.led_distance_mm"),
         ("[sensor]\nfull_well_e = nan", "sensor.full_well_e"),

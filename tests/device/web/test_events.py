@@ -4,10 +4,10 @@ import types
 
 import pytest
 
+from device.config import PressSection
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.status import PressJob, ProcedureStatus
-from device.settings.press_section import PressSection
 from device.web import schema
 from device.web.events import snapshot
 

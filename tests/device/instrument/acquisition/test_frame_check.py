@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from device.config import CameraSection
 from device.errors import LateFrameError, TornFrameError
 from device.instrument.acquisition.frame_check import (
     LATE_FRAMES,
@@ -13,7 +14,6 @@ from device.instrument.acquisition.frame_check import (
     largest_step,
 )
 from device.measurement.recording.tactile_image import Frame
-from device.settings.camera_section import CameraSection
 
 HEIGHT, WIDTH = 120, 160
 Y, X = np.mgrid[:HEIGHT, :WIDTH]

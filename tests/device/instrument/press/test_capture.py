@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from device.config import Config
+from device.config import Config, LightSection, PressSection
 from device.errors import AmbientLightError, DarkSideError, NoContrastError, TornFrameError
 from device.instrument.acquisition.bench import DARK
 from device.instrument.acquisition.light_budget import LightBudget
@@ -16,8 +16,6 @@ from device.instrument.press.states import Guidance, PressState
 from device.instrument.status import StatusBoard
 from device.measurement.mode import FRAMES, Frames
 from device.measurement.recording.tactile_image import Frame
-from device.settings.light_section import LightSection
-from device.settings.press_section import PressSection
 
 PRESS = PressSection(target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, timeout_s=20.0)
 LIGHT = LightSection(ratio=(0.1, 0.2, 0.3, 0.4))

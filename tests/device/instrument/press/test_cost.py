@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from device.config import Config
+from device.config import CameraSection, Config
 from device.instrument.press.cost import PressCost, press_cost
 from device.measurement.mode import FRAMES, MODES
-from device.settings.camera_section import CameraSection
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from device.config import PressSection
 from device.instrument.acquisition.frame_check import TearWatch
 from device.instrument.press.frame_choice import HoldFrames
 from device.instrument.press.states import Guidance, PressState
 from device.measurement.recording.tactile_image import Frame
-from device.settings.press_section import PressSection
 
 PRESS = PressSection(target_n=0.5, band_ratio=0.05)
 STATES = (PressState.TOO_LIGHT, PressState.CAPTURING)

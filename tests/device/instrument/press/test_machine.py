@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from device.config import PressSection
 from device.instrument.press.machine import (
     MAX_LIFTS,
     MAX_REPLACED,
@@ -17,7 +18,6 @@ from device.instrument.press.machine import (
     PressUnderWay,
 )
 from device.instrument.press.states import ACTIVE, SEEING, TOUCHING, TRANSITIONS, IllegalTransition, PressState
-from device.settings.press_section import PressSection
 
 SECTION = PressSection(
     target_n=0.5, band_ratio=0.05, contact_n=0.05, overload_n=1.0, timeout_s=10.0, steady_n=0.02, max_offset_mm=2.5

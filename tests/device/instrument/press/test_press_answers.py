@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_certificate import small_certificate
 
-from device.config import Config
+from device.config import CameraSection, Config
 from device.errors import DimLightError
 from device.files.recording_file import read_recording
 from device.instrument.press.record import Estimator, PressAnswers
@@ -18,7 +18,6 @@ from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
-from device.settings.camera_section import CameraSection
 
 CONFIG = Config(camera=CameraSection(width_px=64, height_px=64))
 FRAMES = [Frame(np.full((64, 64), 9, np.uint8), role, 0.0, 0.5, (0.6,) * 4) for role in ("dark", "reference", "press")]

@@ -5,11 +5,11 @@ import re
 import pytest
 from daemon_process import ROOT
 
+from device.config import PressSection
 from device.instrument.press import machine as press_machine
 from device.instrument.press.frame_outliers import DEVIATION_RATIO, ROBUST_SIGMAS
 from device.instrument.press.states import TOUCHING, TRANSITIONS, PressState
 from device.measurement.estimate import SATURATED_RATIO
-from device.settings.press_section import PressSection
 
 PAGE = (ROOT / "docs" / "press.md").read_text(encoding="utf-8")
 

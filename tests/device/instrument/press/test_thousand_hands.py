@@ -12,9 +12,8 @@ import pytest
 from people import KINDS, verdict
 from simulated_time_bench import CAMERA, SimulatedTimePress
 
-from device.config import Config
+from device.config import Config, PressSection
 from device.measurement.mode import FRAMES
-from device.settings.press_section import PressSection
 from device.simulation.hand import HandSettings
 
 HANDS = {"ordinary": 590, "borderline": 60}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from device.config import Config, simulated_config
+from device.config import CameraSection, Config, LightSection, simulated_config
 from device.errors import CameraError, LightError, LoadCellError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.acquisition.bench import DARK
@@ -21,8 +21,6 @@ from device.instrument.watch.progress import ProgressBoard
 from device.measurement.recording.led_sides import SIDES
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
-from device.settings.camera_section import CameraSection
-from device.settings.light_section import LightSection
 
 CONFIG = replace(simulated_config(), light=LightSection(ratio=(0.1, 0.2, 0.3, 0.4)))
 ON_BLOCK = SelfTestJob("j", "2026-01-01T00:00:00Z", on_block=True, weight_n=1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from device.hardware.pwm_clock import PwmClock
+from device.config_chips import PwmClock
 
 
 @pytest.mark.parametrize(("pwm_hz", "prescale"), [(200.0, 0x1E), (1526.0, 0x03), (24.0, 0xFD), (50.0, 121)])
