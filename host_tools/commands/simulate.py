@@ -37,7 +37,7 @@ def simulate(
     explain: Annotated[bool, typer.Option(help="Print which model was chosen, and why.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the whole solution as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write a figure (PNG, PDF, SVG).")] = None,
-    frame: Annotated[Path | None, typer.Option(help="Write a camera frame (PNG, 8 bit, linear optics).")] = None,
+    frame: Annotated[Path | None, typer.Option(help="Write a camera frame (PNG, 8 bit, scattered light).")] = None,
     save_scene: Annotated[Path | None, typer.Option(help="Write the scene, with every key of it (TOML).")] = None,
     exposure_us: Annotated[float, typer.Option(help="Exposure of the frame.")] = 4000.0,
     seed: Annotated[int, typer.Option(help="Seed of the frame's noise.")] = 1,

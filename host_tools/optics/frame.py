@@ -13,17 +13,21 @@ from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.sensor import Sensor
 from device.simulation.physics.skin import Skin
 from host_tools.calibration.phantom import CAMERA, LIT
+from host_tools.forward.face_points import FacePoints
 from host_tools.forward.solution import Solution
 
 TABLES = Path(__file__).resolve().parents[2] / "models" / "simulated_probe"
 
 
 def simulated_frame(solution: Solution, *, exposure_us: float, seed: int) -> Counts:
-    """Return the 768 x 492 frame (8 bit) of the pressed face under four equal LEDs, default skin, lens and sensor."""
+    """Return the 768 x 492 frame (8 bit) of the pressed face under four equal LEDs, default skin, lens and sensor.
+
+    Of the whole face, so an inclusion beside the axis is seen beside it: +x is to the right, +y down.
+    """
     shape = CAMERA.height_px, CAMERA.width_px
     image = ScatteredImage(LookupOptics.load(TABLES), Skin(), Lens(), shape, CAMERA.scale)
-    r_mm = np.hypot(image.x_mm, image.y_mm)
-    w_mm = np.interp(r_mm, solution.r_mm, solution.w_mm).astype(np.float32)
-    p_kpa = np.interp(r_mm, solution.r_mm, np.maximum(solution.p_kpa, 0), right=0.0).astype(np.float32)
-    intensity = image.intensity(w_mm, p_kpa, LIT)
+    at_pixels = FacePoints(solution.rays, image.x_mm, image.y_mm)
+    w_mm = at_pixels(solution.pressed.w_mm).astype(np.float32)
+    p_kpa = (at_pixels(np.maximum(solution.pressed.p_kpa, 0)) * at_pixels.is_inside).astype(np.float32)
+    intensity = image.intensity(w_mm, np.maximum(p_kpa, 0), LIT)  # a spline may dip below 0
     return Sensor().expose(intensity, exposure_us=exposure_us, gain=CAMERA.gain, seed=(seed, 0))
