@@ -39,7 +39,7 @@ class FacePoints:
     def __call__(self, field: Array) -> Array:
         """Return the field at the points; beyond the rim it keeps the rim's value."""
         if self._is_axisymmetric:
-            return np.interp(self._from_axis_mm, self._rays.r_mm[0], field[0])
+            return np.asarray(np.interp(self._from_axis_mm, self._rays.r_mm[0], field[0]))
         return np.asarray(map_coordinates(_all_round(self._rays, field), self._places, order=1, mode="grid-wrap"))
 
     @property

@@ -7,14 +7,13 @@ from typing import Any
 
 import matplotlib
 
-from device.measurement.arrays import Array
-
 matplotlib.use("Agg")
 
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.colors import LogNorm
 
+from device.measurement.arrays import Array
 from host_tools.limits.accuracy_map import DEPTHS_MM, MODULI_KPA, SIZES_MM, STANDARD, MappedScene, stds
 from host_tools.limits.accuracy_page import ROUGHLY
 from host_tools.limits.accuracy_tables import NAMES, percent

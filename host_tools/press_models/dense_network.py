@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from device.measurement.arrays import Array, SingleArray
+from device.measurement.arrays import Array, Single
 from device.measurement.quantities import UNKNOWNS
 
 DIRECTIONS, HIDDEN = 32, 96
@@ -26,10 +26,10 @@ LARGEST_LOG_VARIANCE = 1.0
 class InputScaling:
     """Row [P] to network inputs [2 K]: (row - mean) @ projection, plain and by its area sine, each over its spread."""
 
-    mean: SingleArray
-    projection: SingleArray
-    plain_spread: SingleArray
-    area_sine_spread: SingleArray
+    mean: Single
+    projection: Single
+    plain_spread: Single
+    area_sine_spread: Single
 
     @classmethod
     def fit(cls, rows: Array, noise: Array, directions: int = DIRECTIONS) -> InputScaling:
@@ -42,7 +42,7 @@ class InputScaling:
         parts = mean, projection, plain.std(axis=0), np.arcsinh(plain).std(axis=0)
         return cls(*(np.asarray(part, np.float32) for part in parts))
 
-    def inputs(self, rows: SingleArray) -> SingleArray:
+    def inputs(self, rows: Single) -> Single:
         """Return the network's inputs [n, 2 K] of rows [n, P]."""
         plain = (rows - self.mean) @ self.projection
         return np.hstack([plain / self.plain_spread, np.arcsinh(plain) / self.area_sine_spread])
@@ -51,15 +51,15 @@ class InputScaling:
 class DenseLayer(NamedTuple):
     """Weights [fan_in, fan_out] and biases [fan_out]."""
 
-    weights: SingleArray
-    biases: SingleArray
+    weights: Single
+    biases: Single
 
 
 class Prediction(NamedTuple):
     """Mean [n, 3] of the unknowns' coordinates and logarithm of their variance [n, 3]."""
 
-    mean: SingleArray
-    log_variance: SingleArray
+    mean: Single
+    log_variance: Single
 
 
 def initial_layers(inputs: int, rng: np.random.Generator, outputs: int = 2 * len(UNKNOWNS)) -> list[DenseLayer]:
@@ -73,14 +73,12 @@ def initial_layers(inputs: int, rng: np.random.Generator, outputs: int = 2 * len
     return layers
 
 
-def predict(layers: list[DenseLayer], inputs: SingleArray) -> Prediction:
+def predict(layers: list[DenseLayer], inputs: Single) -> Prediction:
     """Return the prediction for inputs [n, 2 K]."""
     return _split(activations_of(layers, inputs)[-1])
 
 
-def loss_and_gradient(
-    layers: list[DenseLayer], inputs: SingleArray, target: SingleArray
-) -> tuple[float, list[DenseLayer]]:
+def loss_and_gradient(layers: list[DenseLayer], inputs: Single, target: Single) -> tuple[float, list[DenseLayer]]:
     """Return the loss, mean over rows and unknowns, and its gradient; `target` [n, 3] in coordinates.
 
     Half the squared error, plus the Gaussian's negative log likelihood in which only the variance learns: mean and
@@ -97,12 +95,12 @@ def loss_and_gradient(
     return loss, backward(layers, activations, by_output.astype(np.float32))
 
 
-def _split(output: SingleArray) -> Prediction:
+def _split(output: Single) -> Prediction:
     half = output.shape[1] // 2
     return Prediction(output[:, :half], np.minimum(output[:, half:], np.float32(LARGEST_LOG_VARIANCE)))
 
 
-def activations_of(layers: list[DenseLayer], inputs: SingleArray) -> list[SingleArray]:
+def activations_of(layers: list[DenseLayer], inputs: Single) -> list[Single]:
     """Return the inputs [n, 2 K], what each hidden layer makes of them, and the outputs, which are linear."""
     values = [inputs]
     for number, (weights, biases) in enumerate(layers):
@@ -111,7 +109,7 @@ def activations_of(layers: list[DenseLayer], inputs: SingleArray) -> list[Single
     return values
 
 
-def backward(layers: list[DenseLayer], activations: list[SingleArray], by_output: SingleArray) -> list[DenseLayer]:
+def backward(layers: list[DenseLayer], activations: list[Single], by_output: Single) -> list[DenseLayer]:
     """Return the gradient by weights and biases, of a loss whose derivatives by the outputs are `by_output`."""
     gradient, delta = [], by_output
     for (weights, _), before in zip(reversed(layers), reversed(activations[:-1]), strict=True):

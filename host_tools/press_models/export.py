@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from device.measurement.arrays import Array, SingleArray
+from device.measurement.arrays import Array, Single
 from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
 from device.measurement.paper_mode.inversion import HELD_UNITS, PROFILE_UNITS
 from device.measurement.parameters import NUISANCES, RANGES
@@ -129,7 +129,7 @@ def _card(
     }
 
 
-def _training_range(columns: Mapping[str, Array | SingleArray]) -> dict[str, Any]:
+def _training_range(columns: Mapping[str, Array | Single]) -> dict[str, Any]:
     return {
         "features": {name: [float(column.min()), float(column.max())] for name, column in columns.items()},
         "unknowns": {name: [RANGES[name].low, RANGES[name].high] for name in UNKNOWNS},

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.arrays import Array, SingleArray
+from device.measurement.arrays import Array, Single
 from device.measurement.parameters import to_unit
 from device.measurement.ramp_modes.noise import PressNoise, drift_directions, light_ratio, smooth_errors
 from device.measurement.ramp_modes.surrogate import PressSurrogate
@@ -26,14 +26,14 @@ class Presses(Protocol):
     """What networks learn from: coordinates [n, 9] and rows [n, P] of presses, and how noise is added to them."""
 
     @property
-    def unit(self) -> SingleArray:
+    def unit(self) -> Single:
         """Coordinates [n, 9]."""
 
     @property
-    def rows(self) -> SingleArray:
+    def rows(self) -> Single:
         """Noise-free rows [n, P]."""
 
-    def noisy(self, index: Index, rng: np.random.Generator) -> SingleArray:
+    def noisy(self, index: Index, rng: np.random.Generator) -> Single:
         """Return the rows [m, P] of an index [m], with fresh noise."""
 
     def typical_noise(self) -> Array:
@@ -44,11 +44,11 @@ class Presses(Protocol):
 class Pool:
     """Coordinates [n, 9] and noise-free rows [n, P] of random presses, single precision, and their noise."""
 
-    unit: SingleArray
-    rows: SingleArray
+    unit: Single
+    rows: Single
     sampler: NoiseSampler
 
-    def noisy(self, index: Index, rng: np.random.Generator) -> SingleArray:
+    def noisy(self, index: Index, rng: np.random.Generator) -> Single:
         """Return the rows [m, P] of an index [m], with fresh noise."""
         return self.sampler.add(self.rows[index], rng)
 
@@ -66,7 +66,7 @@ class NoiseSampler:
         camera, flat = (np.linalg.cholesky(part).T.astype(np.float32) for part in (noise.camera, smooth))
         self.noise, self._camera, self._smooth = noise, camera, flat
 
-    def add(self, rows: SingleArray, rng: np.random.Generator) -> SingleArray:
+    def add(self, rows: Single, rng: np.random.Generator) -> Single:
         """Return rows [n, P] with camera noise, drift of light and cell, and smooth errors."""
         camera, smooth = rng.standard_normal((2, *rows.shape), dtype=np.float32)
         gain, zero_n = rng.standard_normal((2, len(rows), 1), dtype=np.float32)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from device.measurement.arrays import Array, SingleArray
+from device.measurement.arrays import Array, Single
 from device.measurement.confidence_belt import Bands
 from device.measurement.parameters import to_unit
 from device.measurement.quantities import UNKNOWNS
@@ -42,12 +42,12 @@ from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 class HeldPool:
     """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
 
-    unit: SingleArray
-    rows: SingleArray
+    unit: Single
+    rows: Single
     camera: Array
     levels: ErrorLevels = field(default_factory=ErrorLevels)
 
-    def noisy(self, index: Index, rng: np.random.Generator) -> SingleArray:
+    def noisy(self, index: Index, rng: np.random.Generator) -> Single:
         """Return the rows [m, 12] of an index [m], with fresh noise on the contrast and the force."""
         rows = self.rows[index]
         light, force_n = 1 + rows[:, :RINGS], rows[:, RINGS]
@@ -79,7 +79,7 @@ def held_pool(pool: Pool, camera: Array, seed: int) -> HeldPool:
     return HeldPool(pool.unit, held_rows(pool.rows, force_n).astype(np.float32), camera)
 
 
-def held_rows(rows: SingleArray | Array, force_n: Array) -> Array:
+def held_rows(rows: Single | Array, force_n: Array) -> Array:
     """Return the rows [n, 12] of presses held at forces [n], for profile rows [n, P]."""
     powers = np.vander(PROFILE_FORCES_N, increasing=True)
     weights = np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers)

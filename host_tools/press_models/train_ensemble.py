@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from joblib import Parallel, delayed, parallel_config
 
-from device.measurement.arrays import Array, SingleArray
+from device.measurement.arrays import Array, Single
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, initial_layers, loss_and_gradient, predict
 from host_tools.press_models.noisy_presses import Presses
@@ -41,7 +41,7 @@ class Adam:
         self._done += 1
         rate = 0.5 * self._rate * (1 + np.cos(np.pi * min(self._done / self._steps, 1.0)))
         rate *= np.sqrt(1 - DECAY_SQUARE**self._done) / (1 - DECAY_MEAN**self._done)
-        slopes: list[SingleArray] = [part for layer in gradient for part in layer]
+        slopes: list[Single] = [part for layer in gradient for part in layer]
         for part, slope, mean, square in zip(self._parts, slopes, self._mean, self._square, strict=True):
             mean += np.float32(1 - DECAY_MEAN) * (slope - mean)
             square += np.float32(1 - DECAY_SQUARE) * (slope * slope - square)
@@ -58,8 +58,8 @@ class Lesson(NamedTuple):
     """What networks are to learn of a pool's presses: `target` [n, ...], by a loss of so many outputs."""
 
     outputs: int
-    target: SingleArray
-    loss_and_gradient: Callable[[list[DenseLayer], SingleArray, SingleArray], tuple[float, list[DenseLayer]]]
+    target: Single
+    loss_and_gradient: Callable[[list[DenseLayer], Single, Single], tuple[float, list[DenseLayer]]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from device.measurement.arrays import Array, SingleArray
+from device.measurement.arrays import Array, Single
 from device.measurement.mode import Mode
 from device.measurement.parameters import PARAMETERS, to_unit
 from device.measurement.ramp_modes.legendre import LegendreSum
@@ -53,7 +53,7 @@ def draw_wide_parameters(count: int, rng: np.random.Generator, *, inclusions_a_s
     return values
 
 
-def is_outside(unit: Array | SingleArray) -> NDArray[np.bool_]:
+def is_outside(unit: Array | Single) -> NDArray[np.bool_]:
     """Return whether size or depth lies outside its trained range [n], for coordinates [n, 9] of `to_unit`."""
     return np.asarray((np.abs(unit[:, PLACE]) > 1).any(axis=1))
 
@@ -93,7 +93,7 @@ class RangeNetwork:
 
 
 def logistic_loss_and_gradient(
-    layers: list[DenseLayer], inputs: SingleArray, is_outside: SingleArray
+    layers: list[DenseLayer], inputs: Single, is_outside: Single
 ) -> tuple[float, list[DenseLayer]]:
     """Return the mean of -ln(probability of what is so), and its gradient; `is_outside` [n] is 0 or 1."""
     activations = activations_of(layers, inputs)

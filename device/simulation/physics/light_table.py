@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.arrays import SingleArray
+from device.measurement.arrays import Single
 from device.measurement.quantities import Bound, require
 from device.simulation.physics.table_file import load_table, save_table
 
@@ -44,12 +44,12 @@ class LightTable:
     """
 
     block: dict[str, float | str]
-    depths_mm: SingleArray
+    depths_mm: Single
     relative_irradiance: NDArray[np.float16]
     half_angle: NDArray[np.float16]
-    stray: SingleArray
-    background: SingleArray
-    returned_ratio: SingleArray
+    stray: Single
+    background: Single
+    returned_ratio: Single
 
     def number(self, name: str) -> float:
         """Return one number of the block's optics."""

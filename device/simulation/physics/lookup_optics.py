@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.arrays import SingleArray
+from device.measurement.arrays import Single
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.light_table import LightTable, load_light_table
 from device.simulation.physics.skin import Skin
@@ -46,7 +46,7 @@ def turn_vectors(field: NDArray[Any]) -> NDArray[Any]:
     return np.stack([-y, x, z], axis=-4)
 
 
-def four_leds(field: NDArray[np.floating]) -> SingleArray:
+def four_leds(field: NDArray[np.floating]) -> Single:
     """Return a map of numbers [...] of the LED at +x for all LEDs [4, ...] as float32."""
     maps: list[NDArray[Any]] = [field]
     for _ in range(LEDS - 1):
@@ -54,7 +54,7 @@ def four_leds(field: NDArray[np.floating]) -> SingleArray:
     return np.stack(maps).astype(np.float32)
 
 
-def four_led_vectors(field: NDArray[np.floating]) -> SingleArray:
+def four_led_vectors(field: NDArray[np.floating]) -> Single:
     """Return a map of vectors [..., 3, m, n, n] of the LED at +x for all LEDs [4, ...] as float32."""
     maps: list[NDArray[Any]] = [field]
     for _ in range(LEDS - 1):
@@ -88,7 +88,7 @@ def diffuse_reflectance(n_from: float, n_to: float) -> float:
 
 
 @lru_cache(maxsize=4)
-def passing(n_from: float, n_to: float) -> SingleArray:
+def passing(n_from: float, n_to: float) -> Single:
     """Return [COSINES * WIDTHS] the mean of cosine * transmission over a round source seen from a place.
 
     Row: cosine between the light's mean direction and the face's normal, from LOWEST_COSINE to 1. Column: half-width
@@ -106,7 +106,7 @@ def passing(n_from: float, n_to: float) -> SingleArray:
     return table
 
 
-def passing_index(cosine: SingleArray, width: SingleArray) -> NDArray[np.intp]:
+def passing_index(cosine: Single, width: Single) -> NDArray[np.intp]:
     """Return where in the table of `passing` a cosine and a half-width of cosines are, to the nearest entry."""
     row = (cosine - np.float32(LOWEST_COSINE)) * np.float32((COSINES - 1) / (1 - LOWEST_COSINE)) + np.float32(0.5)
     column = width * np.float32((WIDTHS - 1) / WIDEST) + np.float32(0.5)
@@ -127,7 +127,7 @@ class LookupOptics:
         self._table = table
         half, n = table.number("half_width_mm"), table.stray.shape[-1]
         self._cell_mm = 2 * half / n
-        self._x_mm: SingleArray = ((np.arange(FINER * n) + 0.5) * (self._cell_mm / FINER) - half).astype(np.float32)
+        self._x_mm: Single = ((np.arange(FINER * n) + 0.5) * (self._cell_mm / FINER) - half).astype(np.float32)
         self._beams = _beams(table, face_area_mm2=4 * half * half)
         self._stray, self._background = four_leds(table.stray), four_leds(table.background)
         k = np.fft.fftfreq(2 * n, self._cell_mm) * 2 * math.pi
@@ -146,18 +146,18 @@ class LookupOptics:
         return self._table.block
 
     @property
-    def x_mm(self) -> SingleArray:
+    def x_mm(self) -> Single:
         """Centres [n] of the render grid's columns (mm)."""
         return self._x_mm
 
     @property
-    def y_mm(self) -> SingleArray:
+    def y_mm(self) -> Single:
         """Centres [n] of the render grid's rows (mm)."""
         return self._x_mm
 
     def radiance(
-        self, w_mm: SingleArray, p_kpa: SingleArray, led_ratio: Sequence[float], skin: Skin, touching: bool = True
-    ) -> SingleArray:
+        self, w_mm: Single, p_kpa: Single, led_ratio: Sequence[float], skin: Skin, touching: bool = True
+    ) -> Single:
         """Return the radiance towards the camera [ny, nx], 1/(sr mm2) per unit of light of all four LEDs at ratio 1.
 
         `w_mm` and `p_kpa` [ny, nx] on the render grid; `led_ratio` of the sides +x, +y, -x, -y, and exactly linear in
@@ -177,7 +177,7 @@ class LookupOptics:
         seen /= np.sqrt(1 + slope_x * slope_x + slope_y * slope_y)
         return np.asarray(given_back * seen + haze)
 
-    def _require(self, w_mm: SingleArray, p_kpa: SingleArray, led_ratio: Sequence[float]) -> SingleArray:
+    def _require(self, w_mm: Single, p_kpa: Single, led_ratio: Sequence[float]) -> Single:
         shape = (len(self._x_mm), len(self._x_mm))
         if w_mm.shape != shape or p_kpa.shape != shape:
             found = f"{w_mm.shape} and {p_kpa.shape}"
@@ -209,7 +209,7 @@ class LookupOptics:
         self._seen_dry = np.float32(transmission(straight, n_block, 1.0)[0] * through / math.pi)
         self._skin = skin
 
-    def _given_back(self, w: SingleArray, contact: SingleArray, ratio: SingleArray, skin: Skin) -> SingleArray:
+    def _given_back(self, w: Single, contact: Single, ratio: Single, skin: Skin) -> Single:
         """Return the light the skin gives back per area (1/mm2) on the light grid.
 
         Spread is the convolution with 2 exp(-2 r / m) / (pi m^2), m its mean; its transform is (1 + (k m / 2)^2)^-3/2.
@@ -226,7 +226,7 @@ class LookupOptics:
         wet, dry = skin.albedo * (np.array([from_wet, from_dry]) @ self._table.returned_ratio)
         return np.asarray(once + (np.float32(dry) + np.float32(wet - dry) * contact) * again, dtype=np.float32)
 
-    def _arriving(self, w: SingleArray, ratio: SingleArray) -> tuple[SingleArray, SingleArray]:
+    def _arriving(self, w: Single, ratio: Single) -> tuple[Single, Single]:
         """Return the light (1/mm2 of the light grid) that a wet and that a dry face would take in."""
         x, y, z, half_angle = self._at_depth(w)
         slope_y, slope_x = _slopes(w, self._cell_mm)
@@ -241,7 +241,7 @@ class LookupOptics:
         stray = _lit(ratio, self._stray)
         return wet + stray[0], dry + stray[1]
 
-    def _at_depth(self, w: SingleArray) -> SingleArray:
+    def _at_depth(self, w: Single) -> Single:
         """Return the beams [x y z half-angle, led, class, n, n] at the face's depth, linear between the table's."""
         depths = self._table.depths_mm
         place = np.clip((w - depths[0]) / (depths[1] - depths[0]), 0, np.float32(len(depths) - 1 - 1e-4)).ravel()
@@ -255,7 +255,7 @@ class LookupOptics:
         return np.asarray(low.reshape(*low.shape[:-1], *w.shape))
 
 
-def _beams(table: LightTable, face_area_mm2: float) -> SingleArray:
+def _beams(table: LightTable, face_area_mm2: float) -> Single:
     """Return [x y z half-angle, led, class, depth * n * n], contiguous so that a depth is quick to take."""
     vectors = four_led_vectors(table.relative_irradiance.astype(np.float32) / np.float32(face_area_mm2))
     beams = np.concatenate([vectors, four_leds(table.half_angle)[:, :, None]], axis=2)
@@ -271,17 +271,17 @@ def _glass(table: LightTable) -> float:
     return float(first * second / (1 - (1 - first) * (1 - second)))
 
 
-def _lit(ratio: SingleArray, maps: SingleArray) -> SingleArray:
+def _lit(ratio: Single, maps: Single) -> Single:
     """Return the sum of the LEDs' maps [led, ...], each at its ratio."""
     return np.asarray(np.tensordot(ratio, maps, 1), dtype=np.float32)
 
 
-def _coarser(field: SingleArray) -> SingleArray:
+def _coarser(field: Single) -> Single:
     """Return the means over 2 x 2 render cells."""
     return (field[::2, ::2] + field[1::2, ::2] + field[::2, 1::2] + field[1::2, 1::2]) * np.float32(0.25)
 
 
-def _finer(field: SingleArray) -> SingleArray:
+def _finer(field: Single) -> Single:
     """Return a field of the light grid on the render grid, bilinear between the cells' centres."""
     for axis in (0, 1):
         rows = np.moveaxis(field, axis, 0)
@@ -293,7 +293,7 @@ def _finer(field: SingleArray) -> SingleArray:
     return field
 
 
-def _slopes(w: SingleArray, step_mm: float) -> tuple[SingleArray, SingleArray]:
+def _slopes(w: Single, step_mm: float) -> tuple[Single, Single]:
     """Return (dw/dy, dw/dx) by central differences, one-sided at the edges."""
     slope_y, slope_x = np.gradient(w, np.float32(step_mm))
     return np.asarray(slope_y), np.asarray(slope_x)
