@@ -19,7 +19,7 @@ from host_tools.forward.sampling import FaceSector
 from host_tools.scenes.scene import Scene
 
 StrainModel = Literal["small", "finite"]
-Contact = Literal["closed_sliding", "unilateral", "true_sliding", "true_sliding_with_edge_force", "paired"]
+Contact = Literal["closed_sliding", "unilateral", "true_sliding"]
 
 DEFAULT_TOLERANCE = 0.005
 STANDARD = Level("standard", 3)
@@ -53,7 +53,6 @@ def model_plan(
     *,
     tolerance: float | None = None,
     strain: Literal["small", "finite", "auto"] = "small",
-    paired: bool = False,
 ) -> ModelPlan:
     """Return the plan for a relative tolerance on O1-O3; without one, at the level that all data sets share.
 
@@ -62,7 +61,7 @@ def model_plan(
     reasons: dict[str, str] = {}
     symmetry = _symmetry(scene, reasons)
     chosen_strain = _strain(scene, symmetry, strain, tolerance or DEFAULT_TOLERANCE, reasons)
-    contact = _contact(scene, chosen_strain, paired, reasons)
+    contact = _contact(scene, chosen_strain, reasons)
     formulation = _formulation(scene, chosen_strain, reasons)
     mesh = _mesh(scene, symmetry, reasons)
     level, error, seconds = _level(scene, symmetry, chosen_strain, tolerance, reasons)
@@ -125,14 +124,9 @@ def _strain(scene: Scene, symmetry: FaceSector, asked: str, tolerance: float, re
     return "small"
 
 
-def _contact(scene: Scene, strain: StrainModel, paired: bool, reasons: dict[str, str]) -> Contact:
-    if strain == "finite" and paired:
-        reasons["contact"] = "asked for: slip ignored, the cheap variant of finite strain"
-        return "paired"
+def _contact(scene: Scene, strain: StrainModel, reasons: dict[str, str]) -> Contact:
     if strain == "finite":
-        reasons["contact"] = (
-            "in finite strain the tissue slips under the face; pairing points would inflate the inclusion"
-        )
+        reasons["contact"] = "in finite strain the tissue slips under the face, and its sliding counts"
         return "true_sliding"
     if scene.waveguide.dome_mm > 0:
         reasons["contact"] = f"the dome of {scene.waveguide.dome_mm:g} mm may lift off the tissue at its rim"

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from netgen.meshing import NgException
 
 from host_tools.forward.face_state import Rays
-from host_tools.forward.finite_strain.load_path import ContactName, FiniteStrainModel
+from host_tools.forward.finite_strain.load_path import FiniteStrainModel
 from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
 from host_tools.forward.meshes.morph import morphed_mesh
 from host_tools.forward.meshes.solid_mesh import COARSE, FINE, SolidResolution, solid_mesh
@@ -31,11 +31,6 @@ AXISYMMETRIC_SIZES = {
 }
 """Element sizes by the name of the level; "blunt" keeps the rims coarser than the slip of finite strain."""
 
-FINITE_CONTACTS: dict[str, ContactName] = {
-    "true_sliding": "sliding",
-    "true_sliding_with_edge_force": "sliding_with_edge_force",
-    "paired": "paired",
-}
 SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE}
 SOLID_ANGLES = 48
 """Rays over the face of a 3-D scene: 7.5 degrees apart, a multiple of eight to meet a square's corners."""
@@ -66,7 +61,7 @@ def build(scene: Scene, plan: ModelPlan) -> Meshed:
     mixed = plan.formulation == "mixed"
     model: PressModel
     if plan.strain == "finite":
-        model = FiniteStrainModel(mesh, plan.order, rays, contact=FINITE_CONTACTS[plan.contact])
+        model = FiniteStrainModel(mesh, plan.order, rays)
     elif plan.contact == "unilateral":
         model = DomedModel(
             mesh,

@@ -11,7 +11,6 @@ import host_tools.forward.solve  # noqa: F401 - sets the number of threads befor
 from host_tools.pages.benchmark import Chapter, Table, at_least, at_most
 from host_tools.verification import (
     balance,
-    basis,
     eshelby,
     hayes,
     hertz,
@@ -35,7 +34,6 @@ CHAPTERS: dict[str, Callable[[bool], Chapter]] = {
     "symmetries": symmetries.chapter,
     "balance": balance.chapter,
     "smoothness": smoothness.chapter,
-    "basis": basis.chapter,
     "calculix": mechanics.chapter,
 }
 """Each function takes whether to be quick."""

@@ -95,11 +95,6 @@ class PressRequests:
         """While it is held, nobody cancels: for the step after which a press can no longer be cancelled."""
         return self._lock
 
-    @property
-    def is_waiting(self) -> bool:
-        """Whether a press has been asked for that has not begun."""
-        return self._waiting is not None
-
     def begin(self, *, is_touched: bool) -> PressJob | None:
         """Put the press that was asked for, or that the touched probe begins, on the board and return it."""
         with self._lock:

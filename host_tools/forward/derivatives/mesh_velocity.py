@@ -65,7 +65,6 @@ class _Harmonic:
         held = HELD if mesh.dim == 3 else HELD | {"dirichlety": ""}
         self.space = VectorH1(mesh, order=order, **held)
         inside = self.space.GetDofs(mesh.Materials(INCLUSION))
-        self.not_moved_as_inclusion = ~inside
         free = self.space.FreeDofs() & ~inside & ~self.space.GetDofs(mesh.Materials(LAYERS))
         u, v = self.space.TnT()
         self.laplacian = BilinearForm(self.space, symmetric=True)

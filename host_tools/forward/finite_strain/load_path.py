@@ -3,7 +3,7 @@
 The steps between the loads are chosen by `equilibrium_path.py`; a load that cannot be reached is an exception that
 says how far the press got, never a number.
 
-Finite strain as a `PressModel`: one load path through all presses, with true sliding or with paired points.
+Finite strain as a `PressModel`: one load path through all presses, with true sliding.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import inf
-from typing import Any, Literal
+from typing import Any
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.face_state import FaceState, Rays
@@ -20,14 +20,12 @@ from host_tools.forward.finite_strain.closed_contact import ClosedContact
 from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath
 from host_tools.forward.finite_strain.loaded_face import LoadedFace, face_state, reaction_n
 from host_tools.forward.finite_strain.newton import EnergyNewton, NewtonStatus
-from host_tools.forward.finite_strain.pairing import PairedContact
 from host_tools.forward.finite_strain.sliding import SlidingContact
 from host_tools.forward.materials import Elasticity
 from host_tools.forward.press_model import Loaded
 from host_tools.forward.sampling import FaceSampler
 from host_tools.scenes.scene import Press
 
-ContactName = Literal["sliding", "sliding_with_edge_force", "paired"]
 REFINING_ITERATIONS = 1
 """One correction finds the change of the inclusion field from order 3 to 4 to 15 % up to 2 mm, half of it at 3 mm."""
 
@@ -38,16 +36,17 @@ def press_along(
     indentations_mm: Sequence[float],
     *,
     order: int,
-    contact: ContactName,
     rays: Rays,
     estimate_error: bool = False,
+    edge_force: bool = False,
 ) -> tuple[LoadedFace, ...]:
     """Return the face at every one of ascending indentations (mm), with its refined twin if errors are wanted.
 
-    Raises `InvalidQuantity` for indentations that do not ascend from above 0, `PathEnded` for one out of reach.
+    `edge_force` asks for the other reading of the rim (`sliding.py`), which only comparisons
+    need. Raises `InvalidQuantity` for indentations that do not ascend from above 0, `PathEnded` for one out of reach.
     """
     _require_ascending("indentations_mm", indentations_mm)
-    press = _Press(_contact(contact, mesh, elasticity, order), rays, estimate_error)
+    press = _Press(SlidingContact(mesh, elasticity, order, edge_force=edge_force), rays, estimate_error)
     return tuple(press.face_after(press.path.press_to, load) for load in indentations_mm)
 
 
@@ -57,20 +56,13 @@ def press_to_forces(
     forces_n: Sequence[float],
     *,
     order: int,
-    contact: ContactName,
     rays: Rays,
     estimate_error: bool = False,
 ) -> tuple[LoadedFace, ...]:
     """Return the face at every one of ascending forces (N), met to 1e-8; otherwise as `press_along`."""
     _require_ascending("forces_n", forces_n)
-    press = _Press(_contact(contact, mesh, elasticity, order), rays, estimate_error)
+    press = _Press(SlidingContact(mesh, elasticity, order), rays, estimate_error)
     return tuple(press.face_after(press.path.push_to, load) for load in forces_n)
-
-
-def _contact(name: ContactName, mesh: Any, elasticity: Elasticity, order: int) -> ClosedContact:
-    if name == "paired":
-        return PairedContact(mesh, elasticity, order)
-    return SlidingContact(mesh, elasticity, order, edge_force=name == "sliding_with_edge_force")
 
 
 def _require_ascending(quantity: str, loads: Sequence[float]) -> None:
@@ -117,8 +109,8 @@ class _Press:
 class FiniteStrainModel:
     """Neo-Hookean probe and tissue in axisymmetry; every press on the way is kept."""
 
-    def __init__(self, mesh: Any, order: int, rays: Rays, *, contact: ContactName) -> None:
-        self.mesh, self.order, self.rays, self.contact = mesh, order, rays, contact
+    def __init__(self, mesh: Any, order: int, rays: Rays) -> None:
+        self.mesh, self.order, self.rays = mesh, order, rays
 
     def press(self, elasticity: Elasticity, presses: Sequence[Press], *, estimate_error: bool) -> tuple[Loaded, ...]:
         """Return the face at every press; raise `PressFailed` for one that is out of reach."""
@@ -130,7 +122,6 @@ class FiniteStrainModel:
             elasticity,
             loads,
             order=self.order,
-            contact=self.contact,
             rays=self.rays,
             estimate_error=estimate_error,
         )

@@ -29,10 +29,6 @@ class Sector:
         return 360 / self.angle_deg
 
 
-QUARTER = Sector(90.0, 6)
-"""The quarter model that the paper's SOLID95 elements imply."""
-
-
 @dataclass(frozen=True)
 class RevolvedMesh:
     """Nodes (n, 3) in mm; elements (m, 20) and (m, 15) with their materials, hexahedra first; sets of nodes and faces.

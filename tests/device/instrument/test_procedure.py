@@ -457,7 +457,7 @@ def test_a_press_that_is_asked_for_while_the_probe_fails_ends_with_the_fault(rig
     broken = pytest.MonkeyPatch()
 
     def fail_when_asked():
-        rig.until(lambda: rig.procedure._requests.is_waiting)
+        rig.until(lambda: rig.procedure._requests._waiting)
         broken.undo()
         raise CameraError("No frame came.", "Check the ribbon cable.")
 

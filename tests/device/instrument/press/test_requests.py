@@ -45,7 +45,7 @@ def test_a_press_that_was_asked_for_waits_in_the_store_and_begins_untouched(requ
     job = requests.ask("quick")
     assert store.press(job.id)["state"] == "waiting"
     assert requests.begin(is_touched=False) == job == board.now.press
-    assert not requests.is_waiting
+    assert requests.begin(is_touched=False) is None
 
 
 def test_a_press_that_nobody_asked_for_begins_at_a_touch_in_the_mode_of_the_settings(requests):
@@ -64,7 +64,7 @@ def test_a_second_press_is_refused_while_one_waits_and_while_one_is_under_way(re
 def test_a_mode_that_the_probe_does_not_have_is_refused_with_those_it_has(requests):
     with pytest.raises(ModeUnavailable, match="paper, quick"):
         requests.ask("precise")
-    assert not requests.is_waiting
+    assert requests.begin(is_touched=False) is None
 
 
 def test_a_probe_at_fault_answers_a_request_with_the_fault(requests, board):
