@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from daemon_process import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```console\n\$ (.*)\n((?:.*\n)*?)```", README)
+PYTHON_BLOCKS = re.findall(r"```python\n((?:.*\n)*?)```", README)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
@@ -43,3 +45,20 @@ def test_the_greeting_of_make_run_is_the_daemons(daemon):
     source = (ROOT / "device" / "__main__.py").read_text()
     assert shown.startswith("TSIS simulated probe SIM-0001: screen and API at http://127.0.0.1:")
     assert 'f"TSIS {kind} {procedure.config.serial}: screen and API at http://{host}:{port}/"' in source
+
+
+@pytest.mark.parametrize("block", PYTHON_BLOCKS)
+def test_a_python_example_of_the_readme_runs(block, tmp_path):
+    """In a process of its own and an empty folder, without a screen, as a stranger would paste it."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    command = [sys.executable, "-W", "error::DeprecationWarning:__main__", "-c", block]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    for name in re.findall(r'savefig\("([^"]+)"\)', block):
+        assert (tmp_path / name).stat().st_size > 10_000
+
+
+def test_the_scene_that_the_readme_solves_takes_five_lines():
+    lines = [line for line in PYTHON_BLOCKS[0].splitlines() if line]
+    assert lines[0] == "import host_tools as tsis"
+    assert len(lines) <= 5

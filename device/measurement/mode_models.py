@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeVar
 
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate, estimate_recording
-from device.measurement.mode import Mode
+from device.measurement.mode import Mode, mode_of
 from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import HeldModel, estimate_held
@@ -60,6 +60,12 @@ class ModeModels(NamedTuple):
         raise InvalidQuantity(
             "mode", mode, f"one of {', '.join(self.modes)}", "choose one of them, or install its model"
         )
+
+
+def analysed(recording: Recording, models: ModeModels, calibration: Calibration, mode: Mode | None = None) -> Estimate:
+    """Return the estimate of a recording in a mode; by default in the one that reads most of its press frames."""
+    of_frames = mode_of([frame.force_n for frame in recording.with_role("press")])
+    return models.estimate(recording, mode or of_frames, calibration)
 
 
 def with_models(paper: ModelBundle, held: Path, profile: Path) -> ModeModels:

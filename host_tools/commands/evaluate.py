@@ -19,8 +19,8 @@ from rich.console import Console
 from device.files.recording_file import read_recording
 from device.measurement.calibration import Calibration, read_calibration
 from device.measurement.estimate import Estimate
-from device.measurement.mode import Mode, mode_named, mode_of
-from device.measurement.mode_models import ModeModels, with_models
+from device.measurement.mode import Mode, mode_named
+from device.measurement.mode_models import ModeModels, analysed, with_models
 from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
@@ -127,8 +127,7 @@ def evaluate(
     models = with_models(ModelBundle.load(model), quick_model, profile_model)
 
     def answer(recording: Recording) -> Estimate:
-        of_frames = mode_of([frame.force_n for frame in recording.with_role("press")])
-        return models.estimate(recording, asked or of_frames, certificate)
+        return analysed(recording, models, certificate, asked)
 
     samples = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
     say = partial(note.print, markup=False, soft_wrap=True)

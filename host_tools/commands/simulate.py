@@ -137,9 +137,9 @@ def _solution(scene: Scene, tolerance_ratio: float, strain: SimulateStrain) -> S
 
 
 def _plot(solution: Solution, path: Path) -> None:
-    from host_tools.forward.plots import plot_solution
+    from host_tools.forward.plots import write_plot
 
-    plot_solution(solution, path)
+    write_plot(solution, path)
 
 
 def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int) -> None:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from device.files.durable import sync_directory
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Journal, Row
+from host_tools.forward.solution_dataset import unit_of
 
-UNITS = {"_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa", "_n": "N"}
 NOT_VARIABLES = ("index", "reason", "r_mm")
 BLOCK_SCENES = 64
 """Some 10 MB of rows with five loads each."""
@@ -65,7 +65,7 @@ def _lay_out(file: h5netcdf.File, journal: Journal, solved: Row) -> dict[str, ND
     empty_of = {}
     for name in (name for name in solved if name not in NOT_VARIABLES):
         empty_of[name] = np.full_like(np.asarray(solved[name], dtype=float), np.nan)
-        _create(file, name, ("scene", *list(coordinates)[: empty_of[name].ndim]), _unit(name))
+        _create(file, name, ("scene", *list(coordinates)[: empty_of[name].ndim]), unit_of(name))
     reason = file.create_variable("reason", ("scene",), h5py.string_dtype())
     reason.attrs["long_name"] = "why the scene failed, or empty"
     return empty_of
@@ -75,8 +75,3 @@ def _create(file: h5netcdf.File, name: str, dimensions: tuple[str, ...], unit: s
     variable = file.create_variable(name, dimensions, float, fillvalue=np.nan)
     variable.attrs["units"] = unit
     return variable
-
-
-def _unit(name: str) -> str:
-    """Return the unit that a name ends in; stated errors are relative, whatever they are of."""
-    return "1" if name.startswith("stated_error_") else UNITS["_" + name.rpartition("_")[2]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,14 @@ from device.measurement.arrays import Array
 from host_tools.forward.deformation import Deformation, deformation
 from host_tools.forward.face_state import RADII, FaceState, Rays
 from host_tools.forward.plan import ModelPlan
+from host_tools.scenes.scene import Scene
 
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+PAPER_FEATURES = ("max_deformation_mm", "central_deformation_mm3", "deformation_area_mm2")
+"""O1-O3 as the inversion uses them."""
 PRESSED_RATIO = 0.95
 """Where the pressure must be positive, over the face: at the rim itself it is singular and its sign means nothing."""
 RING_RATIO = 0.1
@@ -20,11 +27,12 @@ RING_RATIO = 0.1
 the pressure rings between both signs while its sum is right."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solution:
     """What one scene does to the probe. Rays are those of the face; a single one in axisymmetry.
 
-    `stated_error` is relative and estimated (docs/forward_model.md), empty where no estimate was asked for.
+    `stated_error` is relative and estimated (docs/forward_model.md), empty where no estimate was asked for. `scene` is
+    what was solved, with its press.
     """
 
     rays: Rays
@@ -33,6 +41,7 @@ class Solution:
     plan: ModelPlan
     elements: int
     stated_error: dict[str, float]
+    scene: Scene
 
     @cached_property
     def inclusion_field(self) -> Deformation:
@@ -114,6 +123,35 @@ class Solution:
             "p_kpa": self.p_kpa.tolist(),
         }
         return record if len(self.rays.angle_rad) == 1 else record | self._fields()
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the solution as a data set with units, one row long; `solve_ramp`'s are put together by `dataset_of`.
+
+        Of `host_tools/forward/solution_dataset.py`, which says which names it has.
+        """
+        from host_tools.forward.solution_dataset import dataset_of
+
+        return dataset_of([self])
+
+    def plot(self) -> Figure:
+        """Return a figure of three panels: the deformed face, what the inclusion adds, and the contact pressure."""
+        from host_tools.forward.plots import plot_solution
+
+        return plot_solution(self)
+
+    def __repr__(self) -> str:
+        """Return one line: load, O1-O3 and the model."""
+        o1, o2, o3 = (getattr(self.inclusion_field, name) for name in PAPER_FEATURES)
+        load = f"{self.force_n:.4g} N at {self.indentation_mm:.4g} mm"
+        inclusion = f"the inclusion adds O1 {o1:.4g} mm, O2 {o2:.4g} mm3, O3 {o3:.4g} mm2"
+        model = f"{self.plan.symmetry}, {self.plan.strain} strain, {self.elements} elements"
+        return f"<Solution: {load}; {inclusion}; {model}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: numbers with their errors, the plan with its reasons, and the figure."""
+        from host_tools.solution_html import solution_html
+
+        return solution_html(self)
 
     def _fields(self) -> dict[str, Any]:
         """Return the whole fields, one row a ray."""

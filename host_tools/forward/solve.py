@@ -50,6 +50,14 @@ def solve_ramp(
         pressed = meshed.model.press(with_inclusion(turned), presses, estimate_error=estimate_error)
     rays = replace(meshed.rays, angle_rad=meshed.rays.angle_rad + angle_rad)
     return tuple(
-        Solution(rays, one.state, without.state, plan, meshed.elements, stated_error(plan, meshed.rays, one, without))
-        for one, without in zip(pressed, bare, strict=True)
+        Solution(
+            rays,
+            one.state,
+            without.state,
+            plan,
+            meshed.elements,
+            stated_error(plan, meshed.rays, one, without),
+            scene.with_press(press),
+        )
+        for press, one, without in zip(presses, pressed, bare, strict=True)
     )

@@ -15,7 +15,7 @@ RAYS = Rays.over(Scene().waveguide)
 
 def _under(p_kpa, **plan):
     face = FaceState(1.0, np.zeros_like(p_kpa), p_kpa, 0.0, 1.0, 1.0)
-    return Solution(RAYS, face, face, replace(model_plan(Scene()), **plan), 1, {})
+    return Solution(RAYS, face, face, replace(model_plan(Scene()), **plan), 1, {}, Scene())
 
 
 def test_pressure_that_rings_inside_an_element_is_no_tension():

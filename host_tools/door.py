@@ -1,0 +1,171 @@
+"""What `import host_tools` offers as functions: each a few words over the module that does the work.
+
+A tolerance is a ratio: 0.01 is 1 %. Folders of models and of the simulated probe are those of this repository unless
+given. Nothing here computes anything of its own, and each function imports what it needs: whoever solves a scene does
+not wait for what reads recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from device import __version__
+from device.measurement.quantities import Bound, InvalidQuantity, require
+from host_tools.scenes.scene import Press, Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from device.measurement.calibration import Calibration
+    from device.measurement.estimate import Estimate
+    from device.measurement.mode_models import ModeModels
+    from device.measurement.paper_mode.inversion import ModelBundle
+    from device.measurement.recording.recording import Recording
+    from device.simulation.virtual_probe import ProbeTables
+    from host_tools.forward.solution import Solution
+    from host_tools.limits.bounds import Limits
+    from host_tools.limits.protocol import PressProtocol
+    from host_tools.paper_network.train import Trained
+
+ROOT = Path(__file__).resolve().parents[1]
+MODELS = ROOT / "models"
+SIMULATED_PROBE = MODELS / "simulated_probe"
+STANDARD_PROTOCOL = ROOT / "protocols" / "standard.toml"
+TOLERANCE = 0.01
+StrainChoice = Literal["small", "finite", "auto"]
+
+
+def solve(scene: Scene, *, tolerance: float = TOLERANCE, strain: StrainChoice = "auto") -> Solution:
+    """Solve a scene by the cheapest model that is planned to hold a tolerance: the face, the force, O1-O3, and errors.
+
+    `tolerance` is the relative error allowed on O1-O3: 0.01 is 1 %. `strain` "auto" takes finite strain where small
+    strain departs by more than that; "small" is the paper's model. Raise `InvalidQuantity` for a scene that no model
+    serves, `PressFailed` for a press that cannot be reached.
+    """
+    return solve_ramp(scene, [scene.press], tolerance=tolerance, strain=strain)[0]
+
+
+def solve_ramp(
+    scene: Scene, presses: Sequence[Press], *, tolerance: float = TOLERANCE, strain: StrainChoice = "auto"
+) -> tuple[Solution, ...]:
+    """Solve a scene at several presses, all by indentation or all by force, ascending; one path serves all.
+
+    As `solve`; `dataset_of` makes one data set of them.
+    """
+    from host_tools.forward.plan import model_plan
+    from host_tools.forward.solve import solve_ramp as solve_presses
+
+    if not presses:
+        raise InvalidQuantity("presses", "none", "at least one", "give the loads")
+    allowed = require("tolerance", tolerance, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
+    plan = model_plan(scene.with_press(presses[-1]), tolerance=allowed, strain=strain)
+    return solve_presses(scene, presses, plan, estimate_error=True)
+
+
+def sweep(
+    scenes: int,
+    out: Path | str,
+    *,
+    seed: int = 1,
+    forces_n: Sequence[float] = (0.5,),
+    strain: Literal["small", "finite"] = "small",
+    jobs: int = -1,
+    scheduler: str | None = None,
+) -> xr.Dataset:
+    """Solve random scenes of the paper's box under rising forces into a netCDF file; return it as a data set.
+
+    On all cores, or on a Dask cluster (`scheduler` "tcp://host:port"). Interrupted, the same call goes on. All scenes
+    are solved at one level, since features would jump where a plan changes its mind. A scene that fails is a row of
+    NaN with its `reason`.
+    """
+    from host_tools.data.plan import SweepPlan
+    from host_tools.data.sweep import sweep as solve_scenes
+
+    plan = SweepPlan(scenes, seed, tuple(forces_n), strain)
+    return read_sweep(solve_scenes(plan, Path(out), jobs=jobs, scheduler=scheduler))
+
+
+def read_sweep(path: Path | str) -> xr.Dataset:
+    """Return the data set of a sweep: a row a scene, in the names of `Solution.to_xarray`, with the unit of each.
+
+    `attrs` hold schema and origin (JSON). Raise `InvalidQuantity` for a file that is no sweep.
+    """
+    from host_tools.data.dataset import read_dataset
+    from host_tools.forward.solution_dataset import named_as_solutions
+
+    return named_as_solutions(read_dataset(Path(path)))
+
+
+def train(sweep_file: Path | str, *, trials: int = 100, seed: int = 1) -> Trained:
+    """Train the paper's network, `trials` times, on a sweep's file; nine of its scenes are kept apart to score it.
+
+    Raise `InvalidQuantity` for a sweep of too few scenes, several loads or finite strain.
+    """
+    from host_tools.data.dataset import require_enough, training_rows
+    from host_tools.paper_network.train import train as train_networks
+
+    rows = training_rows(Path(sweep_file))
+    require_enough(rows, Path(sweep_file))
+    return train_networks(rows, trials=trials, seed=seed)
+
+
+def export(trained: Trained, folder: Path | str) -> ModelBundle:
+    """Write a trained model's bundle, ONNX and card, to a folder; return it as the probe would load it."""
+    from device.measurement.paper_mode.inversion import ModelBundle
+    from host_tools.paper_network.export import export as write_bundle
+
+    write_bundle(trained, Path(folder), software_version=__version__)
+    return ModelBundle.load(Path(folder))
+
+
+def limits(scene: Scene, protocol: PressProtocol | Path | str = STANDARD_PROTOCOL) -> Limits:
+    """Return the Cramer-Rao bound: how well any method could know size, depth and modulus in a scene.
+
+    `protocol` says what is measured and how uncertain the rest is, itself or its TOML file; by default that of mode
+    standard. Raise `InvalidQuantity` for a scene off the axis, layered or without inclusion.
+    """
+    from host_tools.limits.bounds import limits as bounds
+    from host_tools.limits.protocol import read_protocol
+
+    return bounds(scene, read_protocol(Path(protocol)) if isinstance(protocol, Path | str) else protocol)
+
+
+def installed_models(folder: Path | str = MODELS) -> ModeModels:
+    """Return the models of all modes in a folder; raise `BundleRefused` for one that does not hold."""
+    from device.measurement.mode_models import with_models
+    from device.measurement.paper_mode.inversion import ModelBundle
+
+    models = Path(folder)
+    return with_models(ModelBundle.load(models / "paper"), models / "quick", models / "standard")
+
+
+def simulated_probe(folder: Path | str = SIMULATED_PROBE) -> ProbeTables:
+    """Return the tables of the simulated probe, which stand in for finite elements and ray tracing."""
+    from device.simulation.virtual_probe import ProbeTables
+
+    return ProbeTables.load(Path(folder))
+
+
+def analyse(
+    recording: Recording | Path | str,
+    *,
+    mode: str = "",
+    models: ModeModels | None = None,
+    calibration: Calibration | None = None,
+) -> Estimate:
+    """Return size, depth and modulus of a recording, or of its folder or .zip, as the probe would answer.
+
+    `mode` quick, standard, precise or paper; by default the one that reads most of the frames. Models and certificate
+    are those of the simulated probe unless given. Raise `InvalidQuantity` where recording, mode, model and certificate
+    do not belong together.
+    """
+    from device.files.recording_file import read_recording
+    from device.measurement.calibration import read_calibration
+    from device.measurement.mode import mode_named
+    from device.measurement.mode_models import analysed
+
+    taken = read_recording(Path(recording)) if isinstance(recording, Path | str) else recording
+    certificate = calibration or read_calibration(SIMULATED_PROBE / "calibration.json")
+    return analysed(taken, models or installed_models(), certificate, mode_named(mode) if mode else None)
