@@ -1,7 +1,7 @@
 """What a press means: numbers in, numbers out. Shared with the workstation.
 
 Modules in reading order: `quantities`, `arrays`, `mode`, `parameters`, `model_card`, `calibration`,
-`confidence_belt`, `estimate`, `interval_estimate`, `mode_models`.
+`confidence_belt`, `estimate`, `interval_estimate`, `mode_models`, `radial_gaussian`, `shape_features`.
 
 Rooms: `recording` (frames to a corrected image), `paper_mode`, `ramp_modes` (standard and precise), `quick_mode`. It
 imports nothing else of ours; what it reads from a disk is read in `device.files`.
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from device.measurement.arrays import Array as Array
+    from device.measurement.arrays import Single as Single
     from device.measurement.calibration import Calibration as Calibration
     from device.measurement.estimate import Estimate as Estimate
     from device.measurement.estimate import Quantity as Quantity
@@ -43,6 +44,7 @@ _HOME = {
     "InvalidQuantity": "device.measurement.quantities",
     "require": "device.measurement.quantities",
     "Array": "device.measurement.arrays",
+    "Single": "device.measurement.arrays",
     "Recording": "device.measurement.recording.recording",
     "CameraSettings": "device.measurement.recording.recording",
     "Frame": "device.measurement.recording.tactile_image",
@@ -75,6 +77,7 @@ __all__ = [
     "ModelBundle",
     "Quantity",
     "Recording",
+    "Single",
     "TactileImage",
     "analysed",
     "mode_named",

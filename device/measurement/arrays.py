@@ -10,4 +10,3 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
-SingleArray = NDArray[np.float32]

@@ -149,7 +149,7 @@ class Solution:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: numbers with their errors, the plan with its reasons, and the figure."""
-        from host_tools.solution_html import solution_html
+        from host_tools.forward.solution_html import solution_html
 
         return solution_html(self)
 

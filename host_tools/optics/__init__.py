@@ -1,4 +1,4 @@
-"""The block of light behind the virtual probe: reference ray tracer, the table made from it, and a scene's camera frame.
+"""The light behind the virtual probe: reference ray tracer, the table made from it, and the camera frame of a scene.
 
 Modules in reading order: `light_block`, `fresnel`, `height_field`, `ray`, `compiled`, `emission`, `block_events`,
 `face_events`, `traced`, `tracer`, `build_lookup`, `frame`.

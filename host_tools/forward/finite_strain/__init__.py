@@ -1,7 +1,7 @@
 """Finite strain: neo-Hookean tissue that slides along the face, followed over a path of loads.
 
-Modules in reading order: `hyperelasticity`, `closed_contact`, `newton`, `form_action`, `sliding`, `pairing`,
-`loaded_face`, `equilibrium_path`, `load_path`.
+Modules in reading order: `hyperelasticity`, `closed_contact`, `newton`, `form_action`, `sliding`, `loaded_face`,
+`equilibrium_path`, `load_path`.
 
 Derivatives by the scene stand next door.
 """
