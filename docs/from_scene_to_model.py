@@ -136,7 +136,7 @@ for name in ("size_mm", "depth_mm", "youngs_modulus_kpa"):
 # phantom above were. A bound beyond some 50 % only says "not known".
 
 # %%
-bound = tsis.limits(scene, tsis.Protocol(forces_n=(0.5,), strain="small", systematic_ratio=0.002))
+bound = tsis.limits(scene, tsis.PressProtocol(forces_n=(0.5,), strain="small", systematic_ratio=0.002))
 for name, std in zip(("size_mm", "depth_mm", "youngs_modulus_kpa"), bound.std_with_box, strict=True):
     print(f"{name:20} cannot be known better than to {100 * std:5.1f} %")
 

@@ -18,7 +18,7 @@
 Modules in reading order: `door`.
 
 Rooms in the order of a scene: `scenes`, `forward`, `data`, `optics`, `probe_tables`, `calibration`, `paper_network`,
-`press_models`, `limits`, `scores`, `verification`, `replication`; `pages` writes documents, `commands` holds the
+`press_models`, `cramer_rao`, `scores`, `verification`, `replication`; `pages` writes documents, `commands` holds the
 verbs. From the device it takes `measurement`, `simulation` and `files`.
 
 Everything is loaded when it is first asked for, so that the import costs nothing. All else of the toolkit is reached by
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from device.measurement.quantities import InvalidQuantity as InvalidQuantity
     from device.measurement.recording.recording import Recording as Recording
     from host_tools.calibration.phantom import phantom_recording as phantom_recording
+    from host_tools.cramer_rao.protocol import PressProtocol as PressProtocol
+    from host_tools.cramer_rao.protocol import read_protocol as read_protocol
     from host_tools.door import analyse as analyse
     from host_tools.door import export as export
     from host_tools.door import installed_models as installed_models
@@ -53,8 +55,6 @@ if TYPE_CHECKING:
     from host_tools.forward.press_model import PressFailed as PressFailed
     from host_tools.forward.solution import Solution as Solution
     from host_tools.forward.solution_dataset import dataset_of as dataset_of
-    from host_tools.limits.protocol import PressProtocol as PressProtocol
-    from host_tools.limits.protocol import read_protocol as read_protocol
     from host_tools.optics.frame import simulated_frame as simulated_frame
     from host_tools.scenes.scene import Placement as Placement
     from host_tools.scenes.scene import Press as Press
@@ -85,8 +85,8 @@ _HOME = {
     "train": "host_tools.door",
     "export": "host_tools.door",
     "limits": "host_tools.door",
-    "PressProtocol": "host_tools.limits.protocol",
-    "read_protocol": "host_tools.limits.protocol",
+    "PressProtocol": "host_tools.cramer_rao.protocol",
+    "read_protocol": "host_tools.cramer_rao.protocol",
     "Recording": "device.measurement.recording.recording",
     "read_recording": "device.files.recording_file",
     "write_recording": "device.files.recording_file",

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from device.measurement.paper_mode.inversion import ModelBundle
     from device.measurement.recording.recording import Recording
     from device.simulation.virtual_probe import ProbeTables
+    from host_tools.cramer_rao.bounds import Limits
+    from host_tools.cramer_rao.protocol import PressProtocol
     from host_tools.forward.solution import Solution
-    from host_tools.limits.bounds import Limits
-    from host_tools.limits.protocol import PressProtocol
     from host_tools.paper_network.train import Trained
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -126,8 +126,8 @@ def limits(scene: Scene, protocol: PressProtocol | Path | str = STANDARD_PROTOCO
     `protocol` says what is measured and how uncertain the rest is, itself or its TOML file; by default that of mode
     standard. Raise `InvalidQuantity` for a scene off the axis, layered or without inclusion.
     """
-    from host_tools.limits.bounds import limits as bounds
-    from host_tools.limits.protocol import read_protocol
+    from host_tools.cramer_rao.bounds import limits as bounds
+    from host_tools.cramer_rao.protocol import read_protocol
 
     return bounds(scene, read_protocol(Path(protocol)) if isinstance(protocol, Path | str) else protocol)
 

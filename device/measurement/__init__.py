@@ -6,8 +6,14 @@ Modules in reading order: `quantities`, `arrays`, `mode`, `parameters`, `model_c
 Rooms: `recording` (frames to a corrected image), `paper_mode`, `ramp_modes` (standard and precise), `quick_mode`. It
 imports nothing else of ours; what it reads from a disk is read in `device.files`.
 
-Its door, `from device.measurement import ...`, loads each name when it is first asked for: whoever needs a quantity
-alone, as `device.commands.led_off`, loads no NumPy.
+Its door, `from device.measurement import Recording`:
+
+- quantities: `Inclusion`, `Bound`, `InvalidQuantity`, `require`; arrays: `Array`, `Single`
+- recordings: `Recording`, `CameraSettings`, `Frame`, `TactileImage`; modes: `Mode`, `mode_named`, `mode_of`
+- certificates and models: `Calibration`, `ModelBundle`, `BundleRefused`, `ModeModels`, `with_models`
+- answers: `analysed`, `Estimate`, `Quantity`
+
+Each is loaded when it is first asked for: whoever needs a quantity alone, as `device.commands.led_off`, loads no NumPy.
 """
 
 from __future__ import annotations

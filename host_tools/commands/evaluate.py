@@ -136,7 +136,7 @@ def evaluate(
 
 def _bound_of(models: ModeModels) -> LeastErrors:
     """Return what bounds the errors of standard and precise; the bundles of the other modes hold no forward model."""
-    from host_tools.limits.press_bound import least_errors
+    from host_tools.cramer_rao.press_bound import least_errors
     from host_tools.scores.score_recordings import unbounded
 
     return partial(least_errors, models.profile.answers) if models.profile else unbounded

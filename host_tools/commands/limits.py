@@ -13,7 +13,7 @@ from host_tools.commands.measured_chapters import ROOT, shown
 from host_tools.commands.output import note, progress, require_writable
 
 if TYPE_CHECKING:
-    from host_tools.limits.bounds import Limits
+    from host_tools.cramer_rao.bounds import Limits
     from host_tools.scenes.scene import Scene
 
 STANDARD = ROOT / "protocols" / "standard.toml"
@@ -37,8 +37,8 @@ def limits(
         return
     if out is not None:
         raise InvalidQuantity("out", out, "given with --map", "add --map, or print with --json")
-    from host_tools.limits.bounds import limits as bounds
-    from host_tools.limits.protocol import read_protocol
+    from host_tools.cramer_rao.bounds import limits as bounds
+    from host_tools.cramer_rao.protocol import read_protocol
 
     asked = read_protocol(protocol)
     found = bounds(_scene(scene, given), asked)
@@ -119,10 +119,10 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     require_writable(out, (".md",))
     from device.files.durable import write_durably
     from device.measurement.ramp_modes.model import ProfileModel
-    from host_tools.limits.accuracy_figure import draw_map
-    from host_tools.limits.accuracy_map import inclusions, mapped_scene
-    from host_tools.limits.accuracy_page import FIGURE, limits_markdown
-    from host_tools.limits.press_bound import beside_over_axis
+    from host_tools.cramer_rao.accuracy_figure import draw_map
+    from host_tools.cramer_rao.accuracy_map import inclusions, mapped_scene
+    from host_tools.cramer_rao.accuracy_page import FIGURE, limits_markdown
+    from host_tools.cramer_rao.press_bound import beside_over_axis
 
     beside = beside_over_axis(ProfileModel.load(ROOT / "models" / "standard").answers)
     chosen, mapped = inclusions(), []

@@ -23,9 +23,9 @@ from device.measurement.ramp_modes.surrogate import MODULUS, SIZE
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom_sets import BREAST_IMAGER_SLAB_MM, Phantom, breast_imager
-from host_tools.limits.accuracy_map import PROTOCOLS
-from host_tools.limits.bounds import limits
-from host_tools.limits.protocol import read_protocol
+from host_tools.cramer_rao.accuracy_map import PROTOCOLS
+from host_tools.cramer_rao.bounds import limits
+from host_tools.cramer_rao.protocol import read_protocol
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed

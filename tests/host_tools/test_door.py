@@ -164,7 +164,7 @@ def test_a_sweep_is_a_data_set_in_the_names_of_a_solution(tmp_path, solution):
 
 
 def test_limits_are_those_of_the_command():
-    found = tsis.limits(SCENE, tsis.Protocol(forces_n=(0.2, 0.4), strain="small"))
+    found = tsis.limits(SCENE, tsis.PressProtocol(forces_n=(0.2, 0.4), strain="small"))
     assert found.std.shape == (3,)
     assert found.identifiable == tuple(found.std_with_box < 0.5 * found.box_std)
 

@@ -2,5 +2,5 @@
 
 Modules in reading order: `equilibrium`, `mesh_velocity`, `sliding_parts`, `sensitivity`, `sensitive_presses`.
 
-Read by `host_tools.limits` alone.
+Read by `host_tools.cramer_rao` alone.
 """

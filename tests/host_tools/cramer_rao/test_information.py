@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from host_tools.limits.information import cramer_rao, with_nuisances
+from host_tools.cramer_rao.information import cramer_rao, with_nuisances
 
 
 @pytest.fixture

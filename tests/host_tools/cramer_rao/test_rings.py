@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from host_tools.limits.rings import PIXEL_MM, Rings, mean_between
+from host_tools.cramer_rao.rings import PIXEL_MM, Rings, mean_between
 
 R_MM = np.linspace(0.0, 11.0, 221)
 RINGS = Rings.within(9.9)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from host_tools.limits.accuracy_tables import (
+from host_tools.cramer_rao.accuracy_tables import (
     BOX,
     LN_MODULUS,
     MODULUS,
@@ -13,8 +13,8 @@ from host_tools.limits.accuracy_tables import (
     std_of_modulus,
     visible_line,
 )
-from host_tools.limits.bounds import Limit, Limits
-from host_tools.limits.information import CramerRao
+from host_tools.cramer_rao.bounds import Limit, Limits
+from host_tools.cramer_rao.information import CramerRao
 
 MODULI_KPA = (15.0, 40.0, 80.0, 120.0)
 LN_BOX = np.log(BOX.high / BOX.low)

@@ -11,7 +11,7 @@ from device.measurement.parameters import EVEN_STD, HIGH, LOW, PARAMETERS
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.model import ProfileAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
-from host_tools.limits.press_bound import least_errors
+from host_tools.cramer_rao.press_bound import least_errors
 
 TRUTH = Inclusion(9.0, 7.0, 60.0)
 STD = 0.05

@@ -16,14 +16,14 @@ from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_of_unit
 from device.measurement.quantities import UNKNOWNS, Inclusion
+from host_tools.cramer_rao.information import CramerRao, cramer_rao, with_nuisances
+from host_tools.cramer_rao.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe, scalars_of, with_growth
+from host_tools.cramer_rao.protocol import PressProtocol
+from host_tools.cramer_rao.rings import Rings
+from host_tools.cramer_rao.sight import Sight, rings_of, sights
 from host_tools.forward.derivatives.mesh_velocity import inclusion_of
 from host_tools.forward.derivatives.sensitive_presses import InclusionSensitivity, sensitive_offset, sensitive_ramp
 from host_tools.forward.derivatives.sensitivity import FORCE
-from host_tools.limits.information import CramerRao, cramer_rao, with_nuisances
-from host_tools.limits.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe, scalars_of, with_growth
-from host_tools.limits.protocol import PressProtocol
-from host_tools.limits.rings import Rings
-from host_tools.limits.sight import Sight, rings_of, sights
 from host_tools.scenes.scene import Scene
 
 CONVERGED_RATIO = 1.2

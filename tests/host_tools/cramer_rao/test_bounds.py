@@ -7,11 +7,11 @@ import pytest
 
 from device.measurement.parameters import RANGES
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from host_tools.cramer_rao.bounds import Limit, Limits, limit_of, limits, std_of_box
+from host_tools.cramer_rao.information import CramerRao
+from host_tools.cramer_rao.protocol import SPREADS, PressProtocol
+from host_tools.cramer_rao.sight import rings_of, sights
 from host_tools.forward.derivatives.sensitive_presses import sensitive_ramp
-from host_tools.limits.bounds import Limit, Limits, limit_of, limits, std_of_box
-from host_tools.limits.information import CramerRao
-from host_tools.limits.protocol import SPREADS, PressProtocol
-from host_tools.limits.sight import rings_of, sights
 from host_tools.scenes.scene import Scene
 
 INCLUSION = Inclusion(10, 6, 80)

@@ -26,8 +26,8 @@ from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, P
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.model import ProfileAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
-from host_tools.limits.accuracy_map import MODULI_KPA, Triple, inclusions
-from host_tools.limits.information import cramer_rao
+from host_tools.cramer_rao.accuracy_map import MODULI_KPA, Triple, inclusions
+from host_tools.cramer_rao.information import cramer_rao
 
 BOX_STD: Array = np.full(len(PARAMETERS), EVEN_STD)
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
+from host_tools.cramer_rao.bounds import Limits, limit_of_sights, std_of_box
+from host_tools.cramer_rao.protocol import Observable, PressProtocol, read_protocol
+from host_tools.cramer_rao.sight import Sight, rings_of, sights
 from host_tools.forward.derivatives.sensitive_presses import Ramps, sensitive_ramp
-from host_tools.limits.bounds import Limits, limit_of_sights, std_of_box
-from host_tools.limits.protocol import Observable, PressProtocol, read_protocol
-from host_tools.limits.sight import Sight, rings_of, sights
 from host_tools.scenes.scene import Scene
 
 SIZES_MM, DEPTHS_MM, MODULI_KPA = (3.0, 6.0, 10.0, 15.0), (4.0, 6.0, 8.0, 12.0), (15.0, 40.0, 80.0, 120.0)

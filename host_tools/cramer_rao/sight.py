@@ -24,12 +24,12 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
 from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.skin import Skin
+from host_tools.cramer_rao.protocol import Observable
+from host_tools.cramer_rao.rings import Rings, mean_between
 from host_tools.forward.derivatives.mesh_velocity import OFFSET
 from host_tools.forward.derivatives.sensitive_presses import InclusionSensitivity
 from host_tools.forward.derivatives.sensitivity import FORCE, FaceSensitivity
 from host_tools.forward.face_state import Rays
-from host_tools.limits.protocol import Observable
-from host_tools.limits.rings import Rings, mean_between
 
 TABLES = Path(__file__).resolve().parents[2] / "models" / "simulated_probe"
 SMOOTH_MM = 1.0

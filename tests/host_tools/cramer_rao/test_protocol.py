@@ -8,7 +8,7 @@ import pytest
 from device.measurement.mode import FRAMES, MODES, RAMP_FROM_N, RAMP_TO_N
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import LARGEST_STEP_N, PROFILE_FORCES_N
-from host_tools.limits.protocol import PressProtocol, read_protocol
+from host_tools.cramer_rao.protocol import PressProtocol, read_protocol
 
 SHIPPED_FOLDER = Path(__file__).parents[3] / "protocols"
 SHIPPED = sorted(SHIPPED_FOLDER.glob("*.toml"))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from device import __version__
-from host_tools.limits.accuracy_figure import draw_map
-from host_tools.limits.accuracy_map import (
+from host_tools.cramer_rao.accuracy_figure import draw_map
+from host_tools.cramer_rao.accuracy_map import (
     DEPTHS_MM,
     MODULI_KPA,
     NOT_SMOOTH,
@@ -20,11 +20,11 @@ from host_tools.limits.accuracy_map import (
     stds,
     ways,
 )
-from host_tools.limits.accuracy_page import FIGURE, limits_markdown
-from host_tools.limits.accuracy_tables import percent
-from host_tools.limits.bounds import Limit, Limits
-from host_tools.limits.information import CramerRao
-from host_tools.limits.press_bound import OFFSETS_MM
+from host_tools.cramer_rao.accuracy_page import FIGURE, limits_markdown
+from host_tools.cramer_rao.accuracy_tables import percent
+from host_tools.cramer_rao.bounds import Limit, Limits
+from host_tools.cramer_rao.information import CramerRao
+from host_tools.cramer_rao.press_bound import OFFSETS_MM
 
 BOX = np.array([0.4, 0.4, 0.8])
 PAIRS = len(SIZES_MM) * len(DEPTHS_MM)

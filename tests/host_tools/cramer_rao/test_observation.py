@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from host_tools.limits.observation import GAIN, ZERO, observe, variance_counts, with_growth
-from host_tools.limits.protocol import PressProtocol
-from host_tools.limits.rings import Rings
-from host_tools.limits.sight import Sight
+from host_tools.cramer_rao.observation import GAIN, ZERO, observe, variance_counts, with_growth
+from host_tools.cramer_rao.protocol import PressProtocol
+from host_tools.cramer_rao.rings import Rings
+from host_tools.cramer_rao.sight import Sight
 
 RINGS = Rings.within(0.9)
 COUNT = len(RINGS.r_mm)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from host_tools.limits.observation import SMOOTHING_MM, Observation, scalars_of, three_scalars
-from host_tools.limits.rings import Rings
+from host_tools.cramer_rao.observation import SMOOTHING_MM, Observation, scalars_of, three_scalars
+from host_tools.cramer_rao.rings import Rings
 
 RINGS = Rings.within(9.9)
 AMPLITUDE, WIDTH_MM = 0.2, 3.0

@@ -23,10 +23,10 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.simulation.physics.sensor import Sensor
+from host_tools.cramer_rao.protocol import PressProtocol
+from host_tools.cramer_rao.rings import Rings
+from host_tools.cramer_rao.sight import Sight
 from host_tools.forward.derivatives.mesh_velocity import OFFSET
-from host_tools.limits.protocol import PressProtocol
-from host_tools.limits.rings import Rings
-from host_tools.limits.sight import Sight
 
 
 def with_growth(observed: Observation, seen: Sequence[Sight], rings: Rings, protocol: PressProtocol) -> Observation:

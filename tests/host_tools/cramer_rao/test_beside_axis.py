@@ -5,7 +5,7 @@ from daemon_process import ROOT
 
 from device.measurement.parameters import EVEN_STD
 from device.measurement.ramp_modes.model import ProfileModel
-from host_tools.limits.press_bound import spread_of_modulus
+from host_tools.cramer_rao.press_bound import spread_of_modulus
 
 
 @pytest.fixture(scope="module")

@@ -21,10 +21,10 @@ from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
+from host_tools.cramer_rao.accuracy_map import MODULI_KPA, PRECISE, STANDARD, MappedScene
+from host_tools.cramer_rao.bounds import Limits
+from host_tools.cramer_rao.press_bound import OFFSETS_MM
 from host_tools.forward.derivatives.sensitive_presses import ORDERS
-from host_tools.limits.accuracy_map import MODULI_KPA, PRECISE, STANDARD, MappedScene
-from host_tools.limits.bounds import Limits
-from host_tools.limits.press_bound import OFFSETS_MM
 
 MODULUS = UNKNOWNS.index("youngs_modulus_kpa")
 BOX = RANGES["youngs_modulus_kpa"]
@@ -168,7 +168,7 @@ def _determined(scenes: list[MappedScene]) -> Iterator[str]:
         "",
         "In per cent of presses: how often the posterior of the modulus, with the ends of the box, would be called "
         "`identifiable`. It is followed over the whole box with the bound of each column in its place "
-        "(`host_tools/limits/accuracy_tables.py`); size and depth are held as in the table above.",
+        "(`host_tools/cramer_rao/accuracy_tables.py`); size and depth are held as in the table above.",
         "",
         *_head("Standard, modulus determined"),
     )
@@ -194,7 +194,7 @@ def _beside_axis(beside: Array) -> Iterator[str]:
         "own: of some inclusions' modulus it tells more than the unknown place costs, of others' less. By the polynomials "
         "and the noise that mode standard believes in (`models/standard`), with the box as prior: bound of the modulus "
         "over the same on the axis, smallest / median / largest of the pairs of size and depth "
-        "(`host_tools/limits/press_bound.py`). Only ratios, since that model is not the one of the bounds above: it is "
+        "(`host_tools/cramer_rao/press_bound.py`). Only ratios, since that model is not the one of the bounds above: it is "
         "made of the simulated probe's tables. Inclusions up to 2 mm beside the axis are what [the modes](modes.md) are "
         "scored on, so these may call the modulus determined where no inclusion on the axis is bold.",
         "",

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from host_tools.cramer_rao.rings import Rings
+from host_tools.cramer_rao.sight import SKIN, IdealPicture, LightPicture, Profiles, smooth
 from host_tools.forward.face_state import Rays
-from host_tools.limits.rings import Rings
-from host_tools.limits.sight import SKIN, IdealPicture, LightPicture, Profiles, smooth
 from host_tools.scenes.scene import Waveguide
 
 RAYS = Rays.over(Waveguide())
