@@ -10,7 +10,8 @@ from host_tools.verification.light.angles import chapter, critical_angle_of_inte
 
 
 def test_every_angle_and_reflectance_is_the_one_on_paper() -> None:
-    assert chapter(0).passed
+    for benchmark in chapter(0).benchmarks:
+        assert benchmark.error <= (1e-6 if "(degrees)" in benchmark.quantity else 1e-12), benchmark
 
 
 def test_an_interface_into_a_medium_as_dense_traps_nothing() -> None:
