@@ -20,6 +20,17 @@ def test_constant_bounds_give_the_mean_plus_and_minus_that_many_spreads():
     assert interval.is_identifiable
 
 
+def test_what_the_grid_cuts_off_at_both_ends_is_given_back():
+    """Over means that lie anywhere between two truths of the grid, half a step of it makes up for what is cut off.
+
+    So the ends are right on average: 1.64 spreads of 0.1 below and above the mean, where 401 truths stand 0.005 apart.
+    """
+    means = np.linspace(0.1, 0.2, 1001)
+    ends = np.array([bands(-1.64, 1.64).interval(mean, 0.1)[:2] for mean in means])
+    assert (ends[:, 0] - means).mean() == pytest.approx(-0.164, abs=2e-4)
+    assert (ends[:, 1] - means).mean() == pytest.approx(0.164, abs=2e-4)
+
+
 def test_bounds_that_grow_with_the_truth_shift_the_interval():
     """At truth t the answer usually lies t spreads too low: t - 1 <= (t - m) / s <= t + 1 with s = 0.1, m = 0."""
     shifted = Bands(TRUTH, LOG_SPREAD, np.array([[-2.0, -2.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [2.0, 2.0]]))
