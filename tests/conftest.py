@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `make test` has it: more threads would only wait for each other
+
 from collections.abc import Iterator
 
+import hypothesis
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon
 from schedule import OneHand
@@ -19,6 +23,8 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 
 MODELS = ROOT / "models"
+hypothesis.settings.register_profile("any machine", deadline=None)
+hypothesis.settings.load_profile("any machine")
 
 
 def pytest_xdist_auto_num_workers() -> int:

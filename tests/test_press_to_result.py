@@ -5,13 +5,12 @@ from __future__ import annotations
 import io
 import json
 import sqlite3
-import time
 import urllib.request
 import zipfile
 from dataclasses import replace
 
 import pytest
-from daemon_process import QUICK_HAND, Daemon
+from daemon_process import QUICK_HAND, WAIT_S, Daemon, wait_for
 
 from device.assembly.answers import answers_for
 from device.assembly.opened_parts import StartFailed
@@ -22,6 +21,8 @@ from device.files.recording_file import read_recording
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.records.store import Store
 from device.simulation.scenario import Scenario
+
+pytestmark = pytest.mark.real_time
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_the_tactile_image_is_a_png_in_true_proportions(daemon, measurement):
 
 
 def test_the_event_stream_tells_the_status(daemon):
-    with urllib.request.urlopen(daemon.url + "/api/v1/events", timeout=10) as stream:
+    with urllib.request.urlopen(daemon.url + "/api/v1/events", timeout=WAIT_S) as stream:
         assert stream.headers["content-type"].startswith("text/event-stream")
         assert stream.readline() == b"event: status\n"
         status = json.loads(stream.readline().removeprefix(b"data: "))
@@ -138,14 +139,6 @@ def test_a_probe_that_runs_is_tared_and_presses_on(daemon):
     assert daemon.press()["state"] == "done"
 
 
-def test_a_press_that_is_too_hard_is_rejected_with_both_numbers(tmp_path):
-    daemon = Daemon(tmp_path, QUICK_HAND + "aim_n = 1.4\n")
-    job = daemon.press("paper")
-    assert job["state"] == "rejected"
-    assert "above 1.00 N" in job["reason"]
-    daemon.stop()
-
-
 def test_a_press_interrupted_by_a_stop_is_not_lost(tmp_path):
     """SIGTERM in the middle of a press: exit 0, and the job says how it ended after the next start."""
     daemon = Daemon(tmp_path)
@@ -169,24 +162,9 @@ def test_a_kill_loses_no_measurement(tmp_path):
     assert kept == [(job["measurement_id"],)]
 
 
-def test_an_inclusion_that_cannot_be_seen_gets_no_number(tmp_path):
-    """0.5 mm, 10 mm deep: its contrast is a thousandth of the camera's noise."""
-    daemon = Daemon(tmp_path, "[inclusion]\nsize_mm = 0.5\ndepth_mm = 10.0\nyoungs_modulus_kpa = 80.0\n" + QUICK_HAND)
-    job = daemon.press()
-    estimate = daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json["estimate"]
-    daemon.stop()
-    # No contrast, or, when the two presses differ by a hundredth of the force, a contrast that no inclusion has.
-    assert estimate["status"] in ("not_identifiable", "outside_range")
-    assert estimate["size_mm"]["value"] is None
-
-
 def test_a_daemon_whose_certificate_has_expired_serves_and_refuses_presses_with_its_code(tmp_path):
     daemon = Daemon(tmp_path, '[[faults]]\nkind = "clock_jump"\nstep_s = 2e9\n')
-    for _ in range(600):
-        status = daemon.ask("/api/v1/status").json
-        if status["faults"]:
-            break
-        time.sleep(0.05)
+    status = wait_for(lambda: daemon.ask("/api/v1/status").json, lambda status: status["faults"])
     press, ready = daemon.ask("/api/v1/presses", "POST", {}), daemon.ask("/api/v1/health/ready")
     known = daemon.ask("/api/v1/calibrations").json
     daemon.stop()

@@ -19,6 +19,7 @@ from supervisor import DARK_WITHIN_S, Supervisor, codes, faults
 
 from device.instrument.watch.progress import PARTS
 
+pytestmark = [pytest.mark.long, pytest.mark.real_time]
 WATCHDOG_S = 6.0
 FAULTS = {
     "camera": ("camera_stall", "the camera"),

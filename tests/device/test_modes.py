@@ -1,13 +1,12 @@
 """A press in each mode through the daemon's whole procedure on emulated chips: which recording reaches the estimator.
 
-The estimator is a stand-in that keeps what it got. Hands and cameras are faster than people's, by as much as the
-largest rate of a ramp is raised.
+The estimator is a stand-in that keeps what it got. Time is simulated; hands and cameras are faster than people's, by as
+much as the largest rate of a ramp is raised, so that there are fewer frames to render.
 """
 
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,6 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from simulated_time import SimulatedTime
+from simulated_time_probe import simulate_time
 
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
@@ -55,14 +56,13 @@ class Witness:
 class Device:
     """A simulated probe that runs, its witness, and every guidance it has given."""
 
-    def __init__(self, procedure: Procedure, witness: Witness) -> None:
+    def __init__(self, procedure: Procedure, witness: Witness, clock: SimulatedTime) -> None:
         self.procedure, self.board, self.witness, self.told = procedure, procedure.board, witness, []
-        self._pause = threading.Event()
+        self._clock = clock
         self.board.on_guidance(lambda guidance: self.told.append(guidance.code))
 
     def until(self, condition: Callable[[], bool]) -> None:
-        tries = round(LONGEST_WAIT_S / 0.01)
-        assert any(condition() or self._pause.wait(0.01) for _ in range(tries)), (self.board.now, self.told)
+        assert self._clock.wait(condition, LONGEST_WAIT_S), (self.board.now, self.told)
 
     def begin(self, mode: Mode) -> str:
         self.until(lambda: self.board.now.step != "starting" and self.board.now.fault is None)
@@ -78,14 +78,14 @@ class Device:
 
 @pytest.fixture
 def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    witness = Witness()
+    witness, clock = Witness(), simulate_time(monkeypatch)
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, witness.estimate))
     config = replace(simulated_config(), data=tmp_path, camera=CameraSection(frame_rate_hz=60.0), press=PRESS)
 
     @contextmanager
     def run(scenario: Scenario = QUICK) -> Iterator[Device]:
         opened = open_simulated_probe(config, scenario)
-        device = Device(opened, witness)
+        device = Device(opened, witness, clock)
         opened.start()
         try:
             yield device
@@ -177,6 +177,14 @@ def test_a_ramp_that_goes_too_far_is_rejected_with_both_numbers(running, monkeyp
         job = device.press("standard")
     assert job["state"] == "rejected"
     assert "above 1.00 N" in job["reason"]
+    assert device.witness.recordings == []
+
+
+def test_a_hold_that_is_too_hard_is_rejected_with_both_numbers(running):
+    with running(Scenario(hand=replace(HAND, aim_n=1.4))) as device:
+        job = device.press("paper")
+    assert job["state"] == "rejected"
+    assert re.search(r"1\.\d\d N.*above 1\.00 N", job["reason"])
     assert device.witness.recordings == []
 
 

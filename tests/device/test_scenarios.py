@@ -1,26 +1,37 @@
 """Every fault that a scenario injects is raised by its code, or found by the self-test; after it the device is ready.
 
-The daemon's whole procedure on emulated chips, in two fifths of the time: hand, camera and time limits are as much
-faster as the faults are shorter.
+The daemon's whole procedure on emulated chips in simulated time, and in two fifths of it, for fewer frames to render:
+hand, camera and time limits are as much faster as the faults are shorter. A camera's process that hangs or dies is a
+process: those two are in real time, and their fault ends when the test has seen what it waits for.
 """
 
 from __future__ import annotations
 
 import re
-import threading
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
-from daemon_process import ROOT
+from daemon_process import ROOT, wait_for
+from simulated_time import SimulatedTime
+from simulated_time_probe import simulate_time
 
+from device.assembly import probe as assembly
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
 from device.config import CameraSection, LightSection, PressSection, simulated_config
-from device.errors import DeviceError, LightBudgetError, MissingCalibration, StalledError, ZeroShiftError
+from device.errors import (
+    CameraProcessError,
+    DeviceError,
+    LightBudgetError,
+    MissingCalibration,
+    StalledError,
+    ZeroShiftError,
+)
 from device.files.recording_file import read_recording
 from device.files.toml_record import from_table
 from device.instrument import procedure
@@ -32,15 +43,17 @@ from device.instrument.watch import watchdog
 from device.instrument.watch.restart_note import RestartNote
 from device.instrument.watch.watchdog import Watchdog
 from device.measurement.mode import Mode
+from device.measurement.quantities import Inclusion
 from device.measurement.recording.recording import Recording
 from device.records.store import ENDED
 from device.settings.layers import overridden
-from device.simulation.faults import PARAMETERS, ScriptedFault
+from device.simulation.faults import PARAMETERS, FaultTimeline, ScriptedFault
 from device.simulation.hand import HandSettings
 from device.simulation.physics.sensor import Sensor
 from device.simulation.scenario import Scenario, read_scenario
 
 FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).expects]
+OF_A_PROCESS = [path for path in FILES if read_scenario(path).expects == CameraProcessError.code]
 SELF_TEST_FILES = [path for path in sorted((ROOT / "scenarios").glob("*.toml")) if read_scenario(path).self_test_fails]
 TIME_RATIO, FROZEN_TIME_RATIO = 0.4, 0.2
 """A frozen part is waited for only: the watchdog's time and the scene's can shrink together beyond what a hand does."""
@@ -52,9 +65,8 @@ LONGEST_WAIT_S = 20.0
 class Device:
     """A simulated probe that runs, and what it has said so far."""
 
-    def __init__(self, procedure: Procedure) -> None:
-        self.procedure, self.board = procedure, procedure.board
-        self._pause = threading.Event()
+    def __init__(self, procedure: Procedure, clock: SimulatedTime) -> None:
+        self.procedure, self.board, self._clock = procedure, procedure.board, clock
 
     def codes(self) -> set[str]:
         """Codes of fault, press and warnings that are shown now."""
@@ -66,8 +78,7 @@ class Device:
         return set(shown)
 
     def until(self, condition: Callable[[], bool]) -> None:
-        tries = round(LONGEST_WAIT_S / 0.01)
-        assert any(condition() or self._pause.wait(0.01) for _ in range(tries)), (self.board.now, self.codes())
+        assert self._clock.wait(condition, LONGEST_WAIT_S), (self.board.now, self.codes())
 
     def is_ready(self) -> bool:
         return self.board.now.step != "starting" and self.board.now.hindrance is None
@@ -89,6 +100,16 @@ class Device:
         self.until(lambda: self.has_ended(job.id) or self.board.now.hindrance is not None)
 
 
+class RealTimeDevice(Device):
+    """The same, looked at from outside while it runs."""
+
+    def __init__(self, procedure: Procedure) -> None:
+        self.procedure, self.board = procedure, procedure.board
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        wait_for(lambda: (condition(), self.board.now, self.codes()), lambda seen: seen[0])
+
+
 @pytest.fixture
 def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., object]:
     monkeypatch.setattr(bench, "FRAME_TIMEOUT_S", TIME_RATIO * bench.FRAME_TIMEOUT_S)
@@ -96,7 +117,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
     monkeypatch.setattr(procedure, "AFTER_FAULT_S", 0.1)
     monkeypatch.setattr(self_test_run, "FREE_TIMEOUT_S", 2.0)
     monkeypatch.chdir(ROOT)  # a scene's settings name files from there
-    watchdog_s = watchdog.WITHOUT_SYSTEMD_S
+    watchdog_s, clock = watchdog.WITHOUT_SYSTEMD_S, simulate_time(monkeypatch)
     camera = CameraSection(frame_rate_hz=60.0)
     config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
@@ -115,7 +136,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
         watching = Watchdog(opened.progress, opened.board, RestartNote(tmp_path))
         watching.start()
         try:
-            yield Device(opened)
+            yield Device(opened, clock)
         finally:
             watching.close()
             opened.close()
@@ -123,7 +144,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
     return run
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [one for one in FILES if one not in OF_A_PROCESS], ids=lambda path: path.stem)
 def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(path, running):
     scenario = read_scenario(path)
     try:
@@ -134,6 +155,28 @@ def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(p
                 device.procedure.require_ready()
     except StartFailed as refusal:
         assert [fault.code for fault in refusal.faults] == [scenario.expects]  # noqa: PT017 - else it has started
+
+
+@pytest.mark.parametrize("path", OF_A_PROCESS, ids=lambda path: path.stem)
+def test_a_camera_whose_process_hangs_or_dies_is_at_fault_until_it_does_so_no_more(path, tmp_path, monkeypatch):
+    """The fault's own clock stands until its code is shown; then the fault is over."""
+    fault_s, timeline = [0.0], partial(FaultTimeline, clock=lambda: fault_s[0])
+    monkeypatch.setattr(assembly, "FaultTimeline", timeline)
+    scenario = read_scenario(path)
+    camera = CameraSection(frame_rate_hz=60.0, late_frames=100.0)
+    config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
+    opened = open_simulated_probe(config, replace(scenario, hand=QUICK_HAND))
+    device = RealTimeDevice(opened)
+    opened.start()
+    try:
+        device.until(device.is_ready)
+        device.procedure.request()
+        device.until(lambda: scenario.expects in device.codes())
+        fault_s[0] = 1e3
+        device.until(device.is_ready)
+        device.procedure.require_ready()
+    finally:
+        opened.close()
 
 
 def provoke(device: Device, scenario: Scenario) -> None:
@@ -239,6 +282,16 @@ def test_a_probe_with_the_other_led_chip_measures_without_a_fault(running):
         device.press()
         assert device.board.now.press.state == "done"
         assert device.codes() == set()
+
+
+def test_an_inclusion_that_cannot_be_seen_gets_no_number(running):
+    """0.5 mm, 10 mm deep: its contrast is a thousandth of the camera's noise."""
+    with running(Scenario(inclusion=Inclusion(0.5, 10.0, 80.0))) as device:
+        device.press()
+        estimate = device.procedure.store.measurement(device.board.now.press.measurement_id)["estimate"]
+    # No contrast, or, when the two presses differ by a hundredth of the force, a contrast that no inclusion has.
+    assert estimate["status"] in ("not_identifiable", "outside_range")
+    assert estimate["size_mm"]["value"] is None
 
 
 def test_a_hand_that_trembles_is_rejected_with_the_reason_and_no_fault(running):

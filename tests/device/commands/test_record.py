@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import QUICK_HAND, ROOT
+from simulated_time_probe import simulate_time
 
 from device.__main__ import main
 from device.files.recording_file import read_recording
@@ -34,8 +35,9 @@ def command(*arguments, scene=""):
 
 
 @pytest.fixture
-def run(capsys):
-    """Run a command line; return its exit code and the lines of stdout and stderr."""
+def run(capsys, monkeypatch):
+    """Run a command line in simulated time; return its exit code and the lines of stdout and stderr."""
+    simulate_time(monkeypatch)
 
     def run_line(arguments):
         try:

@@ -3,14 +3,16 @@
 import json
 
 import pytest
+from simulated_time_probe import simulate_time
 
 from device.__main__ import main
 
 
 @pytest.fixture
 def run(capsys, tmp_path, monkeypatch):
-    """Run a command line in an empty folder, with a scene; return its exit code, and the lines of stdout and stderr."""
+    """Run a command line in an empty folder, with a scene, in simulated time; return exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
+    simulate_time(monkeypatch)
 
     def run_line(*arguments, scene=""):
         (tmp_path / "scene.toml").write_text(scene)

@@ -63,8 +63,15 @@ class Unit:
 
 
 @pytest.fixture(autouse=True)
+def _long_waits(monkeypatch):
+    """A reply that is only late, on a busy machine, is not asked for again."""
+    monkeypatch.setattr(mantracourt, "REPLY_S", 30.0)
+
+
+@pytest.fixture
 def _short_waits(monkeypatch):
-    monkeypatch.setattr(mantracourt, "REPLY_S", 0.1)
+    """For who gets no reply, or half of one."""
+    monkeypatch.setattr(mantracourt, "REPLY_S", 0.3)
 
 
 @pytest.fixture
@@ -77,7 +84,7 @@ def unit() -> Iterator[Unit]:
 
 def test_the_bridge_is_asked_for_and_then_its_flags_and_a_count_is_a_nanovolt_a_volt(unit):
     unit.will_say(b"+00000.123456\r", FINE, b"-00002.500000\r", FINE)
-    assert [unit.cell.read(timeout_s=1.0).counts for _ in range(2)] == pytest.approx([123_456.0, -2_500_000.0])
+    assert [unit.cell.read(timeout_s=30.0).counts for _ in range(2)] == pytest.approx([123_456.0, -2_500_000.0])
     assert unit.requests == [b"!001:MVV?", b"!001:STAT?"] * 2
     assert unit.cell.skipped_lines == 0
 
@@ -92,21 +99,23 @@ def test_a_partial_reply_waits_for_its_rest_and_the_sample_is_stamped_when_that_
 
     rest = threading.Timer(0.03, send_the_rest)
     rest.start()
-    sample = unit.cell.read(timeout_s=1.0)
+    sample = unit.cell.read(timeout_s=30.0)
     rest.join()
     assert sample.counts == pytest.approx(123_456.0)
     assert sent_s[0] <= sample.t_s <= time.monotonic()
 
 
+@pytest.mark.usefixtures("_short_waits")
 def test_a_station_that_is_not_there_answers_nothing_and_is_named(unit):
-    with pytest.raises(LoadCellError, match=r"station 1 on .* answered nothing for 0\.05 s\. Check .*station") as error:
-        unit.cell.read(timeout_s=0.05)
+    with pytest.raises(LoadCellError, match=r"station 1 on .* answered nothing for 0\.3 s\. Check .*station") as error:
+        unit.cell.read(timeout_s=0.3)
     assert error.value.code == "E301"
 
 
+@pytest.mark.usefixtures("_short_waits")
 def test_a_request_that_got_no_reply_is_repeated_within_the_time_allowed(unit):
     unit.will_say(b"", b"+00000.000007\r", b"", b"+00000.000008\r", FINE)
-    assert unit.cell.read(timeout_s=5.0).counts == pytest.approx(8.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(8.0)
     assert unit.requests == [b"!001:MVV?", b"!001:MVV?", b"!001:STAT?", b"!001:MVV?", b"!001:STAT?"]
 
 
@@ -128,40 +137,42 @@ def test_a_request_that_got_no_reply_is_repeated_within_the_time_allowed(unit):
 )
 def test_a_line_that_is_no_reply_is_skipped_and_counted(unit, bad):
     unit.will_say(bad + b"\r+00000.000007\r", FINE)
-    assert unit.cell.read(timeout_s=1.0).counts == pytest.approx(7.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(7.0)
     assert unit.cell.skipped_lines == 1
 
 
 def test_a_reply_that_lost_a_digit_is_not_of_the_others_length_and_is_asked_for_again(unit):
     unit.will_say(b"+0000.123456\r", FINE, b"+00000.123456\r", FINE)
-    assert unit.cell.read(timeout_s=1.0).counts == pytest.approx(123_456.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(123_456.0)
     assert unit.cell.skipped_lines == 1
 
 
 def test_flags_that_are_no_whole_number_are_the_late_reply_to_something_else(unit):
     unit.will_say(b"+00000.000007\r", b"+00000.500000\r", b"+00000.000008\r", FINE)
-    assert unit.cell.read(timeout_s=1.0).counts == pytest.approx(8.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(8.0)
 
 
 def test_what_came_unasked_is_not_an_answer(unit):
     os.write(unit.master, b"+00009.000000\r+00009.")
     unit.will_say(b"+00000.000007\r", FINE)
-    assert unit.cell.read(timeout_s=1.0).counts == pytest.approx(7.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(7.0)
 
 
+@pytest.mark.usefixtures("_short_waits")
 def test_a_unit_of_too_few_decimals_is_told_which_setting_is_wrong(unit):
     unit.will_say(b"+00000.123\r")
     with pytest.raises(
         UnreadableCellError, match=r"1 lines skipped, the last b'\+00000\.123'\. Set its DP to 6"
     ) as error:
-        unit.cell.read(timeout_s=0.05)
+        unit.cell.read(timeout_s=0.3)
     assert error.value.code == "E302"
 
 
+@pytest.mark.usefixtures("_short_waits")
 def test_babble_without_an_end_is_unreadable_not_silent(unit):
     unit.will_say(b"7" * 3000)
     with pytest.raises(UnreadableCellError, match="1 lines skipped"):
-        unit.cell.read(timeout_s=0.05)
+        unit.cell.read(timeout_s=0.3)
 
 
 @pytest.mark.parametrize(
@@ -176,15 +187,15 @@ def test_babble_without_an_end_is_unreadable_not_silent(unit):
 def test_a_reading_that_its_flags_do_not_vouch_for_is_an_error_until_they_do(unit, flags, error, code):
     unit.will_say(b"+00003.000000\r", b"+%05d.000000\r" % flags, b"+00000.000007\r", FINE)
     with pytest.raises(error, match=rf"STAT {flags}") as caught:
-        unit.cell.read(timeout_s=1.0)
+        unit.cell.read(timeout_s=30.0)
     assert (type(caught.value), caught.value.code) == (error, code)
-    assert unit.cell.read(timeout_s=1.0).counts == pytest.approx(7.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(7.0)
 
 
 @pytest.mark.parametrize("flags", [1 << 0, 1 << 1, 1 << 12])
 def test_flags_of_the_units_ports_say_nothing_about_the_bridge(unit, flags):
     unit.will_say(b"+00000.000007\r", b"+%05d.000000\r" % flags)
-    assert unit.cell.read(timeout_s=1.0).counts == pytest.approx(7.0)
+    assert unit.cell.read(timeout_s=30.0).counts == pytest.approx(7.0)
 
 
 def test_unplugged_and_plugged_in_again_it_goes_on_by_itself(unit, tmp_path):
@@ -198,10 +209,10 @@ def test_unplugged_and_plugged_in_again_it_goes_on_by_itself(unit, tmp_path):
     link.unlink()
     for words in ("is gone", "force cannot be opened"):
         with pytest.raises(UnpluggedCellError, match=words) as error:
-            cell.read(timeout_s=0.5)
+            cell.read(timeout_s=30.0)
         assert error.value.code == "E304"
     link.symlink_to(again.path)
     again.will_say(b"+00000.000007\r", FINE)
-    assert cell.read(timeout_s=5.0).counts == pytest.approx(7.0)
+    assert cell.read(timeout_s=30.0).counts == pytest.approx(7.0)
     cell.close()
     again.unplug()

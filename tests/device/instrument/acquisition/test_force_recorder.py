@@ -72,9 +72,9 @@ def recorder(cell):
 
 
 def reached(condition):
-    """Wait, at most 5 s, until a condition holds."""
+    """Wait, at most half a minute, until a condition holds."""
     waiting = threading.Event()
-    return any(condition() or waiting.wait(0.005) for _ in range(1000))
+    return any(condition() or waiting.wait(0.005) for _ in range(6000))
 
 
 @pytest.mark.parametrize(("t_s", "force_n"), [(1.0, 0.0), (1.25, 0.5), (1.5, 1.0), (2.0, 2.0), (3.0, 1.5), (4.0, 1.0)])

@@ -1,0 +1,107 @@
+"""The daemon's whole procedure on emulated chips in simulated time: no processes, no terminals, everything else as is.
+
+The camera's driver reads the virtual camera in this process, and the load cell's reads lines from memory. What becomes
+of a camera's process that hangs or dies, and of a real terminal, is tested in real time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import serial
+from simulated_time import SimulatedTime
+
+from device.assembly import camera as camera_assembly
+from device.assembly import probe
+from device.hardware import load_cell
+from device.hardware.camera import RawMonoCamera
+from device.settings.camera_section import CameraSection
+from device.simulation.chips.emulated_amplifier import MAX_UNREAD_BYTES, EmulatedAmplifier
+
+
+class CameraInProcess:
+    """Stands for a `CameraServer`: its address is what opens the camera."""
+
+    def __init__(self, open_camera: Callable[[], Any]) -> None:
+        self.address = open_camera
+
+    def close(self) -> None:
+        pass
+
+
+def camera_in_process(settings: CameraSection, open_camera: Callable[[], Any]) -> RawMonoCamera:
+    return RawMonoCamera(open_camera(), **camera_assembly._driver_settings(settings))
+
+
+class Terminal:
+    """What the amplifier has sent and nobody has read, while it is plugged in."""
+
+    def __init__(self) -> None:
+        self.unread, self.is_plugged = bytearray(), True
+
+
+class Terminals:
+    """The load cells' lines by their paths, and `serial.Serial` for them."""
+
+    def __init__(self, clock: SimulatedTime) -> None:
+        self._clock, self._plugged = clock, dict[str, Terminal]()
+
+    def plug_in(self, amplifier: EmulatedAmplifier) -> None:
+        self._plugged[amplifier.device_path] = Terminal()
+        amplifier._is_plugged = True
+
+    def unplug(self, amplifier: EmulatedAmplifier) -> None:
+        if amplifier._is_plugged:
+            amplifier._is_plugged = False
+            self._plugged.pop(amplifier.device_path).is_plugged = False
+
+    def send(self, amplifier: EmulatedAmplifier, line: bytes) -> None:
+        unread = self._plugged[amplifier.device_path].unread
+        if len(unread) + len(line) <= MAX_UNREAD_BYTES:
+            unread += line
+
+    def opened(self, path: str, baudrate: int, exclusive: bool) -> Port:
+        if path not in self._plugged:
+            raise serial.SerialException(f"could not open port {path}")
+        return Port(self._clock, self._plugged[path])
+
+
+class Port:
+    """The part of `serial.Serial` that a line is read with."""
+
+    timeout: float | None = None
+    write_timeout: float | None = None
+
+    def __init__(self, clock: SimulatedTime, terminal: Terminal) -> None:
+        self._clock, self._terminal = clock, terminal
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self._terminal.unread)
+
+    def read(self, size: int) -> bytes:
+        self._clock.wait(lambda: bool(self._terminal.unread) or not self._terminal.is_plugged, self.timeout)
+        if not self._terminal.is_plugged:
+            raise serial.SerialException("device reports readiness to read but returned no data")
+        read = bytes(self._terminal.unread[:size])
+        del self._terminal.unread[:size]
+        return read
+
+    def close(self) -> None:
+        pass
+
+
+def simulate_time(monkeypatch: pytest.MonkeyPatch) -> SimulatedTime:
+    """Let probes that are opened from now on live in simulated time; the thread that asks has the first turn."""
+    clock = SimulatedTime()
+    clock.replace("device", monkeypatch)
+    monkeypatch.setattr(probe, "CameraServer", CameraInProcess)
+    monkeypatch.setattr(probe, "emulated_camera", camera_in_process)
+    terminals = Terminals(clock)
+    monkeypatch.setattr(load_cell, "serial", type("serial", (), {"Serial": staticmethod(terminals.opened)}))
+    for name, method in (("_plug_in", "plug_in"), ("_unplug", "unplug"), ("_send", "send")):
+        act = getattr(terminals, method)
+        monkeypatch.setattr(EmulatedAmplifier, name, lambda *parts, act=act: act(*parts))
+    return clock

@@ -1,0 +1,22 @@
+"""The scheduler of parallel runs, and whether it is still needed."""
+
+import inspect
+
+import xdist.remote
+from schedule import MARK, REAL_TIME, OneHand
+
+
+def test_xdist_still_names_groups_where_pytest_does_not_look(request):
+    """When this fails, `--dist loadgroup` works again: drop schedule.py, as its first lines say, and this file."""
+    assert "item._nodeid = " in inspect.getsource(xdist.remote)
+    name = request.node.nodeid
+    request.node._nodeid = f"{name}@group"  # what xdist does for a marked test
+    assert request.node.nodeid == name
+
+
+def test_a_file_is_a_scope_and_all_that_is_in_real_time_is_one(tmp_path):
+    plain, marked = tmp_path / "test_plain.py", tmp_path / "test_marked.py"
+    plain.write_text("def test_one(): ...")
+    marked.write_text(f"pytestmark = {MARK}")
+    scopes = [OneHand._split_scope(None, f"{path}::test_one[a::b]") for path in (plain, marked)]
+    assert scopes == [str(plain), REAL_TIME]
