@@ -1,11 +1,12 @@
 # Bare `make` lists the verbs. `run` and `test` set themselves up: they need python3 (3.11 or newer) and a package index.
 PORT ?= 8000
 SCENE ?=
+FILE ?=
 PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -29,8 +30,14 @@ setup: .venv/all.stamp ## make the virtual environment .venv with everything
 run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCENE=FILE]
 	@exec $(PY) -m device --simulate --port $(PORT) $(if $(SCENE),--scene $(SCENE))
 
-test: .venv/all.stamp ## run all tests
-	$(PY) -m pytest -n auto --maxprocesses 4 --dist loadscope
+test: .venv/all.stamp ## run the tests, but for the long ones (four minutes)
+	$(PY) -m pytest -n auto --maxprocesses 4 -m "not long"
+
+test-all: .venv/all.stamp ## run all tests, as continuous integration does (a quarter of an hour)
+	$(PY) -m pytest -n auto --maxprocesses 4
+
+loop: .venv/all.stamp ## run the tests of one module's room, in seconds: make loop FILE=device/web/app.py
+	@tests=$$($(PY) tests/room.py "$(FILE)") && $(PY) -m pytest -n auto --maxprocesses 4 -m "not long" $$tests
 
 test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian chroot under build (root, 1.7 GB)
 	tests/libcamera/run.sh build/trixie

@@ -80,6 +80,7 @@ def test_every_verb_has_help_with_an_example(verb):
     assert f"Example: host_tools {verb}" in done.stdout
 
 
+@pytest.mark.long
 def test_train_from_a_sweep_gives_a_bundle_the_device_accepts(tmp_path):
     """The whole way from scenes to ONNX, small: 70 scenes, 2 networks."""
     assert run_toolkit("sweep", "--scenes", 75, "--seed", 2, "--out", tmp_path / "s.nc").returncode == 0

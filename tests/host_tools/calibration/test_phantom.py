@@ -81,6 +81,7 @@ def test_random_phantoms_fill_the_box_and_come_again_with_their_seed():
     np.testing.assert_array_equal(truths[:3], [p.inclusion.as_tuple() for p in random_set(3, seed=4)])
 
 
+@pytest.mark.long
 def test_a_phantom_in_a_thicker_slab_is_solved_for_itself(tables):
     """Its face yields more under the same force than the table's 30 mm slab: the press goes deeper, w changes little,
     and the inclusion is one that the table does not hold."""

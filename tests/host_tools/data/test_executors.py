@@ -49,6 +49,7 @@ def client(cluster):
         yield connected
 
 
+@pytest.mark.long
 def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(tmp_path, cluster, client, uninterrupted):
     victim = next(iter(client.run(os.getpid).values()))
     done_of = []
@@ -65,6 +66,7 @@ def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(tmp_path, c
     xr.testing.assert_allclose(read_dataset(path), uninterrupted.isel(scene=slice(SCENES)), rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.long
 def test_only_the_scene_that_kills_its_workers_fails(client):
     def solve(index, truth):
         if index == 2:
@@ -78,6 +80,7 @@ def test_only_the_scene_that_kills_its_workers_fails(client):
     assert set(reasons.values()) == {""}
 
 
+@pytest.mark.long
 def test_no_more_cases_are_under_way_than_asked_for(client):
     drawn = []
 
@@ -93,6 +96,7 @@ def test_no_more_cases_are_under_way_than_asked_for(client):
     assert all(b - a <= 1 for a, b in pairwise(drawn_by_then))
 
 
+@pytest.mark.long
 def test_a_mistake_in_the_program_is_no_row(client):
     with pytest.raises(ZeroDivisionError):
         list(solve_on_cluster(client, lambda index, truth: 1 / 0, [(0, NO_TRUTH)]))
@@ -113,6 +117,7 @@ def test_threads_of_one_worker_solve_one_after_the_other():
     assert all(a["ended_s"] <= b["began_s"] for a, b in pairwise(rows))
 
 
+@pytest.mark.long
 def test_a_worker_solves_on_one_core(client):
     threads = client.run(lambda: [os.environ.get(name) for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")])
     assert all(counts == ["1", "1"] for counts in threads.values())

@@ -4,12 +4,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from daemon_process import ROOT
+from daemon_process import ROOT, WAIT_S, wait_for
 from sweep_rows import SCENES, synthetic_rows
 from typer.testing import CliRunner
 
@@ -24,8 +23,9 @@ from host_tools.data.sweep import sweep
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 
-def _start(folder, name):
+def _start(folder, name, jobs):
     command = [sys.executable, "-m", "host_tools", "sweep", "--scenes", str(SCENES), "--seed", "4", "--out", name]
+    command += ["--jobs", str(jobs)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
         command,
@@ -43,20 +43,17 @@ def _hear_interrupts():
 
 
 def _wait_for_rows(journal, count):
-    for _ in range(600):
-        if journal.exists() and journal.read_bytes().count(b"\n") > count:
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"{journal} has not reached {count} rows")
+    wait_for(lambda: journal.exists() and journal.read_bytes().count(b"\n"), lambda rows: rows > count)
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
-def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterrupted, stop):
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterrupted, stop, jobs):
     journal, out = tmp_path / "s.nc.partial", tmp_path / "s.nc"
-    running = _start(tmp_path, "s.nc")
+    running = _start(tmp_path, "s.nc", jobs)
     _wait_for_rows(journal, 3)
     os.killpg(running.pid, stop)
-    _, told = running.communicate(timeout=60)
+    _, told = running.communicate(timeout=WAIT_S)
     assert running.returncode == (1 if stop == signal.SIGINT else -signal.SIGKILL)
     assert not out.exists()
     if stop == signal.SIGINT:
@@ -64,8 +61,8 @@ def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterr
     done = journal.read_bytes().count(b"\n") - 1
     assert 0 < done < SCENES
     journal.write_bytes(journal.read_bytes() + b'{"index": 11, "torn by a cra')
-    again = _start(tmp_path, "s.nc")
-    again.communicate(timeout=120)
+    again = _start(tmp_path, "s.nc", jobs)
+    again.communicate(timeout=WAIT_S)
     assert again.returncode == 0
     assert not journal.exists()
     # Workers may differ from this process in the last bits of their linear algebra.

@@ -26,7 +26,7 @@ from host_tools.press_models.mode_outcome import (
 from host_tools.press_models.noisy_presses import NoiseSampler, Pool
 from host_tools.press_models.recorded_presses import RecordedPresses
 
-STD, COUNT, RECORDED = 0.1, 8000, 150
+STD, COUNT, RECORDED = 0.1, 4000, 150
 TOLD = np.arange(len(PARAMETERS)) != MODULUS
 GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
 NOISE = white_noise(STD)
@@ -121,14 +121,14 @@ def outcome(answers, pool, recorded) -> ModeOutcome:
 
 
 def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
-    covered, known = gaussian(6000, 1).covered(exact_bands(1.645))
+    covered, known = gaussian(3000, 1).covered(exact_bands(1.645))
     assert known.all()
     np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.015)
 
 
 def test_bands_of_one_half_of_gaussian_answers_cover_nine_in_ten_of_the_other():
-    both = gaussian(8000, 2)
-    seen, unseen = both.part(slice(4000)), both.part(slice(4000, None))
+    both = gaussian(5000, 2)
+    seen, unseen = both.part(slice(3000)), both.part(slice(3000, None))
     covered, _ = unseen.covered(confidence_bands(seen.truth, seen.mean, seen.spread))
     np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.02)
 

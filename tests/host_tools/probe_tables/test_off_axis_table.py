@@ -17,10 +17,15 @@ FORCE_N = 0.02
 
 
 TRUTHS = [
-    ((10.0, 5.0, 80.0), 1.5, 0.05),
     ((7.0, 7.0, 100.0), 9.0, 0.05),
-    ((12.0, 6.0, 10.0), 5.0, 0.10),
-    ((12.0, 6.0, 60.0), 10.0, 0.15),
+    *(
+        pytest.param(*one, marks=pytest.mark.long)
+        for one in (
+            ((10.0, 5.0, 80.0), 1.5, 0.05),
+            ((12.0, 6.0, 10.0), 5.0, 0.10),
+            ((12.0, 6.0, 60.0), 10.0, 0.15),
+        )
+    ),
 ]
 """Inclusion, offset (mm) and the share of the peak that is held: less for soft inclusions, and at the face's rim."""
 

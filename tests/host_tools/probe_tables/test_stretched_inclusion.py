@@ -20,6 +20,7 @@ def longer(tables):
     return stretched_inclusion(scene(2.0), tables.off_axis)
 
 
+@pytest.mark.long
 def test_an_inclusion_that_is_longer_adds_to_the_mean_and_to_the_second_cosine(tables, longer):
     """As the solved ellipsoid does to the solved sphere: more volume, and longer along x."""
     own, found = (one.modes(INCLUSION, OFFSET_MM) for one in (tables.off_axis, longer))
@@ -28,6 +29,7 @@ def test_an_inclusion_that_is_longer_adds_to_the_mean_and_to_the_second_cosine(t
     assert (found - own)[0, 0].max() > 0.05 * peak_mm
 
 
+@pytest.mark.long
 def test_far_beside_it_the_probe_meets_its_own_sphere(tables, longer):
     away_mm = UNDER_THE_PROBE_MM + 0.01
     np.testing.assert_array_equal(longer.modes(INCLUSION, away_mm), tables.off_axis.modes(INCLUSION, away_mm))

@@ -23,11 +23,11 @@ from host_tools.probe_tables.surface_table import (
 )
 
 TRUTHS = [
-    (10.0, 5.0, 80.0),
-    (3.7, 6.6, 104.0),
     (14.3, 11.2, 47.0),
-    (12.0, 9.0, 20.0),
-    (6.0, 5.0, 150.0),
+    *(
+        pytest.param(truth, marks=pytest.mark.long)
+        for truth in ((10.0, 5.0, 80.0), (3.7, 6.6, 104.0), (12.0, 9.0, 20.0), (6.0, 5.0, 150.0))
+    ),
 ]
 IN_SLABS = [((9.0, 7.0, 60.0), Slab(4.4, 27.6)), ((11.0, 5.0, 20.0), Slab(5.8, 33.0))]
 """Between the points of the star and aside of its arms, the first in thinner tissue than any that was solved."""
@@ -52,6 +52,7 @@ def test_the_table_is_within_half_a_percent_of_the_inclusions_deformation_and_on
 
 
 @pytest.mark.parametrize(("truth", "slab"), IN_SLABS)
+@pytest.mark.long
 def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, truth, slab):
     """What the slab changes in the inclusion's deformation and pressure, over the inclusion's peaks, from solves on one
     mesh.
@@ -69,6 +70,7 @@ def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, tr
 
 
 @pytest.mark.parametrize(("truth", "slab"), IN_SLABS[:1])
+@pytest.mark.long
 def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(table, truth, slab):
     """Within 1 % of its peak; pressures near the rim differ by more from mesh to mesh."""
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
@@ -77,6 +79,7 @@ def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(
         assert worst_over_peak(found_mm, fresh_mm, inside) < 0.01, force_n
 
 
+@pytest.mark.long
 def test_the_inclusion_free_face_is_the_models(table):
     """At a force between the table's, on the same mesh: 0.1 % of the peak."""
     bare = table.ramps(Inclusion(0.0, 6.0, 80.0)).bare.at(0.3)
@@ -85,6 +88,7 @@ def test_the_inclusion_free_face_is_the_models(table):
         assert worst_over_peak(bare[value], fresh[value], slice(None)) < 1e-3
 
 
+@pytest.mark.long
 def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table):
     """From solves on one mesh, over the peak in the central window: 0.3 %."""
     known, solved, inside, slab = [], [], table.r_mm <= 9.9, Slab(5.8, 33.0)
@@ -96,6 +100,7 @@ def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table):
     assert (np.abs(departure)[:, inside].max(axis=1) < 0.003 * np.abs(solved[1])[:, inside].max(axis=1)).all()
 
 
+@pytest.mark.long
 def test_layers_that_stand_in_for_the_base_give_the_slabs_own_deformation():
     """1 mm less of a slab of 30 mm: the layer below it is as good as rigid, 0.1 % of the peak."""
     layered, own = (

@@ -11,7 +11,7 @@ from host_tools.optics.light_block import LightBlock
 from host_tools.verification.light.lookup import cell_means, dimple_scenes, held_out_errors, pressed_scenes
 
 MODELS = Path(__file__).parents[4] / "models" / "simulated_probe"
-RAYS = 400_000
+RAYS = 100_000
 
 
 @pytest.fixture(scope="module")
