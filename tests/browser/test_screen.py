@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shutil
 import socket
 import threading
+import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 import uvicorn
-from daemon_process import QUICK_HAND, ROOT, Daemon
+from daemon_process import QUICK_HAND, ROOT, WAIT_S, Daemon
 from playwright.sync_api import Page, expect, sync_playwright
 
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
 from device.config import simulated_config
+from device.instrument.procedure import Procedure
 from device.measurement.estimate import Estimate, Quantity
 from device.measurement.mode import MODES, Mode
 from device.measurement.recording.recording import Recording
+from device.settings.camera_section import CameraSection
+from device.simulation import virtual_probe
+from device.simulation.hand import HandSettings, VirtualHand
+from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario
 from device.web.app import create_app
 
@@ -35,6 +42,7 @@ FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ]
+WAITS_AT_N = 0.3
 SHOTS = ROOT / "build" / "screens"
 
 
@@ -46,14 +54,81 @@ def page():
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         page = browser.new_page(viewport={"width": 800, "height": 480})
-        page.set_default_timeout(60_000)
+        page.set_default_timeout(1000 * WAIT_S)
+        expect.set_options(timeout=1000 * WAIT_S)
         yield page
         browser.close()
 
 
+class WaitingHand(VirtualHand):
+    """The default hand; its time stands still from `WAITS_AT_N` of its first press on, until it is told to go on.
+
+    So what the screen says meanwhile is there for as long as it takes to be read.
+    """
+
+    def __init__(self, settings: HandSettings) -> None:
+        super().__init__(settings)
+        self._goes_on, self._waits_since_s, self._waited_s = False, math.inf, 0.0
+
+    def _own_s(self, t_s: float) -> float:
+        return t_s - self._waited_s if self._goes_on else min(t_s, self._waits_since_s)
+
+    def go_on(self) -> None:
+        self._waited_s = max(0.0, time.monotonic() - self._waits_since_s)
+        self._goes_on = True
+
+    def force_n(self, t_s: float) -> float:
+        force_n = super().force_n(self._own_s(t_s))
+        if force_n >= WAITS_AT_N and not self._goes_on:
+            self._waits_since_s = min(t_s, self._waits_since_s)
+        return force_n
+
+    def place(self, t_s: float) -> ProbePlacement:
+        return super().place(self._own_s(t_s))
+
+    def follow(self, guidance: str, now_s: float) -> None:
+        super().follow(guidance, self._own_s(now_s))
+
+
+@dataclass
+class Served:
+    """A simulated probe that is served from this process, and its hand."""
+
+    url: str
+    procedure: Procedure
+    hand: WaitingHand
+
+
 @pytest.fixture
-def probe_with_every_mode(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """The address of a simulated probe with the default hand, whose answer is the same in every mode."""
+def probe(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
+    """A simulated probe whose hand waits in the middle of its first ramp."""
+    hands: list[WaitingHand] = []
+
+    def waiting_hand(settings: HandSettings) -> WaitingHand:
+        hands.append(WaitingHand(settings))
+        return hands[-1]
+
+    monkeypatch.setattr(virtual_probe, "VirtualHand", waiting_hand)
+    config = replace(simulated_config(), data=tmp_path, camera=CameraSection(late_frames=100.0))
+    procedure = open_simulated_probe(config, Scenario())
+    procedure.start()
+    settings = uvicorn.Config(
+        create_app(procedure, procedure.store), log_level="warning", timeout_graceful_shutdown=1, lifespan="off"
+    )
+    server, listening = uvicorn.Server(settings), socket.create_server(("127.0.0.1", 0))
+    serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
+    serving.start()
+    yield Served(f"http://127.0.0.1:{listening.getsockname()[1]}", procedure, hands[0])
+    page.goto("about:blank")  # an open event stream would hold the server
+    server.should_exit = True
+    serving.join()
+    listening.close()
+    procedure.close()
+
+
+@pytest.fixture
+def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To be asked for before the probe."""
 
     def estimate(recording: Recording, mode: Mode) -> Estimate:
         size_mm, depth_mm, modulus_kpa = (
@@ -63,20 +138,6 @@ def probe_with_every_mode(page: Page, tmp_path: Path, monkeypatch: pytest.Monkey
         return Estimate(*answer, "ok", "", mode, "stand-in", "00", "c", True, {})
 
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
-    procedure = open_simulated_probe(replace(simulated_config(), data=tmp_path), Scenario())
-    procedure.start()
-    settings = uvicorn.Config(
-        create_app(procedure, procedure.store), log_level="warning", timeout_graceful_shutdown=1, lifespan="off"
-    )
-    server, listening = uvicorn.Server(settings), socket.create_server(("127.0.0.1", 0))
-    serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
-    serving.start()
-    yield f"http://127.0.0.1:{listening.getsockname()[1]}"
-    page.goto("about:blank")  # an open event stream would hold the server
-    server.should_exit = True
-    serving.join()
-    listening.close()
-    procedure.close()
 
 
 def _shoot(page: Page, name: str) -> None:
@@ -95,9 +156,8 @@ def _require_fits(page: Page) -> None:
     assert spilling == []
 
 
-def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, tmp_path: Path):
-    daemon = Daemon(tmp_path)  # with the default hand: slow enough to see each instruction
-    page.goto(daemon.url)
+def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, probe: Served):
+    page.goto(probe.url)
     expect(page.locator("#simulated-badge")).to_be_visible()
     expect(page.locator("#simulated-badge")).to_contain_text("simulated", ignore_case=True)
     button = page.locator("#press-button")
@@ -107,21 +167,22 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     expect(page.locator("#instruction")).to_have_text("Press slowly harder")
     _shoot(page, "press-slowly-harder")
     _require_fits(page)
-    expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
+    probe.hand.go_on()
+    expect(page.locator("#size-value")).to_be_visible()
     _shoot(page, "result")
     _require_fits(page)
-    newest = daemon.ask("/api/v1/measurements?limit=1").json["measurements"][0]
+    newest = probe.procedure.store.measurement(probe.procedure.board.now.measurement_id)
     size = newest["estimate"]["size_mm"]
     expect(page.locator("#size-value")).to_have_text(f"{size['value']:.1f} mm")
     expect(page.locator("#truth-size")).to_have_text("12.0 mm")
     expect(page.locator("#modulus-value")).to_have_text("not determined")
     expect(page.locator("#simulated-badge")).to_be_visible()
-    daemon.stop()
 
 
-def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe_with_every_mode: str):
+@pytest.mark.usefixtures("same_answer_in_every_mode")
+def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Served):
     """Every mode with what it costs; a slow ramp is led by its open forces, and the result says how it was taken."""
-    page.goto(probe_with_every_mode)
+    page.goto(probe.url)
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
     modes = page.locator("#modes label")
     expect(modes).to_have_count(4)
@@ -141,8 +202,9 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe_with_
     assert 0 < wanted.count() < 10
     _shoot(page, "ramp")
     _require_fits(page)
-    expect(wanted).to_have_count(0, timeout=60_000)
-    expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
+    probe.hand.go_on()
+    expect(wanted).to_have_count(0)
+    expect(page.locator("#size-value")).to_be_visible()
     expect(page.locator("#image-title")).to_have_text("Measurement 1, standard")
     expect(page.locator("#modes input:checked")).to_have_value("standard")
     expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
@@ -159,10 +221,10 @@ def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: P
     page.goto(daemon.url)
     page.locator("#press-button").click()
     warning = page.locator('.fault[data-severity="warning"]')
-    expect(warning.locator(".fault-code")).to_have_text("E701", timeout=60_000)
+    expect(warning.locator(".fault-code")).to_have_text("E701")
     expect(warning.locator(".fault-title")).to_have_text("Clock was set")
     expect(warning.locator(".fault-code")).to_have_css("background-color", "rgb(255, 190, 61)")
-    expect(page.locator("#size-value")).to_be_visible(timeout=60_000)
+    expect(page.locator("#size-value")).to_be_visible()
     expect(page.locator("#size-value")).to_have_text(re.compile(r"\d+\.\d mm"))
     _shoot(page, "warning")
     _require_fits(page)
@@ -178,7 +240,7 @@ def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_pa
     expect(page.locator("#connection-lost")).to_be_visible()
     _shoot(page, "connection-lost")
     again = Daemon(tmp_path, QUICK_HAND, port=int(daemon.url.rpartition(":")[2]))
-    expect(page.locator("#connection-lost")).to_be_hidden(timeout=30_000)
+    expect(page.locator("#connection-lost")).to_be_hidden()
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
     again.stop()
 
@@ -188,7 +250,7 @@ def test_a_fault_takes_the_view_with_its_code_and_title(page: Page, tmp_path: Pa
     page.goto(daemon.url)
     page.locator("#press-button").click()
     fault = page.locator('.fault[data-severity="fault"]')
-    expect(fault.locator(".fault-code")).to_have_text("E202", timeout=60_000)
+    expect(fault.locator(".fault-code")).to_have_text("E202")
     expect(fault.locator(".fault-title")).to_have_text("I2C bus stuck")
     _shoot(page, "fault")
     _require_fits(page)
@@ -210,7 +272,7 @@ def test_the_operator_tares_between_presses_and_reads_what_came_of_it(page: Page
 
 def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page, tmp_path: Path):
     """Two swapped plugs: the page says what to do, then names both, before all that is well."""
-    scene = '[[faults]]\nkind = "led_swapped"\nside = "+x"\nother_side = "-x"\n[hand]\nreaction_s = 1.0\n'
+    scene = '[[faults]]\nkind = "led_swapped"\nside = "+x"\nother_side = "-x"\n[hand]\nreaction_s = 5.0\n'
     daemon = Daemon(tmp_path, scene)
     page.goto(daemon.url)
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
