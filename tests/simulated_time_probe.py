@@ -15,9 +15,9 @@ from simulated_time import SimulatedTime
 
 from device.assembly import camera as camera_assembly
 from device.assembly import probe
+from device.config import CameraSection
 from device.hardware import load_cell
 from device.hardware.camera import RawMonoCamera
-from device.settings.camera_section import CameraSection
 from device.simulation.chips.emulated_amplifier import MAX_UNREAD_BYTES, EmulatedAmplifier
 
 

@@ -21,12 +21,11 @@ from playwright.sync_api import Page, expect, sync_playwright
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
-from device.config import simulated_config
+from device.config import CameraSection, simulated_config
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import Estimate, Quantity
 from device.measurement.mode import MODES, Mode
 from device.measurement.recording.recording import Recording
-from device.settings.camera_section import CameraSection
 from device.simulation import virtual_probe
 from device.simulation.hand import HandSettings, VirtualHand
 from device.simulation.physics.pressed_face import ProbePlacement

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from device.config import Config
+from device.config import CameraSection, Config
 from device.instrument.press.record import measurement_record, recording_of
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.recording.tactile_image import Frame
-from device.settings.camera_section import CameraSection
 
 LIT = (0.6, 0.6, 0.6, 0.6)
 
