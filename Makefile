@@ -85,9 +85,8 @@ modes: .venv/all.stamp ## measure what the modes of a press are worth; write doc
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
 	$(HOST_TOOLS) evaluate
 
-pages: sweep ## measure again and write docs/accuracy.md, features.md and paper_protocol.md
+pages: sweep ## measure again and write docs/accuracy.md and paper_protocol.md
 	$(HOST_TOOLS) limits --map --out docs/accuracy.md
-	$(HOST_TOOLS) features --out docs/features.md
 	$(HOST_TOOLS) paper --out docs/paper_protocol.md
 
 lock: .venv/all.stamp ## choose and pin newest versions again

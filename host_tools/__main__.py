@@ -10,7 +10,6 @@ from device.measurement.model_card import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.calibrate import calibrate
 from host_tools.commands.evaluate import evaluate
-from host_tools.commands.features import features
 from host_tools.commands.limits import limits
 from host_tools.commands.model import phantom, table
 from host_tools.commands.modes import modes
@@ -37,7 +36,6 @@ app.command(epilog="Example: host_tools table --out models/simulated_probe")(tab
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
-app.command(epilog="Example: host_tools features --out docs/features.md")(features)
 app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)
 app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
 app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)

@@ -46,9 +46,7 @@ class PressProfile:
 
     contrast [K, J]: ring means of the tactile image. growth [K - 1, J]: ln of the inclusion-free light at each force
     over that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the
-    forces, without the ring in the middle. elongation [J - 1]: the same of the second harmonic, along its own
-    direction. offset_at_force, elongation_at_force [K, J - 1]: both at each force, along the direction of their mean,
-    so that noise makes neither longer. second_harmonic [2, K, J - 2]: the second harmonic at each force, along and
+    forces, without the ring in the middle. second_harmonic [2, K, J - 2]: the second harmonic at each force, along and
     across the direction of the bright side, also without the outermost ring. residual: root mean square, over rings and
     frames, of what the polynomial in the force leaves.
     """
@@ -57,9 +55,6 @@ class PressProfile:
     contrast: Array
     growth: Array
     offset: Array
-    elongation: Array
-    offset_at_force: Array
-    elongation_at_force: Array
     second_harmonic: Array
     residual: float
 
@@ -127,9 +122,6 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> PressProfile:
         contrast=rings.mean,
         growth=np.log(bare[:-1] / bare[-1]),
         offset=harmonic(rings, 1),
-        elongation=harmonic(rings, 2),
-        offset_at_force=harmonic_at_forces(rings, 1),
-        elongation_at_force=harmonic_at_forces(rings, 2),
         second_harmonic=second_harmonic(rings),
         residual=residual,
     )
@@ -149,15 +141,6 @@ def harmonic(rings: RingMeans, order: int) -> Array:
     """
     cosine, sine = (part.mean(axis=0) for part in _waves(rings, order))
     return _along(cosine, sine, _direction(cosine, sine))
-
-
-def harmonic_at_forces(rings: RingMeans, order: int) -> Array:
-    """Return the harmonic of an order [K, J - 1] at each force, along the direction of `harmonic`.
-
-    Its mean over the forces is that; a spot that moves to the other side has a negative one there.
-    """
-    cosine, sine = _waves(rings, order)
-    return _along(cosine, sine, _direction(cosine.mean(axis=0), sine.mean(axis=0)))
 
 
 def second_harmonic(rings: RingMeans) -> Array:

@@ -22,8 +22,6 @@ RING_MM = 0.9
 RINGS = 11
 """Rings at 0, 0.9 ... 9.0 mm: the last ends where the central window does, at 0.9 of the face's radius."""
 RING_RADII_MM: Array = RING_MM * np.arange(RINGS, dtype=np.float64)
-RING_AREAS_MM2: Array = np.pi * RING_MM * np.append(RING_MM / 3, 2 * RING_RADII_MM[1:])
-"""Integral of each ring's weight: times the means, they add up to the image's integral."""
 MIDDLE = np.repeat([1 / 4, 0.0], [4, RINGS - 4])
 """Weights of the mean over the innermost rings."""
 MIDDLE_LESS_RIM = MIDDLE - np.repeat([0.0, 1 / 3], [RINGS - 3, 3])

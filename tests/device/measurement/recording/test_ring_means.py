@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from device.measurement.recording.pixel_scale import PixelScale
-from device.measurement.recording.ring_means import RING_AREAS_MM2, RING_MM, RING_RADII_MM, ring_weights
+from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, ring_weights
 
 SCALE = PixelScale(0.05, 0.0625)
 SHAPE = (336, 416)
@@ -55,8 +55,9 @@ def test_pixels_of_another_size_and_shape_give_the_same_means():
 
 
 def test_means_times_areas_add_up_to_the_integral():
-    """A Gaussian of standard deviation s and height 1 has the integral 2 pi s^2."""
-    found = means(np.exp(-(R**2) / (2 * 2.0**2))).mean @ RING_AREAS_MM2
+    """A Gaussian of standard deviation s and height 1 has the integral 2 pi s^2; a ring's area is its weight's."""
+    areas_mm2 = np.pi * RING_MM * np.append(RING_MM / 3, 2 * RING_RADII_MM[1:])
+    found = means(np.exp(-(R**2) / (2 * 2.0**2))).mean @ areas_mm2
     assert found == pytest.approx(8 * np.pi, rel=1e-3)
 
 
