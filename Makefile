@@ -6,7 +6,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -45,12 +45,13 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
 
-check: .venv/all.stamp ## lint, format, types, import arrows, dead links
+check: .venv/all.stamp ## lint, format, types, import arrows, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 	$(PY) tests/dead_links.py
+	$(HOST_TOOLS) pages --check
 
 bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; time the darkness after a kill
 	$(PY) tests/bench.py
@@ -85,7 +86,10 @@ modes: .venv/all.stamp ## measure what the modes of a press are worth; write doc
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
 	$(HOST_TOOLS) evaluate
 
-pages: sweep ## measure again and write docs/accuracy.md and paper_protocol.md
+pages: .venv/all.stamp ## write the pages of docs/results from docs/templates, without measuring
+	$(HOST_TOOLS) pages
+
+measure: sweep ## measure again what docs/accuracy.md and paper_protocol.md say, and write them
 	$(HOST_TOOLS) limits --map --out docs/accuracy.md
 	$(HOST_TOOLS) paper --out docs/paper_protocol.md
 

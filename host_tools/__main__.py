@@ -15,6 +15,7 @@ from host_tools.commands.model import phantom, table
 from host_tools.commands.modes import modes
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note
+from host_tools.commands.pages import pages
 from host_tools.commands.paper import paper
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
@@ -38,6 +39,7 @@ app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/c
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)
 app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
+app.command(epilog="Example: host_tools pages --check")(pages)
 app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)
 app.add_typer(optics, name="optics")
 

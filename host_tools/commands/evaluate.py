@@ -27,7 +27,7 @@ from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
 from device.measurement.recording.recording import Recording
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_tables
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table
 from host_tools.commands.model import MODELS, phantoms_of
 from host_tools.commands.output import note
 
@@ -59,7 +59,8 @@ def print_reference(
     for timed in measure_chapters(chapters).values():
         missed += print_chapter(timed)
         out.print(timed.chapter.claim, markup=False)
-        print_tables(timed.chapter)
+        for shown in timed.chapter.tables:
+            print_table(shown)
     if missed:
         raise typer.Exit(1)
 

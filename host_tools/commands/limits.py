@@ -28,7 +28,9 @@ def limits(
     modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the inclusion.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print bounds and correlations as JSON.")] = False,
     whole_map: Annotated[bool, typer.Option("--map", help="Map the box instead of one scene (minutes).")] = False,
-    out: Annotated[Path | None, typer.Option(help="With --map: Markdown file; its figure goes beside it.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="With --map: Markdown file; results and figure go beside it.")
+    ] = None,
 ) -> None:
     """Print the Cramer-Rao bound: the least error of size, depth and modulus that any method can have."""
     given = (size_mm, depth_mm, modulus_kpa)
@@ -117,12 +119,12 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     if out is None or any(value is not None for value in given):
         raise InvalidQuantity("map", "asked for", "asked for with --out and no scene", "add --out docs/accuracy.md")
     require_writable(out, (".md",))
-    from device.files.durable import write_durably
     from device.measurement.ramp_modes.model import ProfileModel
     from host_tools.cramer_rao.accuracy_figure import draw_map
     from host_tools.cramer_rao.accuracy_map import inclusions, mapped_scene
-    from host_tools.cramer_rao.accuracy_page import FIGURE, limits_markdown
+    from host_tools.cramer_rao.accuracy_page import FIGURE, accuracy_facts
     from host_tools.cramer_rao.press_bound import beside_over_axis
+    from host_tools.study.page import FIGURES, Results, write_page
 
     beside = beside_over_axis(ProfileModel.load(ROOT / "models" / "standard").answers)
     chosen, mapped = inclusions(), []
@@ -131,8 +133,9 @@ def _write_map(out: Path | None, given: list[object]) -> None:
         for inclusion in chosen:
             mapped.append(mapped_scene(inclusion))
             bar.advance(task)
-    figures = out.parent / "figures"
+    figures = out.parent / FIGURES
     figures.mkdir(exist_ok=True)
     draw_map(mapped, figures / FIGURE)
-    write_durably(out, limits_markdown(mapped, beside, f"host_tools limits --map --out {shown(out)}").encode())
+    command = f"host_tools limits --map --out {shown(out)}"
+    write_page(out, Results("accuracy", command, facts=accuracy_facts(mapped, beside)))
     note.print(f"{out} written.")

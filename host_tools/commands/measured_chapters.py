@@ -14,15 +14,15 @@ from rich.table import Table
 from host_tools.commands.output import progress
 
 if TYPE_CHECKING:
-    from host_tools.pages.benchmark import Chapter
-    from host_tools.pages.document import Timed
+    from host_tools.pages import benchmark
+    from host_tools.study.page import Timed
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def measure_chapters(chapters: Mapping[str, Callable[[], Chapter]]) -> dict[str, Timed]:
+def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) -> dict[str, Timed]:
     """Measure every chapter, one after the other, each with the wall time it took."""
-    from host_tools.pages.document import Timed
+    from host_tools.study.page import Timed
 
     measured = {}
     with progress("chapters") as bar:
@@ -37,7 +37,7 @@ def measure_chapters(chapters: Mapping[str, Callable[[], Chapter]]) -> dict[str,
 
 def print_chapter(timed: Timed) -> int:
     """Print one chapter; return how many of its benchmarks miss their bound."""
-    from host_tools.pages.document import BENCHMARK_HEADER, benchmark_row
+    from host_tools.study.page import BENCHMARK_HEADER, benchmark_row
 
     chapter, out = timed.chapter, Console(width=140, highlight=False)
     if chapter.skipped:
@@ -50,14 +50,12 @@ def print_chapter(timed: Timed) -> int:
     return sum(not benchmark.passed for benchmark in chapter.benchmarks)
 
 
-def print_tables(chapter: Chapter) -> None:
-    """Print the numbers of a chapter that `print_chapter` does not judge."""
-    console = Console(width=160, highlight=False)
-    for table in chapter.tables:
-        printed = Table(*map(escape, table.header), title=escape(table.caption), title_justify="left")
-        for row in table.rows:
-            printed.add_row(*map(escape, row))
-        console.print(printed)
+def print_table(table: benchmark.Table) -> None:
+    """Print numbers that are not judged."""
+    printed = Table(*map(escape, table.header), title=escape(table.caption), title_justify="left")
+    for row in table.rows:
+        printed.add_row(*map(escape, row))
+    Console(width=160, highlight=False).print(printed)
 
 
 def shown(path: Path) -> str:

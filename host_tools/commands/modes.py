@@ -22,7 +22,9 @@ MODELS = ROOT / "models"
 
 
 def modes(
-    out: Annotated[Path | None, typer.Option(help="Markdown file to write; printed only when not given.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Markdown file to write, results beside it; printed only when not given.")
+    ] = None,
     model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
     only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
@@ -31,7 +33,6 @@ def modes(
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
-    from host_tools.pages.document import write_document
     from host_tools.press_models.seeds import derived_seed
     from host_tools.scores.breast_imager import breast_imager_chapter
     from host_tools.scores.coverage import coverage_chapter
@@ -40,9 +41,9 @@ def modes(
     from host_tools.scores.just_outside import just_outside_chapter
     from host_tools.scores.noise_free import noise_free_chapter
     from host_tools.scores.outside import kinds, outside_chapter
-    from host_tools.scores.page import MODES_PAGE
     from host_tools.scores.posterior import posterior_chapter
     from host_tools.scores.span import span_chapter
+    from host_tools.study.page import Results, write_page
 
     if out:
         require_writable(out, (".md",))
@@ -68,7 +69,7 @@ def modes(
     missed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         chosen = "".join(f" --only {name}" for name in only or [])
-        write_document(out, measured, command=f"host_tools modes --out {shown(out)}{chosen}", cover=MODES_PAGE)
+        write_page(out, Results("modes", f"host_tools modes --out {shown(out)}{chosen}", measured))
         note.print(f"{out} written.")
     if missed:
         raise typer.Exit(1)

@@ -34,7 +34,7 @@ def build(
 
 @optics.command(epilog="Example: host_tools optics verify --mitsuba --out docs/optics.md")
 def verify(
-    out: Annotated[Path | None, typer.Option(help="Markdown file to write; figures go beside it.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Markdown file to write; results and figures go beside it.")] = None,
     rays: Annotated[int, typer.Option(help="Rays a scene; bounds are meant for 2 million.")] = DEFAULT_RAYS,
     mitsuba: Annotated[bool, typer.Option(help="Compare with Mitsuba 3, where it is installed.")] = False,
     mitsuba_python: Annotated[
@@ -42,19 +42,20 @@ def verify(
     ] = None,
 ) -> None:
     """Check the light against answers on paper and against Mitsuba 3; exit code 1 when one misses its bound."""
-    from host_tools.verification.light.chapters import cover, optics_chapters
+    from host_tools.verification.light.chapters import optics_chapters
 
     require_writable(out, (".md",))
     require("rays", rays, Bound(10_000, 1e10, ""), "trace enough rays to see anything")
     measured = measure_chapters(optics_chapters(rays, mitsuba=mitsuba, mitsuba_python=mitsuba_python))
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        from host_tools.pages.document import write_document
+        from host_tools.study.page import Results, write_page
+        from host_tools.verification.light.verdict import facts
 
         flags = [f"--rays {rays}"] if rays != DEFAULT_RAYS else []
         flags += ["--mitsuba"] if mitsuba else []
         command = " ".join(["host_tools optics verify", *flags, f"--out {shown(out)}"])
-        write_document(out, measured, command=command, cover=cover(rays))
+        write_page(out, Results("optics", command, measured, facts=facts(rays)))
         note.print(f"{out} written.")
     if failed:
         note.print(f"{failed} benchmarks miss their bound.")

@@ -21,7 +21,7 @@ TABLES = ROOT / "host_tools" / "forward" / "accuracy_table.json"
 
 def verify(
     only: Annotated[list[str] | None, typer.Option(help="A chapter, such as hayes; repeat it for several.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Markdown file to write; figures go beside it.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Markdown file to write; results and figures go beside it.")] = None,
     quick: Annotated[bool, typer.Option(help="Fewer cases, and nothing that takes minutes.")] = False,
     extremes: Annotated[bool, typer.Option(help="Add scenes at the ends of every range.")] = False,
     effectivity: Annotated[bool, typer.Option(help="Add how often stated errors hold the true ones.")] = False,
@@ -36,11 +36,13 @@ def verify(
     measured = measure_chapters(chapters)
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        from host_tools.pages.document import write_document
+        from host_tools.study.page import Results, write_page
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
         flags += ["--quick"] if quick else []
-        write_document(out, measured, command=" ".join(["host_tools verify", *flags, f"--out {shown(out)}"]))
+        write_page(
+            out, Results("verification", " ".join(["host_tools verify", *flags, f"--out {shown(out)}"]), measured)
+        )
         note.print(f"{out} written.")
     if failed:
         note.print(f"{failed} benchmarks miss their bound.")

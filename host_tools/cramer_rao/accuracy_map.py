@@ -1,7 +1,7 @@
 """Where size, depth and modulus of an inclusion can be known: Cramer-Rao bounds over the box, and over ways to measure.
 
-Each scene is solved once; every way to measure then looks at the same faces. `limits_markdown` writes the part of
-docs/accuracy.md that says what no method can beat.
+Each scene is solved once; every way to measure then looks at the same faces. `accuracy_page` makes of it the numbers
+of docs/accuracy.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
@@ -70,9 +70,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Chapter:
-    """One benchmark problem: what is claimed, where the known answer is from, and what was measured.
+    """One benchmark problem: a sentence on what is claimed, where the known answer is from, and what was measured.
 
-    `skipped` says why nothing was measured; then there are no benchmarks.
+    `facts` are numbers that the page's prose quotes. `skipped` says why nothing was measured; then there are no
+    benchmarks.
     """
 
     title: str
@@ -82,6 +83,7 @@ class Chapter:
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = field(default=(), compare=False)
     skipped: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:

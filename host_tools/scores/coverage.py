@@ -36,17 +36,11 @@ def coverage_chapter(cards: Mapping[Mode, Mapping[str, Any]]) -> Chapter:
     numbers = ", ".join(f"{card['modes'][mode]['simulated']['presses']} in {mode}" for mode, card in cards.items())
     return Chapter(
         title="Intervals hold what they promise",
-        claim=(
-            f"Random presses with camera noise and every nuisance ({numbers}), and recordings of the simulated camera. "
-            "Counted are presses that determine the unknown; the others get the whole range as their interval, and "
-            f"`not identifiable`. An unknown that fewer than {RAREST_RATIO:.0%} determine is never called determined. "
-            f"Octiles with fewer than {FEWEST_IN_OCTILE} determined presses are shown, not judged. "
-            "Recordings are fewer: their coverage may fall short by twice its standard error. Presses in which the "
-            "device would see no inclusion are counted, too."
-        ),
+        claim=f"Random presses with camera noise and every nuisance ({numbers}), and simulated recordings.",
         source="models/quick/model.json, models/standard/model.json; host_tools/press_models/mode_outcome.py",
         benchmarks=tuple(benchmarks),
         tables=(Table("By octiles of the truth, lowest first: mean error (coverage)", HEADER, tuple(rows)),),
+        facts={"rarest_ratio": RAREST_RATIO, "fewest_in_octile": FEWEST_IN_OCTILE},
     )
 
 

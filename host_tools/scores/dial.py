@@ -61,11 +61,7 @@ def dial_chapter(
     header = ("mode", "frames a press", "compute (ms)", "answered", *_columns("error"), *_columns("determined"))
     return Chapter(
         title="Speed and accuracy",
-        claim=(
-            f"{PRESSES} random presses over the trained ranges (10-160 kPa), the same ones in every mode: median error "
-            "of what is answered, and how often the unknown is called determined. The last row guesses the median "
-            "of the truths."
-        ),
+        claim=f"{PRESSES} random presses over the trained ranges (10-160 kPa), the same ones in every mode.",
         source="host_tools/scores/dial.py; seconds of a press: `GET /api/v1/device`",
         benchmarks=(at_most("ensemble of one press", "median time of one call (ms)", *_network_ms(network)),),
         tables=(

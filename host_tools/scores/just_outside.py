@@ -120,18 +120,7 @@ def spoken(inclusion: Inclusion) -> Sequence[str]:
 
 
 PRESSES = 10
-CLAIM = (
-    f"{PRESSES} recordings of each inclusion, nominal tissue and skin, with every drift. A press is as far from its nearest "
-    "twin inside the ranges, whatever tissue and skin that one has, as it says: standard deviations of all that noise "
-    f"and drift leave unknown. Three doubts - misfit, elongation and this one - share the {FALSE_AT_MOST:.0%} of false "
-    f"flags that a mode may have, so each may flag {FALSE_FLAGS:.2%} of the presses inside. The best test that flags "
-    "as many of the twin's presses flags at most the share beside it: no refusal is asked for where that is below "
-    f"{REFUSED_AT_LEAST:.0%}. Beside that stands what it could flag if all {FALSE_AT_MOST:.0%} were its own. (Where "
-    "more is refused, the twin lies at the very end of a range and is refused more often than others, too.) What is "
-    "answered there is the twin's answer; an interval that ends with the range is open and holds all beyond. Size and "
-    "depth are told by networks that have seen inclusions around the ranges; a modulus outside is not looked for, since "
-    "hardly any could be told."
-)
+CLAIM = f"{PRESSES} recordings of each inclusion, nominal tissue and skin, with every drift."
 HEADER = ("mode", "size (mm)", "depth (mm)", "modulus (kPa)", "looks like: size", "depth", "modulus",
           "deviations apart", "most that any test can flag", "if all false flags were its own", "refused",
           "of the others: size holds", "depth holds", "modulus holds")  # fmt: skip
@@ -161,6 +150,11 @@ def just_outside_chapter(
         source="Neyman & Pearson, Phil. Trans. R. Soc. A 231 (1933); host_tools/scores/just_outside.py",
         benchmarks=tuple(benchmarks),
         tables=(Table("Each inclusion", HEADER, tuple(rows)),),
+        facts={
+            "false_at_most": FALSE_AT_MOST,
+            "false_flags": FALSE_FLAGS,
+            "refused_at_least": REFUSED_AT_LEAST,
+        },
     )
 
 

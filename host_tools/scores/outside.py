@@ -153,11 +153,7 @@ def outside_chapter(answer: EstimateOf, kinds: Sequence[Kind], *, jobs: int = -1
         title="What is not one round inclusion gets no numbers",
         claim=(
             "Each press is refused for its misfit, its elongation, the odds of a size or depth outside its range, or "
-            "because nothing stands out. Ordinary presses are those of the trained ranges; those in which "
-            "nothing stands out are not counted among them. Mode quick sees one force: it cannot "
-            "tell gel, whose light does not grow with the force, from an inclusion. On the probe such a press ends "
-            "with fault E501 in every mode, because the way to the hold is seen there; a recording alone does not "
-            "hold it."
+            "because nothing stands out."
         ),
         source="device/measurement/ramp_modes/estimate.py, held_estimate.py; host_tools/scores/outside.py",
         benchmarks=tuple(benchmarks),

@@ -80,7 +80,7 @@ def posterior_chapter(
         title="As good as the reference posterior",
         claim=(
             f"{scenes} presses drawn from the forward model with camera noise and every nuisance; emcee, {WALKERS} "
-            f"walkers of {STEPS} steps after {BURN_IN}. In coordinates that run from -1 to 1 over the trained range."
+            f"walkers of {STEPS} steps after {BURN_IN}."
         ),
         source="Foreman-Mackey et al., PASP 125 (2013); host_tools/scores/posterior.py",
         benchmarks=tuple(benchmarks),

@@ -40,10 +40,7 @@ def span_chapter(answers: ProfileAnswers, tables: ProbeTables) -> Chapter:
         ]
     return Chapter(
         title=f"A cell whose span is off by {SPAN_ERROR_RATIO:.1%}",
-        claim=(
-            f"{PRESSES} random presses without noise, at forces {SPAN_ERROR_RATIO:.1%} larger than the cell says. No "
-            "mode knows of such an error; its noise holds 1 mN of the zero."
-        ),
+        claim=f"{PRESSES} random presses without noise, at forces {SPAN_ERROR_RATIO:.1%} larger than the cell says.",
         source="host_tools/scores/span.py",
         benchmarks=tuple(benchmarks),
     )

@@ -100,8 +100,7 @@ def chapter(quick: bool) -> Chapter:
     return Chapter(
         "Rigid paraboloid on a half-space (Hertz)",
         "P = 4/3 E* sqrt(R) delta^1.5, a = sqrt(R delta), p0 = 2 E* a / (pi R), by the unilateral contact of the domed "
-        "face (penalty, Newton). Radius and peak are those of Hertz's ellipse fitted to the recovered pressure. The "
-        "slab's finite size L adds a share of a/L, as the table shows; the benchmark is its limit.",
+        "face (penalty, Newton).",
         "Hertz (1882); Johnson, Contact Mechanics (1985), sections 3.4 and 4.2.",
         benchmarks(found),
         (Table("Departure from Hertz by the size of the slab", header, tuple(rows)),),

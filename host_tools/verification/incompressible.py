@@ -112,8 +112,7 @@ def chapter(quick: bool) -> Chapter:
     found = measurements((Formulation(1, False), Formulation(3, True)) if quick else FORMULATIONS)
     return Chapter(
         "Incompressible limit",
-        "Every material's Poisson ratio goes to one half. With the pressure as an unknown (discontinuous, one order "
-        "lower) the solution settles; displacements alone lock, the sooner the lower their order.",
+        "Every material's Poisson ratio goes to one half.",
         "Hughes, The Finite Element Method (1987), sections 4.3-4.4.",
         benchmarks(found),
         (_table(found),),

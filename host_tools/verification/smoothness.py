@@ -125,9 +125,8 @@ def chapter(quick: bool) -> Chapter:
     steps = [(where, *(f"{v:+.1e}" for v in j)) for where, j in jumps.items()]
     return Chapter(
         "Smoothness in size and depth",
-        f"Scans of {len(found['size_mm', 'morphed'])} points about an inclusion of 10 mm, 6 mm deep; noise is the largest "
-        f"departure from a polynomial of degree {DEGREE}. Inside the box one mesh is morphed; outside, every scene is "
-        "meshed anew, and features jump at the border.",
+        f"Scans of {len(found['size_mm', 'morphed'])} points about an inclusion of 10 mm, 6 mm deep; noise is the "
+        f"largest departure from a polynomial of degree {DEGREE}.",
         "No reference: this is the forward model against itself.",
         (*noise_benchmarks(found), folding, *hand_over),
         (

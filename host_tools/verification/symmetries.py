@@ -68,8 +68,8 @@ def chapter(quick: bool) -> Chapter:
     rows = [(name, str(timed.solution.elements), f"{timed.seconds:.2f}") for name, timed in found.items()]
     return Chapter(
         "Quarter = half = full = axisymmetric",
-        "The default inclusion pressed by 1 mm, on 3-D meshes of the coarse level at order 3 (curved elements, one layer "
-        "of prisms at both rims), against the axisymmetric solution of the data sets.",
+        "The default inclusion pressed by 1 mm, on 3-D meshes of the coarse level at order 3 (curved elements, one "
+        "layer of prisms at both rims), against the axisymmetric solution of the data sets.",
         "The same continuum; Hughes, The Finite Element Method (1987), section 2.12.",
         benchmarks(found),
         (Table("What each costs (wall time, both presses)", ("body", "elements", "seconds"), tuple(rows)),),

@@ -108,10 +108,7 @@ def chapter(_rays: int) -> Chapter:
     """Return the chapter; it traces no rays."""
     return Chapter(
         "Which light is trapped",
-        "Light beyond the critical angle is reflected whole. From the side walls it comes no steeper than the column "
-        "'lowest incidence', so a dry flat face holds all of it but a sliver below an index of 1.414, and a wet one "
-        "only what is nearly parallel to it. Bonding the glass changes nothing: n sin(angle) is the same in every "
-        "parallel layer.",
+        "Light beyond the critical angle is reflected whole.",
         "Hecht, Optics, 5th edition, sections 4.4-4.7.",
         benchmarks(),
         (_table(),),

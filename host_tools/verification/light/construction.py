@@ -90,9 +90,7 @@ def chapter(rays: int) -> Chapter:
     header = ("block", "centre, touched", "face, touched", "face, untouched", "contrast", "straight into the aperture")
     return Chapter(
         "What the construction must keep",
-        "The dark face is what the image is seen against. LEDs must stand behind a flat window, outside the block: "
-        "cast into it they light the skin at every angle. Walls must be black, and the block clear: haze scatters "
-        "light out of its trap. The index changes the brightness, which the correction divides out.",
+        "The dark face is what the image is seen against.",
         "No reference: this model compared with itself.",
         benchmarks(found),
         (Table("Radiance of the centre and mean of the face, 1/(sr mm2) per unit of LED light", header, tuple(rows)),),

@@ -106,14 +106,10 @@ def chapter(rays: int) -> Chapter:
     )
     return Chapter(
         "Contact makes the image, pressure its contrast",
-        "Skin in contact shines. But given complete contact, a dimple is darker than the flat face, not brighter. "
-        "What tells an inclusion is that its pressure brings more skin into contact; a deep dimple can take back all that "
-        f"its pressure adds. Here an inclusion adds a drastic {INCLUSION_KPA:g} kPa to the {PRESS_KPA:g} kPa of a press with "
-        "0.5 N (the next chapter has a real one); the contact ratio is 1 - exp(-p / 2 kPa), which is assumed. The "
-        "light follows the pressure less than in proportion, since a face that is all wet cannot get wetter, and "
-        "since light comes back better through a dry place than through a wet one.",
+        "Skin in contact shines, and pressure brings more of it into contact.",
         "Han, UIST 2005, for the mechanism; the rest is this model compared with itself.",
         benchmarks(rays),
         (_by_scene(rays), _by_pressure(rays)),
         (maps, profiles),
+        facts={"inclusion_kpa": INCLUSION_KPA, "press_kpa": PRESS_KPA},
     )

@@ -26,12 +26,7 @@ from host_tools.verification.peer.mitsuba import MitsubaFailed, mitsuba_python, 
 from host_tools.verification.peer.mitsuba_scene import MitsubaCamera
 
 TITLE = "Another program: Mitsuba 3"
-CLAIM = (
-    "Lambertian LEDs of 2 mm radius cast into the block, with ratios 1 : 1 : 1 : 0.5; a dimple of 0.8 mm at (2, 1) mm "
-    "whose contact ratio rises from 0.2 to 0.9; skin of the block's index without spread, nothing behind dry places. "
-    "Mitsuba follows light from the camera to the LEDs, the tracer from the LEDs to the camera. The LEDs are larger "
-    "than ours, since only chance lets Mitsuba find them by way of a mirror."
-)
+CLAIM = "Mitsuba follows light from the camera to the LEDs, the tracer from the LEDs to the camera."
 SOURCE = "Mitsuba 3, variant scalar_rgb, integrator `path`: another code, another direction, another mesh of the face."
 BLOCK = LightBlock(led_coupling="embedded", led_radius_mm=2.0, glass_refractive_index=1.41, glass_thickness_mm=0.0)
 SKIN = Skin(refractive_index=BLOCK.refractive_index, spread_mm=0.0)

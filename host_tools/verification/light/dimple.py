@@ -93,12 +93,10 @@ def chapter(rays: int) -> Chapter:
     figure = Figure("optics_dimple.svg", caption, lambda canvas: draw_maps(canvas, names), size_in=(8.5, 3.2))
     return Chapter(
         "A dimple alone makes no image of itself",
-        "Dimples turn light out of the block, but at grazing angles that the lens never sees: it catches no ray up to "
-        f"a slope of {slope_deg(DEPTHS_MM[-1]):.0f} degrees, and some at {slope_deg(STEEP_MM, STEEP_WIDTH_MM):.0f}. "
-        "With skin near by, light leaves through slopes that face an LED, crosses the air and lights the skin: up to "
-        "four spots beside the centre, not in it.",
+        "Dimples turn light out of the block, but at grazing angles that the lens never sees.",
         "Geometry of reflection; the rest is this model compared with itself.",
         benchmarks(rays),
         (Table("Nothing behind the dimple, then skin across the air gap", header, tuple(_rows(rays))),),
         (figure,),
+        facts={"slope_deg": slope_deg(DEPTHS_MM[-1]), "steep_deg": slope_deg(STEEP_MM, STEEP_WIDTH_MM)},
     )

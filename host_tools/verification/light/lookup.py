@@ -146,10 +146,7 @@ def _compare(lookup: LookupOptics, block: LightBlock, scene: HeldOutScene, rays:
 
 TABLES = Path(__file__).resolve().parents[3] / "models" / "simulated_probe"
 TITLE = "The virtual probe's fast model"
-CLAIM = (
-    "The simulated probe looks its light up in a table instead of tracing it. Random dimples, and faces of a pressed "
-    "probe with and without an inclusion, at 0.5 mm cells."
-)
+CLAIM = "The simulated probe looks its light up in a table instead of tracing it."
 SOURCE = "The ray tracer; no scene was used to make the table."
 MEAN_BOUND, WORST_BOUND, SUM_BOUND = 0.03, 0.05, 0.05
 

@@ -117,8 +117,7 @@ def chapter(rays: int) -> Chapter:
     return Chapter(
         "The LEDs' light, on paper",
         "With black walls and an almost black skin of the block's own index only two ways lead from LED to skin: "
-        "straight, and once reflected by the bottom. Both are integrals over the LED's disc. They fix the tracer's "
-        "units, refraction, cosines and squared indices.",
+        "straight, and once reflected by the bottom.",
         "Lambert's cosine law; conservation of radiance over squared index, Nicodemus, Appl. Opt. 2:767 (1963).",
         benchmarks(rays),
     )

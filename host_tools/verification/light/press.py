@@ -125,9 +125,7 @@ def chapter(rays: int) -> Chapter:
     caption = "Simulated images of an inclusion, each over its own reference without the inclusion"
     return Chapter(
         "An inclusion under the probe's own press",
-        "Inclusion of 10 mm, 6 mm deep, 80 kPa, pressed with 0.5 N: deformation and pressure of the forward model, image "
-        "by the tracer, divided by that of the same press without the inclusion. The inclusion's pressure makes the image; its "
-        "deformation alone makes next to none, and gel or sweat all over the skin takes the image away.",
+        "The inclusion's pressure makes the image; its deformation alone makes next to none.",
         "No reference: this model compared with itself.",
         benchmarks(rays),
         (Table("The press, from the forward model", header, tuple(_row(found, k) for k in places)),),

@@ -56,8 +56,7 @@ def chapter(rays: int) -> Chapter:
     return Chapter(
         "Untouched: the light is trapped",
         "A dry flat face lets out nothing that comes straight from an LED behind its window but the sliver below an "
-        "index of 1.414; what else leaves was scattered by the walls first. It is a block rather than a waveguide: "
-        "only a third of the light ever meets the face, and the walls swallow most of it.",
+        "index of 1.414.",
         "Snell's law; the rest is this model compared with itself.",
         benchmarks(rays),
         (Table(caption, header, tuple(rows)),),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,8 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.optics import build_lookup
 from host_tools.pages.benchmark import Chapter, at_most
-from host_tools.pages.document import Cover
-from host_tools.verification.light import chapters
+from host_tools.study.page import RESULTS
+from host_tools.verification.light import chapters, verdict
 
 Asked = list[dict[str, object]]
 
@@ -30,10 +31,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
 
     def fake(rays: int, **options: object) -> dict[str, Callable[[], Chapter]]:
         calls.append({"rays": rays, **options})
-        return {"one": lambda: Chapter("One", "", "", (at_most("case", "noise", rays / 1e6, 1.0),))}
+        return {"angles": lambda: Chapter("One", "", "", (at_most("case", "noise", rays / 1e6, 1.0),))}
 
     monkeypatch.setattr(chapters, "optics_chapters", fake)
-    monkeypatch.setattr(chapters, "cover", lambda rays: Cover("Light", (f"{rays} rays",), ("nothing",)))
+    measured = json.loads((RESULTS / "optics.json").read_text())["facts"]
+    monkeypatch.setattr(verdict, "facts", lambda rays: measured | {"contact_over_dark": rays})
     return calls
 
 
@@ -54,7 +56,7 @@ def test_the_page_repeats_the_command_without_paths_of_the_machine(asked: Asked,
     text = page.read_text()
     assert "`host_tools optics verify --rays 50000 --mitsuba --out optics.md`" in text
     assert "/there" not in text
-    assert text.startswith("# Light\n\n50000 rays\n")
+    assert "the centre is 50000 times as bright" in text
 
 
 @pytest.mark.parametrize(("words", "sentence"), [(("--rays", 5), "rays is 5"), (("--out", "page.txt"), "page.txt")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,11 +14,10 @@ from device.measurement.quantities import InvalidQuantity
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.__main__ import app
 from host_tools.data import dataset
-from host_tools.pages.benchmark import Chapter, Table, at_most
-from host_tools.pages.document import Cover
-from host_tools.replication import chapters as paper_chapters
+from host_tools.pages.benchmark import Table
 from host_tools.replication import study as paper_study
-from host_tools.replication import verdict
+from host_tools.study import paper_page
+from host_tools.study.page import RESULTS
 
 
 def run(*words: object) -> Any:
@@ -26,26 +26,20 @@ def run(*words: object) -> Any:
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One chapter whose error is 1 % of the seeds; holds up to a hundred."""
-
-    def chapters(study: Any) -> dict[str, Any]:
-        table = Table("Errors", ("unknown", "error [%]"), (("size", "7"),))
-        return {"one": lambda: Chapter("One", "", "", (at_most("case", "noise", study.seeds / 100, 1.0),), (table,))}
+    """The same small table for every one of the page's, and the facts of the page with the seeds asked for."""
+    measured = json.loads((RESULTS / "paper_protocol.json").read_text())
+    table = Table("Errors", ("unknown", "error [%]"), (("size", "7"),))
 
     monkeypatch.setattr(dataset, "training_rows", lambda path: SimpleNamespace(excluded_rows=4, features=range(80)))
     monkeypatch.setattr(ProbeTables, "load", lambda folder: None)
     monkeypatch.setattr(paper_study, "PaperStudy", lambda rows, tables, seeds: SimpleNamespace(seeds=seeds))
-    monkeypatch.setattr(paper_chapters, "paper_chapters", chapters)
-    monkeypatch.setattr(verdict, "cover", lambda study: Cover("Paper", (f"{study.seeds} seeds",), ("nothing",)))
-
-
-def test_a_missed_bound_is_exit_code_1() -> None:
-    assert run().exit_code == 0
-    assert run("--seeds", 101).exit_code == 1
+    monkeypatch.setattr(paper_page, "paper_tables", lambda study: dict.fromkeys(measured["tables"], lambda: table))
+    monkeypatch.setattr(paper_page, "paper_facts", lambda study: measured["facts"] | {"seeds": study.seeds})
 
 
 def test_tables_are_printed_and_rows_that_are_left_out_are_counted() -> None:
     done = run()
+    assert done.exit_code == 0
     assert "error [%]" in done.output
     assert "4 scenes of" in done.output
 
@@ -56,7 +50,8 @@ def test_the_page_repeats_the_command(tmp_path: Path) -> None:
     assert "`host_tools paper --out paper.md`" in page.read_text()
     run("--seeds", 5, "--out", page)
     assert "`host_tools paper --seeds 5 --out paper.md`" in page.read_text()
-    assert page.read_text().startswith("# Paper\n\n5 seeds\n")
+    assert "## Levenberg-Marquardt beside scaled conjugate gradient, 5 seeds\n" in page.read_text()
+    assert json.loads((tmp_path / "results" / "paper.json").read_text())["facts"]["seeds"] == 5
     run("--data", tmp_path / "other.nc", "--table", tmp_path / "tables", "--out", page)
     assert "`host_tools paper --data other.nc --table tables --out paper.md`" in page.read_text()
 
@@ -64,4 +59,4 @@ def test_the_page_repeats_the_command(tmp_path: Path) -> None:
 def test_a_page_of_another_type_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
     done = run("--out", tmp_path / "paper.txt")
     assert isinstance(done.exception, InvalidQuantity)
-    assert "One" not in done.output
+    assert "Errors" not in done.output

@@ -25,29 +25,29 @@ def fakes(monkeypatch):
 
         return chapter
 
-    monkeypatch.setattr(chapters, "CHAPTERS", {"good": fake("good", 0.5), "bad": fake("bad", 2.0)})
+    monkeypatch.setattr(chapters, "CHAPTERS", {"patch": fake("patch", 0.5), "hertz": fake("hertz", 2.0)})
     return asked
 
 
 def test_a_missed_bound_is_exit_code_1(fakes):
     assert run().exit_code == 1
-    assert fakes == [("good", False), ("bad", False)]
+    assert fakes == [("patch", False), ("hertz", False)]
 
 
 def test_only_the_chapters_asked_for_are_run(fakes):
-    assert run("--only", "good", "--quick").exit_code == 0
-    assert fakes == [("good", True)]
+    assert run("--only", "patch", "--quick").exit_code == 0
+    assert fakes == [("patch", True)]
 
 
 def test_an_unknown_chapter_is_refused_before_anything_runs(fakes):
-    result = run("--only", "good", "--only", "nothing")
+    result = run("--only", "patch", "--only", "nothing")
     assert isinstance(result.exception, InvalidQuantity)
     assert "nothing" in str(result.exception)
-    assert "good, bad" in str(result.exception)
+    assert "patch, hertz" in str(result.exception)
     assert fakes == []
 
 
 def test_the_document_repeats_the_command(fakes, tmp_path):
     out = tmp_path / "verification.md"
-    run("--only", "good", "--quick", "--out", str(out))
-    assert "`host_tools verify --only good --quick --out verification.md`" in out.read_text()
+    run("--only", "patch", "--quick", "--out", str(out))
+    assert "`host_tools verify --only patch --quick --out verification.md`" in out.read_text()

@@ -1,9 +1,11 @@
-"""The page's chapters and verdicts say what the study found, and a verdict stands only while its numbers do."""
+"""The page's tables and numbers say what the study found, and a verdict stands only while its numbers do."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,14 +13,14 @@ import pytest
 from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.pages.benchmark import Chapter
+from host_tools.pages.benchmark import Table
 from host_tools.paper_network import train as training
 from host_tools.paper_network.train import TrainingRows
 from host_tools.replication import study as paper_study
-from host_tools.replication.chapters import letter, paper_chapters
 from host_tools.replication.protocol import ProtocolStep, Views
 from host_tools.replication.study import PaperStudy
-from host_tools.replication.verdict import cover, findings
+from host_tools.study.page import Results, write_page
+from host_tools.study.paper_page import paper_facts, paper_tables
 
 
 def fake_views(truth: Array, exact: Array, light: str, tables: ProbeTables, *, presses: int) -> Views:
@@ -50,8 +52,13 @@ def study(rows: TrainingRows) -> Iterator[PaperStudy]:
 
 
 @pytest.fixture(scope="module")
-def chapters(study: PaperStudy) -> dict[str, Chapter]:
-    return {name: chapter() for name, chapter in paper_chapters(study).items()}
+def found(study: PaperStudy) -> dict[str, Table]:
+    return {name: table() for name, table in paper_tables(study).items()}
+
+
+@pytest.fixture(scope="module")
+def facts(study: PaperStudy) -> dict[str, Any]:
+    return paper_facts(study)
 
 
 def test_on_straight_lines_the_image_costs_nothing_and_noise_does(study: PaperStudy) -> None:
@@ -71,8 +78,8 @@ def test_each_phantom_is_left_out_of_its_own_networks_only(study: PaperStudy) ->
     assert {len(sets[0].problem.scenes.truth) for sets in study.left_nine_out.values()} == {71}
 
 
-def test_the_papers_figures_stand_beside_ours(study: PaperStudy, chapters: dict[str, Chapter]) -> None:
-    table = chapters["letter"].tables[0]
+def test_the_papers_figures_stand_beside_ours(study: PaperStudy, found: dict[str, Table]) -> None:
+    table = found["letter"]
     assert table.header[:4] == ("", "size, the paper", "size, linear light", "size, traced light")
     papers = [(row[0], *row[1::3]) for row in table.rows]
     assert papers[::3] == [("mean", "7.0", "7.2", "5.1"), ("max", "20.0", "26.4", "11.7")]
@@ -80,34 +87,41 @@ def test_the_papers_figures_stand_beside_ours(study: PaperStudy, chapters: dict[
     assert table.rows[0][3::3] == tuple(f"{mean:.1f}" for mean in means)
 
 
-def test_every_table_has_a_cell_under_every_heading(chapters: dict[str, Chapter]) -> None:
-    tables = [table for chapter in chapters.values() for table in chapter.tables]
-    assert len(tables) == 9
-    for table in tables:
+def test_every_table_has_a_cell_under_every_heading(found: dict[str, Table]) -> None:
+    assert len(found) == 9
+    for table in found.values():
         assert {len(row) for row in table.rows} == {len(table.header)}
 
 
-def test_both_methods_and_every_failure_are_in_the_side_by_side(chapters: dict[str, Chapter]) -> None:
-    for table in chapters["methods"].tables:
+def test_both_methods_and_every_failure_are_in_the_side_by_side(found: dict[str, Table]) -> None:
+    for table in (found["side_by_side"], found["side_by_side_ours"]):
         assert table.header == ("", "SCG", "LM")
         assert sum(row[0].startswith("failed:") for row in table.rows) == 3
         assert table.rows[-1][:2] == ("time, SCG = 1", "1")
 
 
-def test_a_verdict_that_the_numbers_do_not_bear_is_open(study: PaperStudy, monkeypatch: pytest.MonkeyPatch) -> None:
-    good, bad = np.array([1.0, 1.0, 500.0]), np.array([50.0, 50.0, 1.0])
+def test_the_prose_quotes_the_numbers_of_the_tables(study: PaperStudy, facts: dict[str, Any]) -> None:
+    letter, refitted = (study.mean_percent("linear", step) for step in (ProtocolStep.LETTER, ProtocolStep.REFITTED))
+    assert facts["letter_percent"]["linear"] == pytest.approx(letter, rel=1e-5)
+    assert facts["growth"]["refitted"]["linear"] == pytest.approx(refitted / letter, rel=1e-5)
+    assert (facts["scenes"], facts["scenes_that_train"], facts["excluded_scenes"]) == (80, 71, 0)
+    assert facts["lm_over_scg"]["time"] > 0
+
+
+def test_a_verdict_that_the_numbers_do_not_bear_is_open(
+    found: dict[str, Table], facts: dict[str, Any], tmp_path: Path
+) -> None:
+    good, bad = [1.0, 1.0, 500.0], [50.0, 50.0, 1.0]
     for means, supported in ((good, True), (bad, False)):
-        monkeypatch.setattr(study, "mean_percent", lambda *_, means=means: means)
-        assert [finding.supported for finding in findings(study)[:2]] == [supported, supported]
-        assert [benchmark.passed for benchmark in letter(study).benchmarks[:3]] == [supported] * 3
-
-
-def test_the_page_opens_with_the_verdicts_and_says_that_all_is_simulated(study: PaperStudy) -> None:
-    page = cover(study)
-    assert sum(line.startswith("| ") for line in page.opening) == 1 + len(findings(study))
-    assert any("80 are used; 0, failed or without a number" in line for line in page.opening)
-    assert any("is simulated" in line for line in page.opening)
-    assert any("not known to us" in limit for limit in page.limits)
+        of_means = facts | {"letter_percent": {"linear": means, "physical": means}}
+        write_page(tmp_path / "paper.md", Results("paper_protocol", "paper", tables=found, facts=of_means))
+        text = (tmp_path / "paper.md").read_text()
+        verdicts = text.split("| what the paper")[1].split("\n\n")[0].splitlines()[2:]
+        assert len(verdicts) == 7
+        assert ["**open**" not in row for row in verdicts[:2]] == [supported, supported]
+        assert "80 are used; 0, failed or without a number" in text
+        assert "is simulated" in text
+        assert "not known to us" in text
 
 
 def test_rows_that_cannot_train_and_a_single_trial_are_refused(rows: TrainingRows, tables: ProbeTables) -> None:
