@@ -185,5 +185,5 @@ def _numbers(values: Array | list[float]) -> list[float | None]:
 
 
 def _number(value: float) -> float | None:
-    """Return a number to four digits; None for a bound that is too large to mean anything."""
-    return float(f"{value:.4g}") if value <= MOST else None
+    """Return a number to six digits; None for a bound that is too large to mean anything."""
+    return float(f"{value:.6g}") if value <= MOST else None
