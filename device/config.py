@@ -290,7 +290,8 @@ class PressSection(Section):
         float,
         Bound(0.5, 30.0, "mm"),
         Doc(
-            "An inclusion whose bright spot lies further off the middle of the face is off-centre: the press is rejected."
+            "An inclusion whose bright spot lies further off the middle of the face is off-centre: "
+            "the press is rejected."
         ),
     ] = 2.5
     timeout_s: Annotated[float, Bound(1.0, 3600.0, "s"), Doc("A press that takes longer is given up.")] = 60.0

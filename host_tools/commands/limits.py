@@ -124,7 +124,7 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     from host_tools.cramer_rao.accuracy_map import inclusions, mapped_scene
     from host_tools.cramer_rao.accuracy_page import FIGURE, accuracy_facts
     from host_tools.cramer_rao.press_bound import beside_over_axis
-    from host_tools.study.page import FIGURES, Results, write_page
+    from host_tools.pages.page import FIGURES, Results, write_page
 
     beside = beside_over_axis(ProfileModel.load(ROOT / "models" / "standard").answers)
     chosen, mapped = inclusions(), []

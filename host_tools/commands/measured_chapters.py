@@ -15,14 +15,14 @@ from host_tools.commands.output import progress
 
 if TYPE_CHECKING:
     from host_tools.pages import benchmark
-    from host_tools.study.page import Timed
+    from host_tools.pages.page import Timed
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) -> dict[str, Timed]:
     """Measure every chapter, one after the other, each with the wall time it took."""
-    from host_tools.study.page import Timed
+    from host_tools.pages.page import Timed
 
     measured = {}
     with progress("chapters") as bar:
@@ -37,7 +37,7 @@ def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) ->
 
 def print_chapter(timed: Timed) -> int:
     """Print one chapter; return how many of its benchmarks miss their bound."""
-    from host_tools.study.page import BENCHMARK_HEADER, benchmark_row
+    from host_tools.pages.page import BENCHMARK_HEADER, benchmark_row
 
     chapter, out = timed.chapter, Console(width=140, highlight=False)
     if chapter.skipped:

@@ -33,6 +33,7 @@ def modes(
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
+    from host_tools.pages.page import Results, write_page
     from host_tools.press_models.seeds import derived_seed
     from host_tools.scores.breast_imager import breast_imager_chapter
     from host_tools.scores.coverage import coverage_chapter
@@ -43,7 +44,6 @@ def modes(
     from host_tools.scores.outside import kinds, outside_chapter
     from host_tools.scores.posterior import posterior_chapter
     from host_tools.scores.span import span_chapter
-    from host_tools.study.page import Results, write_page
 
     if out:
         require_writable(out, (".md",))

@@ -49,7 +49,7 @@ def verify(
     measured = measure_chapters(optics_chapters(rays, mitsuba=mitsuba, mitsuba_python=mitsuba_python))
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        from host_tools.study.page import Results, write_page
+        from host_tools.pages.page import Results, write_page
         from host_tools.verification.light.verdict import facts
 
         flags = [f"--rays {rays}"] if rays != DEFAULT_RAYS else []

@@ -16,7 +16,7 @@ def pages(
     ] = False,
 ) -> None:
     """Write each page of docs/results from its template in docs/templates."""
-    from host_tools.study.page import DOCS, RESULTS, render
+    from host_tools.pages.page import DOCS, RESULTS, render
 
     stale = []
     for record in sorted(RESULTS.glob("*.json")):

@@ -28,8 +28,8 @@ def paper(
     """
     require_writable(out, (".md",))
     from host_tools.data.dataset import require_enough, training_rows
+    from host_tools.replication.page import paper_facts, paper_tables
     from host_tools.replication.study import PaperStudy
-    from host_tools.study.paper_page import paper_facts, paper_tables
 
     rows = training_rows(data)
     note_left_out(rows.excluded_rows, data)
@@ -44,7 +44,7 @@ def paper(
     for computed in tables.values():
         print_table(computed)
     if out:
-        from host_tools.study.page import Results, write_page
+        from host_tools.pages.page import Results, write_page
 
         command = _command(out, data, table, seeds)
         write_page(out, Results("paper_protocol", command, tables=tables, facts=paper_facts(study)))

@@ -36,7 +36,7 @@ def verify(
     measured = measure_chapters(chapters)
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
-        from host_tools.study.page import Results, write_page
+        from host_tools.pages.page import Results, write_page
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
         flags += ["--quick"] if quick else []

@@ -16,7 +16,7 @@ from matplotlib.colors import LogNorm
 from device.measurement.arrays import Array
 from host_tools.cramer_rao.accuracy_map import DEPTHS_MM, MODULI_KPA, SIZES_MM, STANDARD, MappedScene, stds
 from host_tools.cramer_rao.accuracy_page import NAMES, ROUGHLY
-from host_tools.study.page import percent
+from host_tools.pages.page import percent
 
 
 def draw_map(scenes: list[MappedScene], path: Path) -> None:

@@ -29,7 +29,7 @@ from host_tools.cramer_rao.accuracy_tables import BOX, MODULUS, determined_share
 from host_tools.cramer_rao.press_bound import OFFSETS_MM
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.forward.derivatives.sensitive_presses import ORDERS
-from host_tools.study.page import MOST
+from host_tools.pages.page import MOST
 
 FIGURE = "accuracy_map.png"
 NAMES = ("size", "depth", "modulus")

@@ -1,6 +1,6 @@
 """Measured numbers beside known ones, and the pages of docs/ made of them.
 
-Modules in reading order: `benchmark`, `document`.
+Modules in reading order: `benchmark`, `page`.
 
-No measuring.
+Prose stands in docs/templates, numbers in docs/results. No measuring.
 """

@@ -1,7 +1,7 @@
 """What the modes are worth: recordings with truth to errors, coverage and refusals, beside the best that could be had.
 
 Modules in reading order: `score_recordings`, `paper_scores`, `dial`, `coverage`, `posterior`, `noise_free`, `span`,
-`outside`, `just_outside`, `ellipsoids`, `breast_imager`, `page`.
+`outside`, `just_outside`, `ellipsoids`, `breast_imager`.
 
 No training; what is scored has been frozen before.
 """

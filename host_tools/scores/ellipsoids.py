@@ -104,7 +104,8 @@ def spoken(inclusion: Oblong) -> Sequence[str]:
     """Return size, depth, modulus, ratio, offset and direction as table cells."""
     size_mm, depth_mm, modulus_kpa = inclusion.inclusion.as_tuple()
     return (
-        f"{size_mm:.1f}", f"{depth_mm:.1f}", f"{modulus_kpa:.0f}", f"{inclusion.width_ratio:.2f}", f"{inclusion.offset_mm:.1f}",
+        f"{size_mm:.1f}", f"{depth_mm:.1f}", f"{modulus_kpa:.0f}",
+        f"{inclusion.width_ratio:.2f}", f"{inclusion.offset_mm:.1f}",
         "across" if inclusion.is_across else "along",
     )  # fmt: skip
 
@@ -141,7 +142,8 @@ def oblong_chapter(answer: EstimateOf, model: ProfileModel, tables: ProbeTables,
     return Chapter(
         title="Inclusions that are not round",
         claim=CLAIM,
-        source="Lehmann & Romano, Testing Statistical Hypotheses (2005), 6.3; device/measurement/ramp_modes/ellipticity.py",
+        source="Lehmann & Romano, Testing Statistical Hypotheses (2005), 6.3; "
+        "device/measurement/ramp_modes/ellipticity.py",
         benchmarks=tuple(benchmarks),
         tables=(Table("All of them", SUMMARY, tuple(sums)), Table("Each ellipsoid, means", HEADER, tuple(rows))),
         facts={"false_at_most": FALSE_AT_MOST, "refused_at_least": REFUSED_AT_LEAST},

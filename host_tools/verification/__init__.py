@@ -1,8 +1,7 @@
 """Does the program solve its equations? The forward model against answers known on paper, and against another program.
 
 Modules in reading order: `elastic`, `patch`, `rates`, `hertz`, `hayes`, `eshelby`, `incompressible`, `balance`,
-`symmetries`, `smoothness`, `scene_rates`, `mechanics`, `extremes`, `effectivity`, `level_tables`, `chapters`,
-`not_shown`.
+`symmetries`, `smoothness`, `scene_rates`, `mechanics`, `extremes`, `effectivity`, `level_tables`, `chapters`.
 
 Rooms: `light` (the same for the optics), `peer` (the other programs). Measured here, bounded in tests/physics.
 """

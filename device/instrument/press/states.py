@@ -1,4 +1,4 @@
-"""The states of a press as one table: which follow which, what the operator is told in each, and why a press is rejected.
+"""The states of a press as one table: which follow which, what the operator is told in each, and why one is rejected.
 
 One measurement runs through them twice, beside the lesion and on it. Guidance is one code for machines and one sentence
 for the screen; a reason says what was seen, its bound, and what to do. docs/press.md shows the table; a test compares.

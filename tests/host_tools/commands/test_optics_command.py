@@ -14,7 +14,7 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.optics import build_lookup
 from host_tools.pages.benchmark import Chapter, at_most
-from host_tools.study.page import RESULTS
+from host_tools.pages.page import RESULTS
 from host_tools.verification.light import chapters, verdict
 
 Asked = list[dict[str, object]]

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from host_tools.__main__ import app
-from host_tools.study import page
+from host_tools.pages import page
 
 
 @pytest.fixture

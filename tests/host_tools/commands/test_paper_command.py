@@ -15,9 +15,9 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.__main__ import app
 from host_tools.data import dataset
 from host_tools.pages.benchmark import Table
+from host_tools.pages.page import RESULTS
+from host_tools.replication import page as paper_page
 from host_tools.replication import study as paper_study
-from host_tools.study import paper_page
-from host_tools.study.page import RESULTS
 
 
 def run(*words: object) -> Any:

@@ -24,7 +24,7 @@ from host_tools.cramer_rao.accuracy_page import FIGURE, accuracy_facts
 from host_tools.cramer_rao.bounds import Limit, Limits
 from host_tools.cramer_rao.information import CramerRao
 from host_tools.cramer_rao.press_bound import OFFSETS_MM
-from host_tools.study.page import Results, write_page
+from host_tools.pages.page import Results, write_page
 
 BOX = np.array([0.4, 0.4, 0.8])
 PAIRS = len(SIZES_MM) * len(DEPTHS_MM)

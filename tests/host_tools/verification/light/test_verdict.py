@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from host_tools.study.page import Results, write_page
+from host_tools.pages.page import Results, write_page
 from host_tools.verification.light.chapters import optics_chapters
 from host_tools.verification.light.verdict import facts
 

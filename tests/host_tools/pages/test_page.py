@@ -7,7 +7,7 @@ import pytest
 
 from device import __version__
 from host_tools.pages.benchmark import Chapter, Figure, Table, at_most, relative
-from host_tools.study.page import DOCS, RESULTS, TEMPLATES, Results, Timed, dumps, percent, render, write_page
+from host_tools.pages.page import DOCS, RESULTS, TEMPLATES, Results, Timed, dumps, percent, render, write_page
 
 FIGURE = Figure("line.svg", "A line", lambda figure: figure.subplots().plot([0, 1]))
 ROWS = (

@@ -14,13 +14,13 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Table
+from host_tools.pages.page import Results, write_page
 from host_tools.paper_network import train as training
 from host_tools.paper_network.train import TrainingRows
 from host_tools.replication import study as paper_study
+from host_tools.replication.page import paper_facts, paper_tables
 from host_tools.replication.protocol import ProtocolStep, Views
 from host_tools.replication.study import PaperStudy
-from host_tools.study.page import Results, write_page
-from host_tools.study.paper_page import paper_facts, paper_tables
 
 
 def fake_views(truth: Array, exact: Array, light: str, tables: ProbeTables, *, presses: int) -> Views:
