@@ -29,15 +29,15 @@ from device.commands.record import add_record_command, run_record_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.files.bundle_file import read_paper_model
 from device.files.recording_file import read_recording
 from device.instrument.press.phantom_press import PhantomPress
 from device.instrument.procedure import Procedure
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.restart_note import RestartNote
 from device.instrument.watch.watchdog import Watchdog
+from device.measurement.bundle import BundleRefused
 from device.measurement.mode import mode_named, mode_of
-from device.measurement.model_card import BundleRefused
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.records.calibrations import Calibrations
 from device.settings.last_good import StartSettings, start_settings
@@ -182,7 +182,7 @@ def _record(options: argparse.Namespace) -> int:
 def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:
     """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
     config = stated or simulated_config(serial)
-    bundle = ModelBundle.load(config.model)
+    bundle = read_paper_model(config.model)
     calibration = Calibrations(config.calibration).active()
     if calibration:
         calibration.require_for(serial, bundle)

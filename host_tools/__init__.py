@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from device.files.recording_file import write_recording as write_recording
     from device.measurement.estimate import Estimate as Estimate
     from device.measurement.mode_models import ModeModels as ModeModels
-    from device.measurement.model_card import BundleRefused as BundleRefused
+    from device.measurement.bundle import BundleRefused as BundleRefused
     from device.measurement.quantities import Inclusion as Inclusion
     from device.measurement.quantities import InvalidQuantity as InvalidQuantity
     from device.measurement.recording.recording import Recording as Recording
@@ -98,7 +98,7 @@ _HOME = {
     "analyse": "host_tools.door",
     "InvalidQuantity": "device.measurement.quantities",
     "PressFailed": "host_tools.forward.press_model",
-    "BundleRefused": "device.measurement.model_card",
+    "BundleRefused": "device.measurement.bundle",
 }
 
 __all__ = [

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from device.measurement.model_card import BundleRefused
+from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.calibrate import calibrate
 from host_tools.commands.evaluate import evaluate

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from device.measurement.calibration import Calibration
     from device.measurement.estimate import Estimate
     from device.measurement.mode_models import ModeModels
-    from device.measurement.paper_mode.inversion import ModelBundle
+    from device.measurement.bundle import ModelBundle
     from device.measurement.recording.recording import Recording
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.cramer_rao.bounds import Limits
@@ -113,11 +113,11 @@ def train(sweep_file: Path | str, *, trials: int = 100, seed: int = 1) -> Traine
 
 def export(trained: Trained, folder: Path | str) -> ModelBundle:
     """Write a trained model's bundle, ONNX and card, to a folder; return it as the probe would load it."""
-    from device.measurement.paper_mode.inversion import ModelBundle
+    from device.files.bundle_file import read_paper_model
     from host_tools.paper_network.export import export as write_bundle
 
     write_bundle(trained, Path(folder), software_version=__version__)
-    return ModelBundle.load(Path(folder))
+    return read_paper_model(Path(folder))
 
 
 def limits(scene: Scene, protocol: PressProtocol | Path | str = STANDARD_PROTOCOL) -> Limits:
@@ -134,11 +134,10 @@ def limits(scene: Scene, protocol: PressProtocol | Path | str = STANDARD_PROTOCO
 
 def installed_models(folder: Path | str = MODELS) -> ModeModels:
     """Return the models of all modes in a folder; raise `BundleRefused` for one that does not hold."""
-    from device.measurement.mode_models import with_models
-    from device.measurement.paper_mode.inversion import ModelBundle
+    from device.files.bundle_file import read_models, read_paper_model
 
     models = Path(folder)
-    return with_models(ModelBundle.load(models / "paper"), models / "quick", models / "standard")
+    return read_models(read_paper_model(models / "paper"), models / "quick", models / "standard")
 
 
 def simulated_probe(folder: Path | str = SIMULATED_PROBE) -> ProbeTables:
@@ -162,7 +161,7 @@ def analyse(
     do not belong together.
     """
     from device.files.recording_file import read_recording
-    from device.measurement.calibration import read_calibration
+    from device.files.certificate_file import read_calibration
     from device.measurement.mode import mode_named
     from device.measurement.mode_models import analysed
 

@@ -13,16 +13,17 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from device.files.bundle_file import read_paper_model
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads make small products slower on a busy machine
 
 import numpy as np
 from camera_works import Handover, sustained_hz
 
-from device.measurement.calibration import read_calibration
-from device.measurement.estimate import estimate_recording
+from device.files.certificate_file import read_calibration
+from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.paper_mode.features import extract_features
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
 from device.measurement.recording.tactile_image import reference, tactile_image
 from device.simulation.physics.pressed_face import ProbePlacement
@@ -68,7 +69,7 @@ def _next_frame(light: str, tables: ProbeTables) -> Callable[[], object]:
 
 def main() -> None:
     """Print a table of ratios and the peak memory."""
-    bundle, tables = ModelBundle.load(MODELS / "paper"), ProbeTables.load(MODELS / "simulated_probe")
+    bundle, tables = read_paper_model(MODELS / "paper"), ProbeTables.load(MODELS / "simulated_probe")
     calibration = read_calibration(MODELS / "simulated_probe" / "calibration.json")
     recording = phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=1)
     base, press = reference(recording.frames), recording.with_role("press")[0]
@@ -83,7 +84,7 @@ def main() -> None:
         "frame: correction": lambda: tactile_image(press, base, recording.camera.scale),
         "frame: features": lambda: extract_features(image, calibration.settings),
         "frame: 100 networks (ONNX)": lambda: bundle.estimate(row),
-        "press: ten frames to an estimate": lambda: estimate_recording(recording, bundle, calibration),
+        "press: ten frames to an estimate": lambda: estimate_paper(recording, bundle, calibration),
         "simulated frame: physical light, camera": _next_frame("physical", tables),
         "simulated frame: linear light, camera": _next_frame("linear", tables),
         "scene: finite elements with baseline": lambda: solve(Scene(Inclusion(10.0, 6.0, 80.0))),

@@ -14,8 +14,10 @@ from daemon_process import QUICK_HAND, ROOT, Daemon
 from schedule import OneHand
 from xdist.remote import Producer
 
-from device.measurement.calibration import Calibration, read_calibration
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.files.bundle_file import read_paper_model
+from device.files.certificate_file import read_calibration
+from device.measurement.bundle import ModelBundle
+from device.measurement.calibration import Calibration
 from device.measurement.quantities import Inclusion
 from device.measurement.recording.recording import Recording
 from device.simulation.physics.surface_table import SurfaceTable
@@ -39,7 +41,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OneHand
 
 @pytest.fixture(scope="session")
 def bundle() -> ModelBundle:
-    return ModelBundle.load(MODELS / "paper")
+    return read_paper_model(MODELS / "paper")
 
 
 @pytest.fixture(scope="session")

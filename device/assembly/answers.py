@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 from device.config import Config
 from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
+from device.files.bundle_file import read_models
 from device.instrument.press.record import Estimator
 from device.instrument.watch.progress import ProgressBoard
+from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
-from device.measurement.mode_models import ModeModels, with_models
-from device.measurement.model_card import BundleRefused
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
 from device.records.calibrations import Calibrations
@@ -97,7 +97,7 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
-    models = with_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
+    models = read_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
 
     def estimate(recording: Recording, mode: Mode) -> Estimate:
         if calibration is None:

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from typing import TypeVar
 
 from device.errors import DeviceError, ModelError
-from device.measurement.model_card import BundleRefused
+from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 
 OpenedPart = TypeVar("OpenedPart")

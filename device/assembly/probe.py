@@ -21,6 +21,7 @@ from device.assembly.opened_parts import OpenedParts
 from device.config import SIMULATED_PROBE, Config
 from device.config_chips import RAW_BITS
 from device.errors import ConfigError
+from device.files.bundle_file import read_paper_model
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.instrument.acquisition.bench import Bench
@@ -34,9 +35,9 @@ from device.instrument.status import StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.progress import ProgressBoard
+from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.mode import Mode
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Inclusion
 from device.records.disk import Disk
 from device.records.store import Store
@@ -234,7 +235,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing but the tare of a held probe."""
     config, parts, progress = probe.config, probe.parts, ProgressBoard()
     force = probe.force_once_lifted(progress)
-    bundle = parts.open(lambda: ModelBundle.load(config.model))
+    bundle = parts.open(lambda: read_paper_model(config.model))
     watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
     calibration = watch.calibration if watch else None
     answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None

@@ -12,9 +12,9 @@ from typing import Any
 from device.assembly.answers import require_own
 from device.config import Config
 from device.errors import MissingCalibration
+from device.files.bundle_file import read_paper_model
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.records.calibrations import Calibrations
 
 EXAMPLES = """examples:
@@ -81,7 +81,7 @@ def _list(calibrations: Calibrations, *, as_json: bool) -> int:
 def _activate(calibrations: Calibrations, name: str, config: Config) -> int:
     """Refuse what a start would refuse, and what has expired; then write the pointer."""
     calibration = calibrations.read(name)
-    require_own(calibration, config, ModelBundle.load(config.model))
+    require_own(calibration, config, read_paper_model(config.model))
     CalibrationWatch(calibration).require_valid(ClockWatch(config.clock.max_jump_s).now())
     calibrations.activate(name)
     print(f"{name} is active from the next start of the daemon on.")

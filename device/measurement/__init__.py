@@ -1,7 +1,7 @@
 """What a press means: numbers in, numbers out. Shared with the workstation.
 
-Modules in reading order: `quantities`, `arrays`, `mode`, `parameters`, `model_card`, `calibration`,
-`confidence_belt`, `estimate`, `interval_estimate`, `mode_models`, `radial_gaussian`, `shape_features`.
+Modules in reading order: `quantities`, `arrays`, `mode`, `parameters`, `bundle`, `calibration`,
+`confidence_belt`, `estimate`, `mode_models`.
 
 Rooms: `recording` (frames to a corrected image), `paper_mode`, `ramp_modes` (standard and precise), `quick_mode`. It
 imports nothing else of ours; what it reads from a disk is read in `device.files`.
@@ -10,7 +10,7 @@ Its door, `from device.measurement import Recording`:
 
 - quantities: `Inclusion`, `Bound`, `InvalidQuantity`, `require`; arrays: `Array`, `Single`
 - recordings: `Recording`, `CameraSettings`, `Frame`, `TactileImage`; modes: `Mode`, `mode_named`, `mode_of`
-- certificates and models: `Calibration`, `ModelBundle`, `BundleRefused`, `ModeModels`, `with_models`
+- certificates and models: `Calibration`, `ModelBundle`, `BundleRefused`, `ModeModels`
 - answers: `analysed`, `Estimate`, `Quantity`
 
 Each is loaded when it is first asked for: whoever needs a quantity alone, as `device.commands.led_off`, loads no NumPy.
@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from device.measurement.mode import mode_of as mode_of
     from device.measurement.mode_models import ModeModels as ModeModels
     from device.measurement.mode_models import analysed as analysed
-    from device.measurement.mode_models import with_models as with_models
-    from device.measurement.model_card import BundleRefused as BundleRefused
-    from device.measurement.paper_mode.inversion import ModelBundle as ModelBundle
+    from device.measurement.bundle import BundleRefused as BundleRefused
+    from device.measurement.bundle import ModelBundle as ModelBundle
     from device.measurement.quantities import Bound as Bound
     from device.measurement.quantities import Inclusion as Inclusion
     from device.measurement.quantities import InvalidQuantity as InvalidQuantity
@@ -59,10 +58,9 @@ _HOME = {
     "mode_named": "device.measurement.mode",
     "mode_of": "device.measurement.mode",
     "Calibration": "device.measurement.calibration",
-    "ModelBundle": "device.measurement.paper_mode.inversion",
-    "BundleRefused": "device.measurement.model_card",
+    "ModelBundle": "device.measurement.bundle",
+    "BundleRefused": "device.measurement.bundle",
     "ModeModels": "device.measurement.mode_models",
-    "with_models": "device.measurement.mode_models",
     "analysed": "device.measurement.mode_models",
     "Estimate": "device.measurement.estimate",
     "Quantity": "device.measurement.estimate",
@@ -89,7 +87,6 @@ __all__ = [
     "mode_named",
     "mode_of",
     "require",
-    "with_models",
 ]
 
 

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.bundle import ModelBundle
 from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings
 from device.measurement.paper_mode.intervals import HeldOut
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import CameraSettings, RecordedCell
@@ -234,12 +234,12 @@ def _sha256(record: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(record, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def read_calibration(path: Path) -> Calibration:
-    """Read a certificate; raise `InvalidQuantity` naming the first thing that is wrong with it.
+def calibration_of(content: bytes, path: Path) -> Calibration:
+    """Return the certificate of a file's content; raise `InvalidQuantity` naming the first thing that is wrong with it.
 
-    The hash tells a file that was damaged or edited; it is no signature.
+    `path` is named in refusals. The hash tells a file that was damaged or edited; it is no signature.
     """
-    record = _record(path)
+    record = _record(content, path)
     try:
         for name, kind in (("validity", Validity), ("camera", CameraSettings), ("cell", RecordedCell)):
             record[name] = kind(**record[name])
@@ -256,11 +256,11 @@ def read_calibration(path: Path) -> Calibration:
         raise InvalidQuantity("calibration", path, "a complete certificate", f"{RENEW} ({error})") from error
 
 
-def _record(path: Path) -> dict[str, Any]:
+def _record(content: bytes, path: Path) -> dict[str, Any]:
     """Return what the file says, without schema and hash, once both hold."""
     try:
-        record: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        record: Any = json.loads(content)
+    except ValueError as error:
         raise InvalidQuantity("calibration", path, "a readable certificate", f"{RENEW} ({error})") from error
     schema = record.pop("schema", None) if isinstance(record, dict) else None
     if schema != SCHEMA:

@@ -8,14 +8,15 @@ ten whatever the truth is. Source: Masserano et al., WALDO, AISTATS 2023 (Neyman
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
 COVERAGE = 0.9
 IDENTIFIABLE_RATIO = 0.5
@@ -68,3 +69,11 @@ class Bands:
     def _at(self, truth: Array, log_spread: float, table: Array) -> Array:
         at_spread = np.array([np.interp(log_spread, self.log_spread, row) for row in table])
         return np.asarray(np.interp(truth, self.truth, at_spread))
+
+
+def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
+    """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
+    parts = ("truth", "log_spread", "low", "high")
+    return tuple(
+        Bands(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS
+    )

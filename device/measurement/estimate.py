@@ -1,42 +1,41 @@
-"""A recording to its estimate: size, depth and Young's modulus, each with a 90 % interval, and a status in words.
+"""The answer to a press: size, depth and Young's modulus, each with a 90 % interval, and a status in words.
 
-Every press frame is estimated on its own and the estimates are averaged; their standard deviation is the scatter of
-this press, not its accuracy. Accuracy is the interval, which comes from held-out scenes. Source: Lee & Won 2013,
-section IV: ten images a lesion, averaged.
+What all modes share: where an estimate is from, when an image is saturated, and how numbers, or the lack of them, are
+told. Each mode has an estimator of its own, which ends here. Source of the format: docs/contracts.md.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
+from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings, extract_features
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.confidence_belt import Bands
+from device.measurement.mode import Mode
+from device.measurement.parameters import COUNT, HIGH, LOW, unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import saturated_ratio
 
 EstimateStatus = Literal["ok", "outside_range", "no_contact", "saturated", "not_identifiable", "rejected"]
 
-CONTACT_N = 0.05
-"""Below this mean force the probe touches nothing."""
 SATURATED_RATIO = 0.001
 """More pixels than this at full scale, and the sum and the peak are no longer the light."""
-VISIBLE_CONTRAST = 0.002
-"""An inclusion whose peak is fainter than this is not told from the residue of light, force and camera."""
-
 SPOKEN = {"size_mm": "size", "depth_mm": "depth", "youngs_modulus_kpa": "Young's modulus"}
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One unknown: estimate, 90 % interval, scatter over the frames, and whether the data determine it.
+    """One unknown: estimate, 90 % interval, standard deviation, and whether the data determine it.
 
-    An interval that ends where the trained range does is open there: what lies beyond was never tried, and may be.
+    `std`: in mode paper the scatter over the frames, else the spread that the model states. An interval that ends where
+    the trained range does is open there: what lies beyond was never tried, and may be.
     """
 
     value: float | None
@@ -74,105 +73,101 @@ class Estimate:
         return record
 
 
-def estimate_recording(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> Estimate:
-    """Return the estimate of a recording.
+@dataclass(frozen=True)
+class Origin:
+    """Where an estimate is from: mode, model, certificate, and whether the press was simulated."""
 
-    Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe.
-    """
-    calibration.require_for(recording.serial, bundle)
+    mode: Mode
+    model: str
+    model_sha256: str
+    calibration_id: str
+    simulated: bool
+
+
+def origin_of(recording: Recording, mode: Mode, bundle: ModelBundle, calibration: Calibration) -> Origin:
+    """Return where an estimate is from; raises `InvalidQuantity` for a pixel size that the certificate is not for."""
     calibration.require_scale(recording.camera.scale)
-    press = recording.with_role("press")
-    if not press:
-        raise InvalidQuantity("press frames", 0, "at least one", "record frames while the probe presses the lesion")
-    force_n = float(np.mean([frame.force_n for frame in press]))
-    if force_n < CONTACT_N:
-        reason = f"The mean force is {force_n:.3f} N, below {CONTACT_N} N: press the lesion."
-        return _without_answer("no_contact", reason, recording, bundle, calibration)
-    if not calibration.holds_at(force_n):
-        reason = (
-            f"The mean force is {force_n:.3f} N, not the {calibration.force_n:g} N of the calibration: press again."
+    return Origin(mode, bundle.name, bundle.sha256, calibration.id, recording.simulated)
+
+
+def require_trained_for(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> None:
+    """Raise `InvalidQuantity` for a probe that the certificate, or the model itself, is not for.
+
+    The card's `serials` are the probes whose light and tables the model was trained with.
+    """
+    serials = bundle.card.get("serials", [])
+    if recording.serial not in serials:
+        expected = f"one of {', '.join(serials)}, which {bundle.name} is trained for"
+        raise InvalidQuantity(
+            "serial", recording.serial, expected, "press in mode paper, or train a model for this one"
         )
-        return _without_answer("rejected", reason, recording, bundle, calibration)
-    saturated = max(saturated_ratio(frame.counts) for frame in press)
-    if saturated > SATURATED_RATIO:
-        reason = f"{saturated:.1%} of the pixels are saturated, above {SATURATED_RATIO:.1%}: lower the light."
-        return _without_answer("saturated", reason, recording, bundle, calibration)
-    image_rows = image_features(recording, calibration.settings)
-    peak = float(image_rows[:, 0].mean())
-    if peak < VISIBLE_CONTRAST:
-        reason = f"No inclusion stands out: peak contrast {peak:.2%}, below {VISIBLE_CONTRAST:.1%}."
-        return _without_answer("not_identifiable", reason, recording, bundle, calibration)
-    return _answer(image_rows, recording, bundle, calibration)
+    if calibration.serial != recording.serial:
+        found, expected = f"for probe {calibration.serial}", f"for probe {recording.serial}"
+        raise InvalidQuantity("calibration", found, expected, "use the probe's own certificate")
 
 
-def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[np.float64]:
-    """Return the image features [n, 3] of a recording's press frames."""
-    return np.array([extract_features(image, settings).as_row() for image in recording.press_images()])
+def saturation(recording: Recording) -> str:
+    """Return a sentence when too many pixels of the press are at full scale; "" is good."""
+    ratio = max((saturated_ratio(frame.counts) for frame in recording.with_role("press")), default=0.0)
+    if ratio <= SATURATED_RATIO:
+        return ""
+    return f"{ratio:.1%} of the pixels are saturated, above {SATURATED_RATIO:.1%}: lower the light."
 
 
-def _answer(
-    image_rows: NDArray[np.float64], recording: Recording, bundle: ModelBundle, calibration: Calibration
-) -> Estimate:
-    rows = calibration.deformation_features(image_rows)
-    estimates = bundle.estimate(rows).estimate.astype(float)
-    mean, std = estimates.mean(axis=0), _scatter(estimates)
-    outside = bundle.outside_training_range(rows.mean(axis=0))
-    if outside:
-        return _without_answer("outside_range", " ".join(outside), recording, bundle, calibration)
-    interval = calibration.held_out.interval(mean)
-    value = np.clip(mean, interval.low, interval.high)  # a network may extrapolate; its interval cannot
-    status, reason = _verdict(interval.identifiable)
-    quantities: dict[str, Any] = {
-        name: Quantity(
-            float(value[i]),
-            float(interval.low[i]),
-            float(interval.high[i]),
-            float(std[i]),
-            bool(interval.identifiable[i]),
-            low_is_open=bool(interval.low[i] <= calibration.held_out.box_low[i]),
-            high_is_open=bool(interval.high[i] >= calibration.held_out.box_high[i]),
-        )
-        for i, name in enumerate(UNKNOWNS)
-    }
-    return Estimate(
-        **quantities,
-        status=status,
-        reason=reason,
-        features=_named(image_rows.mean(axis=0), rows.mean(axis=0), bundle),
-        **_origin(recording, bundle, calibration),
-    )
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Each [3] in the unknowns' own units: value, standard deviation, 90 % interval, whether the data determine it.
+
+    `range_low`, `range_high`: the trained range, with whose ends an interval is open.
+    """
+
+    value: Array
+    std: Array
+    low: Array
+    high: Array
+    is_identifiable: NDArray[np.bool_]
+    range_low: Array
+    range_high: Array
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return them by the names of the unknowns; a model may extrapolate, but no value leaves its interval."""
+        value = np.clip(self.value, self.low, self.high)
+        return {
+            name: Quantity(
+                float(value[i]),
+                float(self.low[i]),
+                float(self.high[i]),
+                float(self.std[i]),
+                bool(self.is_identifiable[i]),
+                low_is_open=bool(self.low[i] <= self.range_low[i]),
+                high_is_open=bool(self.high[i] >= self.range_high[i]),
+            )
+            for i, name in enumerate(UNKNOWNS)
+        }
 
 
-def _named(image_row: NDArray[np.float64], row: NDArray[np.float64], bundle: ModelBundle) -> dict[str, float]:
-    names = (*FEATURE_NAMES, *bundle.feature_names)
-    return {name: float(value) for name, value in zip(names, (*image_row, *row), strict=True)}
+def numbers_in_bands(mean: Array, spread: Array, bands: Sequence[Bands]) -> Numbers:
+    """Return the numbers of mean and spread [3] in coordinates (`press_parameters.to_unit`), by each unknown's bands.
+
+    The standard deviation is half of what mean - spread to mean + spread spans in the unknown's own unit.
+    """
+    intervals = [band.interval(float(at), float(width)) for band, at, width in zip(bands, mean, spread, strict=True)]
+    low, high = (unknowns_from_unit(np.array([one[end] for one in intervals])) for end in (0, 1))
+    below, above = (unknowns_from_unit(mean + sign * spread) for sign in (-1, 1))
+    known = np.array([one.is_identifiable for one in intervals])
+    return Numbers(unknowns_from_unit(mean), (above - below) / 2, low, high, known, LOW[:COUNT], HIGH[:COUNT])
 
 
-def _scatter(estimates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the standard deviation [3] over the frames; of one frame there is none to see."""
-    return np.asarray(estimates.std(axis=0, ddof=1) if len(estimates) > 1 else np.zeros(estimates.shape[1]))
+def with_numbers(numbers: Numbers, features: Mapping[str, float], origin: Origin) -> Estimate:
+    """Return the estimate of numbers; it says which of the unknowns the press does not determine."""
+    quantities: dict[str, Any] = numbers.quantities()
+    unknown = [SPOKEN[name] for name, one in quantities.items() if not one.identifiable]
+    reason = f"This press does not determine {' and '.join(unknown)}." if unknown else ""
+    status: EstimateStatus = "not_identifiable" if unknown else "ok"
+    return Estimate(**quantities, status=status, reason=reason, features=dict(features), **asdict(origin))
 
 
-def _verdict(identifiable: NDArray[np.bool_]) -> tuple[EstimateStatus, str]:
-    open_ones = [SPOKEN[name] for name, known in zip(UNKNOWNS, identifiable, strict=True) if not known]
-    if open_ones:
-        return "not_identifiable", f"This press does not determine {' and '.join(open_ones)}."
-    return "ok", ""
-
-
-def _without_answer(
-    status: EstimateStatus, reason: str, recording: Recording, bundle: ModelBundle, calibration: Calibration
-) -> Estimate:
+def without_numbers(status: EstimateStatus, reason: str, origin: Origin) -> Estimate:
+    """Return an estimate that says why there are no numbers."""
     unknown: dict[str, Any] = dict.fromkeys(UNKNOWNS, UNKNOWN_QUANTITY)
-    origin = _origin(recording, bundle, calibration)
-    return Estimate(**unknown, status=status, reason=reason, features={}, **origin)
-
-
-def _origin(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> dict[str, Any]:
-    return {
-        "mode": "paper",
-        "model": bundle.name,
-        "model_sha256": bundle.sha256,
-        "calibration_id": calibration.id,
-        "simulated": recording.simulated,
-    }
+    return Estimate(**unknown, status=status, reason=reason, features={}, **asdict(origin))

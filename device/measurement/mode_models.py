@@ -5,43 +5,42 @@ Only mode paper always has one. The others answer where their bundle is installe
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple, TypeVar
 
+from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.estimate import Estimate, estimate_recording
+from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode, mode_of
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.quick_mode.model import HeldModel, estimate_held
-from device.measurement.ramp_modes.estimate import estimate_profile
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.quick_mode.model import QuickModel, estimate_quick
+from device.measurement.ramp_modes.estimate import estimate_ramp
+from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from device.measurement.recording.recording import Recording
 
-Model = TypeVar("Model", HeldModel, ProfileModel)
+Model = TypeVar("Model", QuickModel, RampModel)
 
 
 class ModeModels(NamedTuple):
-    """`paper` of mode paper, `held` of quick, `profile` of standard and precise."""
+    """`paper` of mode paper, `quick` of quick, `ramp` of standard and precise."""
 
     paper: ModelBundle
-    held: HeldModel | None = None
-    profile: ProfileModel | None = None
+    quick: QuickModel | None = None
+    ramp: RampModel | None = None
 
     @property
     def modes(self) -> tuple[Mode, ...]:
         """The modes that have a model."""
-        quick: tuple[Mode, ...] = ("quick",) if self.held else ()
-        return (*quick, *(RAMP_MODES if self.profile else ()), "paper")
+        quick: tuple[Mode, ...] = ("quick",) if self.quick else ()
+        return (*quick, *(RAMP_MODES if self.ramp else ()), "paper")
 
     def for_probe(self, serial: str) -> ModeModels:
         """Return the models that are for one probe."""
-        return ModeModels(self.paper, _if_for(serial, self.held), _if_for(serial, self.profile))
+        return ModeModels(self.paper, _if_for(serial, self.quick), _if_for(serial, self.ramp))
 
     def prove(self) -> None:
         """Run the golden vectors of every model; raise `BundleRefused` when one of them does not hold any more."""
-        for model in (self.held, self.profile):
+        for model in (self.quick, self.ramp):
             if model:
                 model.prove()
         self.paper.prove()
@@ -51,12 +50,12 @@ class ModeModels(NamedTuple):
 
         Raises `InvalidQuantity` for a mode without a model, and as the mode's own estimate does.
         """
-        if mode == "quick" and self.held:
-            return estimate_held(recording, self.held, calibration)
-        if mode in RAMP_MODES and self.profile:
-            return estimate_profile(recording, mode, self.profile, calibration)
+        if mode == "quick" and self.quick:
+            return estimate_quick(recording, self.quick, calibration)
+        if mode in RAMP_MODES and self.ramp:
+            return estimate_ramp(recording, mode, self.ramp, calibration)
         if mode == "paper":
-            return estimate_recording(recording, self.paper, calibration)
+            return estimate_paper(recording, self.paper, calibration)
         raise InvalidQuantity(
             "mode", mode, f"one of {', '.join(self.modes)}", "choose one of them, or install its model"
         )
@@ -66,18 +65,6 @@ def analysed(recording: Recording, models: ModeModels, calibration: Calibration,
     """Return the estimate of a recording in a mode; by default in the one that reads most of its press frames."""
     of_frames = mode_of([frame.force_n for frame in recording.with_role("press")])
     return models.estimate(recording, mode or of_frames, calibration)
-
-
-def with_models(paper: ModelBundle, held: Path, profile: Path) -> ModeModels:
-    """Return the bundle of mode paper with the models of two folders, which may be missing.
-
-    Raises `BundleRefused` or `InvalidQuantity` when one that is there does not hold.
-    """
-    return ModeModels(paper, _if_there(held, HeldModel.load), _if_there(profile, ProfileModel.load))
-
-
-def _if_there(folder: Path, load: Callable[[Path], Model]) -> Model | None:
-    return load(folder) if folder.exists() else None
 
 
 def _if_for(serial: str, model: Model | None) -> Model | None:

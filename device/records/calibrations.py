@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import MissingCalibration
+from device.files.certificate_file import read_calibration
 from device.files.durable import write_durably
-from device.measurement.calibration import Calibration, read_calibration
+from device.measurement.calibration import Calibration
 from device.measurement.quantities import InvalidQuantity
 
 POINTER = "active"

@@ -22,6 +22,7 @@ import numpy as np
 
 from device import __version__
 from device.measurement.arrays import Array
+from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import (
     VALID_DAYS,
     Calibration,
@@ -31,10 +32,9 @@ from device.measurement.calibration import (
     moment,
     written,
 )
-from device.measurement.estimate import image_features
+from device.measurement.paper_mode.estimate import PAPER_UNITS, image_features
 from device.measurement.paper_mode.features import FeatureSettings
 from device.measurement.paper_mode.intervals import HeldOut
-from device.measurement.paper_mode.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import Frame
@@ -224,7 +224,7 @@ def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: fl
 
 def as_row(inclusion: Deformation) -> Array:
     """Return the deformation features in the model's order."""
-    return np.array([getattr(inclusion, name) for name in FEATURE_UNITS])
+    return np.array([getattr(inclusion, name) for name in PAPER_UNITS])
 
 
 def fit_line(x: Array, y: Array) -> tuple[Regression, Array]:

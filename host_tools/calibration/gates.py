@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from device.measurement.calibration import FORCE_TOLERANCE, Regression, Validity
 from device.measurement.estimate import SATURATED_RATIO
-from device.measurement.paper_mode.inversion import FEATURE_UNITS
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import saturated_ratio
@@ -23,8 +23,8 @@ from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 PHANTOMS_NEEDED = 6
 """The standard deviation of n residuals is itself uncertain by 1 / sqrt(2 (n - 1)): a third with six, a quarter with
 the paper's nine."""
-LEAST_R_SQUARED = dict(zip(FEATURE_UNITS, (0.95, 0.95, 0.85), strict=True))
-LARGEST_LEFT_OUT_RATIO = dict(zip(FEATURE_UNITS, (0.30, 0.30, 0.50), strict=True))
+LEAST_R_SQUARED = dict(zip(PAPER_UNITS, (0.95, 0.95, 0.85), strict=True))
+LARGEST_LEFT_OUT_RATIO = dict(zip(PAPER_UNITS, (0.30, 0.30, 0.50), strict=True))
 """Leave-one-out standard deviation over that of the phantoms' feature.
 
 R2 and this ratio of O1, O2, O3 on the nine phantoms of the simulated probe (`host_tools phantom`, `calibrate`): three
@@ -162,7 +162,7 @@ def _spread_gates(truths: Sequence[Inclusion]) -> list[Gate]:
 def fit_gates(lines: Sequence[Regression], features: NDArray[np.float64]) -> list[Gate]:
     """Return the gates of the three regressions; `features` [phantoms, 3] are the deformation features."""
     gates = []
-    for line, name, spread in zip(lines, FEATURE_UNITS, features.std(axis=0, ddof=1), strict=True):
+    for line, name, spread in zip(lines, PAPER_UNITS, features.std(axis=0, ddof=1), strict=True):
         action = "check the phantoms' truths, wipe face and phantoms, and press on the middle of each inclusion"
         r_squared, left_out = line.r_squared, line.leave_one_out_std / float(spread)
         gates += [

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from device.files.bundle_file import read_paper_model
 from device.files.durable import write_once
 from device.files.recording_file import read_recording
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.paper_mode.features import FEATURE_NAMES
-from device.measurement.paper_mode.inversion import FEATURE_UNITS, ModelBundle
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.surface_table import load_surface_table
 from host_tools.calibration.gates import CalibrationRejected, Gate
@@ -53,7 +54,7 @@ def calibrate(
     try:
         done = run_calibration(
             [read_recording(path) for path in recordings],
-            ModelBundle.load(model),
+            read_paper_model(model),
             load_surface_table(table),
             force_n=force_n,
             provenance=Provenance(operator, phantom_serial, valid_days=valid_days),
@@ -101,7 +102,7 @@ def _record(done: Calibrated, path: Path) -> dict[str, Any]:
 
 def _show(done: Calibrated, path: Path) -> None:
     certificate = done.certificate
-    for image, line, name in zip(FEATURE_NAMES, certificate.regressions, FEATURE_UNITS, strict=True):
+    for image, line, name in zip(FEATURE_NAMES, certificate.regressions, PAPER_UNITS, strict=True):
         law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"
         print(f"{law:76} R2 {line.r_squared:.5f}  leave-one-out {line.leave_one_out_std:.3g}")
     for gate in done.gates:

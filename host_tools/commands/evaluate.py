@@ -16,14 +16,16 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from device.files.bundle_file import read_models, read_paper_model, read_ramp_model
+from device.files.certificate_file import read_calibration
 from device.files.recording_file import read_recording
-from device.measurement.calibration import Calibration, read_calibration
+from device.measurement.bundle import ModelBundle
+from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode, mode_named
-from device.measurement.mode_models import ModeModels, analysed, with_models
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.mode_models import ModeModels, analysed
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.ramp_modes.model import RAMP_MODES
 from device.measurement.recording.recording import Recording
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
@@ -47,7 +49,7 @@ def print_reference(
     from host_tools.scores.posterior import SCENES, posterior_chapter
 
     modes = _ramp_modes(mode)
-    trained, tables = ProfileModel.load(model), ProbeTables.load(table)
+    trained, tables = read_ramp_model(model), ProbeTables.load(table)
     chapters: dict[str, Callable[[], Chapter]] = {}
     if noise_free:
         presses = PRESSES if scenes is None else scenes
@@ -88,7 +90,7 @@ def evaluate(
     mode: Annotated[str, typer.Option(help="quick, standard, precise or paper; that of the frames by default.")] = "",
     model: Annotated[Path, typer.Option(help="Bundle of mode paper.")] = MODELS / "paper",
     quick_model: Annotated[Path, typer.Option(help="Bundle of mode quick.")] = MODELS / "quick",
-    profile_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
+    ramp_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = PROBE,
     light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
     scenes: Annotated[
@@ -116,16 +118,14 @@ def evaluate(
     if noise_free or posterior:
         if recordings:
             raise InvalidQuantity("recordings", len(recordings), "none", "leave out --noise-free and --posterior")
-        print_reference(
-            profile_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed
-        )
+        print_reference(ramp_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed)
         return
     scenes = SCENES if scenes is None else scenes
     certificate = read_calibration(table / _certificate(light))
     if not recordings and asked in (None, "paper"):
-        _print_paper(ModelBundle.load(model), certificate, table, light, scenes, seed, out)
+        _print_paper(read_paper_model(model), certificate, table, light, scenes, seed, out)
         return
-    models = with_models(ModelBundle.load(model), quick_model, profile_model)
+    models = read_models(read_paper_model(model), quick_model, ramp_model)
 
     def answer(recording: Recording) -> Estimate:
         return analysed(recording, models, certificate, asked)
@@ -140,7 +140,7 @@ def _bound_of(models: ModeModels) -> LeastErrors:
     from host_tools.cramer_rao.press_bound import least_errors
     from host_tools.scores.score_recordings import unbounded
 
-    return partial(least_errors, models.profile.answers) if models.profile else unbounded
+    return partial(least_errors, models.ramp.answers) if models.ramp else unbounded
 
 
 def _certificate(light: str) -> str:

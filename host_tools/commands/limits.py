@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from device.files.bundle_file import read_ramp_model
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from host_tools.commands.measured_chapters import ROOT, shown
 from host_tools.commands.output import note, progress, require_writable
@@ -119,14 +120,13 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     if out is None or any(value is not None for value in given):
         raise InvalidQuantity("map", "asked for", "asked for with --out and no scene", "add --out docs/accuracy.md")
     require_writable(out, (".md",))
-    from device.measurement.ramp_modes.model import ProfileModel
     from host_tools.cramer_rao.accuracy_figure import draw_map
     from host_tools.cramer_rao.accuracy_map import inclusions, mapped_scene
     from host_tools.cramer_rao.accuracy_page import FIGURE, accuracy_facts
     from host_tools.cramer_rao.press_bound import beside_over_axis
     from host_tools.pages.page import FIGURES, Results, write_page
 
-    beside = beside_over_axis(ProfileModel.load(ROOT / "models" / "standard").answers)
+    beside = beside_over_axis(read_ramp_model(ROOT / "models" / "standard").answers)
     chosen, mapped = inclusions(), []
     with progress("scenes") as bar:
         task = bar.add_task("", total=len(chosen))

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from device.files.bundle_file import read_paper_model
 from device.files.recording_file import write_recording
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.bundle import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario, read_scenario
@@ -95,7 +96,7 @@ def _phantom_set(which: str, model: Path, scenes: int, seed: int) -> Iterator[Ph
         return random_set(scenes, seed)
     if which != "calibration":
         raise InvalidQuantity("set", repr(which), "calibration, breast-imager or random", "choose one of them")
-    return (Phantom(f"phantom{i}", truth) for i, truth in enumerate(phantoms_of(ModelBundle.load(model)), start=1))
+    return (Phantom(f"phantom{i}", truth) for i, truth in enumerate(phantoms_of(read_paper_model(model)), start=1))
 
 
 def phantoms_of(bundle: ModelBundle) -> list[Inclusion]:

@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
-from device.measurement.calibration import read_calibration
+from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
+from device.files.certificate_file import read_calibration
 from device.measurement.mode_models import ModeModels
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.quick_mode.model import HeldModel
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.ramp_modes.model import RAMP_MODES
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
 from host_tools.commands.output import note, require_writable
@@ -47,13 +46,13 @@ def modes(
 
     if out:
         require_writable(out, (".md",))
-    held, trained, tables = HeldModel.load(MODELS / "quick"), ProfileModel.load(model), ProbeTables.load(table)
-    models = ModeModels(ModelBundle.load(MODELS / "paper"), held, trained)
+    quick, trained, tables = read_quick_model(MODELS / "quick"), read_ramp_model(model), ProbeTables.load(table)
+    models = ModeModels(read_paper_model(MODELS / "paper"), quick, trained)
     calibration = read_calibration(table / "calibration.json")
     chapters = {
         "dial": lambda: dial_chapter(models, trained.bundle, calibration, tables),
         "coverage": lambda: coverage_chapter(
-            {"quick": held.bundle.card} | dict.fromkeys(RAMP_MODES, trained.bundle.card)
+            {"quick": quick.bundle.card} | dict.fromkeys(RAMP_MODES, trained.bundle.card)
         ),
         "posterior": lambda: posterior_chapter(trained),
         "noise-free": lambda: noise_free_chapter(trained.answers, tables),

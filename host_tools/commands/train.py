@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from device import __version__
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
+from device.measurement.bundle import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.commands.output import note, note_left_out, progress
 
@@ -102,7 +103,7 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
         )
     with _refusals():
         export(trained, out, software_version=__version__, training_command=command)
-    bundle = ModelBundle.load(out)
+    bundle = read_paper_model(out)
     print(f"{out}: {trials} networks from {len(rows.training_index)} scenes, model {bundle.sha256[:12]}")
     for unknown, errors in bundle.card["held_out_errors_percent"].items():
         if unknown in UNKNOWNS:
@@ -110,38 +111,37 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
 
 
 def _standard(table: Path, wide: Path | None, out: Path, seed: int, quick: bool, command: str) -> None:
-    from device.measurement.calibration import read_calibration
-    from device.measurement.ramp_modes.estimate import estimate_profile
-    from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+    from device.files.certificate_file import read_calibration
+    from device.measurement.ramp_modes.estimate import estimate_ramp
+    from device.measurement.ramp_modes.model import RAMP_MODES
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.export import export_profile
-    from host_tools.press_models.ramp_training import QUICK_EFFORT, Effort, train_profile
+    from host_tools.press_models.ramp_training import QUICK_EFFORT, Effort, train_ramp
     from host_tools.probe_tables.out_of_range_table import load_wide_table
     from host_tools.scores.dial import publish_dial
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
     effort = QUICK_EFFORT if quick else Effort()
-    trained = train_profile(tables, load_wide_table(wide or _wide()), effort=effort, seed=seed, say=note.print)
+    trained = train_ramp(tables, load_wide_table(wide or _wide()), effort=effort, seed=seed, say=note.print)
     with _refusals():
         export_profile(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
         )
     note.print("speed and accuracy of modes standard and precise")
-    model = ProfileModel.load(out)
+    model = read_ramp_model(out)
     publish_dial(
         out,
         RAMP_MODES,
-        lambda recording, mode: estimate_profile(recording, mode, model, calibration),
+        lambda recording, mode: estimate_ramp(recording, mode, model, calibration),
         tables,
     )
-    _print_modes(out, ProfileModel.load(out).bundle)
+    _print_modes(out, read_ramp_model(out).bundle)
 
 
 def _quick(table: Path, out: Path, seed: int, command: str) -> None:
-    from device.measurement.calibration import read_calibration
-    from device.measurement.quick_mode.model import HeldModel, estimate_held
-    from device.measurement.ramp_modes.model import ProfileModel
+    from device.files.certificate_file import read_calibration
+    from device.measurement.quick_mode.model import estimate_quick
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.export import export_quick
@@ -149,7 +149,7 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
     from host_tools.scores.dial import publish_dial
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
-    standard = ProfileModel.load(MODELS / "standard")
+    standard = read_ramp_model(MODELS / "standard")
     ramps = standard.answers
     trained = train_quick(tables, ramps.surrogate, ramps.noise["standard"], seed=seed, say=note.print)
     with _refusals():
@@ -162,9 +162,9 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
             training_command=command,
         )
     note.print("speed and accuracy of mode quick")
-    model = HeldModel.load(out)
-    publish_dial(out, ("quick",), lambda recording, _: estimate_held(recording, model, calibration), tables)
-    _print_modes(out, HeldModel.load(out).bundle)
+    model = read_quick_model(out)
+    publish_dial(out, ("quick",), lambda recording, _: estimate_quick(recording, model, calibration), tables)
+    _print_modes(out, read_quick_model(out).bundle)
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from device.measurement.arrays import Array
 from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, PARAMETERS, to_unit
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.model import ProfileAnswers
+from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
 from host_tools.cramer_rao.accuracy_map import MODULI_KPA, Triple, inclusions
 from host_tools.cramer_rao.information import cramer_rao
@@ -32,9 +32,7 @@ from host_tools.cramer_rao.information import cramer_rao
 BOX_STD: Array = np.full(len(PARAMETERS), EVEN_STD)
 
 
-def least_errors(
-    answers: ProfileAnswers, mode: Mode, truth: Inclusion, nuisances: Mapping[str, float] = NOMINAL
-) -> Array:
+def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: Mapping[str, float] = NOMINAL) -> Array:
     """Return the least standard deviations [3] in coordinates, which run from -1 to 1 (`press_parameters.to_unit`).
 
     nuisances: the true ones by their names in `PARAMETERS`; one that is not given is taken to be nominal. nan for a
@@ -51,7 +49,7 @@ def least_errors(
 OFFSETS_MM = (0.5, 1.0, 1.5, 2.0)
 
 
-def spread_of_modulus(answers: ProfileAnswers, inclusion: Triple, offset_mm: float) -> float:
+def spread_of_modulus(answers: RampAnswers, inclusion: Triple, offset_mm: float) -> float:
     """Return the bound of the modulus's coordinate, from -1 to 1 over its range, in mode standard.
 
     Tissue and skin are nominal; they, the place and the inclusion are known to lie in their ranges, each a Gaussian.
@@ -59,7 +57,7 @@ def spread_of_modulus(answers: ProfileAnswers, inclusion: Triple, offset_mm: flo
     return float(least_errors(answers, "standard", Inclusion(*inclusion), {"offset_mm": offset_mm})[MODULUS])
 
 
-def beside_over_axis(answers: ProfileAnswers) -> Array:
+def beside_over_axis(answers: RampAnswers) -> Array:
     """Return bounds of the modulus over those on the axis, [offsets, pairs of size and depth, moduli] of the map."""
     found = [
         [spread_of_modulus(answers, inclusion, offset_mm) for inclusion in inclusions()]

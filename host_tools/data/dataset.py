@@ -16,13 +16,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from device.measurement.paper_mode.inversion import FEATURE_UNITS
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.plan import SCHEMA, SCHEMA_OF_LOADS
 from host_tools.paper_network.train import MIN_TRAINING_ROWS, TrainingRows
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
-FEATURES = tuple(FEATURE_UNITS)
+FEATURES = tuple(PAPER_UNITS)
 L9 = np.array([(0, 0, 0), (0, 1, 1), (0, 2, 2), (1, 0, 1), (1, 1, 2), (1, 2, 0), (2, 0, 2), (2, 1, 0), (2, 2, 1)])
 PHANTOM_LOW, PHANTOM_HIGH = (5.0, 4.5, 50.0), (14.0, 10.0, 110.0)
 """Corners of the phantoms' part of the box: inclusions that can be made and that the probe can see."""

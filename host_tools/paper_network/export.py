@@ -21,8 +21,8 @@ from onnx import TensorProto, helper, numpy_helper
 
 from device.files.durable import sync_directory, write_and_sync
 from device.measurement.arrays import Array
-from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
-from device.measurement.paper_mode.inversion import FEATURE_UNITS, open_session
+from device.measurement.bundle import CARD_FILE, MODEL_FILE, SCHEMA, largest_deviation, open_session
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS
 from host_tools.paper_network.evaluate import ErrorTable
 from host_tools.paper_network.network import LAYERS, LOG_RATIOS, Ensemble, unpack
@@ -51,7 +51,8 @@ def export(trained: Trained, folder: Path, *, software_version: str, training_co
     """
     network = build_network(trained.ensemble)
     phantoms = held_out_features(trained)
-    verify_agreement(trained.ensemble, network, phantoms)
+    expected = trained.ensemble.estimate(phantoms)
+    agreed_outputs(network, phantoms, {"estimate": expected.estimate, "spread": expected.spread})
     command = training_command or f"python -m host_tools train --trials {trained.trials} --seed {trained.seed}"
     card = {
         "schema": SCHEMA,
@@ -127,16 +128,30 @@ def held_out_features(trained: Trained) -> Array:
     return trained.rows.features[trained.rows.phantom_index].astype(np.float32).astype(np.float64)
 
 
-def verify_agreement(ensemble: Ensemble, network: bytes, features: Array) -> None:
-    """Raise `ExportRefused` unless onnxruntime and NumPy agree within 1e-5 relative on features [n, 3]."""
-    found = open_session(network).run(["estimate", "spread"], {"features": features.astype(np.float32)})
-    for name, ours, theirs in zip(("estimate", "spread"), ensemble.estimate(features), found, strict=True):
-        worst = float(np.max(np.abs(theirs - ours) / np.abs(ours)))
-        if not worst <= AGREEMENT:
+def agreed_outputs(
+    network: bytes,
+    rows: Array,
+    expected: Mapping[str, Array],
+    *,
+    tolerance: float = AGREEMENT,
+    floor: float = 0.0,
+    of: str = "",
+) -> dict[str, Array]:
+    """Return what onnxruntime makes of rows [n, F], outputs [n, columns] by name: golden vectors are made of these.
+
+    Raises `ExportRefused` when NumPy's `expected` ones are further away than the tolerance: relative, magnitudes below
+    `floor` counting as this. `of` names the network in the refusal.
+    """
+    found = open_session(network).run(list(expected), {"features": rows.astype(np.float32)})
+    outputs = {name: np.asarray(one, np.float64) for name, one in zip(expected, found, strict=True)}
+    for name, ours in expected.items():
+        worst = largest_deviation(outputs[name], ours, floor)
+        if not worst <= tolerance:
             raise ExportRefused(
-                f"{name} of the exported network differs from NumPy by {worst:.2g} relative, but must agree within "
-                f"{AGREEMENT:g}: train anew, or check the installed onnx and onnxruntime. Nothing was written."
+                f"{name} of the exported network{of} differs from NumPy by {worst:.2g} relative, but must agree within "
+                f"{tolerance:g}: train anew, or check the installed onnx and onnxruntime. Nothing was written."
             )
+    return outputs
 
 
 def model_card(trained: Trained) -> dict[str, Any]:
@@ -144,7 +159,7 @@ def model_card(trained: Trained) -> dict[str, Any]:
     rows, scaling = trained.rows, trained.ensemble.scaling
     resolved = np.maximum(rows.features[rows.training_index], scaling.floor)  # below it the network sees no difference
     return {
-        "features": [{"name": name, "unit": FEATURE_UNITS[name]} for name in rows.feature_names],
+        "features": [{"name": name, "unit": PAPER_UNITS[name]} for name in rows.feature_names],
         "unknowns": list(UNKNOWNS),
         "architecture": {"layers": list(LAYERS), "hidden": "logistic", "output": "linear"},
         "trials": trained.trials,

@@ -16,7 +16,7 @@ from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.paper_mode.inversion import FEATURE_UNITS
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity, require
 from host_tools.paper_network import levenberg_marquardt, scaled_conjugate_gradient
 from host_tools.paper_network.network import (
@@ -185,7 +185,7 @@ def require_trials(trials: int) -> None:
 
 def require_usable(rows: TrainingRows) -> None:
     """Raise `InvalidQuantity` naming what keeps rows from training; see `train`."""
-    names = tuple(FEATURE_UNITS)
+    names = tuple(PAPER_UNITS)
     if rows.feature_names != names:
         action = "make the data set with this version of the toolkit"
         raise InvalidQuantity("feature_names", ", ".join(rows.feature_names), f"the three {', '.join(names)}", action)

@@ -16,26 +16,26 @@ from typing import Any
 import numpy as np
 
 from device.measurement.arrays import Array, Single
-from device.measurement.model_card import CARD_FILE, MODEL_FILE, SCHEMA
-from device.measurement.paper_mode.inversion import HELD_UNITS, PROFILE_UNITS
+from device.measurement.bundle import CARD_FILE, MODEL_FILE, SCHEMA
 from device.measurement.parameters import NUISANCES, RANGES
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.quick_mode.model import QUICK_UNITS
 from device.measurement.ramp_modes.ellipticity import COEFFICIENTS, DEGREES, ROUND_FILE, RoundSpot
-from device.measurement.ramp_modes.model import SURROGATE_FILE
+from device.measurement.ramp_modes.model import RAMP_UNITS, SURROGATE_FILE
 from device.measurement.ramp_modes.range_classifier import ENTRY, RANGE_FILE
 from host_tools.paper_network.export import write_folder
 from host_tools.press_models.mode_outcome import ModeOutcome
 from host_tools.press_models.mode_statistics import statistics
 from host_tools.press_models.onnx_networks import build_network, build_range_networks, golden_vectors, range_entry
 from host_tools.press_models.quick_training import QuickOutcome, TrainedQuick
-from host_tools.press_models.ramp_training import TrainedProfile
+from host_tools.press_models.ramp_training import TrainedRamp
 from host_tools.press_models.seeds import derived_seed
 
 GOLDEN_ROWS = 8
 
 
 def export_profile(
-    trained: TrainedProfile, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
+    trained: TrainedRamp, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
 ) -> None:
     """Write the bundle to `folder`, whole or not at all; raises `ExportRefused` when onnxruntime and NumPy differ.
 
@@ -53,8 +53,8 @@ def export_profile(
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
         "effort": asdict(trained.effort),
-        "features": [{"name": name, "unit": unit} for name, unit in PROFILE_UNITS.items()],
-        "training_range": _training_range(dict(zip(PROFILE_UNITS, trained.samples.rows.T, strict=True))),
+        "features": [{"name": name, "unit": unit} for name, unit in RAMP_UNITS.items()],
+        "training_range": _training_range(dict(zip(RAMP_UNITS, trained.samples.rows.T, strict=True))),
         "surrogate_error": _error(trained.surrogate_error),
         "round_error": _error(trained.round_error),
         "modes": {
@@ -91,8 +91,8 @@ def export_quick(
         "dataset_sha256": hashlib.sha256(trained.pool.rows.tobytes()).hexdigest(),
         "surrogate_sha256": surrogate_sha256,
         "effort": vars(trained.effort),
-        "features": [{"name": name, "unit": unit} for name, unit in HELD_UNITS.items()],
-        "training_range": _training_range(dict(zip(HELD_UNITS, _usual(trained).T, strict=True))),
+        "features": [{"name": name, "unit": unit} for name, unit in QUICK_UNITS.items()],
+        "training_range": _training_range(dict(zip(QUICK_UNITS, _usual(trained).T, strict=True))),
         "modes": {
             "quick": {
                 "faintest_contrast": list(trained.faintest_contrast),
@@ -141,7 +141,7 @@ def _text(card: dict[str, Any]) -> bytes:
     return (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
 
 
-def _surrogate_file(trained: TrainedProfile) -> bytes:
+def _surrogate_file(trained: TrainedRamp) -> bytes:
     arrays: dict[str, Any] = trained.surrogate.arrays()
     return _archive(arrays | {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()})
 

@@ -19,7 +19,7 @@ from device.measurement.parameters import to_unit
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.ellipticity import RoundSpot
 from device.measurement.ramp_modes.estimate import stands_out
-from device.measurement.ramp_modes.model import ProfileAnswers, RampAnswer
+from device.measurement.ramp_modes.model import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.noise import PressNoise
 from host_tools.press_models.confidence_belts import confidence_bands, widened
 from host_tools.press_models.noisy_presses import Pool
@@ -73,7 +73,7 @@ class ModeOutcome:
 def judged_mode(
     mode: Mode,
     ensemble: DenseEnsemble,
-    answers: ProfileAnswers,
+    answers: RampAnswers,
     pool: Pool,
     recorded: RecordedPresses,
     round_spot: RoundSpot,
@@ -138,16 +138,14 @@ def outcome_of(
 
 
 def answers_to(
-    mode: Mode, networks: EnsembleNetworks, answers: ProfileAnswers, rows: Array, jobs: int
+    mode: Mode, networks: EnsembleNetworks, answers: RampAnswers, rows: Array, jobs: int
 ) -> list[RampAnswer]:
     """Return what a mode makes of rows [n, P] for which `networks` give mean and spread, best fit and all."""
     mean, spread = networks(rows)
     return in_parallel(lambda i: answers.answer(rows[i], mode, mean[i], spread[i]), len(rows), jobs)
 
 
-def _answered(
-    mode: Mode, ensemble: DenseEnsemble, answers: ProfileAnswers, rows: Array, jobs: int
-) -> tuple[Array, Array]:
+def _answered(mode: Mode, ensemble: DenseEnsemble, answers: RampAnswers, rows: Array, jobs: int) -> tuple[Array, Array]:
     """Return mean and spread [n, 3]; mode standard needs no fit for them."""
     if mode == "standard":
         return ensemble.estimate(rows)

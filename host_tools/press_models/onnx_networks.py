@@ -15,10 +15,9 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.paper_mode.inversion import open_session
 from device.measurement.parameters import BY_RATIO, HIGH, LOW, unknowns_from_unit
 from device.measurement.quantities import UNKNOWNS
-from host_tools.paper_network.export import AGREEMENT, ExportRefused, OnnxGraph
+from host_tools.paper_network.export import AGREEMENT, OnnxGraph, agreed_outputs
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling
 from host_tools.press_models.train_ensemble import DenseEnsemble
 from host_tools.press_models.train_range import DEPTHS, SIZES, RangeNetwork, TrainedRange
@@ -75,19 +74,9 @@ def physical_estimate(ensemble: DenseEnsemble, rows: Array) -> tuple[Array, Arra
 
 def golden_vectors(ensemble: DenseEnsemble, network: bytes, rows: Array) -> dict[str, list[list[float]]]:
     """Return rows [n, P] and what the exported network answers; raises `ExportRefused` when NumPy answers otherwise."""
-    expected = physical_estimate(ensemble, rows)
-    found = open_session(network).run(["estimate", "spread"], {"features": rows.astype(np.float32)})
-    worst = max(float(np.max(np.abs(f - e) / np.abs(e))) for f, e in zip(found, expected, strict=True))
-    if not worst <= 20 * AGREEMENT:
-        found_and_bound = f"by {worst:.2g} relative, but must agree within {20 * AGREEMENT:.0g}"
-        raise ExportRefused(
-            f"The exported network differs from NumPy {found_and_bound}: nothing was written, train anew."
-        )
-    return {
-        "features": rows.tolist(),
-        "estimate": np.asarray(found[0], np.float64).tolist(),
-        "spread": np.asarray(found[1], np.float64).tolist(),
-    }
+    expected = dict(zip(("estimate", "spread"), physical_estimate(ensemble, rows), strict=True))
+    found = agreed_outputs(network, rows, expected, tolerance=20 * AGREEMENT)
+    return {"features": rows.tolist()} | {name: one.tolist() for name, one in found.items()}
 
 
 def build_range_networks(networks: Mapping[Mode, RangeNetwork]) -> bytes:
@@ -104,6 +93,8 @@ def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str,
 
     Raises `ExportRefused` when onnxruntime and NumPy differ.
     """
+    expected: dict[str, Array] = {mode: one.log_odds(rows)[:, None] for mode, one in trained.networks.items()}
+    golden = agreed_outputs(network, rows, expected, tolerance=20 * AGREEMENT, floor=1.0, of=" of the ranges")
     return {
         "sha256": hashlib.sha256(network).hexdigest(),
         "size_mm": list(SIZES),
@@ -114,17 +105,5 @@ def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str,
             "largest": float(trained.surrogate_error.max()),
             "mean": float(trained.surrogate_error.mean()),
         },
-        "golden": {mode: _golden(mode, one, network, rows) for mode, one in trained.networks.items()},
+        "golden": {mode: [float(one) for one in column[:, 0]] for mode, column in golden.items()},
     }
-
-
-def _golden(mode: Mode, ours: RangeNetwork, network: bytes, rows: Array) -> list[float]:
-    found = np.asarray(open_session(network).run([mode], {"features": rows.astype(np.float32)})[0], np.float64)[:, 0]
-    expected = ours.log_odds(rows)
-    worst = float(np.max(np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)))
-    if not worst <= 20 * AGREEMENT:
-        raise ExportRefused(
-            f"The exported network of the ranges in mode {mode} differs from NumPy by {worst:.2g}, but must agree "
-            f"within {20 * AGREEMENT:.0g}: nothing was written, train anew."
-        )
-    return [float(one) for one in found]

@@ -20,7 +20,7 @@ from device.measurement.confidence_belt import Bands
 from device.measurement.parameters import to_unit
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import SEEN_BY
-from device.measurement.quick_mode.profile import HELD_FORCES_N, HeldPress, held_press
+from device.measurement.quick_mode.profile import QUICK_FORCES_N, QuickPress, quick_press
 from device.measurement.ramp_modes.estimate import VISIBLE_DEVIATIONS
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, smooth_ring_errors
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
@@ -39,7 +39,7 @@ from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 
 
 @dataclass(frozen=True, eq=False)
-class HeldPool:
+class QuickPool:
     """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
 
     unit: Single
@@ -62,7 +62,7 @@ class HeldPool:
 
     def typical_noise(self) -> Array:
         """Return the covariance [12, 12] of the noise of a row without an inclusion."""
-        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(HELD_FORCES_N))
+        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(QUICK_FORCES_N))
         covariance = np.zeros((RINGS + 1, RINGS + 1))
         covariance[:RINGS, :RINGS] = self.camera + self._smooth() + self.levels.gain_ratio**2 + zero_ratio**2
         covariance[RINGS, RINGS] = self.levels.zero_n**2
@@ -73,13 +73,13 @@ class HeldPool:
         return flat + model + 1e-14 * np.eye(RINGS)
 
 
-def held_pool(pool: Pool, camera: Array, seed: int) -> HeldPool:
+def quick_pool(pool: Pool, camera: Array, seed: int) -> QuickPool:
     """Return a pool of ramps as held presses, each at a random force."""
-    force_n = np.random.default_rng([seed, 2]).uniform(*HELD_FORCES_N, len(pool.rows))
-    return HeldPool(pool.unit, held_rows(pool.rows, force_n).astype(np.float32), camera)
+    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(pool.rows))
+    return QuickPool(pool.unit, quick_rows(pool.rows, force_n).astype(np.float32), camera)
 
 
-def held_rows(rows: Single | Array, force_n: Array) -> Array:
+def quick_rows(rows: Single | Array, force_n: Array) -> Array:
     """Return the rows [n, 12] of presses held at forces [n], for profile rows [n, P]."""
     powers = np.vander(PROFILE_FORCES_N, increasing=True)
     weights = np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers)
@@ -119,7 +119,7 @@ class TrainedQuick:
     """All parts of the bundle."""
 
     ensemble: DenseEnsemble
-    pool: HeldPool
+    pool: QuickPool
     faintest_contrast: tuple[float, ...]
     outcome: QuickOutcome
     effort: QuickEffort
@@ -148,9 +148,9 @@ def train_quick(
     """Return the trained parts; `noise` is of mode standard, whose camera's part is replaced by that of one frame."""
     asked = effort or QuickEffort()
 
-    def held(count: int, purpose: str) -> HeldPool:
+    def held(count: int, purpose: str) -> QuickPool:
         drawn = derived_seed(seed, purpose)
-        return held_pool(random_pool(surrogate, noise, count, drawn), camera, drawn)
+        return quick_pool(random_pool(surrogate, noise, count, drawn), camera, drawn)
 
     say(f"{asked.recordings} recordings of held presses")
     camera = _camera(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)
@@ -172,8 +172,8 @@ def recorded_holds(tables: ProbeTables, count: int, seed: int, levels: ErrorLeve
     """Return what mode quick reads of random presses that are recorded."""
     parameters = draw_parameters(count, np.random.default_rng(seed))
 
-    def read(i: int) -> HeldPress:
-        return held_press(recorded_press(tables, parameters[i], "quick", press_seed(seed, i), levels=levels))
+    def read(i: int) -> QuickPress:
+        return quick_press(recorded_press(tables, parameters[i], "quick", press_seed(seed, i), levels=levels))
 
     rows, elongation = zip(*in_parallel(read, count, jobs), strict=True)
     return RecordedHolds(parameters, np.array(rows), np.array(elongation))
@@ -184,7 +184,7 @@ def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
     recorded = recorded_holds(tables, count, seed, EXACT, jobs)
     parameters = recorded.parameters
     ramps = np.array(in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], count, jobs))
-    exact = held_rows(ramps, recorded.rows[:, RINGS])
+    exact = quick_rows(ramps, recorded.rows[:, RINGS])
     return shrunk_covariance((recorded.rows - exact)[:, :RINGS] / (1 + exact[:, :RINGS]))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
 from device.measurement.ramp_modes.ellipticity import RoundSpot
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileAnswers
+from device.measurement.ramp_modes.model import RAMP_MODES, RampAnswers
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.surrogate import PressSurrogate
 from device.simulation.virtual_probe import ProbeTables
@@ -58,7 +58,7 @@ QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40, RangeEf
 
 
 @dataclass(frozen=True, eq=False)
-class TrainedProfile:
+class TrainedRamp:
     """All parts of the bundle."""
 
     surrogate: PressSurrogate
@@ -74,7 +74,7 @@ class TrainedProfile:
     seed: int
 
 
-def train_profile(
+def train_ramp(
     tables: ProbeTables,
     wide: WideTable,
     *,
@@ -82,7 +82,7 @@ def train_profile(
     seed: int = 1,
     jobs: int = -1,
     say: Callable[[str], None] = lambda step: None,
-) -> TrainedProfile:
+) -> TrainedRamp:
     """Return the trained parts; `wide` are faces around the trained ranges, `say` hears what begins.
 
     The same seed gives the same parts whatever `jobs`.
@@ -109,16 +109,16 @@ def train_profile(
     pool = random_pool(surrogate, noise["standard"], asked.pool, derived_seed(seed, "training presses"))
     ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     ranges = train_range(tables, wide, noise, effort=asked.ranges, seed=seed, jobs=jobs, say=say)
-    answers = ProfileAnswers(surrogate, noise)
+    answers = RampAnswers(surrogate, noise)
     outcomes = judged(tables, ensemble, answers, ranges, round_spot, asked, seed=seed, jobs=jobs, say=say)
     errors = held_out_error(surrogate, kept), held_out_second_harmonics(round_spot, kept)
-    return TrainedProfile(surrogate, *errors, noise, ensemble, ranges, round_spot, outcomes, samples, asked, seed)
+    return TrainedRamp(surrogate, *errors, noise, ensemble, ranges, round_spot, outcomes, samples, asked, seed)
 
 
 def judged(
     tables: ProbeTables,
     ensemble: DenseEnsemble,
-    answers: ProfileAnswers,
+    answers: RampAnswers,
     ranges: TrainedRange,
     round_spot: RoundSpot,
     effort: Effort,

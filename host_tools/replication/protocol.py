@@ -20,7 +20,7 @@ from enum import Enum
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.estimate import image_features
+from device.measurement.paper_mode.estimate import image_features
 from device.measurement.paper_mode.features import FeatureSettings, extract_features
 from device.measurement.quantities import Inclusion
 from device.measurement.recording.tactile_image import FLOOR_COUNTS, Image, TactileImage

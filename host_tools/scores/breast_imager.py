@@ -16,8 +16,8 @@ from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
 from device.measurement.parameters import NOMINAL, PARAMETERS
-from device.measurement.ramp_modes.estimate import estimate_profile
-from device.measurement.ramp_modes.model import ProfileModel
+from device.measurement.ramp_modes.estimate import estimate_ramp
+from device.measurement.ramp_modes.model import RampModel
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.surrogate import MODULUS, SIZE
 from device.simulation.physics.surface_table import PressRamps
@@ -41,7 +41,7 @@ REPEATS = 3
 
 
 def breast_imager_chapter(
-    model: ProfileModel, calibration: Calibration, tables: ProbeTables, modes: Sequence[Mode], *, jobs: int = -1
+    model: RampModel, calibration: Calibration, tables: ProbeTables, modes: Sequence[Mode], *, jobs: int = -1
 ) -> Chapter:
     """Return the errors in size, and whether the intervals of the modulus cover."""
     phantoms = list(breast_imager())
@@ -99,7 +99,7 @@ def _bounds(phantoms: Sequence[Phantom], modes: Sequence[Mode], best: Array) -> 
 
 
 def estimates(
-    model: ProfileModel,
+    model: RampModel,
     calibration: Calibration,
     tables: ProbeTables,
     mode: Mode,
@@ -114,7 +114,7 @@ def estimates(
         recorded_press(tables, parameters, mode, number, levels=ErrorLevels(), ramps=ramps)
         for number in range(seed, seed + REPEATS)
     )
-    return [estimate_profile(recording, mode, model, calibration) for recording in recordings]
+    return [estimate_ramp(recording, mode, model, calibration) for recording in recordings]
 
 
 def _judged(

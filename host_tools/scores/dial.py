@@ -18,12 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from device.measurement.bundle import CARD_FILE, ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import SPOKEN, Estimate, Quantity
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.mode_models import ModeModels
-from device.measurement.model_card import CARD_FILE
-from device.measurement.paper_mode.inversion import ModelBundle
 from device.measurement.parameters import EVEN_STD, HIGH, LOW
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.ramp_modes.noise import ErrorLevels

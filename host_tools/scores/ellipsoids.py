@@ -24,7 +24,7 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import HIGH, to_unit
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.virtual_probe import ProbeTables
@@ -68,7 +68,7 @@ def draw_oblong(count: int, rng: np.random.Generator) -> list[Oblong]:
     ]
 
 
-def round_deviations(solved: ProbeTables, parameters: Array, model: ProfileModel, mode: Mode) -> float:
+def round_deviations(solved: ProbeTables, parameters: Array, model: RampModel, mode: Mode) -> float:
     """Return how many standard deviations a press [9] of an ellipsoid, without noise, lies from any round one."""
     rows, second = exact_presses(solved, parameters[None])
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise[mode])
@@ -83,7 +83,7 @@ def most_flagged(deviations: Array, false_flags: float) -> Array:
 
 
 def twin_of(
-    posterior: PressPosterior, second: Array, sphere: Array, model: ProfileModel, mode: Mode
+    posterior: PressPosterior, second: Array, sphere: Array, model: RampModel, mode: Mode
 ) -> tuple[Array, float]:
     """Return coordinates [9] and distance in standard deviations of the round inclusion nearest to row and harmonics.
 
@@ -121,7 +121,7 @@ HEADER = ("mode", "width (mm)", "depth (mm)", "modulus (kPa)", "times as long", 
 SUMMARY = ("mode", f"ellipsoids refused ({SKINS * ELLIPSOIDS})", "most that a test can flag")
 
 
-def oblong_chapter(answer: EstimateOf, model: ProfileModel, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
+def oblong_chapter(answer: EstimateOf, model: RampModel, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
     """Return how often presses of each ellipsoid are refused; mode quick is shown and not judged."""
     seed = derived_seed(1, "oblong")
     rng = np.random.default_rng(seed)
@@ -166,7 +166,7 @@ def _is_refused(
     return answer(recording, mode).size_mm.value is None
 
 
-def _apart(solved: Sequence[ProbeTables], parameters: Array, model: ProfileModel, mode: Mode, number: int) -> float:
+def _apart(solved: Sequence[ProbeTables], parameters: Array, model: RampModel, mode: Mode, number: int) -> float:
     return round_deviations(solved[number // SKINS], parameters[number], model, mode)
 
 

@@ -26,9 +26,9 @@ from device.measurement.estimate import Estimate, Quantity
 from device.measurement.mode import Mode
 from device.measurement.parameters import HIGH, LOW, NOMINAL, PARAMETERS, from_unit
 from device.measurement.quantities import UNKNOWNS, Inclusion
-from device.measurement.ramp_modes.estimate import estimate_profile
+from device.measurement.ramp_modes.estimate import estimate_ramp
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.simulation.physics.surface_table import PressRamps, Ramp
 from device.simulation.virtual_probe import ProbeTables
@@ -126,9 +126,7 @@ HEADER = ("mode", "size (mm)", "depth (mm)", "modulus (kPa)", "looks like: size"
           "of the others: size holds", "depth holds", "modulus holds")  # fmt: skip
 
 
-def just_outside_chapter(
-    model: ProfileModel, calibration: Calibration, tables: ProbeTables, *, jobs: int = -1
-) -> Chapter:
+def just_outside_chapter(model: RampModel, calibration: Calibration, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
     """Return how alike to an inclusion inside, and how often refused, each of `INCLUSIONS` is in standard and
     precise.
     """
@@ -158,13 +156,13 @@ def just_outside_chapter(
     )
 
 
-def _twin(model: ProfileModel, mode: Mode, tables: ProbeTables, ramps: Sequence[PressRamps], number: int) -> Twin:
+def _twin(model: RampModel, mode: Mode, tables: ProbeTables, ramps: Sequence[PressRamps], number: int) -> Twin:
     row = profile_rows(tables, at_nominal(INCLUSIONS[number])[None], ramps=ramps[number])[0]
     return nearest_twin(PressPosterior(row, model.answers.surrogate, model.answers.noise[mode]), seed=number)
 
 
 def _press(
-    model: ProfileModel,
+    model: RampModel,
     calibration: Calibration,
     tables: ProbeTables,
     mode: Mode,
@@ -175,7 +173,7 @@ def _press(
     inclusion = number // PRESSES
     at, of_press = at_nominal(INCLUSIONS[inclusion]), press_seed(seed, number)
     recording = recorded_press(tables, at, mode, of_press, levels=ErrorLevels(), ramps=ramps[inclusion])
-    return estimate_profile(recording, mode, model, calibration)
+    return estimate_ramp(recording, mode, model, calibration)
 
 
 def _judged(mode: Mode, inclusion: Inclusion, twin: Twin, found: Sequence[Estimate]) -> list[Benchmark]:

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from device.measurement.arrays import Array
 from device.measurement.parameters import from_unit, to_unit
 from device.measurement.quantities import UNKNOWNS, Bound, require
-from device.measurement.ramp_modes.model import ProfileAnswers
+from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, PressSurrogate
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Chapter, Table, at_most
@@ -37,7 +37,7 @@ STARTS = tuple(product((-0.5, 0.5), (-0.5, 0.5), (-0.7, 0.0, 0.7)))
 
 
 def noise_free_chapter(
-    answers: ProfileAnswers, tables: ProbeTables, *, presses: int = PRESSES, seed: int = 1, jobs: int = -1
+    answers: RampAnswers, tables: ProbeTables, *, presses: int = PRESSES, seed: int = 1, jobs: int = -1
 ) -> Chapter:
     """Return the errors of size, depth and modulus from exact rows, columns weighed as the camera knows them.
 

@@ -14,9 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from device.measurement.arrays import Array
+from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.estimate import SPOKEN, Estimate, estimate_recording, image_features
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.estimate import SPOKEN, Estimate
+from device.measurement.paper_mode.estimate import estimate_paper, image_features
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.recording.recording import Recording
 from device.simulation.scenario import Scenario
@@ -50,7 +51,7 @@ class Rig:
 
     def through_camera(self, truth: Inclusion, seed: int) -> Estimate:
         """Return the device's answer to a recording with fresh noise."""
-        return estimate_recording(self.recording(truth, seed), self.bundle, self.calibration)
+        return estimate_paper(self.recording(truth, seed), self.bundle, self.calibration)
 
     def recording(self, truth: Inclusion, seed: int) -> Recording:
         """Return a recording of one phantom with fresh noise."""

@@ -17,7 +17,7 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import PARAMETERS
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileModel
+from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from host_tools.pages.benchmark import Chapter, Table, at_most
 from host_tools.press_models.noisy_presses import random_pool
 from host_tools.press_models.recorded_presses import in_parallel
@@ -49,7 +49,7 @@ class OneScene(NamedTuple):
 
 
 def posterior_chapter(
-    model: ProfileModel,
+    model: RampModel,
     *,
     modes: Sequence[Mode] = RAMP_MODES,
     seed: int = 1,
@@ -88,7 +88,7 @@ def posterior_chapter(
     )
 
 
-def compared(model: ProfileModel, mode: Mode, *, seed: int, scenes: int, jobs: int) -> list[OneScene]:
+def compared(model: RampModel, mode: Mode, *, seed: int, scenes: int, jobs: int) -> list[OneScene]:
     """Return a mode's answers to random presses of the forward model, beside the reference posterior."""
     answers = model.answers
     pool = random_pool(answers.surrogate, answers.noise[mode], scenes, seed)

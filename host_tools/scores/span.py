@@ -14,7 +14,7 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import to_unit
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.fit import EVENLY_HELD
-from device.measurement.ramp_modes.model import RAMP_MODES, ProfileAnswers
+from device.measurement.ramp_modes.model import RAMP_MODES, RampAnswers
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Chapter, at_most
 from host_tools.press_models.press_samples import draw_parameters, profile_rows
@@ -26,7 +26,7 @@ NEGLIGIBLE = 0.2
 """A shift of so many stated spreads makes errors 2 % larger: they add as squares."""
 
 
-def span_chapter(answers: ProfileAnswers, tables: ProbeTables) -> Chapter:
+def span_chapter(answers: RampAnswers, tables: ProbeTables) -> Chapter:
     """Return by how many of their stated spreads answers shift, root mean square over random presses."""
     parameters = draw_parameters(PRESSES, np.random.default_rng(derived_seed(1, "span")))
     change = profile_rows(tables, parameters, span_ratio=1 + SPAN_ERROR_RATIO) - profile_rows(tables, parameters)
@@ -46,7 +46,7 @@ def span_chapter(answers: ProfileAnswers, tables: ProbeTables) -> Chapter:
     )
 
 
-def _shift(answers: ProfileAnswers, mode: Mode, unit: Array, change: Array) -> Array:
+def _shift(answers: RampAnswers, mode: Mode, unit: Array, change: Array) -> Array:
     """Return the shift of the linearised answer to one press over its spread [3], for a change [P] of its row."""
     row, jacobian = answers.surrogate.rows_and_jacobian(unit)
     weighted = np.linalg.solve(answers.noise[mode].covariance(row), jacobian)

@@ -11,7 +11,7 @@ from daemon_process import ROOT
 from device import __main__ as command_line
 from device.__main__ import main
 from device.files.recording_file import write_recording
-from device.measurement.estimate import estimate_recording
+from device.measurement.paper_mode.estimate import estimate_paper
 from device.settings.last_good import NAME
 from device.web.events import snapshot
 
@@ -169,7 +169,7 @@ def test_a_real_probe_lists_every_part_that_failed_at_once(run, models, tmp_path
 def test_analyse_prints_each_estimate_as_one_line_of_json(run, folder, recording, bundle, calibration):
     code, out, errors = run("analyse", folder, folder)
     assert (code, errors) == (0, [])
-    expected = json.loads(json.dumps(estimate_recording(recording, bundle, calibration).as_record()))
+    expected = json.loads(json.dumps(estimate_paper(recording, bundle, calibration).as_record()))
     assert [json.loads(line) for line in out] == [{"recording": str(folder), **expected}] * 2
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from toolkit_process import run_toolkit
 
+from device.files.certificate_file import read_calibration
 from device.files.recording_file import write_recording
-from device.measurement.calibration import read_calibration
 from device.measurement.quantities import Inclusion
 from device.simulation.scenario import Scenario
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording

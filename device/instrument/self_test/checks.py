@@ -24,12 +24,10 @@ from numpy.typing import NDArray
 
 from device.config import Config
 from device.errors import ModelError, StorageError
+from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
 from device.instrument.self_test.report import CheckResult, broken, judged, not_tested
-from device.measurement.model_card import BundleRefused
-from device.measurement.paper_mode.inversion import GOLDEN_TOLERANCE, ModelBundle
+from device.measurement.bundle import GOLDEN_TOLERANCE, BundleRefused, ModelBundle
 from device.measurement.quantities import Bound, InvalidQuantity
-from device.measurement.quick_mode.model import HeldModel
-from device.measurement.ramp_modes.model import ProfileModel
 from device.measurement.recording.led_sides import SIDES
 from device.measurement.recording.tactile_image import Counts
 from device.records.store import Store
@@ -213,9 +211,9 @@ REINSTALL = "Install the bundle again."
 def model_results(config: Config, folder_of: Callable[[Path], Path]) -> list[CheckResult]:
     """Return one result a model; `folder_of` says where an installed one lies."""
     loaders: dict[Path, Callable[[Path], ModelBundle]] = {
-        config.model: ModelBundle.load,
-        config.quick_model: lambda folder: HeldModel.load(folder).bundle,
-        config.profile_model: lambda folder: ProfileModel.load(folder).bundle,
+        config.model: read_paper_model,
+        config.quick_model: lambda folder: read_quick_model(folder).bundle,
+        config.profile_model: lambda folder: read_ramp_model(folder).bundle,
     }
     return [_result(installed.name, folder_of(installed), load) for installed, load in loaders.items()]
 

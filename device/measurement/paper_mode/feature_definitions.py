@@ -6,7 +6,7 @@ Source: docs/measurement.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 
@@ -25,14 +25,14 @@ INCLUSION_FIELD_FEATURES: Mapping[str, Definition] = {
 }
 """Of the face's displacement, which the network of mode paper reads; a probe regresses them from `features`."""
 
-PROFILE_FEATURES: Mapping[str, Definition] = {
+RADIAL_PROFILE_FEATURES: Mapping[str, Definition] = {
     "contrast": Definition("1", "Mean contrast on a ring of the face: at four forces, on rings 0.9 mm apart."),
     "growth": Definition("1", "Logarithm of the inclusion-free light at a force over that at the largest, on a ring."),
     "offset": Definition("1", "First harmonic of the contrast on a ring, towards the bright side; mean over the ramp."),
 }
 """What the names of a press profile's row begin with (`press_profile`)."""
 
-HELD_FEATURES: Mapping[str, Definition] = {
+QUICK_FEATURES: Mapping[str, Definition] = {
     "contrast": Definition("1", "Mean contrast on a ring of the face, at the force of the hold."),
     "force_n": Definition("N", "Mean force of the hold."),
 }
@@ -45,3 +45,8 @@ def definition_of(name: str, group: Mapping[str, Definition]) -> Definition:
         if name == stem or name.startswith(f"{stem}_"):
             return definition
     raise KeyError(name)
+
+
+def units_of(names: Iterable[str], group: Mapping[str, Definition]) -> dict[str, str]:
+    """Return the unit of each name, in order: the features of a model; raises `KeyError` as `definition_of`."""
+    return {name: definition_of(name, group).unit for name in names}

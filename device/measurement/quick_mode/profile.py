@@ -18,29 +18,29 @@ from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import reference_light
 from device.measurement.recording.ring_means import RING_RADII_MM, RingMeans, ring_weights
 
-HELD_FORCES_N = 0.44, 0.56
+QUICK_FORCES_N = 0.44, 0.56
 """Mean forces of a hold that the network has learnt from; `press.target_n` is 0.5 N."""
 AGAIN = "hold 0.5 N beside the lesion and on it"
-HELD_NAMES = (*(f"contrast_{r:.1f}_mm" for r in RING_RADII_MM), "force_n")
+QUICK_NAMES = (*(f"contrast_{r:.1f}_mm" for r in RING_RADII_MM), "force_n")
 
 
-class HeldPress(NamedTuple):
-    """Contrast on the rings and mean force [12], in the order of `HELD_NAMES`; and the `roundness.elongation_ratio`."""
+class QuickPress(NamedTuple):
+    """Contrast on the rings and mean force [12], in the order of `QUICK_NAMES`; and `roundness.elongation_ratio`."""
 
     row: Array
     elongation_ratio: float
 
 
-def held_press(recording: Recording) -> HeldPress:
+def quick_press(recording: Recording) -> QuickPress:
     """Return what a recording shows, mean over its press frames.
 
-    Raises `InvalidQuantity` when a role is missing or a press was not held within `HELD_FORCES_N`.
+    Raises `InvalidQuantity` when a role is missing or a press was not held within `QUICK_FORCES_N`.
     """
     reference, press = lights_of(recording)
     for name, force_n in (("reference", reference.force_n), ("press", press.force_n)):
         if not len(force_n):
             raise InvalidQuantity(f"{name} frames", 0, "at least one", AGAIN)
-        require(f"mean {name} force", float(np.mean(force_n)), Bound(*HELD_FORCES_N, "N"), AGAIN)
+        require(f"mean {name} force", float(np.mean(force_n)), Bound(*QUICK_FORCES_N, "N"), AGAIN)
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
     weights = ring_weights(press.images[0].shape, press.scale)
     frames = [
@@ -49,4 +49,4 @@ def held_press(recording: Recording) -> HeldPress:
     ]
     rings = RingMeans(*(np.array(part) for part in zip(*frames, strict=True)))
     row = np.append(rings.mean.mean(axis=0), np.mean(press.force_n))
-    return HeldPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))
+    return QuickPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))

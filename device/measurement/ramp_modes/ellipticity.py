@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
@@ -29,7 +30,6 @@ from device.measurement.ramp_modes.surrogate import (
     DEPTH,
     OFFSET,
     SIZE,
-    UNREADABLE,
     PressSurrogate,
     far_field_strength,
     polynomial_coordinates,
@@ -98,19 +98,19 @@ def stretched(contrast: Array) -> Array:
     return np.asarray((RING_RADII_MM * slope_per_mm)[:, 1:-1].ravel())
 
 
-def load_round_spot(path: Path, surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> RoundSpot:
-    """Read the file of a bundle; raise `InvalidQuantity` when a part is missing or of another shape."""
-    names = (DEGREES, COEFFICIENTS, *(f"camera_{mode}" for mode in modes))
-    action = "install the model bundle again"
-    try:
-        with path.open("rb") as stream, np.load(stream) as file:
-            degrees, coefficients, *cameras = (np.asarray(file[name]) for name in names)
-    except UNREADABLE as error:
-        raise InvalidQuantity("second harmonics", path, f"a .npz with {', '.join(names)}", action) from error
+def round_arrays(modes: tuple[Mode, ...]) -> tuple[str, ...]:
+    """Return the names of the arrays in the file of a bundle."""
+    return DEGREES, COEFFICIENTS, *(f"camera_{mode}" for mode in modes)
+
+
+def round_spot_of(arrays: Mapping[str, NDArray[Any]], surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> RoundSpot:
+    """Return what the arrays of `round_arrays` say; raise `InvalidQuantity` when one is of another shape."""
+    degrees, coefficients, *cameras = (arrays[name] for name in round_arrays(modes))
     shapes = [one.shape for one in (degrees, coefficients, *cameras)]
     square = (SECOND_COLUMNS, SECOND_COLUMNS)
     expected = [(len(degrees), len(PARAMETERS)), (len(degrees), SECOND_COLUMNS), *[square] * len(modes)]
     if shapes != expected:
+        action = "install the model bundle again"
         raise InvalidQuantity("shapes of the second harmonics", shapes, str(expected), action)
     second = LegendreSum(degrees, coefficients.astype(np.float64))
     camera = dict(zip(modes, (one.astype(np.float64) for one in cameras), strict=True))

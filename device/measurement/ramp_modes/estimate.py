@@ -11,11 +11,18 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.calibration import Calibration
-from device.measurement.estimate import Estimate
-from device.measurement.interval_estimate import origin_of, saturation, with_numbers, without_numbers
+from device.measurement.estimate import (
+    Estimate,
+    numbers_in_bands,
+    origin_of,
+    require_trained_for,
+    saturation,
+    with_numbers,
+    without_numbers,
+)
 from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RAMP_MODES, ModeLimits, ProfileModel
+from device.measurement.ramp_modes.model import RAMP_MODES, ModeLimits, RampModel
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, press_profile
 from device.measurement.recording.recording import Recording
@@ -25,7 +32,7 @@ VISIBLE_DEVIATIONS = 4.0
 """An inclusion stands out when its contrast lies so many standard deviations above none."""
 
 
-def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, calibration: Calibration) -> Estimate:
+def estimate_ramp(recording: Recording, mode: Mode, model: RampModel, calibration: Calibration) -> Estimate:
     """Return the estimate of a recording in mode standard or precise.
 
     Raises `InvalidQuantity` for another mode, a probe or pixel size that model and certificate are not for, or a
@@ -33,6 +40,7 @@ def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, cali
     """
     if mode not in RAMP_MODES:
         raise InvalidQuantity("mode", mode, f"one of {', '.join(RAMP_MODES)}", "choose one that reads a force ramp")
+    require_trained_for(recording, model.bundle, calibration)
     origin = origin_of(recording, mode, model.bundle, calibration)
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin)
@@ -53,7 +61,7 @@ def estimate_profile(recording: Recording, mode: Mode, model: ProfileModel, cali
     }
     if answer.tissue_kpa:
         features |= dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
-    return with_numbers(answer.mean, answer.spread, limits.bands, features, origin)
+    return with_numbers(numbers_in_bands(answer.mean, answer.spread, limits.bands), features, origin)
 
 
 def stands_out(row: Array, noise: PressNoise) -> bool:

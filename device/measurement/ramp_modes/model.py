@@ -9,29 +9,30 @@ Source of the format: docs/contracts.md.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.confidence_belt import Bands
+from device.measurement.bundle import BundleRefused, ModelBundle
+from device.measurement.confidence_belt import Bands, bands_of
 from device.measurement.mode import Mode
-from device.measurement.model_card import BundleRefused
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.measurement.paper_mode.feature_definitions import RADIAL_PROFILE_FEATURES, units_of
 from device.measurement.parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.ramp_modes.ellipticity import ROUND_FILE, RoundSpot, load_round_spot
+from device.measurement.ramp_modes.ellipticity import RoundSpot
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import sample_press
+from device.measurement.ramp_modes.radial_profile import ROW_NAMES
 from device.measurement.ramp_modes.range_classifier import RangeTest
-from device.measurement.ramp_modes.surrogate import TISSUE, PressSurrogate, load_surrogate
+from device.measurement.ramp_modes.surrogate import TISSUE, PressSurrogate
 
 SURROGATE_FILE = "surrogate.npz"
+RAMP_UNITS = units_of(ROW_NAMES, RADIAL_PROFILE_FEATURES)
+"""The features of a network that reads a force ramp: the whole row of the press profile, ratios all of them."""
 RAMP_MODES: tuple[Mode, ...] = ("standard", "precise")
 WELL_INSIDE = 0.95
 """A fit is begun no nearer to the ends of the ranges, where it would stick."""
@@ -62,7 +63,7 @@ class ModeLimits:
     outside_log_odds: float
 
 
-class ProfileAnswers:
+class RampAnswers:
     """Networks, surrogate and noise of each mode: what answers, without any limit on its answers."""
 
     def __init__(self, surrogate: PressSurrogate, noise: Mapping[Mode, PressNoise]) -> None:
@@ -86,28 +87,16 @@ def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) 
     return RampAnswer(mean, spread, float(np.mean(residuals**2)), best)
 
 
-class ProfileModel:
+class RampModel:
     """A verified bundle: networks, forward model, what tells the ranges and what is round, and each mode's limits."""
 
-    def __init__(self, bundle: ModelBundle, answers: ProfileAnswers, ranges: RangeTest, round_spot: RoundSpot) -> None:
-        """Use `load` for what is installed. Raises `BundleRefused` when the card lacks the limits of a mode."""
+    def __init__(self, bundle: ModelBundle, answers: RampAnswers, ranges: RangeTest, round_spot: RoundSpot) -> None:
+        """Raises `BundleRefused` when the card of a bundle that reads `RAMP_UNITS` lacks the limits of a mode."""
         self.bundle, self.answers, self.ranges, self.round_spot = bundle, answers, ranges, round_spot
         try:
             self.limits = {mode: _limits(bundle.card["modes"][mode]) for mode in RAMP_MODES}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
-            raise BundleRefused(Path(bundle.name), "modes", f"incomplete ({error})", "limits of every mode") from error
-
-    @classmethod
-    def load(cls, folder: Path) -> ProfileModel:
-        """Return the model of a folder; raises `BundleRefused` or `InvalidQuantity` when anything does not hold."""
-        bundle = ModelBundle.load(folder)
-        path = _verified(folder, SURROGATE_FILE, bundle.card.get("surrogate_sha256"))
-        with np.load(path) as file:
-            noise = {mode: PressNoise(np.asarray(file[f"camera_{mode}"], np.float64)) for mode in RAMP_MODES}
-        surrogate = load_surrogate(path)
-        ranges = RangeTest.load(folder, bundle.card, RAMP_MODES)
-        round_path = _verified(folder, ROUND_FILE, bundle.card.get("round_sha256"))
-        return cls(bundle, ProfileAnswers(surrogate, noise), ranges, load_round_spot(round_path, surrogate, RAMP_MODES))
+            raise BundleRefused(bundle.folder, "modes", f"incomplete ({error})", "limits of every mode") from error
 
     def prove(self) -> None:
         """Run the golden vectors of all its networks; raises `BundleRefused` when one does not hold."""
@@ -123,25 +112,6 @@ class ProfileModel:
         """Return the networks' mean and spread [n, 3] of the unknowns' coordinates, for rows [n, P]."""
         raw = self.bundle.estimate(rows)
         return unknowns_to_unit(raw.estimate), raw.spread
-
-
-def _verified(folder: Path, name: str, stated: str | None) -> Path:
-    """Return the path of a bundle's file whose hash is the one stated; raises `BundleRefused`."""
-    path = folder / name
-    if stated is None:
-        raise BundleRefused(folder, f"the hash of {name}", "missing", "in the card: use a bundle of this version")
-    found = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
-    if found != stated:
-        raise BundleRefused(folder, name, found, f"{stated} as model.json states")
-    return path
-
-
-def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
-    """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
-    parts = ("truth", "log_spread", "low", "high")
-    return tuple(
-        Bands(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS
-    )
 
 
 def _limits(entry: Mapping[str, Any]) -> ModeLimits:

@@ -41,7 +41,7 @@ AGAIN = "press slowly harder from the first touch to 0.6 N, beside the lesion an
 
 
 @dataclass(frozen=True, eq=False)
-class PressProfile:
+class RadialProfile:
     """What a press says about inclusion, tissue and skin; K forces `force_n`, J rings `RING_RADII_MM`.
 
     contrast [K, J]: ring means of the tactile image. growth [K - 1, J]: ln of the inclusion-free light at each force
@@ -82,7 +82,7 @@ class RampLights:
     scale: PixelScale
 
 
-def press_profile(recording: Recording) -> PressProfile:
+def press_profile(recording: Recording) -> RadialProfile:
     """Return the profile of a recording whose reference and press are force ramps.
 
     Press frames far below or above the reference's forces count nothing. Raises `InvalidQuantity` when a role is
@@ -103,7 +103,7 @@ def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
     return reference, press
 
 
-def profile_of_lights(reference: RampLights, press: RampLights) -> PressProfile:
+def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile:
     """Return the profile of lights above dark (counts of 8 bits); as `press_profile`, for light without a camera."""
     _require_ramp("reference", reference.force_n)
     press = _within(press, reference.force_n)
@@ -117,7 +117,7 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> PressProfile:
     ]
     rings, residual = _at_profile_forces(press.force_n, frames)
     bare = np.array([weights.means(light.at(force), everywhere).mean for force in PROFILE_FORCES_N])
-    return PressProfile(
+    return RadialProfile(
         force_n=PROFILE_FORCES_N,
         contrast=rings.mean,
         growth=np.log(bare[:-1] / bare[-1]),

@@ -7,10 +7,9 @@ take out what no polynomial follows well. Differentiable, so that a press can be
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,6 @@ GROWTH_COLUMNS = (len(PROFILE_FORCES_N) - 1) * RINGS
 OFFSET_COLUMNS = RINGS - 1
 Number = TypeVar("Number", float, Array)
 ARRAYS = ("lump_degrees", "lump_coefficients", "bare_degrees", "bare_coefficients")
-UNREADABLE = (OSError, EOFError, KeyError, ValueError, BadZipFile)
 
 
 def stiffness_contrast(modulus_kpa: Array, tissue_kpa: Array) -> Array:
@@ -81,18 +79,14 @@ class PressSurrogate:
         return {name: np.asarray(value, kind) for name, value, kind in zip(ARRAYS, values, kinds, strict=True)}
 
 
-def load_surrogate(path: Path) -> PressSurrogate:
-    """Read a surrogate; raise `InvalidQuantity` when a part is missing or of another shape."""
-    action = "install the model bundle again"
-    try:
-        with path.open("rb") as stream, np.load(stream) as file:
-            a, b, c, d = (np.asarray(file[name]) for name in ARRAYS)
-    except UNREADABLE as error:
-        raise InvalidQuantity("surrogate", path, f"a .npz with {', '.join(ARRAYS)}", action) from error
+def surrogate_of(arrays: Mapping[str, NDArray[Any]]) -> PressSurrogate:
+    """Return the surrogate of the arrays in `ARRAYS`; raise `InvalidQuantity` when one is of another shape."""
+    a, b, c, d = (arrays[name] for name in ARRAYS)
     inclusion, bare = LegendreSum(a, b.astype(np.float64)), LegendreSum(c, d.astype(np.float64))
     for field, columns in ((inclusion, CONTRAST_COLUMNS + OFFSET_COLUMNS), (bare, GROWTH_COLUMNS)):
         expected = (len(field.degrees), columns), (len(field.coefficients), len(PARAMETERS))
         if (field.coefficients.shape, field.degrees.shape) != expected:
+            action = "install the model bundle again"
             raise InvalidQuantity("surrogate's shape", field.coefficients.shape, str(expected[0]), action)
     return PressSurrogate(inclusion, bare)
 

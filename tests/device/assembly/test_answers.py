@@ -11,16 +11,15 @@ from device.assembly.probe import open_simulated_probe
 from device.config import PressSection, simulated_config
 from device.errors import ConfigError, ModelError
 from device.instrument.watch.progress import ProgressBoard
-from device.measurement.estimate import estimate_recording
 from device.measurement.mode import MODES
-from device.measurement.paper_mode.inversion import Raw
+from device.measurement.paper_mode.estimate import estimate_paper
 from device.simulation.scenario import Scenario
 
 
 def test_the_estimate_of_a_paper_press_is_that_of_its_model(bundle, calibration, recording):
     answers = answers_for(replace(simulated_config(), press=PressSection(mode="paper")), bundle, calibration)
     assert "paper" in answers.modes
-    assert answers.estimator(recording, "paper") == estimate_recording(recording, bundle, calibration)
+    assert answers.estimator(recording, "paper") == estimate_paper(recording, bundle, calibration)
 
 
 def test_the_simulated_probe_answers_in_every_mode_and_the_one_of_the_papers_light_in_that_only(bundle, calibration):
@@ -52,8 +51,8 @@ def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tm
 def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle, calibration, monkeypatch):
     answers = answers_for(simulated_config(), bundle, calibration)
     answers.prove()
-    wrong = Raw(np.zeros((9, 3)), np.zeros((9, 3)))
-    monkeypatch.setattr(bundle, "_run", lambda rows: wrong)
+    wrong = {"estimate": np.zeros((9, 3)), "spread": np.zeros((9, 3))}
+    monkeypatch.setattr(bundle._network, "run", lambda rows: wrong)
     with pytest.raises(ModelError, match=r"golden\.estimate") as refusal:
         answers.prove()
     assert refusal.value.code == "E401"

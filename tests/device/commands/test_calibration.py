@@ -9,7 +9,8 @@ from daemon_process import ROOT
 from small_certificate import small_certificate
 
 from device.__main__ import main
-from device.measurement.calibration import Validity, certificate_id, read_calibration
+from device.files.certificate_file import read_calibration
+from device.measurement.calibration import Validity, certificate_id
 
 OWN = read_calibration(ROOT / "models" / "simulated_probe" / "calibration.json")
 FOREIGN = small_certificate()

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from daemon_process import ROOT
 
+from device.files.bundle_file import read_quick_model, read_ramp_model
 from device.measurement.mode import Mode
 from device.measurement.parameters import NOMINAL
-from device.measurement.quick_mode.model import HeldModel
-from device.measurement.ramp_modes.model import ProfileModel
+from device.measurement.quick_mode.model import QuickModel
+from device.measurement.ramp_modes.model import RampModel
 from device.measurement.recording.recording import Recording
 from device.simulation.physics.neighbour import Neighbour
 from device.simulation.virtual_probe import ProbeTables
@@ -21,13 +22,13 @@ Press = Callable[..., Recording]
 
 
 @pytest.fixture(scope="session")
-def profile_model() -> ProfileModel:
-    return ProfileModel.load(ROOT / "models" / "standard")
+def ramp_model() -> RampModel:
+    return read_ramp_model(ROOT / "models" / "standard")
 
 
 @pytest.fixture(scope="session")
-def held_model() -> HeldModel:
-    return HeldModel.load(ROOT / "models" / "quick")
+def quick_model() -> QuickModel:
+    return read_quick_model(ROOT / "models" / "quick")
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from small_certificate import small_certificate
 
-from device.measurement.calibration import Regression, certificate_id, read_calibration
+from device.files.certificate_file import read_calibration
+from device.measurement.calibration import Regression, certificate_id
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.pixel_scale import PixelScale
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from device.measurement.estimate import CONTACT_N, estimate_recording, image_features
+from device.measurement.paper_mode.estimate import CONTACT_N, estimate_paper, image_features
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
 
@@ -18,7 +18,7 @@ def with_press(recording, change):
 
 @pytest.fixture
 def estimated(bundle, calibration):
-    return lambda recording: estimate_recording(recording, bundle, calibration)
+    return lambda recording: estimate_paper(recording, bundle, calibration)
 
 
 def assert_no_number(estimate):
@@ -146,7 +146,7 @@ def test_a_value_never_leaves_its_interval_even_where_the_network_extrapolates(b
     """A box of at most 6 mm: whatever the network says, the answer is at most 6 mm."""
     held_out = calibration.held_out
     shrunk = replace(calibration, held_out=replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
-    size = estimate_recording(recording, bundle, shrunk).size_mm
+    size = estimate_paper(recording, bundle, shrunk).size_mm
     assert size.low <= size.value <= size.high <= 6.0
 
 
@@ -154,7 +154,7 @@ def test_an_interval_that_ends_with_the_box_is_open_there(bundle, calibration, r
     """12 mm in a box of at most 6 mm: no held-out scene says how large it is, only that it is not small."""
     held_out = calibration.held_out
     shrunk = replace(calibration, held_out=replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
-    size = estimate_recording(recording, bundle, shrunk).size_mm
+    size = estimate_paper(recording, bundle, shrunk).size_mm
     assert size.high_is_open
     assert size.low_is_open == (size.low <= held_out.box_low[0])
 
@@ -164,7 +164,7 @@ def test_where_all_is_determined_the_status_is_ok(bundle, calibration, recording
     held_out = calibration.held_out
     jittered = held_out.truth + np.random.default_rng(1).normal(0.0, 0.01, held_out.truth.shape)
     exact = replace(calibration, held_out=replace(held_out, estimate=jittered))
-    estimate = estimate_recording(recording, bundle, exact)
+    estimate = estimate_paper(recording, bundle, exact)
     assert (estimate.status, estimate.reason) == ("ok", "")
 
 

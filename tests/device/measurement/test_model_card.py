@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from device.measurement.model_card import SCHEMA, BundleRefused, ModelCard, read_bundle_file
+from device.measurement.bundle import SCHEMA, BundleRefused, ModelCard
 
 SIZE_RANGE = "training_range.unknowns.size_mm"
 
@@ -68,8 +68,3 @@ def test_a_table_has_its_rows_and_columns() -> None:
 def test_a_table_of_another_shape_or_without_a_number_is_refused(table: list[Any]) -> None:
     with pytest.raises(BundleRefused, match=r"golden\.estimate is"):
         card_with(golden={"estimate": table}).table("golden.estimate", 3)
-
-
-def test_a_file_that_is_not_there_is_refused_by_its_name(tmp_path: Path) -> None:
-    with pytest.raises(BundleRefused, match=r"model\.onnx is unreadable \(No such file"):
-        read_bundle_file(tmp_path, "model.onnx")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from device.measurement.calibration import Validity
-from device.measurement.estimate import image_features
+from device.measurement.paper_mode.estimate import image_features
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.scenario import Scenario
 from host_tools.calibration.calibrate import (

@@ -7,8 +7,8 @@ import pytest
 
 from device.config import simulated_config
 from device.instrument.press import capture
-from device.measurement.estimate import image_features
 from device.measurement.mode import FRAMES
+from device.measurement.paper_mode.estimate import image_features
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import RecordedCell
 from device.simulation.physics.pressed_face import ProbePlacement

@@ -3,14 +3,14 @@
 import pytest
 from daemon_process import ROOT
 
+from device.files.bundle_file import read_ramp_model
 from device.measurement.parameters import EVEN_STD
-from device.measurement.ramp_modes.model import ProfileModel
 from host_tools.cramer_rao.press_bound import spread_of_modulus
 
 
 @pytest.fixture(scope="module")
 def answers():
-    return ProfileModel.load(ROOT / "models" / "standard").answers
+    return read_ramp_model(ROOT / "models" / "standard").answers
 
 
 def test_a_bound_with_the_box_is_under_what_the_box_leaves(answers):

@@ -9,7 +9,7 @@ from small_surrogate import linear_surrogate, random_surrogate, white_noise
 
 from device.measurement.parameters import EVEN_STD, HIGH, LOW, PARAMETERS
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.model import ProfileAnswers
+from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
 from host_tools.cramer_rao.press_bound import least_errors
 
@@ -18,9 +18,9 @@ STD = 0.05
 
 
 @pytest.fixture
-def linear() -> ProfileAnswers:
+def linear() -> RampAnswers:
     """Growth is linear in all coordinates but the modulus, which shows in nothing."""
-    return ProfileAnswers(
+    return RampAnswers(
         linear_surrogate(random_slopes()), {"standard": white_noise(STD), "precise": white_noise(STD / 2)}
     )
 
@@ -41,7 +41,7 @@ def test_it_is_of_the_noise_of_the_mode(linear):
 
 
 def test_nuisances_that_are_told_move_the_press_and_others_are_nominal():
-    answers = ProfileAnswers(random_surrogate(), {"standard": white_noise(1e-3)})
+    answers = RampAnswers(random_surrogate(), {"standard": white_noise(1e-3)})
     nominal, told = least_errors(answers, "standard", TRUTH), least_errors(answers, "standard", TRUTH, {"albedo": 0.42})
     again = least_errors(answers, "standard", TRUTH, {"albedo": 0.5})
     np.testing.assert_array_equal(nominal, again)

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from device.measurement.paper_mode.inversion import FEATURE_UNITS
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.data.dataset import require_enough, training_rows
@@ -18,7 +18,7 @@ from host_tools.data.plan import SCHEMA
 from host_tools.paper_network.train import train
 
 SCENES = 80
-COLUMNS = (*UNKNOWNS, *FEATURE_UNITS)
+COLUMNS = (*UNKNOWNS, *PAPER_UNITS)
 
 
 @pytest.fixture

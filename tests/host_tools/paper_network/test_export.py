@@ -12,7 +12,7 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.files.bundle_file import read_paper_model
 from host_tools.paper_network import export as exporting
 from host_tools.paper_network.export import ExportRefused, build_network, export
 from host_tools.paper_network.network import Ensemble
@@ -38,7 +38,7 @@ def test_the_exported_network_computes_what_numpy_does(untrained: Trained) -> No
 def test_the_device_accepts_the_bundle_and_its_card_tells_the_training(untrained: Trained, tmp_path: Path) -> None:
     folder = tmp_path / "models" / "demo"
     export(untrained, folder, software_version="1.2.3")
-    card = ModelBundle.load(folder).card
+    card = read_paper_model(folder).card
     assert (card["name"], card["software_version"]) == ("demo", "1.2.3")
     assert (card["trials"], card["seed"], card["training_rows"], card["excluded_rows"]) == (3, 1, 125, 2)
     assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
@@ -58,7 +58,7 @@ def test_training_ranges_leave_out_phantoms_and_start_at_the_floor(untrained: Tr
         tmp_path / "m",
         software_version="1",
     )
-    bundle = ModelBundle.load(tmp_path / "m")
+    bundle = read_paper_model(tmp_path / "m")
     assert bundle.feature_range["max_deformation_mm"] == (1e-4, features[:-9, 0].max())
     assert bundle.box["size_mm"] == (truth[:-9, 0].min(), truth[:-9, 0].max())
 
@@ -73,7 +73,7 @@ def test_a_new_bundle_replaces_the_old_one_and_leaves_nothing_else(untrained: Tr
     export(untrained, tmp_path / "demo", software_version="1")
     (tmp_path / "demo" / "stray").touch()
     export(untrained, tmp_path / "demo", software_version="2")
-    assert ModelBundle.load(tmp_path / "demo").card["software_version"] == "2"
+    assert read_paper_model(tmp_path / "demo").card["software_version"] == "2"
     assert set(contents(tmp_path / "demo")) == {"model.onnx", "model.json"}
     assert [path.name for path in tmp_path.iterdir()] == ["demo"]
 

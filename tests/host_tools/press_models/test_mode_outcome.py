@@ -9,7 +9,7 @@ from small_surrogate import COLUMNS, linear_surrogate, white_noise
 from device.measurement.confidence_belt import Bands
 from device.measurement.parameters import EVEN_STD, PARAMETERS, from_unit
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import ProfileAnswers, RampAnswer
+from device.measurement.ramp_modes.model import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
 from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
 from device.measurement.recording.ring_means import RINGS
@@ -81,7 +81,7 @@ def some(recorded: RecordedPresses, count: int) -> RecordedPresses:
     return RecordedPresses(recorded.parameters[:count], recorded.rows[:count], recorded.second_harmonics[:count])
 
 
-def judged(answers: ProfileAnswers, pool: Pool, recorded: RecordedPresses, seed: int = 4) -> ModeOutcome:
+def judged(answers: RampAnswers, pool: Pool, recorded: RecordedPresses, seed: int = 4) -> ModeOutcome:
     toys = FirstColumns(), answers, pool, recorded, FirstHarmonic()
     return judged_mode("standard", *toys, outside_log_odds=0.3, seed=seed, jobs=1)
 
@@ -94,8 +94,8 @@ def slopes() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def answers(slopes) -> ProfileAnswers:
-    return ProfileAnswers(linear_surrogate(slopes), {"standard": NOISE, "precise": NOISE})
+def answers(slopes) -> RampAnswers:
+    return RampAnswers(linear_surrogate(slopes), {"standard": NOISE, "precise": NOISE})
 
 
 @pytest.fixture(scope="module")

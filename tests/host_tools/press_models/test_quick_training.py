@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from device.measurement.parameters import PARAMETERS, from_unit
-from device.measurement.quick_mode.profile import held_press
+from device.measurement.quick_mode.profile import quick_press
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models import quick_training
@@ -57,7 +57,7 @@ def test_recordings_are_those_of_each_press_with_its_own_seed(tables):
     found = recorded_holds(tables, 2, 17, ErrorLevels(), jobs=1)
     for number in range(2):
         alone = recorded_press(tables, found.parameters[number], "quick", press_seed(17, number), levels=ErrorLevels())
-        row, ratio = held_press(alone)
+        row, ratio = quick_press(alone)
         np.testing.assert_array_equal(found.rows[number], row)
         assert found.elongation[number] == ratio
 

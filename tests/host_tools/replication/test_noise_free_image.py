@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from device.measurement.estimate import image_features
+from device.measurement.paper_mode.estimate import image_features
 from device.measurement.quantities import Inclusion
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables

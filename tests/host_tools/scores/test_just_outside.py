@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from device.files.bundle_file import read_ramp_model
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import ProfileModel
 from host_tools.press_models.press_samples import profile_rows
 from host_tools.scores.just_outside import (
     FALSE_FLAGS,
@@ -41,7 +41,7 @@ def test_one_of_three_doubts_has_less_than_a_third_of_the_false_flags():
 
 
 def test_an_inclusion_inside_is_its_own_twin(tables):
-    answers = ProfileModel.load(MODELS / "standard").answers
+    answers = read_ramp_model(MODELS / "standard").answers
     row = profile_rows(tables, at_nominal(INSIDE)[None])[0]
     twin = nearest_twin(PressPosterior(row, answers.surrogate, answers.noise["standard"]), seed=0)
     assert twin.deviations < 1.5

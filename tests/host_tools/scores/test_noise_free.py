@@ -8,7 +8,7 @@ from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, from_unit
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import ProfileAnswers
+from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
 from host_tools.scores import noise_free
 from host_tools.scores.noise_free import known_nuisances_fit, noise_free_chapter
@@ -87,7 +87,7 @@ def test_the_chapter_scores_each_unknown_over_all_presses_and_by_octiles(tables,
 
     monkeypatch.setattr(noise_free, "profile_rows", lambda tables, parameters: np.zeros((1, COLUMNS)))
     monkeypatch.setattr(noise_free, "known_nuisances_fit", answer)
-    answers = ProfileAnswers(linear_surrogate(np.zeros((len(PARAMETERS), GROWTH_COLUMNS))), noise)
+    answers = RampAnswers(linear_surrogate(np.zeros((len(PARAMETERS), GROWTH_COLUMNS))), noise)
     noise_free_chapter(answers, tables, presses=40, jobs=1)
     ranked = np.sort(fitted)
 
@@ -106,4 +106,4 @@ def test_the_chapter_scores_each_unknown_over_all_presses_and_by_octiles(tables,
 
 def test_too_few_presses_for_a_score_of_the_modulus_are_refused(tables):
     with pytest.raises(InvalidQuantity, match="presses without noise is 39, but must be at least 40 presses"):
-        noise_free_chapter(ProfileAnswers(linear_surrogate(np.zeros((9, GROWTH_COLUMNS))), {}), tables, presses=39)
+        noise_free_chapter(RampAnswers(linear_surrogate(np.zeros((9, GROWTH_COLUMNS))), {}), tables, presses=39)

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from device.files.bundle_file import read_ramp_model
 from device.measurement.parameters import HIGH, LOW, to_unit
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.ellipticity import stretched
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import ProfileModel
 from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET
 from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models.press_samples import exact_presses
@@ -31,7 +31,7 @@ INCLUSION = Oblong(Inclusion(8.0, 5.0, 80.0), 2.0, 1.5, is_across=True)
 
 @pytest.fixture(scope="module")
 def model():
-    return ProfileModel.load(Path(__file__).parents[3] / "models" / "standard")
+    return read_ramp_model(Path(__file__).parents[3] / "models" / "standard")
 
 
 def test_the_long_axis_lies_along_the_offset_or_across_it():

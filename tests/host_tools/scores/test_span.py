@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from device.measurement.ramp_modes.model import ProfileAnswers
+from device.files.bundle_file import read_surrogate
+from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
-from device.measurement.ramp_modes.surrogate import load_surrogate
 from host_tools.scores.span import _shift
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -16,10 +16,10 @@ MODELS = Path(__file__).parents[3] / "models"
 @pytest.fixture(scope="module")
 def exact():
     """Noise so small that the prior does not count."""
-    surrogate = load_surrogate(MODELS / "standard" / "surrogate.npz")
+    surrogate = read_surrogate(MODELS / "standard" / "surrogate.npz")
     none = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
     noise = PressNoise(1e-12 * np.eye(len(surrogate.rows(np.zeros((1, 9)))[0])), none)
-    return ProfileAnswers(surrogate, {"standard": noise})
+    return RampAnswers(surrogate, {"standard": noise})
 
 
 def test_what_another_inclusion_would_change_shifts_the_answer_to_that_inclusion(exact):

@@ -1,14 +1,15 @@
 """Mode quick: one held frame beside the lesion and one on it, by the committed network."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from device.measurement.model_card import BundleRefused
+from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.quick_mode.model import HeldModel, estimate_held
-from device.measurement.quick_mode.profile import HELD_NAMES, held_press
+from device.measurement.quick_mode.model import QuickModel, estimate_quick
+from device.measurement.quick_mode.profile import QUICK_NAMES, quick_press
 from device.measurement.ramp_modes.radial_profile import press_profile
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.neighbour import Neighbour
@@ -19,60 +20,60 @@ def held(pressed):
     return pressed("quick")
 
 
-def test_one_frame_is_answered_and_each_truth_lies_in_its_interval(held, held_model, calibration):
-    estimate = estimate_held(held, held_model, calibration)
+def test_one_frame_is_answered_and_each_truth_lies_in_its_interval(held, quick_model, calibration):
+    estimate = estimate_quick(held, quick_model, calibration)
     assert (estimate.mode, estimate.model) == ("quick", "quick")
     for name, truth in (("size_mm", 12.0), ("depth_mm", 6.0), ("youngs_modulus_kpa", 60.0)):
         quantity = getattr(estimate, name)
         assert quantity.low <= quantity.value <= quantity.high
         assert quantity.low <= truth <= quantity.high
-    assert tuple(estimate.features) == (*HELD_NAMES, "elongation_ratio")
+    assert tuple(estimate.features) == (*QUICK_NAMES, "elongation_ratio")
 
 
 def test_the_row_is_the_contrast_that_a_ramp_shows_at_that_force(held, pressed):
     """Between 0.40 and 0.55 N the contrast on each ring lies between what the ramp's profile says there."""
-    row, profile = held_press(held).row, press_profile(pressed("precise"))
+    row, profile = quick_press(held).row, press_profile(pressed("precise"))
     low, high = np.sort(profile.contrast[2:], axis=0)
     assert (row[:RINGS] > low - 0.01).all()
     assert (row[:RINGS] < high + 0.01).all()
     assert row[RINGS] == pytest.approx(0.5, abs=0.03)
 
 
-def test_nothing_under_the_skin_gets_no_numbers(pressed, held_model, calibration):
-    estimate = estimate_held(pressed("quick", (0.0, 6.0, 60.0)), held_model, calibration)
+def test_nothing_under_the_skin_gets_no_numbers(pressed, quick_model, calibration):
+    estimate = estimate_quick(pressed("quick", (0.0, 6.0, 60.0)), quick_model, calibration)
     assert (estimate.status, estimate.reason) == ("not_identifiable", "No inclusion stands out.")
 
 
-def test_a_contrast_beyond_what_was_learnt_gets_no_numbers(held, held_model, calibration):
+def test_a_contrast_beyond_what_was_learnt_gets_no_numbers(held, quick_model, calibration):
     frames = tuple(
         replace(frame, counts=np.minimum(2 * frame.counts.astype(int), 250).astype(np.uint8))
         if frame.role == "press"
         else frame
         for frame in held.frames
     )
-    estimate = estimate_held(replace(held, frames=frames), held_model, calibration)
+    estimate = estimate_quick(replace(held, frames=frames), quick_model, calibration)
     assert estimate.status == "outside_range"
     assert estimate.size_mm.value is None
 
 
-def test_a_ramp_is_no_hold(pressed, held_model, calibration):
+def test_a_ramp_is_no_hold(pressed, quick_model, calibration):
     with pytest.raises(InvalidQuantity, match="mean reference force is .* hold 0.5 N beside the lesion and on it"):
-        estimate_held(pressed("standard"), held_model, calibration)
+        estimate_quick(pressed("standard"), quick_model, calibration)
 
 
-def test_a_probe_that_the_model_is_not_for_is_refused(held, held_model, calibration):
+def test_a_probe_that_the_model_is_not_for_is_refused(held, quick_model, calibration):
     with pytest.raises(InvalidQuantity, match="serial is TSIS-0042"):
-        estimate_held(replace(held, serial="TSIS-0042"), held_model, calibration)
+        estimate_quick(replace(held, serial="TSIS-0042"), quick_model, calibration)
 
 
-def test_a_bundle_without_bands_is_refused(held_model):
-    bundle = type("Bundle", (), {"card": {"modes": {}}, "name": "bare"})()
+def test_a_bundle_without_bands_is_refused(quick_model):
+    bundle = type("Bundle", (), {"card": {"modes": {}}, "folder": Path("bare")})()
     with pytest.raises(BundleRefused, match=r"modes\.quick is incomplete"):
-        HeldModel(bundle)
+        QuickModel(bundle)
 
 
-def test_two_inclusions_are_not_round_at_one_force_either(pressed, held_model, calibration):
+def test_two_inclusions_are_not_round_at_one_force_either(pressed, quick_model, calibration):
     two = pressed("quick", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
-    estimate = estimate_held(two, held_model, calibration)
+    estimate = estimate_quick(two, quick_model, calibration)
     assert (estimate.status, estimate.size_mm.value) == ("outside_range", None)
     assert "not round" in estimate.reason

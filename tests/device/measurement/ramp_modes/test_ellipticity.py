@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from small_surrogate import EXACT, GROWTH_COLUMNS, INCLUSION_COLUMNS
 
+from device.files.bundle_file import read_round_spot
 from device.measurement.parameters import HIGH, PARAMETERS, from_unit
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.ellipticity import (
@@ -11,7 +12,6 @@ from device.measurement.ramp_modes.ellipticity import (
     DEGREES,
     SECOND_COLUMNS,
     RoundSpot,
-    load_round_spot,
     second_factor,
     stretched,
 )
@@ -191,7 +191,7 @@ def test_what_is_loaded_is_what_was_saved(spot, tmp_path):
     """Polynomials in single precision; error levels are the usual ones."""
     path = tmp_path / "round.npz"
     np.savez(path, **parts_of(spot))
-    loaded = load_round_spot(path, spot.surrogate, MODES)
+    loaded = read_round_spot(path, spot.surrogate, MODES)
     assert loaded.surrogate is spot.surrogate
     assert loaded.levels == ErrorLevels()
     np.testing.assert_array_equal(loaded.second.degrees, spot.second.degrees)
@@ -203,7 +203,7 @@ def test_what_is_loaded_is_what_was_saved(spot, tmp_path):
 
 def test_a_missing_file_is_refused_by_name(spot, tmp_path):
     with pytest.raises(InvalidQuantity, match=r"^second harmonics is .*absent\.npz"):
-        load_round_spot(tmp_path / "absent.npz", spot.surrogate, MODES)
+        read_round_spot(tmp_path / "absent.npz", spot.surrogate, MODES)
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 cut short"])
@@ -211,7 +211,7 @@ def test_a_garbled_file_is_refused_by_name(spot, content, tmp_path):
     path = tmp_path / "garbled.npz"
     path.write_bytes(content)
     with pytest.raises(InvalidQuantity, match=r"^second harmonics is .*garbled\.npz"):
-        load_round_spot(path, spot.surrogate, MODES)
+        read_round_spot(path, spot.surrogate, MODES)
 
 
 @pytest.mark.parametrize("name", [DEGREES, COEFFICIENTS, "camera_standard", "camera_precise"])
@@ -219,7 +219,7 @@ def test_a_file_without_one_of_its_parts_or_with_one_of_another_shape_is_refused
     path, parts = tmp_path / "partial.npz", parts_of(spot)
     np.savez(path, **{n: part for n, part in parts.items() if n != name})
     with pytest.raises(InvalidQuantity, match="^second harmonics is"):
-        load_round_spot(path, spot.surrogate, MODES)
+        read_round_spot(path, spot.surrogate, MODES)
     np.savez(path, **parts | {name: parts[name][:, :-1]})
     with pytest.raises(InvalidQuantity, match="^shapes of the second harmonics is"):
-        load_round_spot(path, spot.surrogate, MODES)
+        read_round_spot(path, spot.surrogate, MODES)

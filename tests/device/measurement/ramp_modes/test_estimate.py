@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.estimate import doubts_about, estimate_profile
+from device.measurement.ramp_modes.estimate import doubts_about, estimate_ramp, stands_out
 from device.measurement.ramp_modes.model import RAMP_MODES, ModeLimits
-from device.measurement.ramp_modes.radial_profile import press_profile
+from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
+from device.measurement.ramp_modes.radial_profile import ROW_NAMES, press_profile
+from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.neighbour import Neighbour
 
 LIMITS = ModeLimits(bands=(), misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
@@ -20,10 +22,8 @@ def ramp(pressed):
 
 
 @pytest.mark.parametrize("mode", RAMP_MODES)
-def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(
-    pressed, profile_model, calibration, mode
-):
-    estimate = estimate_profile(pressed(mode), mode, profile_model, calibration)
+def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(pressed, ramp_model, calibration, mode):
+    estimate = estimate_ramp(pressed(mode), mode, ramp_model, calibration)
     assert (estimate.mode, estimate.model) == (mode, "standard")
     for name, truth, share in (("size_mm", 12.0, 0.1), ("depth_mm", 6.0, 0.1), ("youngs_modulus_kpa", 60.0, None)):
         quantity = getattr(estimate, name)
@@ -35,21 +35,21 @@ def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(
 
 
 @pytest.mark.parametrize("tissue_kpa", [4.3, 5.7])
-def test_the_press_beside_the_lesion_tells_the_patients_tissue(pressed, profile_model, calibration, tissue_kpa):
+def test_the_press_beside_the_lesion_tells_the_patients_tissue(pressed, ramp_model, calibration, tissue_kpa):
     recording = pressed("precise", tissue_modulus_kpa=tissue_kpa)
-    features = estimate_profile(recording, "precise", profile_model, calibration).features
+    features = estimate_ramp(recording, "precise", ramp_model, calibration).features
     assert features["tissue_modulus_std_kpa"] < 0.4
     assert features["tissue_modulus_kpa"] == pytest.approx(tissue_kpa, abs=3 * features["tissue_modulus_std_kpa"])
 
 
-def test_the_same_recording_gives_the_same_estimate_again(ramp, profile_model, calibration):
-    first, again = (estimate_profile(ramp, "precise", profile_model, calibration) for _ in range(2))
+def test_the_same_recording_gives_the_same_estimate_again(ramp, ramp_model, calibration):
+    first, again = (estimate_ramp(ramp, "precise", ramp_model, calibration) for _ in range(2))
     assert first == again
 
 
-def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, profile_model, calibration):
+def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, ramp_model, calibration):
     """A deep small inclusion says nothing of its modulus: 10-160 kPa are left."""
-    estimate = estimate_profile(pressed("standard", (9.0, 9.0, 100.0)), "standard", profile_model, calibration)
+    estimate = estimate_ramp(pressed("standard", (9.0, 9.0, 100.0)), "standard", ramp_model, calibration)
     modulus = estimate.youngs_modulus_kpa
     assert (modulus.low, modulus.high) == (10.0, 160.0)  # exactly: the truth may be one of them
     assert not modulus.identifiable
@@ -59,32 +59,59 @@ def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, profile
     assert "Young's modulus" in estimate.reason
 
 
-def test_an_interval_is_open_only_where_the_trained_range_ends(ramp, profile_model, calibration):
+def test_an_interval_is_open_only_where_the_trained_range_ends(ramp, ramp_model, calibration):
     """12 mm of at most 15, 6 mm deep of 4-12: both are told from the ends."""
-    estimate = estimate_profile(ramp, "standard", profile_model, calibration)
+    estimate = estimate_ramp(ramp, "standard", ramp_model, calibration)
     for quantity, (lowest, highest) in ((estimate.size_mm, (2.0, 15.0)), (estimate.depth_mm, (4.0, 12.0))):
         assert quantity.low_is_open == (quantity.low <= lowest)
         assert quantity.high_is_open == (quantity.high >= highest)
     assert not estimate.size_mm.low_is_open
 
 
-def test_nothing_under_the_skin_gets_no_numbers(pressed, profile_model, calibration):
-    estimate = estimate_profile(pressed("standard", (0.0, 6.0, 60.0)), "standard", profile_model, calibration)
+def flat_row(middle, rim):
+    """Return a row whose light grows with the force nowhere, of these contrasts on the four inner and other rings."""
+    row = np.zeros(len(ROW_NAMES))
+    row[: 4 * RINGS] = np.tile(np.repeat([middle, rim], [4, RINGS - 4]), 4)
+    return row
+
+
+WHITE = PressNoise(1e-12 * np.eye(len(ROW_NAMES)), ErrorLevels(gain_ratio=0.01, zero_n=0.0, model_ratio=1e-6))
+"""Light drifts by 1 % between the presses, the flat field by 0.2 %; all else hardly anything."""
+
+
+@pytest.mark.parametrize(
+    ("middle", "rim", "is_seen"),
+    [
+        (0.06, 0.06, True),  # six times the drift: seen in the middle by itself, and flat: not against the rim
+        (0.03, 0.03, False),  # what a drift of three standard deviations looks like
+        (0.03, -0.02, True),  # a middle that is no brighter, but 5 % brighter than the rim: no drift does that
+        (0.0, -0.05, True),  # the light has drifted down as a whole, the middle is as it was beside the lesion
+        (-0.05, 0.0, False),  # darker than the rim is no inclusion
+    ],
+)
+def test_an_inclusion_stands_out_by_itself_or_against_the_rim(middle, rim, is_seen):
+    """Drift of 1 % is common to all rings: 4 standard deviations are 4 % for the middle, and next to none against the
+    rim, where the flat field's 0.2 % a 2 mm are left."""
+    assert stands_out(flat_row(middle, rim), WHITE) == is_seen
+
+
+def test_nothing_under_the_skin_gets_no_numbers(pressed, ramp_model, calibration):
+    estimate = estimate_ramp(pressed("standard", (0.0, 6.0, 60.0)), "standard", ramp_model, calibration)
     assert estimate.status == "not_identifiable"
     assert estimate.size_mm.value is None
 
 
-def test_two_inclusions_get_no_numbers_and_a_reason(pressed, profile_model, calibration):
+def test_two_inclusions_get_no_numbers_and_a_reason(pressed, ramp_model, calibration):
     two = pressed("standard", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
-    estimate = estimate_profile(two, "standard", profile_model, calibration)
+    estimate = estimate_ramp(two, "standard", ramp_model, calibration)
     assert estimate.status == "outside_range"
     assert "not round" in estimate.reason or "No single round inclusion" in estimate.reason
     assert estimate.size_mm.value is None
 
 
-def test_gel_on_the_face_gets_no_numbers(pressed, profile_model, calibration):
+def test_gel_on_the_face_gets_no_numbers(pressed, ramp_model, calibration):
     wet = pressed("standard", wet_ratio=0.4)
-    assert estimate_profile(wet, "standard", profile_model, calibration).size_mm.value is None
+    assert estimate_ramp(wet, "standard", ramp_model, calibration).size_mm.value is None
 
 
 def test_what_is_at_its_limit_is_usual():
@@ -138,41 +165,41 @@ def stretched_spot(recording, contrast):
 
 
 @pytest.mark.parametrize("mode", RAMP_MODES)
-def test_an_oblong_spot_gets_no_numbers_and_a_reason(pressed, profile_model, calibration, mode):
+def test_an_oblong_spot_gets_no_numbers_and_a_reason(pressed, ramp_model, calibration, mode):
     """2 % of the light, ten times what flat field and model leave open; the rings' means stay as they were."""
     oblong = stretched_spot(pressed(mode), 0.02)
     rings, as_before = (press_profile(recording).contrast for recording in (oblong, pressed(mode)))
     np.testing.assert_allclose(rings, as_before, atol=2e-3)
-    estimate = estimate_profile(oblong, mode, profile_model, calibration)
+    estimate = estimate_ramp(oblong, mode, ramp_model, calibration)
     assert estimate.status == "outside_range"
     assert "The inclusion is not round" in estimate.reason
     assert estimate.size_mm.value is None
 
 
-def test_a_round_inclusions_elongation_is_told_beside_the_other_features(ramp, profile_model, calibration):
-    features = estimate_profile(ramp, "standard", profile_model, calibration).features
-    assert 0 < features["elongation_deviations"] < profile_model.limits["standard"].elongation_deviations
+def test_a_round_inclusions_elongation_is_told_beside_the_other_features(ramp, ramp_model, calibration):
+    features = estimate_ramp(ramp, "standard", ramp_model, calibration).features
+    assert 0 < features["elongation_deviations"] < ramp_model.limits["standard"].elongation_deviations
     assert "elongation_ratio" not in features
 
 
-def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, profile_model):
+def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, ramp_model):
     """2 mm aside the second harmonic of a sphere is far above noise; its best fit's is as large."""
     aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
-    best, spot = profile_model.answer(aside.as_row(), "precise").best, profile_model.round_spot
+    best, spot = ramp_model.answer(aside.as_row(), "precise").best, ramp_model.round_spot
     assert np.abs(aside.second_harmonic).max() > 0.005
-    limit = profile_model.limits["precise"].elongation_deviations
+    limit = ramp_model.limits["precise"].elongation_deviations
     assert spot.elongation_deviations(aside.second_harmonic, best, "precise") < limit
     on_axis = best.copy()
     on_axis[-1] = -1.0
     assert spot.elongation_deviations(aside.second_harmonic, on_axis, "precise") > limit
 
 
-def test_full_scale_pixels_are_refused(ramp, profile_model, calibration):
+def test_full_scale_pixels_are_refused(ramp, ramp_model, calibration):
     frames = tuple(
         replace(frame, counts=np.full_like(frame.counts, 255)) if frame.role == "press" else frame
         for frame in ramp.frames
     )
-    estimate = estimate_profile(replace(ramp, frames=frames), "standard", profile_model, calibration)
+    estimate = estimate_ramp(replace(ramp, frames=frames), "standard", ramp_model, calibration)
     assert estimate.status == "saturated"
     assert "lower the light" in estimate.reason
 
@@ -184,17 +211,17 @@ def test_full_scale_pixels_are_refused(ramp, profile_model, calibration):
         ({}, "paper", "mode is paper, but must be one of standard, precise"),
     ],
 )
-def test_what_the_model_is_not_for_is_refused(ramp, profile_model, calibration, change, mode, words):
+def test_what_the_model_is_not_for_is_refused(ramp, ramp_model, calibration, change, mode, words):
     with pytest.raises(InvalidQuantity, match=words):
-        estimate_profile(replace(ramp, **change), mode, profile_model, calibration)
+        estimate_ramp(replace(ramp, **change), mode, ramp_model, calibration)
 
 
-def test_frames_of_another_pixel_size_are_refused(ramp, profile_model, calibration):
+def test_frames_of_another_pixel_size_are_refused(ramp, ramp_model, calibration):
     camera = replace(ramp.camera, mm_per_px_x=0.04)
     with pytest.raises(InvalidQuantity, match="mm_per_px"):
-        estimate_profile(replace(ramp, camera=camera), "standard", profile_model, calibration)
+        estimate_ramp(replace(ramp, camera=camera), "standard", ramp_model, calibration)
 
 
-def test_a_hold_is_no_ramp(pressed, profile_model, calibration):
+def test_a_hold_is_no_ramp(pressed, ramp_model, calibration):
     with pytest.raises(InvalidQuantity, match="press slowly harder"):
-        estimate_profile(pressed("paper"), "standard", profile_model, calibration)
+        estimate_ramp(pressed("paper"), "standard", ramp_model, calibration)

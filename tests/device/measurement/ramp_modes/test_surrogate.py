@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from small_surrogate import COLUMNS, INCLUSION_COLUMNS, random_surrogate
 
+from device.files.bundle_file import read_surrogate
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, from_unit, to_unit
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import ROW_NAMES
@@ -17,7 +18,6 @@ from device.measurement.ramp_modes.surrogate import (
     SIZE,
     assemble,
     inclusion_factor,
-    load_surrogate,
     polynomial_coordinates,
     stiffness_contrast,
 )
@@ -80,7 +80,7 @@ def test_the_modulus_coordinate_stays_inside_the_cube_and_touches_its_ends():
 def test_a_saved_surrogate_comes_back_in_single_precision(unit, tmp_path):
     surrogate, path = random_surrogate(), tmp_path / "surrogate.npz"
     np.savez(path, **surrogate.arrays())
-    loaded = load_surrogate(path)
+    loaded = read_surrogate(path)
     np.testing.assert_array_equal(loaded.inclusion_field.degrees, surrogate.inclusion_field.degrees)
     np.testing.assert_array_equal(loaded.bare.coefficients, surrogate.bare.coefficients.astype(np.float32))
     rows = surrogate.rows(unit)
@@ -89,7 +89,7 @@ def test_a_saved_surrogate_comes_back_in_single_precision(unit, tmp_path):
 
 def test_a_missing_file_is_refused_by_name(tmp_path):
     with pytest.raises(InvalidQuantity, match=r"^surrogate is .*absent\.npz"):
-        load_surrogate(tmp_path / "absent.npz")
+        read_surrogate(tmp_path / "absent.npz")
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 cut short"])
@@ -97,7 +97,7 @@ def test_a_garbled_file_is_refused_by_name(content, tmp_path):
     path = tmp_path / "garbled.npz"
     path.write_bytes(content)
     with pytest.raises(InvalidQuantity, match=r"^surrogate is .*garbled\.npz"):
-        load_surrogate(path)
+        read_surrogate(path)
 
 
 def test_a_file_cut_off_or_changed_on_disk_is_refused_by_name(tmp_path):
@@ -108,7 +108,7 @@ def test_a_file_cut_off_or_changed_on_disk_is_refused_by_name(tmp_path):
     for broken in (bytes(content), bytes(content[: len(content) // 2])):
         path.write_bytes(broken)
         with pytest.raises(InvalidQuantity, match=r"^surrogate is .*changed\.npz"):
-            load_surrogate(path)
+            read_surrogate(path)
 
 
 @pytest.mark.parametrize("name", ARRAYS)
@@ -119,7 +119,7 @@ def test_a_file_without_one_of_its_parts_or_with_one_of_another_shape_is_refused
         parts = dict(file)
     np.savez(path, **{n: part for n, part in parts.items() if n != name})
     with pytest.raises(InvalidQuantity, match="^surrogate is"):
-        load_surrogate(path)
+        read_surrogate(path)
     np.savez(path, **parts | {name: parts[name][:, :-1]})
     with pytest.raises(InvalidQuantity, match="^surrogate's shape is"):
-        load_surrogate(path)
+        read_surrogate(path)

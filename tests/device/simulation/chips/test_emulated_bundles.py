@@ -3,8 +3,8 @@
 import pytest
 from daemon_process import ROOT
 
-from device.measurement.model_card import BundleRefused
-from device.measurement.paper_mode.inversion import ModelBundle
+from device.files.bundle_file import read_paper_model
+from device.measurement.bundle import BundleRefused
 from device.simulation.chips.emulated_storage import EmulatedBundles
 from device.simulation.faults import NO_FAULTS, FaultTimeline, ScriptedFault
 
@@ -18,8 +18,8 @@ def test_without_the_fault_the_installed_folder_is_read(tmp_path):
 def test_a_tampered_bundle_is_refused_for_its_hash_and_the_installed_one_is_not(tmp_path):
     bundles = EmulatedBundles(FaultTimeline([ScriptedFault("bundle_tampered")]), tmp_path)
     with pytest.raises(BundleRefused, match=r"sha256 of model\.onnx"):
-        ModelBundle.load(bundles.folder(PAPER))
-    assert ModelBundle.load(PAPER).name == ModelBundle.load(PAPER).card["name"]
+        read_paper_model(bundles.folder(PAPER))
+    assert read_paper_model(PAPER).name == read_paper_model(PAPER).card["name"]
 
 
 def test_a_model_that_is_not_installed_stays_away(tmp_path):

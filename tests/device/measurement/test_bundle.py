@@ -15,11 +15,14 @@ import pytest
 from daemon_process import ROOT
 from onnx import TensorProto, helper
 
-from device.measurement.model_card import BundleRefused
+from device.files.bundle_file import read_paper_model, read_quick_model
+from device.measurement.bundle import BundleRefused
+from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.paper_mode.feature_definitions import INCLUSION_FIELD_FEATURES
-from device.measurement.paper_mode.inversion import FEATURE_UNITS, HELD_UNITS, PROFILE_UNITS, ModelBundle
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.quick_mode.profile import HELD_NAMES
+from device.measurement.quick_mode.model import QUICK_UNITS
+from device.measurement.quick_mode.profile import QUICK_NAMES
+from device.measurement.ramp_modes.model import RAMP_UNITS
 from host_tools.paper_network.export import export
 from host_tools.paper_network.network import Ensemble, Scaling, initial_parameters
 from host_tools.paper_network.train import Trained, TrainingRows
@@ -33,7 +36,7 @@ def trained() -> Trained:
     rng = np.random.default_rng(2)
     features = rng.uniform((0.001, 0.05, 20.0), (0.1, 3.0, 90.0), (100, 3))
     truth = rng.uniform((1.0, 4.0, 40.0), (15.0, 12.0, 120.0), (100, 3))
-    rows = TrainingRows(tuple(FEATURE_UNITS), features, truth, np.arange(9), "00" * 32, {}, 0)
+    rows = TrainingRows(tuple(PAPER_UNITS), features, truth, np.arange(9), "00" * 32, {}, 0)
     parameters = np.array([initial_parameters(np.random.default_rng(trial)) for trial in range(3)])
     return Trained(Ensemble(Scaling.fit(features), parameters), rows, seed=1)
 
@@ -67,7 +70,7 @@ def network_with(input_name: str, columns: int) -> bytes:
 
 def test_a_good_bundle_answers_as_the_ensemble_it_came_from(trained: Trained, folder: Path) -> None:
     """Inputs and outputs are float32, so the answers agree to a few times 6e-8."""
-    bundle = ModelBundle.load(folder)
+    bundle = read_paper_model(folder)
     rows = np.float32(trained.rows.features).astype(float)
     raw, expected = bundle.estimate(rows), trained.ensemble.estimate(rows)
     assert raw.estimate == pytest.approx(expected.estimate, rel=2e-7)
@@ -75,7 +78,7 @@ def test_a_good_bundle_answers_as_the_ensemble_it_came_from(trained: Trained, fo
 
 
 def test_a_bundle_tells_its_name_hash_features_and_ranges(trained: Trained, folder: Path) -> None:
-    bundle = ModelBundle.load(folder)
+    bundle = read_paper_model(folder)
     assert bundle.name == "demo"
     assert bundle.sha256 == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
     assert bundle.feature_names == ("max_deformation_mm", "central_deformation_mm3", "deformation_area_mm2")
@@ -88,14 +91,14 @@ def test_one_tampered_byte_is_refused(folder: Path, position: int) -> None:
     network[position] ^= 1
     (folder / "model.onnx").write_bytes(network)
     with pytest.raises(BundleRefused, match=r"sha256 of model\.onnx is [0-9a-f]{64}, but must be [0-9a-f]{64}"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 @pytest.mark.parametrize("file", ["model.onnx", "model.json"])
 def test_a_missing_file_is_refused_by_name(folder: Path, file: str) -> None:
     (folder / file).unlink()
     with pytest.raises(BundleRefused, match=rf"^Model bundle \S+: {file} is unreadable \(No such file") as refusal:
-        ModelBundle.load(folder)
+        read_paper_model(folder)
     assert "Install the bundle again" in str(refusal.value)
 
 
@@ -103,14 +106,14 @@ def test_a_missing_file_is_refused_by_name(folder: Path, file: str) -> None:
 def test_a_missing_field_is_refused_by_name(folder: Path, field: str) -> None:
     edit_card(folder, lambda card: card.pop(field))
     with pytest.raises(BundleRefused, match=rf"{field}\S* is missing"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 @pytest.mark.parametrize(
     ("features", "found"),
     [
         ([{"name": "volume_mm3", "unit": "mm3"}], "volume_mm3"),
-        ([{"name": "max_deformation_mm", "unit": "um"}], "um"),
+        ([{"name": "max_deformation_mm", "unit": "um"}], r"\(um\)"),
         (["max_deformation_mm"], "max_deformation_mm"),
         ([], r"\[\]"),
         ([{"name": "max_deformation_mm", "unit": "mm"}] * 3, "max_deformation_mm"),
@@ -119,33 +122,38 @@ def test_a_missing_field_is_refused_by_name(folder: Path, field: str) -> None:
 def test_features_the_probe_cannot_measure_are_refused(folder: Path, features: list[Any], found: str) -> None:
     edit_card(folder, lambda card: card.update(features=features))
     with pytest.raises(BundleRefused, match=f"features is .*{found}"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 @pytest.mark.parametrize("ratio", ["1", ""])
-def test_a_card_of_a_profile_may_leave_the_unit_of_a_ratio_empty_as_earlier_versions_did(tmp_path, ratio) -> None:
+def test_a_card_may_leave_the_unit_of_a_ratio_empty_as_earlier_versions_did(tmp_path, ratio) -> None:
     folder = Path(shutil.copytree(ROOT / "models" / "quick", tmp_path / "quick"))
     edit_card(folder, lambda card: [f.update(unit=ratio) for f in card["features"] if f["name"] != "force_n"])
-    assert ModelBundle.load(folder).feature_names == HELD_NAMES
+    assert read_quick_model(folder).bundle.feature_names == QUICK_NAMES
 
 
 def test_another_unit_of_a_ratio_is_refused(tmp_path) -> None:
     folder = Path(shutil.copytree(ROOT / "models" / "quick", tmp_path / "quick"))
     edit_card(folder, lambda card: card["features"][0].update(unit="mm"))
     with pytest.raises(BundleRefused, match="features is"):
-        ModelBundle.load(folder)
+        read_quick_model(folder)
+
+
+def test_a_bundle_of_another_mode_is_refused_with_the_features_that_are_read() -> None:
+    with pytest.raises(BundleRefused, match=r"features is .*but must be max_deformation_mm \(mm\), central"):
+        read_paper_model(ROOT / "models" / "quick")
 
 
 def test_units_are_those_of_the_definitions() -> None:
-    assert {name: definition.unit for name, definition in INCLUSION_FIELD_FEATURES.items()} == FEATURE_UNITS
-    assert set(PROFILE_UNITS.values()) == {"1"}
-    assert dict.fromkeys(HELD_NAMES, "1") | {"force_n": "N"} == HELD_UNITS
+    assert {name: definition.unit for name, definition in INCLUSION_FIELD_FEATURES.items()} == PAPER_UNITS
+    assert set(RAMP_UNITS.values()) == {"1"}
+    assert dict.fromkeys(QUICK_NAMES, "1") | {"force_n": "N"} == QUICK_UNITS
 
 
 def test_a_ratio_outside_the_training_range_is_named_without_a_unit() -> None:
-    bundle = ModelBundle.load(ROOT / "models" / "quick")
-    row = np.array([np.mean(bundle.feature_range[name]) for name in HELD_NAMES])
-    low, high = bundle.feature_range[HELD_NAMES[0]]
+    bundle = read_quick_model(ROOT / "models" / "quick").bundle
+    row = np.array([np.mean(bundle.feature_range[name]) for name in QUICK_NAMES])
+    low, high = bundle.feature_range[QUICK_NAMES[0]]
     row[0], row[-1] = high + 1, 0.7
     contrast, force = bundle.outside_training_range(row)
     assert contrast == f"Contrast 0.0 is {high + 1:.4g}, outside the trained {low:.4g} to {high:.4g}."
@@ -161,33 +169,33 @@ def test_a_golden_vector_that_is_not_reproduced_is_refused(folder: Path, part: s
 
     edit_card(folder, spoil)
     with pytest.raises(BundleRefused, match=rf"golden\.{part} is off by 0\.0002 relative"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 @pytest.mark.parametrize("golden", [[], [[1.0, 2.0]], [[1.0, 2.0, "x"]], [[1.0, 2.0, float("nan")]], [[1.0, 2.0, 3.0]]])
 def test_a_golden_table_of_another_shape_is_refused(folder: Path, golden: list[Any]) -> None:
     edit_card(folder, lambda card: card["golden"].update(estimate=golden))
     with pytest.raises(BundleRefused, match=r"golden\.estimate is"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 def test_a_file_that_is_no_network_is_refused_though_its_hash_agrees(folder: Path) -> None:
     replace_network(folder, b"not a network")
     with pytest.raises(BundleRefused, match=r"model\.onnx is unusable"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 @pytest.mark.parametrize(("name", "columns", "side"), [("input", 3, "inputs"), ("features", 2, "inputs")])
 def test_a_network_of_another_contract_is_refused(folder: Path, name: str, columns: int, side: str) -> None:
     replace_network(folder, network_with(name, columns))
     with pytest.raises(BundleRefused, match=rf"{side} of model\.onnx is .*'features', 'tensor\(float\)', 3"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 def test_a_network_that_computes_something_else_is_refused_by_its_golden_vectors(folder: Path) -> None:
     replace_network(folder, network_with("features", 3))
     with pytest.raises(BundleRefused, match=r"golden\.estimate is off by"):
-        ModelBundle.load(folder)
+        read_paper_model(folder)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e39])
@@ -196,25 +204,25 @@ def test_a_feature_that_is_not_finite_is_refused_by_name_and_row(folder: Path, v
     rows = np.tile(INSIDE, (3, 1))
     rows[1, 2] = value
     with pytest.raises(InvalidQuantity, match="deformation_area_mm2 of row 1 is"):
-        ModelBundle.load(folder).estimate(rows)
+        read_paper_model(folder).estimate(rows)
 
 
 @pytest.mark.parametrize("shape", [(3,), (1, 2), (1, 1, 3)])
 def test_features_of_another_shape_are_refused(folder: Path, shape: tuple[int, ...]) -> None:
     with pytest.raises(InvalidQuantity, match=r"shape of features is .* but must be \[n, 3\] for max_deformation_mm"):
-        ModelBundle.load(folder).estimate(np.ones(shape))
+        read_paper_model(folder).estimate(np.ones(shape))
 
 
 def test_no_rows_give_no_estimates(folder: Path) -> None:
-    assert ModelBundle.load(folder).estimate(np.empty((0, 3))).estimate.shape == (0, 3)
+    assert read_paper_model(folder).estimate(np.empty((0, 3))).estimate.shape == (0, 3)
 
 
 def test_features_inside_the_training_range_are_not_flagged(folder: Path) -> None:
-    assert ModelBundle.load(folder).outside_training_range(INSIDE) == []
+    assert read_paper_model(folder).outside_training_range(INSIDE) == []
 
 
 def test_each_feature_outside_the_training_range_is_named_with_value_and_range(folder: Path) -> None:
-    first, second = ModelBundle.load(folder).outside_training_range(np.array([0.5, 0.8, np.nan]))
+    first, second = read_paper_model(folder).outside_training_range(np.array([0.5, 0.8, np.nan]))
     assert first.startswith("Max deformation is 0.5 mm, outside the trained 0.00")
     assert second.startswith("Deformation area is nan mm2, outside the trained")
 

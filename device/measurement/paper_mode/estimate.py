@@ -1,0 +1,90 @@
+"""Mode paper: a recording of holds to its estimate, by the paper's network and three regressions.
+
+Every press frame is estimated on its own and the estimates are averaged; their standard deviation is the scatter of
+this press, not its accuracy. Accuracy is the interval, which comes from held-out scenes. Source: Lee & Won 2013,
+section IV: ten images a lesion, averaged.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.bundle import ModelBundle
+from device.measurement.calibration import Calibration
+from device.measurement.estimate import (
+    Estimate,
+    Numbers,
+    Origin,
+    origin_of,
+    saturation,
+    with_numbers,
+    without_numbers,
+)
+from device.measurement.paper_mode.feature_definitions import INCLUSION_FIELD_FEATURES, units_of
+from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings, extract_features
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.recording import Recording
+
+PAPER_UNITS = units_of(INCLUSION_FIELD_FEATURES, INCLUSION_FIELD_FEATURES)
+"""The features of the paper's network: O1, O2, O3, in this order."""
+CONTACT_N = 0.05
+"""Below this mean force the probe touches nothing."""
+VISIBLE_CONTRAST = 0.002
+"""An inclusion whose peak is fainter than this is not told from the residue of light, force and camera."""
+
+
+def estimate_paper(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> Estimate:
+    """Return the estimate of a recording in mode paper.
+
+    Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe.
+    """
+    calibration.require_for(recording.serial, bundle)
+    origin = origin_of(recording, "paper", bundle, calibration)
+    press = recording.with_role("press")
+    if not press:
+        raise InvalidQuantity("press frames", 0, "at least one", "record frames while the probe presses the lesion")
+    force_n = float(np.mean([frame.force_n for frame in press]))
+    if force_n < CONTACT_N:
+        reason = f"The mean force is {force_n:.3f} N, below {CONTACT_N} N: press the lesion."
+        return without_numbers("no_contact", reason, origin)
+    if not calibration.holds_at(force_n):
+        reason = (
+            f"The mean force is {force_n:.3f} N, not the {calibration.force_n:g} N of the calibration: press again."
+        )
+        return without_numbers("rejected", reason, origin)
+    if reason := saturation(recording):
+        return without_numbers("saturated", reason, origin)
+    image_rows = image_features(recording, calibration.settings)
+    peak = float(image_rows[:, 0].mean())
+    if peak < VISIBLE_CONTRAST:
+        reason = f"No inclusion stands out: peak contrast {peak:.2%}, below {VISIBLE_CONTRAST:.1%}."
+        return without_numbers("not_identifiable", reason, origin)
+    return _answer(image_rows, bundle, calibration, origin)
+
+
+def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[np.float64]:
+    """Return the image features [n, 3] of a recording's press frames."""
+    return np.array([extract_features(image, settings).as_row() for image in recording.press_images()])
+
+
+def _answer(image_rows: NDArray[np.float64], bundle: ModelBundle, calibration: Calibration, origin: Origin) -> Estimate:
+    rows = calibration.deformation_features(image_rows)
+    estimates = bundle.estimate(rows).estimate.astype(float)
+    outside = bundle.outside_training_range(rows.mean(axis=0))
+    if outside:
+        return without_numbers("outside_range", " ".join(outside), origin)
+    mean, held_out = estimates.mean(axis=0), calibration.held_out
+    interval, box = held_out.interval(mean), (held_out.box_low, held_out.box_high)
+    numbers = Numbers(mean, _scatter(estimates), interval.low, interval.high, interval.identifiable, *box)
+    return with_numbers(numbers, _named(image_rows.mean(axis=0), rows.mean(axis=0), bundle), origin)
+
+
+def _named(image_row: NDArray[np.float64], row: NDArray[np.float64], bundle: ModelBundle) -> dict[str, float]:
+    names = (*FEATURE_NAMES, *bundle.feature_names)
+    return {name: float(value) for name, value in zip(names, (*image_row, *row), strict=True)}
+
+
+def _scatter(estimates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the standard deviation [3] over the frames; of one frame there is none to see."""
+    return np.asarray(estimates.std(axis=0, ddof=1) if len(estimates) > 1 else np.zeros(estimates.shape[1]))
