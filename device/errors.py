@@ -97,7 +97,7 @@ class LastGoodConfigError(ConfigError):
 
 
 class CameraError(DeviceError):
-    """The camera gives no frame, or one of the wrong shape."""
+    """The camera gives no image, or one of the wrong shape."""
 
     code = "E101"
     title = "No camera image"
@@ -105,17 +105,17 @@ class CameraError(DeviceError):
 
 
 class LateFrameError(CameraError):
-    """The camera leaves out most of its frames."""
+    """The camera leaves out most of its images."""
 
     code = "E102"
-    title = "Camera leaves out frames"
+    title = "Camera leaves out images"
 
 
 class TornFrameError(CameraError):
-    """Frames are put together from two exposures, again and again, or one was overwritten before it was read."""
+    """Images are put together from two exposures again and again, or one was overwritten before it was read."""
 
     code = "E103"
-    title = "Torn frames"
+    title = "Torn images"
 
 
 class CameraProcessError(CameraError):
@@ -126,10 +126,10 @@ class CameraProcessError(CameraError):
 
 
 class StaleFrameError(CameraError):
-    """A frame shows the light from before it was changed, although it is said to have begun after that."""
+    """The camera gives an image from before the light was changed as if it had been taken after that."""
 
     code = "E105"
-    title = "Image of the light before"
+    title = "Old image"
 
 
 class LightError(DeviceError):
@@ -198,7 +198,7 @@ class LightBudgetError(LightError):
 
 
 class LightLimitError(LightError):
-    """A side is at an end of its brightness and does not give its share of the light; the measurement stands."""
+    """A side is as bright or dim as it can be and yet does not give its share of light; the measurement stands."""
 
     code = "E210"
     title = "Light at its limit"
@@ -292,7 +292,7 @@ class ExpiredCalibration(ModelError):  # noqa: N818 - the name is what the opera
 
 
 class SlightDriftError(ModelError):
-    """The untouched face looks otherwise than at the calibration; it is measured still."""
+    """The untouched face looks slightly different from the calibration's; the probe still measures."""
 
     code = "E405"
     title = "Face has changed slightly"
@@ -301,7 +301,7 @@ class SlightDriftError(ModelError):
 
 
 class LargeDriftError(ModelError):
-    """The untouched face looks so different from the calibration's that nothing is measured."""
+    """The untouched face looks so different from the calibration's that the probe does not measure."""
 
     code = "E406"
     title = "Face has changed too much"
@@ -317,14 +317,14 @@ class CalibrationEndsSoon(ModelError):  # noqa: N818 - the name is what the oper
 
 
 class ClockBehindError(ModelError):
-    """The wall clock is before the calibration was made: whether that has expired cannot be told."""
+    """The clock shows a day before the calibration was made: nobody can tell whether that has expired."""
 
     code = "E408"
     title = "Clock before calibration"
 
 
 class UncheckedCalibration(ModelError):  # noqa: N818 - the name is what the operator reads
-    """The untouched face was not compared with the calibration's since the start; it is measured all the same."""
+    """The untouched face was not compared with the calibration's since the start; the probe still measures."""
 
     code = "E409"
     title = "Calibration not checked"

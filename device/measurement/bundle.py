@@ -236,7 +236,7 @@ class ModelBundle:
         self.card = self.fields.fields
         self.name = str(self.fields.of("name", str))
         self.sha256 = _verified_hash(self.fields, files.content(MODEL_FILE))
-        self.feature_names, self._units = _verified_names(self.fields, feature_units), feature_units
+        self.feature_names = _verified_names(self.fields, feature_units)
         self.feature_range = self.fields.ranges("features", self.feature_names)
         self.box = self.fields.ranges("unknowns", UNKNOWNS)
         columns, outputs = len(self.feature_names), {"estimate": len(UNKNOWNS), "spread": len(UNKNOWNS)}
@@ -264,15 +264,10 @@ class ModelBundle:
             raise InvalidQuantity(name, rows[row, column], "a finite number", "discard the frame or press again")
         return Raw(**self._network.run(rows))
 
-    def outside_training_range(self, features: NDArray[np.floating[Any]]) -> list[str]:
-        """Return one sentence for each of the features [F] outside what the network has learned from; [] is good."""
-        sentences = []
-        for (name, (low, high)), value in zip(self.feature_range.items(), features, strict=True):
-            if not low <= value <= high:
-                after = "" if self._units[name] == RATIO else f" {self._units[name]}"
-                spoken = name.rpartition("_")[0].replace("_", " ").capitalize()
-                sentences.append(f"{spoken} is {value:.4g}{after}, outside the trained {low:.4g} to {high:.4g}{after}.")
-        return sentences
+    def outside_training_range(self, features: NDArray[np.floating[Any]]) -> dict[str, tuple[float, float]]:
+        """Return the trained range of each of the features [F] that lies outside it, by name; {} is good."""
+        ranges = zip(self.feature_range.items(), features, strict=True)
+        return {name: (low, high) for (name, (low, high)), value in ranges if not low <= value <= high}
 
     def prove(self) -> float:
         """Run the golden vectors; return the largest relative deviation, or raise `BundleRefused` for it."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -27,6 +28,16 @@ EstimateStatus = Literal["ok", "outside_range", "no_contact", "saturated", "not_
 
 SATURATED_RATIO = 0.001
 """More pixels than this at full scale, and the sum and the peak are no longer the light."""
+SHADE = "Shade the probe and press again; if the message stays, lower the light."
+NOTHING_STANDS_OUT = (
+    "No inclusion can be told from the tissue here. Press again where you feel it; if the message stays, "
+    "it is too small, too soft or too deep for the probe."
+)
+NO_NUMBERS = (
+    "No numbers are given. Press again a little beside it; if the message stays, note the finding without numbers."
+)
+"""What to do when a press is not of one round inclusion that the probe can measure."""
+UNKNOWN_IMAGE = "The image is unlike any that the probe can measure."
 SPOKEN = {"size_mm": "size", "depth_mm": "depth", "youngs_modulus_kpa": "Young's modulus"}
 
 
@@ -111,7 +122,7 @@ def saturation(recording: Recording) -> str:
     ratio = max((saturated_ratio(frame.counts) for frame in recording.with_role("press")), default=0.0)
     if ratio <= SATURATED_RATIO:
         return ""
-    return f"{ratio:.1%} of the pixels are saturated, above {SATURATED_RATIO:.1%}: lower the light."
+    return f"The image is too bright: {ratio:.1%} of its pixels are saturated, above {SATURATED_RATIO:.1%}. {SHADE}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +178,23 @@ def with_numbers(numbers: Numbers, features: Mapping[str, float], origin: Origin
     return Estimate(**quantities, status=status, reason=reason, features=dict(features), **asdict(origin))
 
 
-def without_numbers(status: EstimateStatus, reason: str, origin: Origin) -> Estimate:
-    """Return an estimate that says why there are no numbers."""
+def without_numbers(
+    status: EstimateStatus, reason: str, origin: Origin, features: Mapping[str, float] = MappingProxyType({})
+) -> Estimate:
+    """Return an estimate that says why there are no numbers; the figures behind the reason are among its features."""
     unknown: dict[str, Any] = dict.fromkeys(UNKNOWNS, UNKNOWN_QUANTITY)
-    return Estimate(**unknown, status=status, reason=reason, features={}, **asdict(origin))
+    return Estimate(**unknown, status=status, reason=reason, features=dict(features), **asdict(origin))
+
+
+def with_critical(found: Mapping[str, float], critical: Mapping[str, float]) -> dict[str, float]:
+    """Return features with the critical value of each, beyond which a press gets no numbers, under `critical_`."""
+    return dict(found) | {f"critical_{name}": value for name, value in critical.items()}
+
+
+def outside_training(bundle: ModelBundle, row: Array) -> dict[str, float]:
+    """Return the trained range of each feature in a row [F] that lies outside it, as features; {} is good."""
+    return {
+        f"trained_{end}_{name}": value
+        for name, ends in bundle.outside_training_range(row).items()
+        for end, value in zip(("low", "high"), ends, strict=True)
+    }

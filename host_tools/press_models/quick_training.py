@@ -164,7 +164,7 @@ def train_quick(
     recording = derived_seed(seed, "judged recordings of quick")
     recorded = recorded_holds(tables, asked.test_recordings, recording, ErrorLevels(), jobs)
     none = pool.typical_noise()[:RINGS, :RINGS]
-    faintest = tuple(VISIBLE_DEVIATIONS * float(np.sqrt(weights @ none @ weights)) for weights in SEEN_BY)
+    faintest = tuple(VISIBLE_DEVIATIONS * float(np.sqrt(weights @ none @ weights)) for weights in SEEN_BY.values())
     return TrainedQuick(ensemble, pool, faintest, _outcome(ensemble, simulated, recorded), asked, seed)
 
 

@@ -23,8 +23,9 @@ from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
 from device.config import CameraSection, simulated_config
 from device.instrument.procedure import Procedure
-from device.measurement.estimate import Estimate, Quantity
+from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, without_numbers
 from device.measurement.mode import MODES, Mode
+from device.measurement.ramp_modes.estimate import REASONS
 from device.measurement.recording.recording import Recording
 from device.simulation import virtual_probe
 from device.simulation.hand import HandSettings, VirtualHand
@@ -139,6 +140,17 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
 
 
+@pytest.fixture
+def no_numbers_in_any_mode(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To be asked for before the probe: no numbers, for every reason that there is."""
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        reason = " ".join([*REASONS.values(), NO_NUMBERS])
+        return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "c", True))
+
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
+
+
 def _shoot(page: Page, name: str) -> None:
     SHOTS.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=str(SHOTS / f"{name}.png"))
@@ -210,6 +222,20 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#depth-interval")).to_have_text("7.2 mm or less")
     expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")
     _shoot(page, "result-standard")
+    _require_fits(page)
+
+
+@pytest.mark.usefixtures("no_numbers_in_any_mode")
+def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Served):
+    """All three reasons at once are the longest there is: they fit above the tiles, without a figure."""
+    page.goto(probe.url)
+    page.locator("#press-button").click()
+    expect(page.locator("#instruction")).to_have_text("Press slowly harder")
+    probe.hand.go_on()
+    expect(page.locator("#size-value")).to_have_text("not determined")
+    expect(page.locator("#status-word")).to_have_text("No numbers.")
+    expect(page.locator("#status-reason")).to_contain_text("note the finding without numbers.")
+    _shoot(page, "result-without-numbers")
     _require_fits(page)
 
 

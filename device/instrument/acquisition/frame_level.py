@@ -42,7 +42,7 @@ class LevelWatch:
         change = abs(after - before)
         if change >= LEAST_CHANGE_COUNTS and abs(between - before) < STALE_RATIO * change:
             cause = (
-                f"A frame that began after the light was set shows the light before: it has {between:.0f} counts, "
+                f"The camera gave an old image, from before the light was changed: it has {between:.0f} counts, "
                 f"as under the old one ({before:.0f}), and the next has {after:.0f}."
             )
             raise StaleFrameError(cause, "Restart the probe; if it comes back, have its camera software checked.")

@@ -170,8 +170,8 @@ class PressUnderWay:
         if self.saturated < MAX_SATURATED:
             return self._to(PressState.HOLDING, saturated=self.saturated + 1)
         return self.reject(
-            f"{ratio:.1%} of the pixels are saturated, above {SATURATED_RATIO:.1%}: lower light.ratio or "
-            "camera.exposure_us."
+            f"The image is too bright: {ratio:.1%} of its pixels are saturated, above {SATURATED_RATIO:.1%}: shade the "
+            "probe and press again; if the message stays, lower light.ratio or camera.exposure_us."
         )
 
     def replace_frame(self, deviation_ratio: float) -> PressUnderWay:
@@ -234,8 +234,8 @@ class PressUnderWay:
         if self.state is PressState.TOO_HARD:
             return f"The force stayed above {rules.high_n:.2f} N {within}: press lighter."
         return (
-            f"Not all frames could be taken {within}: they are wanted up to {rules.high_n:.2f} N, "
-            f"and the force came to {self.peak_n:.2f} N."
+            f"Not all frames could be taken {within}: press slowly up to {rules.high_n:.2f} N; "
+            f"the force came to {self.peak_n:.2f} N."
         )
 
     def _require(self, states: tuple[PressState, ...], step: str) -> None:

@@ -73,9 +73,7 @@ def too_hard(force_n: float, overload_n: float) -> str:
 
 
 def off_centre(spot_mm: tuple[float, float], max_offset_mm: float) -> str:
-    """Return how far off the middle an inclusion is, and where the probe has to go: +x is right, +y is down in the
-    image.
-    """
+    """Return how far off the middle a lesion is, and where the probe has to go: +x is right, +y down in the image."""
     x_mm, y_mm = spot_mm
     towards = [
         f"{'+' if part > 0 else '-'}{axis}"
@@ -83,7 +81,7 @@ def off_centre(spot_mm: tuple[float, float], max_offset_mm: float) -> str:
         if abs(part) >= max(abs(x_mm), abs(y_mm)) / 2
     ]
     return (
-        f"The inclusion lies {hypot(x_mm, y_mm):.1f} mm off the middle, above {max_offset_mm:g} mm: "
+        f"The lesion lies {hypot(x_mm, y_mm):.1f} mm off the middle, above {max_offset_mm:g} mm: "
         f"move the probe towards {' and '.join(towards)}."
     )
 

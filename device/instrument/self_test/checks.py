@@ -171,7 +171,7 @@ def clock_results(drift_s: float, max_jump_s: float, now: str, synchronised: Pat
 def _time_server(synchronised: Path) -> CheckResult:
     if synchronised.exists():
         return CheckResult(CLOCK, "time server", "passed")
-    return not_tested(CLOCK, "time server", "Nothing says that a server keeps this clock: compare it with another one.")
+    return not_tested(CLOCK, "time server", "No time server is known to keep this clock: compare it with another one.")
 
 
 STORAGE = "Storage"

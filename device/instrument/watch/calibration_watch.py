@@ -90,12 +90,12 @@ class CalibrationWatch:
             if isinstance(self._drift, LargeDriftError):
                 raise self._drift
         else:
-            self._note_untold(f"{load_n:+.3f} N acts on the probe, above {UNTOUCHED_N:g} N.")
+            self._note_untold(f"Something touches the probe: {load_n:+.3f} N, above {UNTOUCHED_N:g} N.")
 
     def _note_untold(self, why: str) -> None:
         """Note that frames say nothing; raise the `LargeDriftError` of the last that did, with what keeps it there."""
         if isinstance(self._drift, LargeDriftError):
-            raise LargeDriftError(f"{self._drift.cause} It was not looked at again: {why}", f"Wipe the face. {FREE}")
+            raise LargeDriftError(f"{self._drift.cause} It was not compared again: {why}", f"Wipe the face. {FREE}")
         if not self._is_judged:
             self._unchecked = UncheckedCalibration(f"The face was not compared since the start: {why}", FREE)
 
@@ -117,4 +117,4 @@ def _described(drift: Drift) -> str:
         more = "brighter" if drift.change_ratio > 0 else "dimmer"
         return f"The untouched face is {abs(drift.change_ratio):.0%} {more} at {drift.side} than at the calibration"
     light = f"{drift.change_ratio:.0%} of a press's light"
-    return f"The untouched face lets out light at {drift.side} that it did not at the calibration: {light}"
+    return f"The untouched face shines at {drift.side}, which it did not at the calibration: {light}"

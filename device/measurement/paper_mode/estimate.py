@@ -7,17 +7,24 @@ section IV: ten images a lesion, averaged.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import (
+    NO_NUMBERS,
+    NOTHING_STANDS_OUT,
+    UNKNOWN_IMAGE,
     Estimate,
     Numbers,
     Origin,
     origin_of,
+    outside_training,
     saturation,
+    with_critical,
     with_numbers,
     without_numbers,
 )
@@ -56,10 +63,9 @@ def estimate_paper(recording: Recording, bundle: ModelBundle, calibration: Calib
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin)
     image_rows = image_features(recording, calibration.settings)
-    peak = float(image_rows[:, 0].mean())
-    if peak < VISIBLE_CONTRAST:
-        reason = f"No inclusion stands out: peak contrast {peak:.2%}, below {VISIBLE_CONTRAST:.1%}."
-        return without_numbers("not_identifiable", reason, origin)
+    if float(image_rows[:, 0].mean()) < VISIBLE_CONTRAST:
+        features = with_critical(_named(FEATURE_NAMES, image_rows), {FEATURE_NAMES[0]: VISIBLE_CONTRAST})
+        return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features)
     return _answer(image_rows, bundle, calibration, origin)
 
 
@@ -70,19 +76,19 @@ def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[n
 
 def _answer(image_rows: NDArray[np.float64], bundle: ModelBundle, calibration: Calibration, origin: Origin) -> Estimate:
     rows = calibration.deformation_features(image_rows)
+    features = _named(FEATURE_NAMES, image_rows) | _named(bundle.feature_names, rows)
     estimates = bundle.estimate(rows).estimate.astype(float)
-    outside = bundle.outside_training_range(rows.mean(axis=0))
-    if outside:
-        return without_numbers("outside_range", " ".join(outside), origin)
+    if outside := outside_training(bundle, rows.mean(axis=0)):
+        return without_numbers("outside_range", f"{UNKNOWN_IMAGE} {NO_NUMBERS}", origin, features | outside)
     mean, held_out = estimates.mean(axis=0), calibration.held_out
     interval, box = held_out.interval(mean), (held_out.box_low, held_out.box_high)
     numbers = Numbers(mean, _scatter(estimates), interval.low, interval.high, interval.identifiable, *box)
-    return with_numbers(numbers, _named(image_rows.mean(axis=0), rows.mean(axis=0), bundle), origin)
+    return with_numbers(numbers, features, origin)
 
 
-def _named(image_row: NDArray[np.float64], row: NDArray[np.float64], bundle: ModelBundle) -> dict[str, float]:
-    names = (*FEATURE_NAMES, *bundle.feature_names)
-    return {name: float(value) for name, value in zip(names, (*image_row, *row), strict=True)}
+def _named(names: Sequence[str], rows: NDArray[np.float64]) -> dict[str, float]:
+    """Return the means over the frames of rows [n, F] by name."""
+    return {name: float(value) for name, value in zip(names, rows.mean(axis=0), strict=True)}
 
 
 def _scatter(estimates: NDArray[np.float64]) -> NDArray[np.float64]:

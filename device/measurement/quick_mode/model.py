@@ -11,11 +11,16 @@ from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.confidence_belt import bands_of
 from device.measurement.estimate import (
+    NO_NUMBERS,
+    NOTHING_STANDS_OUT,
+    UNKNOWN_IMAGE,
     Estimate,
     numbers_in_bands,
     origin_of,
+    outside_training,
     require_trained_for,
     saturation,
+    with_critical,
     with_numbers,
     without_numbers,
 )
@@ -23,20 +28,20 @@ from device.measurement.paper_mode.feature_definitions import QUICK_FEATURES, un
 from device.measurement.parameters import unknowns_to_unit
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.profile import QUICK_NAMES, quick_press
-from device.measurement.quick_mode.roundness import doubt_about_roundness
+from device.measurement.quick_mode.roundness import NOT_ROUND
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS
 
 QUICK_UNITS = units_of(QUICK_NAMES, QUICK_FEATURES)
 """The features of a network that reads one held press."""
-SEEN_BY = MIDDLE, MIDDLE_LESS_RIM
-"""Where an inclusion shows: in the middle by itself, or in the middle against the rim."""
+SEEN_BY = {"middle_contrast": MIDDLE, "middle_less_rim_contrast": MIDDLE_LESS_RIM}
+"""Where an inclusion shows: in the middle by itself, or in the middle against the rim; weights of the rings [J]."""
 
 
 class QuickModel:
     """A verified bundle whose network reads one held press, with the bands of its intervals.
 
-    `faintest_contrast`: of each of `SEEN_BY`, what is more than noise. `elongation_ratio`: the largest usual one.
+    Critical values: `faintest_contrast` of each of `SEEN_BY`, less is noise; `elongation_ratio`, more is not round.
     """
 
     def __init__(self, bundle: ModelBundle) -> None:
@@ -46,7 +51,8 @@ class QuickModel:
             entry = bundle.card["modes"]["quick"]
             self.bands = bands_of(entry)
             self.elongation_ratio = float(entry["elongation_ratio"])
-            self.faintest_contrast = tuple(float(entry["faintest_contrast"][i]) for i in range(len(SEEN_BY)))
+            faintest = (float(entry["faintest_contrast"][i]) for i in range(len(SEEN_BY)))
+            self.faintest_contrast = dict(zip(SEEN_BY, faintest, strict=True))
         except (IndexError, KeyError, TypeError, ValueError, InvalidQuantity) as error:
             raise BundleRefused(bundle.folder, "modes.quick", f"incomplete ({error})", "complete") from error
 
@@ -54,12 +60,10 @@ class QuickModel:
         """Run the golden vectors; raises `BundleRefused` when one does not hold."""
         self.bundle.prove()
 
-    def sees(self, contrast: Array) -> bool:
-        """Return whether an inclusion stands out in the contrast [J] of the rings."""
-        return any(
-            float(weights @ contrast) > faintest
-            for weights, faintest in zip(SEEN_BY, self.faintest_contrast, strict=True)
-        )
+
+def visible_contrast(contrast: Array) -> dict[str, float]:
+    """Return how bright the middle of the contrast [J] of the rings is, by itself and against the rim."""
+    return {name: float(weights @ contrast) for name, weights in SEEN_BY.items()}
 
 
 def estimate_quick(recording: Recording, model: QuickModel, calibration: Calibration) -> Estimate:
@@ -73,12 +77,15 @@ def estimate_quick(recording: Recording, model: QuickModel, calibration: Calibra
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin)
     row, ratio = quick_press(recording)
-    if not model.sees(row[:RINGS]):
-        return without_numbers("not_identifiable", "No inclusion stands out.", origin)
-    doubts = [*doubt_about_roundness(ratio, model.elongation_ratio), *model.bundle.outside_training_range(row)]
-    if doubts:
-        return without_numbers("outside_range", " ".join(doubts), origin)
+    seen, faintest = visible_contrast(row[:RINGS]), model.faintest_contrast
+    found = dict(zip(model.bundle.feature_names, map(float, row), strict=True)) | {"elongation_ratio": ratio} | seen
+    features = with_critical(found, {"elongation_ratio": model.elongation_ratio} | faintest)
+    if not any(seen[name] > faintest[name] for name in SEEN_BY):
+        return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features)
+    outside = outside_training(model.bundle, row)
+    rejections = [*([] if ratio <= model.elongation_ratio else [NOT_ROUND]), *([UNKNOWN_IMAGE] if outside else [])]
+    if rejections:
+        return without_numbers("outside_range", " ".join([*rejections, NO_NUMBERS]), origin, features | outside)
     raw = model.bundle.estimate(row[None])
-    features = dict(zip(model.bundle.feature_names, map(float, row), strict=True)) | {"elongation_ratio": ratio}
     numbers = numbers_in_bands(unknowns_to_unit(raw.estimate[0]), raw.spread[0], model.bands)
     return with_numbers(numbers, features, origin)

@@ -14,6 +14,7 @@ OFFSETS_SHARE, NOISE_CONTRAST = 0.3, 0.004
 """The second harmonic of a round inclusion off the axis is at most this share of its first, and noise is this
 contrast.
 """
+NOT_ROUND = "The inclusion is not round."
 
 
 def elongation_ratio(elongation: Array, offset: Array) -> float:
@@ -23,10 +24,3 @@ def elongation_ratio(elongation: Array, offset: Array) -> float:
     """
     oblong, aside = (float(np.sqrt(np.mean(part**2))) for part in (elongation, offset))
     return oblong / (NOISE_CONTRAST + OFFSETS_SHARE * aside)
-
-
-def doubt_about_roundness(ratio: float, usual_ratio: float) -> list[str]:
-    """Return a sentence when an `elongation_ratio` is above the usual one; [] is good."""
-    if ratio <= usual_ratio:
-        return []
-    return [f"The inclusion is not round: elongation {ratio:.2f}, above the usual {usual_ratio:.2f}."]

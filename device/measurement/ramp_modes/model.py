@@ -10,14 +10,14 @@ Source of the format: docs/contracts.md.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.bundle import BundleRefused, ModelBundle
-from device.measurement.confidence_belt import Bands, bands_of
+from device.measurement.confidence_belt import bands_of
 from device.measurement.mode import Mode
 from device.measurement.paper_mode.feature_definitions import RADIAL_PROFILE_FEATURES, units_of
 from device.measurement.parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
@@ -54,10 +54,12 @@ class RampAnswer(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ModeLimits:
-    """What held-out presses of a mode have shown: bands of each unknown, and the largest usual values of doubt."""
+class CriticalValues:
+    """Of a mode: above any of these a press is not of one round inclusion inside the trained ranges.
 
-    bands: tuple[Bands, ...]
+    Held-out presses that are exceed each of them in 1.25 % of cases.
+    """
+
     misfit_ratio: float
     elongation_deviations: float
     outside_log_odds: float
@@ -88,15 +90,22 @@ def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) 
 
 
 class RampModel:
-    """A verified bundle: networks, forward model, what tells the ranges and what is round, and each mode's limits."""
+    """A verified bundle: networks, forward model, what tells the ranges and what is round.
+
+    `bands` and `critical` values are those of each mode.
+    """
 
     def __init__(self, bundle: ModelBundle, answers: RampAnswers, ranges: RangeTest, round_spot: RoundSpot) -> None:
-        """Raises `BundleRefused` when the card of a bundle that reads `RAMP_UNITS` lacks the limits of a mode."""
+        """Raises `BundleRefused` when the card of a bundle that reads `RAMP_UNITS` lacks the values of a mode."""
         self.bundle, self.answers, self.ranges, self.round_spot = bundle, answers, ranges, round_spot
         try:
-            self.limits = {mode: _limits(bundle.card["modes"][mode]) for mode in RAMP_MODES}
+            entries = {mode: bundle.card["modes"][mode] for mode in RAMP_MODES}
+            self.bands = {mode: bands_of(entry) for mode, entry in entries.items()}
+            self.critical = {mode: _critical_values(entry) for mode, entry in entries.items()}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
-            raise BundleRefused(bundle.folder, "modes", f"incomplete ({error})", "limits of every mode") from error
+            raise BundleRefused(
+                bundle.folder, "modes", f"incomplete ({error})", "bands and critical values of every mode"
+            ) from error
 
     def prove(self) -> None:
         """Run the golden vectors of all its networks; raises `BundleRefused` when one does not hold."""
@@ -114,6 +123,5 @@ class RampModel:
         return unknowns_to_unit(raw.estimate), raw.spread
 
 
-def _limits(entry: Mapping[str, Any]) -> ModeLimits:
-    doubts = (float(entry[name]) for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"))
-    return ModeLimits(bands_of(entry), *doubts)
+def _critical_values(entry: Mapping[str, Any]) -> CriticalValues:
+    return CriticalValues(*(float(entry[field.name]) for field in fields(CriticalValues)))

@@ -11,9 +11,9 @@ const TILES = [
 ];
 
 const STATUS_WORDS = {
-  outside_range: "Outside the model's range.",
+  outside_range: "No numbers.",
   no_contact: "No contact.",
-  saturated: "Image saturated.",
+  saturated: "Image too bright.",
   not_identifiable: "Not determined.",
   rejected: "Rejected.",
 };

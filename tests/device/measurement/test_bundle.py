@@ -150,14 +150,14 @@ def test_units_are_those_of_the_definitions() -> None:
     assert dict.fromkeys(QUICK_NAMES, "1") | {"force_n": "N"} == QUICK_UNITS
 
 
-def test_a_ratio_outside_the_training_range_is_named_without_a_unit() -> None:
+def test_features_outside_the_training_range_are_named_in_their_order() -> None:
     bundle = read_quick_model(ROOT / "models" / "quick").bundle
     row = np.array([np.mean(bundle.feature_range[name]) for name in QUICK_NAMES])
     low, high = bundle.feature_range[QUICK_NAMES[0]]
     row[0], row[-1] = high + 1, 0.7
-    contrast, force = bundle.outside_training_range(row)
-    assert contrast == f"Contrast 0.0 is {high + 1:.4g}, outside the trained {low:.4g} to {high:.4g}."
-    assert force.startswith("Force is 0.7 N, outside the trained")
+    outside = bundle.outside_training_range(row)
+    assert tuple(outside) == (QUICK_NAMES[0], "force_n")
+    assert outside[QUICK_NAMES[0]] == (low, high)
 
 
 @pytest.mark.parametrize("part", ["estimate", "spread"])
@@ -218,13 +218,14 @@ def test_no_rows_give_no_estimates(folder: Path) -> None:
 
 
 def test_features_inside_the_training_range_are_not_flagged(folder: Path) -> None:
-    assert read_paper_model(folder).outside_training_range(INSIDE) == []
+    assert read_paper_model(folder).outside_training_range(INSIDE) == {}
 
 
-def test_each_feature_outside_the_training_range_is_named_with_value_and_range(folder: Path) -> None:
-    first, second = read_paper_model(folder).outside_training_range(np.array([0.5, 0.8, np.nan]))
-    assert first.startswith("Max deformation is 0.5 mm, outside the trained 0.00")
-    assert second.startswith("Deformation area is nan mm2, outside the trained")
+def test_each_feature_outside_the_training_range_is_named_with_its_range(folder: Path) -> None:
+    bundle = read_paper_model(folder)
+    outside = bundle.outside_training_range(np.array([0.5, 0.8, np.nan]))
+    assert tuple(outside) == ("max_deformation_mm", "deformation_area_mm2")
+    assert outside["max_deformation_mm"] == bundle.feature_range["max_deformation_mm"]
 
 
 def test_a_bundle_answers_the_same_in_another_process(bundle):

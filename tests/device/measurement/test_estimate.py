@@ -25,7 +25,6 @@ def assert_no_number(estimate):
     for name in UNKNOWNS:
         quantity = getattr(estimate, name)
         assert (quantity.value, quantity.low, quantity.high, quantity.identifiable) == (None, None, None, False)
-    assert estimate.features == {}
 
 
 def test_an_ordinary_press_is_answered_near_the_truth(estimated, recording):
@@ -101,7 +100,7 @@ def test_a_saturated_image_gets_no_number(estimated, recording):
 
     estimate = estimated(with_press(recording, glare))
     assert estimate.status == "saturated"
-    assert "0.2% of the pixels are saturated, above 0.1%" in estimate.reason
+    assert "0.2% of its pixels are saturated, above 0.1%" in estimate.reason
     assert_no_number(estimate)
 
 
@@ -118,7 +117,8 @@ def test_an_image_like_the_reference_shows_no_inclusion(estimated, recording):
     reference = recording.with_role("reference")[-1]
     estimate = estimated(with_press(recording, lambda frame: replace(reference, role="press")))
     assert estimate.status == "not_identifiable"
-    assert estimate.reason.startswith("No inclusion stands out: peak contrast")
+    assert estimate.reason.startswith("No inclusion can be told from the tissue here.")
+    assert estimate.features["centroid_intensity"] < estimate.features["critical_centroid_intensity"] == 0.002
     assert_no_number(estimate)
 
 
@@ -130,7 +130,9 @@ def test_features_beyond_the_training_range_are_said_to_be_and_get_no_number(est
 
     estimate = estimated(with_press(recording, brighter))
     assert estimate.status == "outside_range"
-    assert "outside the trained" in estimate.reason
+    assert estimate.reason.startswith("The image is unlike any that the probe can measure. No numbers are given.")
+    found, low, high = (estimate.features[f"{end}max_deformation_mm"] for end in ("", "trained_low_", "trained_high_"))
+    assert not low <= found <= high
     assert_no_number(estimate)
 
 

@@ -213,13 +213,16 @@ def test_networks_of_the_ranges_that_differ_from_numpy_are_refused(trained, tmp_
 
 
 def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedRamp, model: RampModel) -> None:
-    assert (model.limits["standard"].misfit_ratio, model.limits["precise"].misfit_ratio) == (1.3, 1.2)
-    assert (model.limits["standard"].elongation_deviations, model.limits["precise"].elongation_deviations) == (3.3, 3.2)
-    for limits in model.limits.values():
-        assert limits.outside_log_odds == 0.3
-        assert [bands.high[0, 0] for bands in limits.bands] == [1.5, 1.6, 1.7]
-        assert [bands.low[1, 1] for bands in limits.bands] == [-1.5, -1.6, -1.7]
-    assert model.limits["standard"].bands[0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
+    assert (model.critical["standard"].misfit_ratio, model.critical["precise"].misfit_ratio) == (1.3, 1.2)
+    assert (model.critical["standard"].elongation_deviations, model.critical["precise"].elongation_deviations) == (
+        3.3,
+        3.2,
+    )
+    assert {critical.outside_log_odds for critical in model.critical.values()} == {0.3}
+    for bands_of_mode in model.bands.values():
+        assert [bands.high[0, 0] for bands in bands_of_mode] == [1.5, 1.6, 1.7]
+        assert [bands.low[1, 1] for bands in bands_of_mode] == [-1.5, -1.6, -1.7]
+    assert model.bands["standard"][0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
 
 
 def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trained, folder, model) -> None:

@@ -35,7 +35,7 @@ def test_frames_that_follow_the_light_at_once_are_taken(levels):
     [[(LIT, 70), (DARK, 70), (DARK, 4)], [(DARK, 4), (SIDE, 5), (SIDE, 20)], [(LIT, 70), (SIDE, 60), (SIDE, 20)]],
 )
 def test_a_frame_with_the_level_of_the_light_before_is_stale(levels):
-    with pytest.raises(StaleFrameError, match="shows the light before") as fault:
+    with pytest.raises(StaleFrameError, match="gave an old image") as fault:
         see(*(frame(*one) for one in levels))
     assert fault.value.code == "E105"
 

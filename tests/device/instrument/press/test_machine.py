@@ -151,7 +151,7 @@ def test_a_touch_that_chatters_is_no_lift():
         (
             0.5,
             {},
-            "Not all frames could be taken for 10 s: they are wanted up to 0.53 N, and the force came to 0.50 N.",
+            "Not all frames could be taken for 10 s: press slowly up to 0.53 N; the force came to 0.50 N.",
         ),
         (0.6, {"range_n": 0.1}, "was not steady to 0.02 N for 10 s: rest the arm"),
     ],
@@ -184,7 +184,7 @@ def test_a_saturated_frame_does_not_count_and_a_few_of_them_end_the_press():
         assert press.state is PressState.HOLDING
     assert press.see(observed(0.5, saturated_ratio=0.001), RULES).state is PressState.CAPTURING
     rejected = press.see(bright, RULES)
-    assert rejected.reason.startswith("0.2% of the pixels are saturated, above 0.1%: lower light.ratio")
+    assert rejected.reason.startswith("The image is too bright: 0.2% of its pixels are saturated, above 0.1%: shade")
 
 
 def test_frames_that_are_unlike_the_others_are_taken_again_a_few_times():

@@ -98,7 +98,7 @@ def test_light_of_a_slight_touch_is_not_taken_for_drift_but_the_check_is_missing
     watch.require_no_drift(unloaded(40, force_n))
     [warning] = watch.warned(())
     assert (warning.code, warning.is_lasting) == ("E409", True)
-    assert f"{force_n:+.3f} N acts on the probe, above 0.01 N" in warning.cause
+    assert f"Something touches the probe: {force_n:+.3f} N, above 0.01 N" in warning.cause
     assert "nothing touch the probe" in warning.remedy
     assert "zero is off" in warning.remedy
 
@@ -118,8 +118,8 @@ def test_a_slight_touch_does_not_withdraw_what_was_warned_of(watch):
 def test_a_face_that_has_drifted_and_is_then_touched_stays_blocked_and_says_what_keeps_it_so(watch):
     with pytest.raises(LargeDriftError, match="dimmer|brighter") as judged:
         watch.require_no_drift(unloaded(40))
-    assert "acts on the probe" not in str(judged.value)
-    with pytest.raises(LargeDriftError, match=r"not looked at again: -0\.030 N acts on the probe") as latched:
+    assert "touches the probe" not in str(judged.value)
+    with pytest.raises(LargeDriftError, match=r"not compared again: Something touches the probe: -0\.030 N") as latched:
         watch.require_no_drift(unloaded(20, force_n=-0.03))
     assert latched.value.remedy.startswith("Wipe the face. Let nothing touch the probe")
     assert "start the probe again" in latched.value.remedy

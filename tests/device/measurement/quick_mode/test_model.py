@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from device.measurement.bundle import BundleRefused
+from device.measurement.estimate import NO_NUMBERS
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QuickModel, estimate_quick
 from device.measurement.quick_mode.profile import QUICK_NAMES, quick_press
@@ -27,7 +28,8 @@ def test_one_frame_is_answered_and_each_truth_lies_in_its_interval(held, quick_m
         quantity = getattr(estimate, name)
         assert quantity.low <= quantity.value <= quantity.high
         assert quantity.low <= truth <= quantity.high
-    assert tuple(estimate.features) == (*QUICK_NAMES, "elongation_ratio")
+    evidence = "elongation_ratio", "middle_contrast", "middle_less_rim_contrast"
+    assert tuple(estimate.features) == (*QUICK_NAMES, *evidence, *(f"critical_{name}" for name in evidence))
 
 
 def test_the_row_is_the_contrast_that_a_ramp_shows_at_that_force(held, pressed):
@@ -41,7 +43,10 @@ def test_the_row_is_the_contrast_that_a_ramp_shows_at_that_force(held, pressed):
 
 def test_nothing_under_the_skin_gets_no_numbers(pressed, quick_model, calibration):
     estimate = estimate_quick(pressed("quick", (0.0, 6.0, 60.0)), quick_model, calibration)
-    assert (estimate.status, estimate.reason) == ("not_identifiable", "No inclusion stands out.")
+    assert estimate.status == "not_identifiable"
+    assert estimate.reason.startswith("No inclusion can be told from the tissue here.")
+    for name in ("middle_contrast", "middle_less_rim_contrast"):
+        assert estimate.features[name] <= estimate.features[f"critical_{name}"]
 
 
 def test_a_contrast_beyond_what_was_learnt_gets_no_numbers(held, quick_model, calibration):
@@ -53,7 +58,9 @@ def test_a_contrast_beyond_what_was_learnt_gets_no_numbers(held, quick_model, ca
     )
     estimate = estimate_quick(replace(held, frames=frames), quick_model, calibration)
     assert estimate.status == "outside_range"
+    assert estimate.reason.endswith("The image is unlike any that the probe can measure. " + NO_NUMBERS)
     assert estimate.size_mm.value is None
+    assert estimate.features["contrast_0.0_mm"] > estimate.features["trained_high_contrast_0.0_mm"]
 
 
 def test_a_ramp_is_no_hold(pressed, quick_model, calibration):
@@ -76,4 +83,5 @@ def test_two_inclusions_are_not_round_at_one_force_either(pressed, quick_model, 
     two = pressed("quick", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
     estimate = estimate_quick(two, quick_model, calibration)
     assert (estimate.status, estimate.size_mm.value) == ("outside_range", None)
-    assert "not round" in estimate.reason
+    assert estimate.reason.startswith("The inclusion is not round.")
+    assert estimate.features["elongation_ratio"] > estimate.features["critical_elongation_ratio"]

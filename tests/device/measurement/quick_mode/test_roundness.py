@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.quick_mode.roundness import (
-    NOISE_CONTRAST,
-    OFFSETS_SHARE,
-    doubt_about_roundness,
-    elongation_ratio,
-)
+from device.measurement.quick_mode.roundness import NOISE_CONTRAST, OFFSETS_SHARE, elongation_ratio
 
 
 def test_a_spot_in_the_middle_is_compared_with_noise():
@@ -23,8 +18,3 @@ def test_a_spot_aside_may_have_a_share_of_its_first_harmonic():
 def test_the_root_mean_square_counts_whatever_the_sign():
     waves = np.array([3.0, -4.0]) * NOISE_CONTRAST
     assert elongation_ratio(waves, np.zeros(2)) == pytest.approx(np.sqrt(12.5))
-
-
-def test_only_a_ratio_above_the_usual_one_is_doubted():
-    assert doubt_about_roundness(0.5, 0.5) == []
-    assert doubt_about_roundness(0.61, 0.5) == ["The inclusion is not round: elongation 0.61, above the usual 0.50."]

@@ -1,19 +1,26 @@
 """Estimates of recorded force ramps by the committed model: numbers for one round inclusion, and for nothing else."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from device.measurement.estimate import NO_NUMBERS, NOTHING_STANDS_OUT
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.estimate import doubts_about, estimate_ramp, stands_out
-from device.measurement.ramp_modes.model import RAMP_MODES, ModeLimits
+from device.measurement.ramp_modes.estimate import (
+    REASONS,
+    estimate_ramp,
+    rejections,
+    stands_out,
+)
+from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.radial_profile import ROW_NAMES, press_profile
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.neighbour import Neighbour
 
-LIMITS = ModeLimits(bands=(), misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
+CRITICAL = CriticalValues(misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +105,8 @@ def test_an_inclusion_stands_out_by_itself_or_against_the_rim(middle, rim, is_se
 def test_nothing_under_the_skin_gets_no_numbers(pressed, ramp_model, calibration):
     estimate = estimate_ramp(pressed("standard", (0.0, 6.0, 60.0)), "standard", ramp_model, calibration)
     assert estimate.status == "not_identifiable"
+    assert estimate.reason == NOTHING_STANDS_OUT
+    assert estimate.features["contrast_deviations"] <= estimate.features["critical_contrast_deviations"] == 4.0
     assert estimate.size_mm.value is None
 
 
@@ -105,7 +114,8 @@ def test_two_inclusions_get_no_numbers_and_a_reason(pressed, ramp_model, calibra
     two = pressed("standard", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
     estimate = estimate_ramp(two, "standard", ramp_model, calibration)
     assert estimate.status == "outside_range"
-    assert "not round" in estimate.reason or "No single round inclusion" in estimate.reason
+    assert "not round" in estimate.reason or "one single inclusion" in estimate.reason
+    assert estimate.reason.endswith(NO_NUMBERS)
     assert estimate.size_mm.value is None
 
 
@@ -114,33 +124,38 @@ def test_gel_on_the_face_gets_no_numbers(pressed, ramp_model, calibration):
     assert estimate_ramp(wet, "standard", ramp_model, calibration).size_mm.value is None
 
 
-def test_what_is_at_its_limit_is_usual():
-    assert doubts_about(1.2, 3.0, 0.5, LIMITS) == []
+def test_what_is_at_its_critical_value_is_not_rejected():
+    assert rejections(CriticalValues(1.2, 3.0, 0.5), CRITICAL) == []
 
 
 @pytest.mark.parametrize(
-    ("doubtful", "sentence"),
+    ("found", "name"),
     [
-        ((1.31, 3.0, 0.5), "No single round inclusion explains this press: misfit 1.31, above the usual 1.20."),
-        (
-            (1.2, 4.26, 0.5),
-            "The inclusion is not round: its elongation is 4.3 standard deviations from a round one's, above the usual 3.0.",
-        ),
-        ((1.2, 3.0, 0.6), "Size or depth rather lies outside its trained range: log odds 0.6, above the usual 0.5."),
+        (CriticalValues(1.31, 3.0, 0.5), "misfit_ratio"),
+        (CriticalValues(1.2, 4.26, 0.5), "elongation_deviations"),
+        (CriticalValues(1.2, 3.0, 0.6), "outside_log_odds"),
     ],
 )
-def test_every_doubt_is_said_in_its_own_sentence(doubtful, sentence):
-    assert doubts_about(*doubtful, LIMITS) == [sentence]
+def test_every_rejection_is_said_in_its_own_sentence_without_figures(found, name):
+    assert rejections(found, CRITICAL) == [REASONS[name]]
+    assert not re.search(r"\d|odds|misfit|usual", REASONS[name])
 
 
-def test_all_doubts_are_said_and_what_is_no_number_is_doubted_too():
-    for everything in ((2.0, 9.0, 1.0), (float("nan"),) * 3):
-        found = doubts_about(*everything, LIMITS)
-        assert [sentence.split(":")[0] for sentence in found] == [
-            "No single round inclusion explains this press",
-            "The inclusion is not round",
-            "Size or depth rather lies outside its trained range",
-        ]
+def test_all_rejections_are_said_and_what_is_no_number_is_rejected_too():
+    for everything in (CriticalValues(2.0, 9.0, 1.0), CriticalValues(*[float("nan")] * 3)):
+        assert rejections(everything, CRITICAL) == list(REASONS.values())
+
+
+def test_a_press_that_is_refused_keeps_the_figures_and_their_critical_values(pressed, ramp_model, calibration):
+    """Gel on the face: which of the three figures is above its critical value is what the sentences say."""
+    refused = estimate_ramp(pressed("precise", wet_ratio=0.4), "precise", ramp_model, calibration)
+    assert refused.status == "outside_range"
+    critical = ramp_model.critical["precise"]
+    for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"):
+        assert refused.features[f"critical_{name}"] == getattr(critical, name)
+    above = [name for name in REASONS if refused.features[name] > refused.features[f"critical_{name}"]]
+    assert above
+    assert refused.reason == " ".join([*(REASONS[name] for name in above), NO_NUMBERS])
 
 
 def stretched_spot(recording, contrast):
@@ -172,13 +187,14 @@ def test_an_oblong_spot_gets_no_numbers_and_a_reason(pressed, ramp_model, calibr
     np.testing.assert_allclose(rings, as_before, atol=2e-3)
     estimate = estimate_ramp(oblong, mode, ramp_model, calibration)
     assert estimate.status == "outside_range"
-    assert "The inclusion is not round" in estimate.reason
+    assert "The inclusion is not round." in estimate.reason
+    assert estimate.features["elongation_deviations"] > estimate.features["critical_elongation_deviations"]
     assert estimate.size_mm.value is None
 
 
 def test_a_round_inclusions_elongation_is_told_beside_the_other_features(ramp, ramp_model, calibration):
     features = estimate_ramp(ramp, "standard", ramp_model, calibration).features
-    assert 0 < features["elongation_deviations"] < ramp_model.limits["standard"].elongation_deviations
+    assert 0 < features["elongation_deviations"] < ramp_model.critical["standard"].elongation_deviations
     assert "elongation_ratio" not in features
 
 
@@ -187,7 +203,7 @@ def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, ramp_model):
     aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
     best, spot = ramp_model.answer(aside.as_row(), "precise").best, ramp_model.round_spot
     assert np.abs(aside.second_harmonic).max() > 0.005
-    limit = ramp_model.limits["precise"].elongation_deviations
+    limit = ramp_model.critical["precise"].elongation_deviations
     assert spot.elongation_deviations(aside.second_harmonic, best, "precise") < limit
     on_axis = best.copy()
     on_axis[-1] = -1.0
@@ -201,7 +217,7 @@ def test_full_scale_pixels_are_refused(ramp, ramp_model, calibration):
     )
     estimate = estimate_ramp(replace(ramp, frames=frames), "standard", ramp_model, calibration)
     assert estimate.status == "saturated"
-    assert "lower the light" in estimate.reason
+    assert estimate.reason.startswith("The image is too bright: 100.0% of its pixels are saturated, above 0.1%.")
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def write_card(folder, card):
 @pytest.mark.parametrize("mode", RAMP_MODES)
 def test_an_inclusion_in_the_middle_of_the_ranges_lies_inside(ramp_model, mode):
     rows = ramp_model.answers.surrogate.rows(np.zeros((1, len(PARAMETERS))))
-    assert ramp_model.ranges.log_odds(rows, mode)[0] < min(0.0, ramp_model.limits[mode].outside_log_odds)
+    assert ramp_model.ranges.log_odds(rows, mode)[0] < min(0.0, ramp_model.critical[mode].outside_log_odds)
 
 
 @pytest.mark.parametrize("mode", RAMP_MODES)
