@@ -70,15 +70,15 @@ train: sweep ## regenerate everything in models/ from nothing
 	rm -rf build/phantoms
 	$(HOST_TOOLS) table --out models/simulated_probe
 	$(HOST_TOOLS) optics build --out models/simulated_probe
-	$(HOST_TOOLS) train --profile paper --data build/sweep.nc --out models/paper
+	$(HOST_TOOLS) train --mode paper --data build/sweep.nc --out models/paper
 	$(HOST_TOOLS) phantom --out build/phantoms/physical
 	rm -f models/simulated_probe/calibration.json models/simulated_probe/calibration_linear.json
 	$(HOST_TOOLS) calibrate build/phantoms/physical/* --operator "make train" --out models/simulated_probe/calibration.json
 	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
 	$(HOST_TOOLS) calibrate build/phantoms/linear/* --operator "make train" --out models/simulated_probe/calibration_linear.json
 	$(HOST_TOOLS) table --part wide
-	$(HOST_TOOLS) train --profile standard --out models/standard
-	$(HOST_TOOLS) train --profile quick --out models/quick
+	$(HOST_TOOLS) train --mode standard --out models/standard
+	$(HOST_TOOLS) train --mode quick --out models/quick
 
 modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
 	$(HOST_TOOLS) modes --out docs/modes.md

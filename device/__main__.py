@@ -182,7 +182,7 @@ def _record(options: argparse.Namespace) -> int:
 def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:
     """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
     config = stated or simulated_config(serial)
-    bundle = read_paper_model(config.model)
+    bundle = read_paper_model(config.paper_model)
     calibration = Calibrations(config.calibration).active()
     if calibration:
         calibration.require_for(serial, bundle)

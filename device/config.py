@@ -340,11 +340,11 @@ class Config(Section):
     """All settings of the daemon."""
 
     serial: Annotated[str, Doc("Serial number of this probe; model and certificate are for it.")] = "TSIS-0000"
-    model: Annotated[Path, Doc("Folder of the model that answers in mode paper.")] = MODELS / "paper"
+    paper_model: Annotated[Path, Doc("Folder of the model that answers in mode paper.")] = MODELS / "paper"
     quick_model: Annotated[
         Path, Doc("Folder of the model of mode quick, offered where it is installed and for this probe.")
     ] = MODELS / "quick"
-    profile_model: Annotated[
+    standard_model: Annotated[
         Path,
         Doc("Folder of the model of modes standard and precise, offered where it is installed and for this probe."),
     ] = MODELS / "standard"
@@ -369,6 +369,9 @@ class Config(Section):
                 bound = f"another than that of {other} on the same bus"
                 yield Conflict(f"{name}.address", hex(ours.chip_address), bound, (f"{other}.address",))
 
+
+RENAMED = {"model": "paper_model", "profile_model": "standard_model"}
+"""Settings of earlier versions and what each is called now: a file that still has one is refused with the new name."""
 
 SIMULATED: dict[str, tuple[str, Mode]] = {
     "SIM-0001": ("calibration.json", "standard"),

@@ -30,9 +30,9 @@ app = typer.Typer(
     help="Finite-element solves, sweeps, training, calibration and scores of the tactile probe's model.",
 )
 app.command(epilog="Example: host_tools simulate --size-mm 10 --depth-mm 6 --modulus-kpa 80 --explain")(simulate)
-app.command(epilog="Example: host_tools verify --quick --out build/verification.md")(verify)
+app.command(epilog="Example: host_tools verify --short --out build/verification.md")(verify)
 app.command(epilog="Example: host_tools sweep --scenes 134 --seed 1 --out build/sweep.nc")(sweep)
-app.command(epilog="Example: host_tools train --profile standard --out models/standard")(train)
+app.command(epilog="Example: host_tools train --mode standard --out models/standard")(train)
 app.command(epilog="Example: host_tools table --out models/simulated_probe")(table)
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)

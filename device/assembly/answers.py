@@ -97,7 +97,7 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
-    models = read_models(bundle, config.quick_model, config.profile_model).for_probe(config.serial)
+    models = read_models(bundle, config.quick_model, config.standard_model).for_probe(config.serial)
 
     def estimate(recording: Recording, mode: Mode) -> Estimate:
         if calibration is None:

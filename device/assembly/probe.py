@@ -172,7 +172,7 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     """Return the same of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
     parts, faults = OpenedParts(), FaultTimeline(scenario.faults)
     bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
-    config = replace(commissioned(config), model=bundles.folder(config.model))
+    config = replace(commissioned(config), paper_model=bundles.folder(config.paper_model))
     parts.open(lambda: _require_own_serial(config, scenario))
     width_px, height_px = config.camera.raw_mode.sensor_px
     shape, scale = (height_px, width_px), config.camera.sensor_scale
@@ -235,7 +235,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
     """Tare, load model and calibration, open the store; then nothing is missing but the tare of a held probe."""
     config, parts, progress = probe.config, probe.parts, ProgressBoard()
     force = probe.force_once_lifted(progress)
-    bundle = parts.open(lambda: read_paper_model(config.model))
+    bundle = parts.open(lambda: read_paper_model(config.paper_model))
     watch = parts.open(lambda: CalibrationWatch(active_calibration(config, bundle))) if bundle else None
     calibration = watch.calibration if watch else None
     answers = parts.open(lambda: _answers(config, bundle, calibration)) if bundle else None

@@ -81,7 +81,7 @@ def _list(calibrations: Calibrations, *, as_json: bool) -> int:
 def _activate(calibrations: Calibrations, name: str, config: Config) -> int:
     """Refuse what a start would refuse, and what has expired; then write the pointer."""
     calibration = calibrations.read(name)
-    require_own(calibration, config, read_paper_model(config.model))
+    require_own(calibration, config, read_paper_model(config.paper_model))
     CalibrationWatch(calibration).require_valid(ClockWatch(config.clock.max_jump_s).now())
     calibrations.activate(name)
     print(f"{name} is active from the next start of the daemon on.")

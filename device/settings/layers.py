@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from device.config import Config, Conflict
+from device.config import RENAMED, Config, Conflict
 from device.errors import ConfigError
 from device.files.toml_record import as_table, from_table, read_table, table_problems
 from device.measurement.quantities import InvalidQuantity
@@ -125,7 +125,7 @@ def read_layers(files: Iterable[Path]) -> Layers:
         except InvalidQuantity as error:
             problems.append(SettingProblem(path, error))
             continue
-        wrong = [what for what in table_problems(Config, table) if not isinstance(what, Conflict)]
+        wrong = [_renamed(what) for what in table_problems(Config, table) if not isinstance(what, Conflict)]
         problems += [SettingProblem(path, error) for error in wrong]
         held = {name: value for name, value in _flat(table) if name not in _names(wrong)}
         values |= held
@@ -137,6 +137,14 @@ def read_layers(files: Iterable[Path]) -> Layers:
             file = next((origins[name] for name in involved if name in origins), read[-1])
             problems.append(SettingProblem(file, conflict))
     return Layers(tuple(read), values, origins, tuple(problems))
+
+
+def _renamed(problem: InvalidQuantity) -> InvalidQuantity:
+    """Return the problem of a setting that has another name now with that name, any other as it is."""
+    new = RENAMED.get(problem.quantity)
+    if not new:
+        return problem
+    return InvalidQuantity(problem.quantity, problem.value, f"called {new} since this version", f"rename it to {new}")
 
 
 def _names(problems: Iterable[InvalidQuantity]) -> set[str]:

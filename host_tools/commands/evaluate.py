@@ -90,7 +90,7 @@ def evaluate(
     mode: Annotated[str, typer.Option(help="quick, standard, precise or paper; that of the frames by default.")] = "",
     model: Annotated[Path, typer.Option(help="Bundle of mode paper.")] = MODELS / "paper",
     quick_model: Annotated[Path, typer.Option(help="Bundle of mode quick.")] = MODELS / "quick",
-    ramp_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
+    standard_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = PROBE,
     light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
     scenes: Annotated[
@@ -118,14 +118,16 @@ def evaluate(
     if noise_free or posterior:
         if recordings:
             raise InvalidQuantity("recordings", len(recordings), "none", "leave out --noise-free and --posterior")
-        print_reference(ramp_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed)
+        print_reference(
+            standard_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed
+        )
         return
     scenes = SCENES if scenes is None else scenes
     certificate = read_calibration(table / _certificate(light))
     if not recordings and asked in (None, "paper"):
         _print_paper(read_paper_model(model), certificate, table, light, scenes, seed, out)
         return
-    models = read_models(read_paper_model(model), quick_model, ramp_model)
+    models = read_models(read_paper_model(model), quick_model, standard_model)
 
     def answer(recording: Recording) -> Estimate:
         return analysed(recording, models, certificate, asked)

@@ -34,7 +34,7 @@ def table(
     axis.
 
     The first hold tissue of 4-6.25 kPa and 27-36 mm, the second is carried over to it. Half an hour on two cores.
-    Part wide, another half an hour, is of inclusions around the trained ranges: `train --profile standard` needs it.
+    Part wide, another half an hour, is of inclusions around the trained ranges: `train --mode standard` needs it.
     """
     from host_tools.probe_tables.off_axis_table import build_off_axis_table, write_off_axis_table
     from host_tools.probe_tables.out_of_range_table import build_wide_table

@@ -21,40 +21,40 @@ CERTIFICATE = "calibration.json"
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
 TRIALS = 100
-OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--wide", "--quick"), "quick": ("--table",)}
-"""Options of each profile beside --out and --seed."""
+OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--wide", "--dry-run"), "quick": ("--table",)}
+"""Options of each mode beside --out and --seed; precise shares the bundle of standard."""
 
 
 def train(
-    profile: Annotated[str, typer.Option(help="paper, standard (and precise), or quick (after standard).")] = "paper",
+    mode: Annotated[str, typer.Option(help="paper, standard (and precise), or quick (after standard).")] = "paper",
     data: Annotated[Path | None, typer.Option(help="Of paper: data set of `sweep`; swept unless given.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/PROFILE unless given.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/MODE unless given.")] = None,
     trials: Annotated[int | None, typer.Option(help="Of paper: networks that are averaged; 100 unless given.")] = None,
     table: Annotated[Path | None, typer.Option(help="Of the others: folder of the probe's tables.")] = None,
     wide: Annotated[
         Path | None, typer.Option(help="Of standard: folder of the table around the ranges; made unless given.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of weights, splits, presses and noise.")] = 1,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Of standard: a tenth of the presses, to try the chain, not to use.")
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Of standard: a tenth of the presses, to try the chain, not to use.")
     ] = False,
 ) -> None:
     """Train a model and export its bundle.
 
-    Example: host_tools train --profile standard --out models/standard
+    Example: host_tools train --mode standard --out models/standard
     """
-    given = {"--data": data, "--trials": trials, "--table": table, "--wide": wide, "--quick": quick or None}
-    if profile not in OWN_OPTIONS:
-        raise InvalidQuantity("profile", repr(profile), f"one of {', '.join(OWN_OPTIONS)}", "choose one of them")
+    given = {"--data": data, "--trials": trials, "--table": table, "--wide": wide, "--dry-run": dry_run or None}
+    if mode not in OWN_OPTIONS:
+        raise InvalidQuantity("mode", repr(mode), f"one of {', '.join(OWN_OPTIONS)}", "choose one of them")
     for option, value in given.items():
-        if value is not None and option not in OWN_OPTIONS[profile]:
-            raise InvalidQuantity("option", option, f"one of profile {profile}", "leave it out")
-    command = _command({"--profile": profile, **given, "--out": out, "--seed": seed})
-    folder = out or MODELS / profile
-    if profile == "paper":
+        if value is not None and option not in OWN_OPTIONS[mode]:
+            raise InvalidQuantity("option", option, f"one of mode {mode}", "leave it out")
+    command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
+    folder = out or MODELS / mode
+    if mode == "paper":
         _paper(data or _swept(), folder, TRIALS if trials is None else trials, seed, command)
-    elif profile == "standard":
-        _standard(table or TABLE, wide, folder, seed, quick, command)
+    elif mode == "standard":
+        _standard(table or TABLE, wide, folder, seed, dry_run, command)
     else:
         _quick(table or TABLE, folder, seed, command)
 
@@ -110,19 +110,19 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
             print(f"{unknown:20} " + "  ".join(f"{name} {value:6.2f} %" for name, value in errors.items()))
 
 
-def _standard(table: Path, wide: Path | None, out: Path, seed: int, quick: bool, command: str) -> None:
+def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: bool, command: str) -> None:
     from device.files.certificate_file import read_calibration
     from device.measurement.ramp_modes.estimate import estimate_ramp
     from device.measurement.ramp_modes.model import RAMP_MODES
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.export import export_profile
-    from host_tools.press_models.ramp_training import QUICK_EFFORT, Effort, train_ramp
+    from host_tools.press_models.ramp_training import DRY_RUN, Effort, train_ramp
     from host_tools.probe_tables.out_of_range_table import load_wide_table
     from host_tools.scores.dial import publish_dial
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
-    effort = QUICK_EFFORT if quick else Effort()
+    effort = DRY_RUN if dry_run else Effort()
     trained = train_ramp(tables, load_wide_table(wide or _wide()), effort=effort, seed=seed, say=note.print)
     with _refusals():
         export_profile(

@@ -22,7 +22,7 @@ TABLES = ROOT / "host_tools" / "forward" / "accuracy_table.json"
 def verify(
     only: Annotated[list[str] | None, typer.Option(help="A chapter, such as hayes; repeat it for several.")] = None,
     out: Annotated[Path | None, typer.Option(help="Markdown file to write; results and figures go beside it.")] = None,
-    quick: Annotated[bool, typer.Option(help="Fewer cases, and nothing that takes minutes.")] = False,
+    short: Annotated[bool, typer.Option(help="Fewer cases, and nothing that takes minutes.")] = False,
     extremes: Annotated[bool, typer.Option(help="Add scenes at the ends of every range.")] = False,
     effectivity: Annotated[bool, typer.Option(help="Add how often stated errors hold the true ones.")] = False,
     tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
@@ -30,7 +30,7 @@ def verify(
     """Check the forward model against answers known on paper; exit code 1 when one misses its bound."""
     require_writable(out, (".md",))
     extra = [name for name, wanted in (("extremes", extremes), ("effectivity", effectivity)) if wanted]
-    chapters = _chapters(only or [], extra, quick=quick)
+    chapters = _chapters(only or [], extra, short=short)
     if tables:
         _measure_tables()
     measured = measure_chapters(chapters)
@@ -39,7 +39,7 @@ def verify(
         from host_tools.pages.page import Results, write_page
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
-        flags += ["--quick"] if quick else []
+        flags += ["--short"] if short else []
         write_page(
             out, Results("verification", " ".join(["host_tools verify", *flags, f"--out {shown(out)}"]), measured)
         )
@@ -49,14 +49,14 @@ def verify(
         raise typer.Exit(1)
 
 
-def _chapters(only: list[str], extra: list[str], *, quick: bool) -> dict[str, Callable[[], Chapter]]:
+def _chapters(only: list[str], extra: list[str], *, short: bool) -> dict[str, Callable[[], Chapter]]:
     """Return the chapters asked for, all of them without a name; refuse a name that is none."""
     from host_tools.verification.chapters import CHAPTERS, EXTRA_CHAPTERS
 
     unknown = [name for name in only if name not in CHAPTERS]
     if unknown:
         raise InvalidQuantity("only", ", ".join(unknown), "a chapter", f"choose from {', '.join(CHAPTERS)}")
-    chosen = {name: partial(chapter, quick) for name, chapter in CHAPTERS.items() if not only or name in only}
+    chosen = {name: partial(chapter, short) for name, chapter in CHAPTERS.items() if not only or name in only}
     return {**chosen, **{name: EXTRA_CHAPTERS[name] for name in extra}}
 
 

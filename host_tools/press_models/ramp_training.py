@@ -53,7 +53,7 @@ class Effort:
     ranges: RangeEffort = field(default_factory=RangeEffort)
 
 
-QUICK_EFFORT = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40, RangeEffort(4_600, 100, 20_000, 1, 900))
+DRY_RUN = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40, RangeEffort(4_600, 100, 20_000, 1, 900))
 """Enough to try the chain; the model is a poor one."""
 
 

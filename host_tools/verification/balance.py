@@ -87,9 +87,9 @@ def finite_balance(contact: str) -> tuple[Benchmark, ...]:
     )
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter: small strain only when quick."""
-    finite = () if quick else tuple(row for contact in WORK_BOUNDS for row in finite_balance(contact))
+def chapter(short: bool) -> Chapter:
+    """Return the chapter: small strain only when short."""
+    finite = () if short else tuple(row for contact in WORK_BOUNDS for row in finite_balance(contact))
     return Chapter(
         "Balance of force and energy",
         "The default inclusion, pressed by 1 mm.",

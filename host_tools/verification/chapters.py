@@ -36,7 +36,7 @@ CHAPTERS: dict[str, Callable[[bool], Chapter]] = {
     "smoothness": smoothness.chapter,
     "calculix": mechanics.chapter,
 }
-"""Each function takes whether to be quick."""
+"""Each function takes whether to be short."""
 
 
 def extremes_chapter() -> Chapter:

@@ -102,8 +102,8 @@ def benchmarks() -> tuple[Benchmark, ...]:
     return tuple(at_most(str(pair), "largest relative error of strain", largest_error(pair), 1e-3) for pair in PAIRS)
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter; a quick one is the same."""
+def chapter(short: bool) -> Chapter:
+    """Return the chapter; a short one is the same."""
     return Chapter(
         "Eshelby's sphere",
         f"Far tension on a sphere of modulus E_i in a matrix of {MATRIX_KPA:g} kPa, order {ORDER}: the strain inside "

@@ -86,14 +86,14 @@ def _published() -> Table:
     return Table(caption, ("nu", *(f"a/h = {ratio:g}" for ratio in RATIOS)), tuple(rows))
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter: every other cell of the table when quick."""
+def chapter(short: bool) -> Chapter:
+    """Return the chapter: every other cell of the table when short."""
     cells = list(product(POISSON_RATIOS, RATIOS))
     return Chapter(
         "Flat punch on a bonded layer (Hayes)",
         "P = 2 E a w kappa / (1 - nu^2) with a rigid probe, through the whole chain from scene to force.",
         "Hayes, Keer, Herrmann & Mockros, J. Biomech. 5:541 (1972); Lebedev & Ufliand, J. Appl. Math. Mech. 22:442 "
         "(1958).",
-        tuple(benchmark(*cell) for cell in (cells[::5] if quick else cells)),
+        tuple(benchmark(*cell) for cell in (cells[::5] if short else cells)),
         (_published(),),
     )

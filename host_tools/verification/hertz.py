@@ -84,8 +84,8 @@ def benchmarks(found: dict[float, Hertz]) -> tuple[Benchmark, ...]:
     )
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter; a quick one is the same."""
+def chapter(short: bool) -> Chapter:
+    """Return the chapter; a short one is the same."""
     found = measurements()
     rows = [
         (

@@ -107,9 +107,9 @@ def _figure(found: LockingFound) -> Figure:
     )
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter: only p = 1 and mixed p = 3 when quick."""
-    found = measurements((Formulation(1, False), Formulation(3, True)) if quick else FORMULATIONS)
+def chapter(short: bool) -> Chapter:
+    """Return the chapter: only p = 1 and mixed p = 3 when short."""
+    found = measurements((Formulation(1, False), Formulation(3, True)) if short else FORMULATIONS)
     return Chapter(
         "Incompressible limit",
         "Every material's Poisson ratio goes to one half.",

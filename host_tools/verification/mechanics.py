@@ -180,10 +180,10 @@ CLAIM = (
 SOURCE = "Dhondt, CalculiX CrunchiX User's Manual, version 2.20: another code, another mesh, another contact law."
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter; it is skipped when quick, since it takes minutes, and where CalculiX is not installed."""
-    if quick or not ccx_available():
-        why = "left out of a quick run" if quick else "the program ccx is not installed"
+def chapter(short: bool) -> Chapter:
+    """Return the chapter; it is skipped when short, since it takes minutes, and where CalculiX is not installed."""
+    if short or not ccx_available():
+        why = "left out of a short run" if short else "the program ccx is not installed"
         return Chapter(TITLE, CLAIM, SOURCE, skipped=f"{why}; `host_tools verify --only calculix` measures it")
     facts = {"version": ccx_version(), "increment_mm": PROCESS.increment_mm, "repairings": PROCESS.repairings}
     try:

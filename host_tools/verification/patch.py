@@ -99,8 +99,8 @@ def benchmarks() -> tuple[Benchmark, ...]:
     return (*uniform, *rigid, *springs_in_series())
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter; a quick one is the same."""
+def chapter(short: bool) -> Chapter:
+    """Return the chapter; a short one is the same."""
     return Chapter(
         "Patch test",
         "A uniform strain of 3 % in a unit body, and a uniform pressure across the sliding contact, come out to "

@@ -97,8 +97,8 @@ def _figure(found: dict[int, list[TubeErrors]]) -> Figure:
     return Figure("verification_rates.svg", "Lamé's tube: error against halvings of the elements, order by order", draw)
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter; a quick one is the same."""
+def chapter(short: bool) -> Chapter:
+    """Return the chapter; a short one is the same."""
     found = measurements()
     return Chapter(
         "Rates of convergence, smooth solution (Lamé's tube)",

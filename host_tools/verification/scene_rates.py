@@ -117,9 +117,9 @@ def _figure(found: Meshes, reference: SceneFeatures) -> Figure:
     return Figure("verification_scene_rates.svg", "The default scene: error against unknowns", draw)
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter: orders 1 and 3 only when quick."""
-    found, reference = measurements((1, 3) if quick else (1, 2, 3, 4)), solve_level(*REFERENCE).features
+def chapter(short: bool) -> Chapter:
+    """Return the chapter: orders 1 and 3 only when short."""
+    found, reference = measurements((1, 3) if short else (1, 2, 3, 4)), solve_level(*REFERENCE).features
     return Chapter(
         "Rates of convergence, the real scene",
         "Inclusion of 10 mm, 6 mm deep, 80 kPa, pressed by 1 mm; the reference is order 5 with elements of 0.001 mm at "

@@ -109,10 +109,10 @@ def _figure(found: Scans) -> Figure:
     return Figure("verification_smoothness.svg", "Noise of O1 over a fine scan of the size", draw)
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter: fewer points and corners when quick."""
-    found = measurements(9 if quick else POINTS)
-    edge = corners()[:1] if quick else corners()
+def chapter(short: bool) -> Chapter:
+    """Return the chapter: fewer points and corners when short."""
+    found = measurements(9 if short else POINTS)
+    edge = corners()[:1] if short else corners()
     jumps = {str(place.as_tuple()[:2]): jump(place) for place in edge}
     hand_over = tuple(
         at_most(

@@ -62,9 +62,9 @@ def benchmarks(found: dict[FaceSector, TimedFeatures]) -> tuple[Benchmark, ...]:
     )
 
 
-def chapter(quick: bool) -> Chapter:
-    """Return the chapter: only the quarter when quick."""
-    found = measurements(("quarter",)) if quick else measurements()
+def chapter(short: bool) -> Chapter:
+    """Return the chapter: only the quarter when short."""
+    found = measurements(("quarter",)) if short else measurements()
     rows = [(name, str(timed.solution.elements), f"{timed.seconds:.2f}") for name, timed in found.items()]
     return Chapter(
         "Quarter = half = full = axisymmetric",

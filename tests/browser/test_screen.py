@@ -237,6 +237,9 @@ def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Serv
     expect(page.locator("#status-reason")).to_contain_text("note the finding without numbers.")
     _shoot(page, "result-without-numbers")
     _require_fits(page)
+    cut = "tiles => tiles.filter(t => t.scrollHeight > t.clientHeight + 1).map(t => t.id)"
+    assert page.locator(".tile").evaluate_all(cut) == []
+    expect(page.locator(".gauge")).to_be_hidden()
 
 
 def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: Page, tmp_path: Path):

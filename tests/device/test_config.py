@@ -100,11 +100,17 @@ def test_only_this_machine_is_served_unless_told_otherwise():
 
 
 def test_what_is_written_holds_and_the_rest_stays(read):
-    config = read('serial = "TSIS-0042"\nmodel = "m"\n[light]\nratio = [0.1, 0.2, 0.3, 1.0]\n[press]\ntarget_n = 2\n'
-                  "overload_n = 4\n")  # fmt: skip
-    assert (config.serial, config.model, config.light.ratio) == ("TSIS-0042", Path("m"), (0.1, 0.2, 0.3, 1.0))
+    config = read('serial = "TSIS-0042"\npaper_model = "m"\n[light]\nratio = [0.1, 0.2, 0.3, 1.0]\n[press]\n'
+                  "target_n = 2\noverload_n = 4\n")  # fmt: skip
+    assert (config.serial, config.paper_model, config.light.ratio) == ("TSIS-0042", Path("m"), (0.1, 0.2, 0.3, 1.0))
     assert config.press.target_n == 2
     assert config.camera == CameraSection()
+
+
+@pytest.mark.parametrize(("old", "new"), [("model", "paper_model"), ("profile_model", "standard_model")])
+def test_a_setting_of_an_earlier_version_is_refused_with_its_new_name(read, old, new):
+    with pytest.raises(ConfigError, match=f"{old} is 'm', but must be called {new} since .*: rename it to {new}"):
+        read(f'{old} = "m"\n')
 
 
 @pytest.mark.parametrize(("name", "low", "high"), BOUNDS)

@@ -37,7 +37,7 @@ def models(tmp_path):
     """A configuration that points at a copy of the committed models."""
     shutil.copytree(ROOT / "models", tmp_path / "models")
     (tmp_path / "probe.toml").write_text(
-        'serial = "SIM-0001"\nmodel = "models/paper"\ncalibration = "models/simulated_probe/calibration.json"\n'
+        'serial = "SIM-0001"\npaper_model = "models/paper"\ncalibration = "models/simulated_probe/calibration.json"\n'
         'data = "var"\n'
     )
     return tmp_path / "models"

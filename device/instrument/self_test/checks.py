@@ -211,9 +211,9 @@ REINSTALL = "Install the bundle again."
 def model_results(config: Config, folder_of: Callable[[Path], Path]) -> list[CheckResult]:
     """Return one result a model; `folder_of` says where an installed one lies."""
     loaders: dict[Path, Callable[[Path], ModelBundle]] = {
-        config.model: read_paper_model,
+        config.paper_model: read_paper_model,
         config.quick_model: lambda folder: read_quick_model(folder).bundle,
-        config.profile_model: lambda folder: read_ramp_model(folder).bundle,
+        config.standard_model: lambda folder: read_ramp_model(folder).bundle,
     }
     return [_result(installed.name, folder_of(installed), load) for installed, load in loaders.items()]
 

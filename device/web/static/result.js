@@ -76,6 +76,8 @@ function showTile({ name, key, unit }, measurement) {
 /** Fill the result view from a measurement of GET /api/v1/measurements/{id}. */
 export function showMeasurement(measurement) {
   for (const tile of TILES) showTile(tile, measurement);
+  const bounded = TILES.some(({ key }) => Number.isFinite(measurement.estimate[key].low));
+  byId("panel").dataset.numbers = bounded ? "some" : "none";
   const image = byId("image");
   image.src = imageUrl(measurement.id);
   image.alt = `Tactile image of measurement ${measurement.seq}`;

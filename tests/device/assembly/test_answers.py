@@ -29,7 +29,7 @@ def test_the_simulated_probe_answers_in_every_mode_and_the_one_of_the_papers_lig
 
 def test_a_probe_without_their_models_has_the_papers_mode_only(bundle, calibration, tmp_path):
     config = replace(
-        simulated_config("SIM-LINEAR"), serial="SIM-0001", profile_model=tmp_path / "a", quick_model=tmp_path / "b"
+        simulated_config("SIM-LINEAR"), serial="SIM-0001", standard_model=tmp_path / "a", quick_model=tmp_path / "b"
     )
     assert answers_for(config, bundle, calibration).modes == ("paper",)
 
@@ -43,7 +43,7 @@ def test_a_mode_without_a_model_is_no_default():
 
 
 def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tmp_path):
-    config = replace(simulated_config(), data=tmp_path, profile_model=tmp_path / "none")
+    config = replace(simulated_config(), data=tmp_path, standard_model=tmp_path / "none")
     with pytest.raises(StartFailed, match=r"press\.mode is standard, but this probe has models for quick, paper only"):
         open_simulated_probe(config, Scenario())
 

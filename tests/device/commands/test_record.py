@@ -18,7 +18,7 @@ from host_tools.calibration.gates import unusable
 
 PHANTOM = ("--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80")
 OUT = Path("phantoms/1")
-NEW_PROBE = 'serial = "SIM-0001"\ncalibration = "calibrations"\nmodel = "none"\ndata = "var"\n'
+NEW_PROBE = 'serial = "SIM-0001"\ncalibration = "calibrations"\npaper_model = "none"\ndata = "var"\n'
 
 
 @pytest.fixture(autouse=True)

@@ -54,7 +54,7 @@ def test_a_text_is_written_as_toml_reads_it(text):
 @pytest.mark.parametrize(
     ("name", "value", "written"),
     [
-        ("model", Path("/opt/m"), '"/opt/m"'),
+        ("paper_model", Path("/opt/m"), '"/opt/m"'),
         ("light.address", 0x0A, "0x0a"),
         ("light.ratio", (0.5, 1), "[0.5, 1]"),
         ("light.commissioned_counts", None, "not set"),

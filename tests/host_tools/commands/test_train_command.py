@@ -11,33 +11,33 @@ from host_tools.commands import train as command
 
 
 @pytest.mark.parametrize(
-    ("profile", "options"),
+    ("mode", "options"),
     [
-        ("quick", {"quick": True}),
+        ("quick", {"dry_run": True}),
         ("standard", {"trials": 3}),
-        ("paper", {"quick": True}),
+        ("paper", {"dry_run": True}),
         ("quick", {"trials": 3}),
         ("quick", {"wide": Path("build")}),
     ],
 )
-def test_an_option_of_another_profile_is_refused_before_anything_is_trained(profile, options):
-    with pytest.raises(InvalidQuantity, match=f"one of profile {profile}"):
-        command.train(profile=profile, **options)
+def test_an_option_of_another_mode_is_refused_before_anything_is_trained(mode, options):
+    with pytest.raises(InvalidQuantity, match=f"one of mode {mode}"):
+        command.train(mode=mode, **options)
 
 
-def test_an_unknown_profile_is_refused_with_the_known_ones():
+def test_an_unknown_mode_is_refused_with_the_known_ones():
     with pytest.raises(InvalidQuantity, match="paper, standard, quick"):
-        command.train(profile="fast")
+        command.train(mode="fast")
 
 
 def test_the_card_keeps_every_option_that_was_given(monkeypatch, tmp_path):
     kept = {}
 
-    def keep(table, wide, out, seed, quick, line):
+    def keep(table, wide, out, seed, dry_run, line):
         kept.update(line=line, out=out, wide=wide)
 
     monkeypatch.setattr(command, "_standard", keep)
     wide = tmp_path / "wide"
-    command.train(profile="standard", out=tmp_path, wide=wide, quick=True, seed=4)
-    assert kept["line"] == f"host_tools train --profile standard --wide {wide} --quick --out {tmp_path} --seed 4"
+    command.train(mode="standard", out=tmp_path, wide=wide, dry_run=True, seed=4)
+    assert kept["line"] == f"host_tools train --mode standard --wide {wide} --dry-run --out {tmp_path} --seed 4"
     assert (kept["out"], kept["wide"]) == (tmp_path, wide)

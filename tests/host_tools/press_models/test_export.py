@@ -31,7 +31,7 @@ from host_tools.press_models.export import GOLDEN_ROWS, export_profile
 from host_tools.press_models.mode_outcome import Answered, ModeOutcome
 from host_tools.press_models.onnx_networks import build_network, build_range_networks, physical_estimate
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
-from host_tools.press_models.ramp_training import QUICK_EFFORT, TrainedRamp
+from host_tools.press_models.ramp_training import DRY_RUN, TrainedRamp
 from host_tools.press_models.train_ensemble import DenseEnsemble
 from host_tools.press_models.train_range import DEPTHS, SIZES, RangeNetwork, TrainedRange
 
@@ -74,7 +74,7 @@ def made_ranges(rows: np.ndarray) -> TrainedRange:
         )
         for mode in RAMP_MODES
     }
-    return TrainedRange(networks, np.array([2e-4, 4e-4]), "0123", QUICK_EFFORT.ranges)
+    return TrainedRange(networks, np.array([2e-4, 4e-4]), "0123", DRY_RUN.ranges)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def trained() -> TrainedRamp:
         round_spot=made_round_spot(surrogate),
         outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
         samples=PressSamples(draw_parameters(PRESSES, rng), rows, np.zeros((PRESSES, SECOND_COLUMNS))),
-        effort=QUICK_EFFORT,
+        effort=DRY_RUN,
         seed=11,
     )
 
@@ -196,7 +196,7 @@ def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, f
     entry = model.bundle.card["range"]
     assert entry["sha256"] == hashlib.sha256((folder / RANGE_FILE).read_bytes()).hexdigest()
     assert (entry["size_mm"], entry["depth_mm"]) == (list(SIZES), list(DEPTHS))
-    assert (entry["dataset_sha256"], entry["effort"]) == ("0123", vars(QUICK_EFFORT.ranges))
+    assert (entry["dataset_sha256"], entry["effort"]) == ("0123", vars(DRY_RUN.ranges))
     assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
     for mode in RAMP_MODES:
         expected = trained.ranges.networks[mode].log_odds(np.array(model.bundle.card["golden"]["features"]))
@@ -230,7 +230,7 @@ def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trai
     assert tuple(card["serials"]) == tuple(card["serials"]) == SERIALS
     assert (card["name"], card["software_version"], card["seed"]) == ("demo", "1.2.3", 11)
     assert card["training_command"] == "host_tools train x"
-    assert card["effort"]["members"] == QUICK_EFFORT.members
+    assert card["effort"]["members"] == DRY_RUN.members
     assert card["dataset_sha256"] == hashlib.sha256(trained.samples.rows.tobytes()).hexdigest()
     assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
     assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()

@@ -8,7 +8,7 @@ from host_tools.verification.peer.calculix import CalculixFailed
 
 def test_without_the_program_the_chapter_says_why_it_is_skipped(monkeypatch):
     monkeypatch.setattr(mechanics, "ccx_available", lambda: False)
-    chapter = mechanics.chapter(quick=False)
+    chapter = mechanics.chapter(short=False)
     assert "not installed" in chapter.skipped
     assert not chapter.benchmarks
 
@@ -24,7 +24,7 @@ def failing(monkeypatch):
 
 
 def test_a_run_that_stops_short_is_a_failure_and_no_skip(failing):
-    chapter = mechanics.chapter(quick=False)
+    chapter = mechanics.chapter(short=False)
     assert not chapter.skipped
     assert not chapter.passed
     assert "2 of 3" in chapter.benchmarks[0].quantity

@@ -19,8 +19,8 @@ def fakes(monkeypatch):
     asked = []
 
     def fake(name, error):
-        def chapter(quick):
-            asked.append((name, quick))
+        def chapter(short):
+            asked.append((name, short))
             return Chapter(name, "", "", (at_most("case", "noise", error, 1.0),))
 
         return chapter
@@ -35,7 +35,7 @@ def test_a_missed_bound_is_exit_code_1(fakes):
 
 
 def test_only_the_chapters_asked_for_are_run(fakes):
-    assert run("--only", "patch", "--quick").exit_code == 0
+    assert run("--only", "patch", "--short").exit_code == 0
     assert fakes == [("patch", True)]
 
 
@@ -49,5 +49,5 @@ def test_an_unknown_chapter_is_refused_before_anything_runs(fakes):
 
 def test_the_document_repeats_the_command(fakes, tmp_path):
     out = tmp_path / "verification.md"
-    run("--only", "patch", "--quick", "--out", str(out))
-    assert "`host_tools verify --only patch --quick --out verification.md`" in out.read_text()
+    run("--only", "patch", "--short", "--out", str(out))
+    assert "`host_tools verify --only patch --short --out verification.md`" in out.read_text()

@@ -14,7 +14,11 @@ from device.instrument.self_test.checks import model_results
 def config(tmp_path):
     shutil.copytree(ROOT / "models" / "paper", tmp_path / "paper")
     shutil.copytree(ROOT / "models" / "standard", tmp_path / "standard")
-    folders = {"model": tmp_path / "paper", "quick_model": tmp_path / "quick", "profile_model": tmp_path / "standard"}
+    folders = {
+        "paper_model": tmp_path / "paper",
+        "quick_model": tmp_path / "quick",
+        "standard_model": tmp_path / "standard",
+    }
     return replace(simulated_config(), **folders)
 
 
