@@ -6,20 +6,20 @@ import numpy as np
 from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
 from device.measurement.parameters import PARAMETERS
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, RESPONSE_COLUMNS
 
 STD = 0.05
 NOISE = white_noise(STD)
 TOLD = np.arange(len(PARAMETERS)) != MODULUS
 """The modulus' slope is 0."""
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
 START = np.zeros(len(PARAMETERS))
 
 
 def random_slopes() -> np.ndarray:
     """Return the slopes [9, growth columns] of a row by the coordinates."""
-    slopes = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), GROWTH_COLUMNS))
+    slopes = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), RESPONSE_COLUMNS))
     slopes[MODULUS] = 0.0
     return slopes
 

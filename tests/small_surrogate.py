@@ -7,10 +7,10 @@ import numpy as np
 from device.measurement.parameters import PARAMETERS
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS, PressSurrogate
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET_COLUMNS, RESPONSE_COLUMNS, PressSurrogate
 
 INCLUSION_COLUMNS = CONTRAST_COLUMNS + OFFSET_COLUMNS
-COLUMNS = INCLUSION_COLUMNS + GROWTH_COLUMNS
+COLUMNS = INCLUSION_COLUMNS + RESPONSE_COLUMNS
 EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
 
 
@@ -19,7 +19,7 @@ def random_surrogate(seed: int = 3) -> PressSurrogate:
     rng = np.random.default_rng(seed)
     degrees = rng.integers(0, 4, (12, len(PARAMETERS))).astype(np.uint8)
     inclusion = LegendreSum(degrees, rng.normal(size=(12, INCLUSION_COLUMNS)))
-    return PressSurrogate(inclusion, LegendreSum(degrees[:5], rng.normal(size=(5, GROWTH_COLUMNS))))
+    return PressSurrogate(inclusion, LegendreSum(degrees[:5], rng.normal(size=(5, RESPONSE_COLUMNS))))
 
 
 def linear_surrogate(slopes: np.ndarray) -> PressSurrogate:

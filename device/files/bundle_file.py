@@ -21,10 +21,15 @@ from device.measurement.mode_models import ModeModels
 from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QUICK_UNITS, QuickModel
-from device.measurement.ramp_modes.ellipticity import ROUND_FILE, RoundSpot, round_arrays, round_spot_of
+from device.measurement.ramp_modes.ellipticity import (
+    ROUND_FILE,
+    EllipticityTest,
+    ellipticity_arrays,
+    ellipticity_test_of,
+)
 from device.measurement.ramp_modes.model import RAMP_MODES, RAMP_UNITS, SURROGATE_FILE, RampAnswers, RampModel
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.range_classifier import RANGE_FILE, RangeTest
+from device.measurement.ramp_modes.range_classifier import RANGE_FILE, RangeClassifier
 from device.measurement.ramp_modes.surrogate import ARRAYS, PressSurrogate, surrogate_of
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -52,10 +57,10 @@ def read_ramp_model(folder: Path) -> RampModel:
     arrays = _arrays("surrogate", folder / SURROGATE_FILE, content, (*ARRAYS, *camera.values()))
     noise = {mode: PressNoise(np.asarray(arrays[name], np.float64)) for mode, name in camera.items()}
     surrogate = surrogate_of(arrays)
-    ranges = RangeTest(files, bundle.fields, len(RAMP_UNITS), RAMP_MODES)
+    ranges = RangeClassifier(files, bundle.fields, len(RAMP_UNITS), RAMP_MODES)
     content = files.verified(ROUND_FILE, bundle.card.get("round_sha256"))
-    round_spot = _round_spot(folder / ROUND_FILE, content, surrogate, RAMP_MODES)
-    return RampModel(bundle, RampAnswers(surrogate, noise), ranges, round_spot)
+    ellipticity = _ellipticity_test(folder / ROUND_FILE, content, surrogate, RAMP_MODES)
+    return RampModel(bundle, RampAnswers(surrogate, noise), ranges, ellipticity)
 
 
 def read_models(paper: ModelBundle, quick: Path, standard: Path) -> ModeModels:
@@ -71,13 +76,15 @@ def read_surrogate(path: Path) -> PressSurrogate:
     return surrogate_of(_arrays("surrogate", path, _content("surrogate", path, ARRAYS), ARRAYS))
 
 
-def read_round_spot(path: Path, surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> RoundSpot:
+def read_ellipticity_test(path: Path, surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> EllipticityTest:
     """Read a round spot's file alone; raise `InvalidQuantity` when a part is missing or of another shape."""
-    return _round_spot(path, _content("second harmonics", path, round_arrays(modes)), surrogate, modes)
+    return _ellipticity_test(path, _content("second harmonics", path, ellipticity_arrays(modes)), surrogate, modes)
 
 
-def _round_spot(path: Path, content: bytes, surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> RoundSpot:
-    return round_spot_of(_arrays("second harmonics", path, content, round_arrays(modes)), surrogate, modes)
+def _ellipticity_test(
+    path: Path, content: bytes, surrogate: PressSurrogate, modes: tuple[Mode, ...]
+) -> EllipticityTest:
+    return ellipticity_test_of(_arrays("second harmonics", path, content, ellipticity_arrays(modes)), surrogate, modes)
 
 
 def _files(folder: Path, *more: str) -> BundleFiles:

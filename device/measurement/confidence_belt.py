@@ -33,7 +33,7 @@ class Interval(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Bands:
+class Belt:
     """Lowest and highest usual (truth - mean) / spread [A, B] at truths [A] and logarithms of the spread [B]."""
 
     truth: Array
@@ -71,9 +71,7 @@ class Bands:
         return np.asarray(np.interp(truth, self.truth, at_spread))
 
 
-def bands_of(entry: Mapping[str, Any]) -> tuple[Bands, ...]:
+def belts_of(entry: Mapping[str, Any]) -> tuple[Belt, ...]:
     """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
     parts = ("truth", "log_spread", "low", "high")
-    return tuple(
-        Bands(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS
-    )
+    return tuple(Belt(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS)

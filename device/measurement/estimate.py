@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.mode import Mode
-from device.measurement.parameters import COUNT, HIGH, LOW, unknowns_from_unit
+from device.measurement.parameters import COUNT, HIGH, LOW, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import saturated_ratio
@@ -157,16 +157,16 @@ class Numbers:
         }
 
 
-def numbers_in_bands(mean: Array, spread: Array, bands: Sequence[Bands]) -> Numbers:
-    """Return the numbers of mean and spread [3] in coordinates (`press_parameters.to_unit`), by each unknown's bands.
+def numbers_in_belts(mean: Array, spread: Array, belts: Sequence[Belt]) -> Numbers:
+    """Return the numbers of mean and spread [3] in coordinates (`press_parameters.normalise`), by each unknown's bands.
 
     The standard deviation is half of what mean - spread to mean + spread spans in the unknown's own unit.
     """
-    intervals = [band.interval(float(at), float(width)) for band, at, width in zip(bands, mean, spread, strict=True)]
-    low, high = (unknowns_from_unit(np.array([one[end] for one in intervals])) for end in (0, 1))
-    below, above = (unknowns_from_unit(mean + sign * spread) for sign in (-1, 1))
+    intervals = [band.interval(float(at), float(width)) for band, at, width in zip(belts, mean, spread, strict=True)]
+    low, high = (denormalise_unknowns(np.array([one[end] for one in intervals])) for end in (0, 1))
+    below, above = (denormalise_unknowns(mean + sign * spread) for sign in (-1, 1))
     known = np.array([one.is_identifiable for one in intervals])
-    return Numbers(unknowns_from_unit(mean), (above - below) / 2, low, high, known, LOW[:COUNT], HIGH[:COUNT])
+    return Numbers(denormalise_unknowns(mean), (above - below) / 2, low, high, known, LOW[:COUNT], HIGH[:COUNT])
 
 
 def with_numbers(numbers: Numbers, features: Mapping[str, float], origin: Origin) -> Estimate:

@@ -53,33 +53,33 @@ NOMINAL = {
 }
 
 
-def to_unit(values: Array) -> Array:
+def normalise(values: Array) -> Array:
     """Return parameters [..., 9] as coordinates that are -1 and 1 at the ends of their ranges."""
     low, high = _evenly(LOW), _evenly(HIGH)
     return np.asarray(2 * (_evenly(values) - low) / (high - low) - 1)
 
 
-def from_unit(unit: Array) -> Array:
-    """Return parameters [..., 9] of coordinates; the inverse of `to_unit`, and exact at the ends of the ranges."""
+def denormalise(normalised: Array) -> Array:
+    """Return parameters [..., 9] of coordinates; the inverse of `normalise`, and exact at the ends of the ranges."""
     low, high = _evenly(LOW), _evenly(HIGH)
-    values = low + (unit + 1) / 2 * (high - low)
+    values = low + (normalised + 1) / 2 * (high - low)
     values[..., BY_RATIO] = np.exp(values[..., BY_RATIO])
-    return np.where(unit == -1, LOW, np.where(unit == 1, HIGH, values))
+    return np.where(normalised == -1, LOW, np.where(normalised == 1, HIGH, values))
 
 
-def unknowns_to_unit(values: Array) -> Array:
+def normalise_unknowns(values: Array) -> Array:
     """Return size, depth and modulus [..., 3] as coordinates."""
     others = np.broadcast_to(HIGH[COUNT:], (*values.shape[:-1], len(NUISANCES)))
-    return to_unit(np.concatenate([values, others], axis=-1))[..., :COUNT]
+    return normalise(np.concatenate([values, others], axis=-1))[..., :COUNT]
 
 
-def unknowns_from_unit(unit: Array) -> Array:
+def denormalise_unknowns(normalised: Array) -> Array:
     """Return size, depth and modulus [..., 3] of coordinates."""
-    others = np.zeros((*unit.shape[:-1], len(NUISANCES)))
-    return from_unit(np.concatenate([unit, others], axis=-1))[..., :COUNT]
+    others = np.zeros((*normalised.shape[:-1], len(NUISANCES)))
+    return denormalise(np.concatenate([normalised, others], axis=-1))[..., :COUNT]
 
 
-def slope_of_unit(values: Array) -> Array:
+def slope_of_normalised(values: Array) -> Array:
     """Return d(parameters) / d(coordinates) [..., 9]."""
     half = (_evenly(HIGH) - _evenly(LOW)) / 2
     return np.asarray(np.where(BY_RATIO, values * half, half))

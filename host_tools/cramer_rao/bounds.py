@@ -14,7 +14,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
-from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_of_unit
+from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_of_normalised
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from host_tools.cramer_rao.information import CramerRao, cramer_rao, with_nuisances
 from host_tools.cramer_rao.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe, scalars_of, with_growth
@@ -99,7 +99,7 @@ def std_of_box(inclusion: Inclusion) -> Array:
     """
     unknowns = {name: getattr(inclusion, name) for name in UNKNOWNS}
     values = np.array([(unknowns | NOMINAL)[name] for name in PARAMETERS])
-    slope = slope_of_unit(values)[: len(UNKNOWNS)]
+    slope = slope_of_normalised(values)[: len(UNKNOWNS)]
     return np.asarray(EVEN_STD * slope / np.array(inclusion.as_tuple()))
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, PARAMETERS, to_unit
+from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, PARAMETERS, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
@@ -33,7 +33,7 @@ BOX_STD: Array = np.full(len(PARAMETERS), EVEN_STD)
 
 
 def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: Mapping[str, float] = NOMINAL) -> Array:
-    """Return the least standard deviations [3] in coordinates, which run from -1 to 1 (`press_parameters.to_unit`).
+    """Return the least standard deviations [3] in coordinates, which run from -1 to 1 (`press_parameters.normalise`).
 
     nuisances: the true ones by their names in `PARAMETERS`; one that is not given is taken to be nominal. nan for a
     press outside the trained ranges, where the forward model says nothing, and for a mode whose bundle has no noise.
@@ -42,7 +42,7 @@ def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: 
     parameters = np.array([at[name] for name in PARAMETERS])
     if mode not in answers.noise or not np.all((parameters >= LOW) & (parameters <= HIGH)):
         return np.full(COUNT, np.nan)
-    row, jacobian = answers.surrogate.rows_and_jacobian(to_unit(parameters))
+    row, jacobian = answers.surrogate.rows_and_jacobian(normalise(parameters))
     return cramer_rao(jacobian, answers.noise[mode].covariance(row), BOX_STD).std[:COUNT]
 
 

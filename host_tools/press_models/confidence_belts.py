@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.confidence_belt import COVERAGE, IDENTIFIABLE_RATIO, Bands
+from device.measurement.confidence_belt import COVERAGE, IDENTIFIABLE_RATIO, Belt
 from device.measurement.parameters import EVEN_STD
 from device.measurement.quantities import Bound, require
 
@@ -30,7 +30,7 @@ WIDE_OPEN = 1e6
 """So many spreads hold all of the range."""
 
 
-def confidence_bands(truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
+def confidence_belts(truth: Array, mean: Array, spread: Array) -> tuple[Belt, ...]:
     """Return bands for each unknown of truths, means and spreads [n, 3] in coordinates.
 
     Only presses that determine an unknown count for it; where they are rare, the bands hold all of the range. Raises
@@ -39,7 +39,7 @@ def confidence_bands(truth: Array, mean: Array, spread: Array) -> tuple[Bands, .
     return tuple(_bands(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
 
 
-def _bands(truth: Array, mean: Array, spread: Array) -> Bands:
+def _bands(truth: Array, mean: Array, spread: Array) -> Belt:
     known = _determined(spread)
     if known.mean() < RAREST_RATIO:
         return _wide_open()
@@ -52,7 +52,7 @@ def _determined(spread: Array) -> NDArray[np.bool_]:
     return np.asarray(spread < IDENTIFIABLE_RATIO * EVEN_STD)
 
 
-def _learned(truth: Array, mean: Array, spread: Array) -> Bands:
+def _learned(truth: Array, mean: Array, spread: Array) -> Belt:
     """Return the quantiles of presses that determine the unknown."""
     neighbours = int(np.clip(NEIGHBOUR_RATIO * len(truth), FEWEST, MOST))
     unusual, log_spread = (truth - mean) / spread, np.log(spread)
@@ -65,7 +65,7 @@ def _learned(truth: Array, mean: Array, spread: Array) -> Bands:
             distance = np.hypot((truth - at) / TRUTH_LENGTH, (log_spread - log) / max(float(np.std(log_spread)), 1e-3))
             near = np.argpartition(distance, neighbours - 1)[:neighbours]
             table[i, j] = np.quantile(unusual[near], tails, method="weibull")  # covers the share, of few presses too
-    return Bands(truths, spreads, table[..., 0], table[..., 1])
+    return Belt(truths, spreads, table[..., 0], table[..., 1])
 
 
 def _crossed_factor(truth: Array, mean: Array, spread: Array) -> float:
@@ -82,31 +82,31 @@ def _crossed_factor(truth: Array, mean: Array, spread: Array) -> float:
     return float(np.quantile(np.concatenate(needed), COVERAGE + _by_chance(len(truth))))
 
 
-def _wide_open() -> Bands:
+def _wide_open() -> Belt:
     ends = np.array([-1.0, 1.0])
-    return Bands(ends, ends, np.full((2, 2), -WIDE_OPEN), np.full((2, 2), WIDE_OPEN))
+    return Belt(ends, ends, np.full((2, 2), -WIDE_OPEN), np.full((2, 2), WIDE_OPEN))
 
 
-def widened(bands: tuple[Bands, ...], truth: Array, mean: Array, spread: Array) -> tuple[Bands, ...]:
+def widened(belts: tuple[Belt, ...], truth: Array, mean: Array, spread: Array) -> tuple[Belt, ...]:
     """Return bands wide enough, about their middles, for truths, means and spreads [n, 3] of recorded presses.
 
     Wide enough is a coverage at most one standard error of chance below the promised one.
     """
-    return tuple(_widened(one, *columns) for one, *columns in zip(bands, truth.T, mean.T, spread.T, strict=True))
+    return tuple(_widened(one, *columns) for one, *columns in zip(belts, truth.T, mean.T, spread.T, strict=True))
 
 
-def _widened(bands: Bands, truth: Array, mean: Array, spread: Array) -> Bands:
+def _widened(belts: Belt, truth: Array, mean: Array, spread: Array) -> Belt:
     known = _determined(spread)
     if not known.any():
-        return bands
-    needed = _needed(bands, truth[known], mean[known], spread[known])
-    return _scaled(bands, max(1.0, float(np.quantile(needed, max(COVERAGE - _by_chance(len(needed)), 0.0)))))
+        return belts
+    needed = _needed(belts, truth[known], mean[known], spread[known])
+    return _scaled(belts, max(1.0, float(np.quantile(needed, max(COVERAGE - _by_chance(len(needed)), 0.0)))))
 
 
-def _needed(bands: Bands, truth: Array, mean: Array, spread: Array) -> Array:
+def _needed(belts: Belt, truth: Array, mean: Array, spread: Array) -> Array:
     """Return by which factor [n] the bands must be widened to hold each press."""
     ends = np.array([
-        np.ravel(bands.bounds(np.array([at]), float(width))) for at, width in zip(truth, spread, strict=True)
+        np.ravel(belts.bounds(np.array([at]), float(width))) for at, width in zip(truth, spread, strict=True)
     ])  # fmt: skip
     middle, half = ends.mean(axis=1), np.diff(ends, axis=1)[:, 0] / 2
     return np.asarray(np.abs((truth - mean) / spread - middle) / np.maximum(half, NARROWEST))
@@ -117,6 +117,6 @@ def _by_chance(presses: int) -> float:
     return float(np.sqrt(COVERAGE * (1 - COVERAGE) / presses))
 
 
-def _scaled(bands: Bands, factor: float) -> Bands:
-    middles, halves = (bands.low + bands.high) / 2, (bands.high - bands.low) / 2
-    return Bands(bands.truth, bands.log_spread, middles - factor * halves, middles + factor * halves)
+def _scaled(belts: Belt, factor: float) -> Belt:
+    middles, halves = (belts.low + belts.high) / 2, (belts.high - belts.low) / 2
+    return Belt(belts.truth, belts.log_spread, middles - factor * halves, middles + factor * halves)

@@ -20,7 +20,7 @@ from device.measurement.bundle import CARD_FILE, MODEL_FILE, SCHEMA
 from device.measurement.parameters import NUISANCES, RANGES
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import QUICK_UNITS
-from device.measurement.ramp_modes.ellipticity import COEFFICIENTS, DEGREES, ROUND_FILE, RoundSpot
+from device.measurement.ramp_modes.ellipticity import COEFFICIENTS, DEGREES, ROUND_FILE, EllipticityTest
 from device.measurement.ramp_modes.model import RAMP_UNITS, SURROGATE_FILE
 from device.measurement.ramp_modes.range_classifier import ENTRY, RANGE_FILE
 from host_tools.paper_network.export import write_folder
@@ -45,11 +45,11 @@ def export_profile(
     network = build_network(trained.ensemble)
     golden = golden_vectors(trained.ensemble, network, rows.astype(np.float64))
     surrogate, ranges = _surrogate_file(trained), build_range_networks(trained.ranges.networks)
-    round_spot = round_file(trained.round_spot)
+    ellipticity = round_file(trained.ellipticity)
     card = {
         **_card(folder, network, serials, software_version, training_command),
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
-        "round_sha256": hashlib.sha256(round_spot).hexdigest(),
+        "round_sha256": hashlib.sha256(ellipticity).hexdigest(),
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
         "effort": asdict(trained.effort),
@@ -69,7 +69,7 @@ def export_profile(
         ENTRY: range_entry(trained.ranges, ranges, np.array(golden["features"])),
         "golden": golden,
     }
-    files = {SURROGATE_FILE: surrogate, RANGE_FILE: ranges, ROUND_FILE: round_spot}
+    files = {SURROGATE_FILE: surrogate, RANGE_FILE: ranges, ROUND_FILE: ellipticity}
     write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card), **files})
 
 
@@ -146,11 +146,11 @@ def _surrogate_file(trained: TrainedRamp) -> bytes:
     return _archive(arrays | {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()})
 
 
-def round_file(round_spot: RoundSpot) -> bytes:
+def round_file(ellipticity: EllipticityTest) -> bytes:
     """Return the content of `round.npz`: polynomials in single precision, and the camera's covariance of each mode."""
-    second = round_spot.second
+    second = ellipticity.second
     arrays = {DEGREES: second.degrees.astype(np.uint8), COEFFICIENTS: second.coefficients.astype(np.float32)}
-    return _archive(arrays | {f"camera_{mode}": camera for mode, camera in round_spot.camera.items()})
+    return _archive(arrays | {f"camera_{mode}": camera for mode, camera in ellipticity.camera.items()})
 
 
 def _archive(arrays: dict[str, Any]) -> bytes:
@@ -167,9 +167,9 @@ def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
     """Return bands and statistics of a mode."""
     return {
         "bands": {
-            name: {part: np.round(getattr(bands, part), 4).tolist() for part in ("truth", "log_spread", "low", "high")}
-            for name, bands in zip(UNKNOWNS, outcome.bands, strict=True)
+            name: {part: np.round(getattr(belts, part), 4).tolist() for part in ("truth", "log_spread", "low", "high")}
+            for name, belts in zip(UNKNOWNS, outcome.belts, strict=True)
         },
-        "simulated": statistics(outcome.simulated, outcome.bands),
-        "recorded": statistics(outcome.recorded, outcome.bands),
+        "simulated": statistics(outcome.simulated, outcome.belts),
+        "recorded": statistics(outcome.recorded, outcome.belts),
     }

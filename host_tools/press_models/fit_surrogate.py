@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import NUISANCES, PARAMETERS, to_unit
+from device.measurement.parameters import NUISANCES, PARAMETERS, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
-from device.measurement.ramp_modes.ellipticity import RoundSpot, second_factor
+from device.measurement.ramp_modes.ellipticity import EllipticityTest, second_factor
 from device.measurement.ramp_modes.legendre import LegendreSum, terms
 from device.measurement.ramp_modes.surrogate import (
     CONTRAST_COLUMNS,
-    GROWTH_COLUMNS,
+    RESPONSE_COLUMNS,
     PressSurrogate,
     inclusion_factor,
     polynomial_coordinates,
@@ -52,7 +52,7 @@ PRESSES_A_TERM = 3.0
 
 def fit_surrogate(samples: PressSamples) -> PressSurrogate:
     """Return the surrogate of random presses; raises `InvalidQuantity` when they are too few or not finite."""
-    at = polynomial_coordinates(to_unit(samples.parameters), samples.parameters)
+    at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
     return PressSurrogate(*fit_polynomials(samples, at, INCLUSION_REACH, INCLUSION_HIGHEST))
 
 
@@ -64,7 +64,7 @@ def fit_polynomials(
 
     Raises as `fit_surrogate`.
     """
-    lump_degrees, bare_degrees = degrees(reach, highest), degrees(BARE_REACH, {})
+    lump_degrees, baseline_degrees = degrees(reach, highest), degrees(BARE_REACH, {})
     bound = Bound(PRESSES_A_TERM * len(lump_degrees), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
     require(
@@ -73,12 +73,16 @@ def fit_polynomials(
         Bound(0, 0, ""),
         "leave them out",
     )
-    contrast, growth, offset = np.split(samples.rows, [CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS], axis=1)
+    contrast, reference_response, offset = np.split(
+        samples.rows, [CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS], axis=1
+    )
     factor, design = inclusion_factor(samples.parameters), terms(lump_degrees, at)
     strength, placed = factor[:, 0], factor[:, -1]
     inclusion = [_weighted(design, strength, contrast), _weighted(design, placed, offset)]
-    bare, *_ = np.linalg.lstsq(terms(bare_degrees, at), growth, rcond=None)
-    return LegendreSum(lump_degrees, np.hstack(inclusion)), LegendreSum(bare_degrees, np.asarray(bare, np.float64))
+    baseline, *_ = np.linalg.lstsq(terms(baseline_degrees, at), reference_response, rcond=None)
+    return LegendreSum(lump_degrees, np.hstack(inclusion)), LegendreSum(
+        baseline_degrees, np.asarray(baseline, np.float64)
+    )
 
 
 def degrees(reach: dict[str, float], highest: dict[str, int]) -> NDArray[np.uint8]:
@@ -98,7 +102,7 @@ def degrees(reach: dict[str, float], highest: dict[str, int]) -> NDArray[np.uint
 
 def held_out_error(surrogate: PressSurrogate, samples: PressSamples) -> Array:
     """Return the root mean square error [P] of the profile's columns on presses that were kept apart."""
-    return np.asarray(np.sqrt(np.mean((surrogate.rows(to_unit(samples.parameters)) - samples.rows) ** 2, axis=0)))
+    return np.asarray(np.sqrt(np.mean((surrogate.rows(normalise(samples.parameters)) - samples.rows) ** 2, axis=0)))
 
 
 def _part(k: tuple[int, ...], names: tuple[str, ...], reach: dict[str, float]) -> float:
@@ -127,17 +131,17 @@ SECOND_HIGHEST = {"size_mm": 7, "depth_mm": 6}
 
 
 def fit_second_harmonics(samples: PressSamples) -> LegendreSum:
-    """Return polynomials [9] to [Q] of `RoundSpot`; raises `InvalidQuantity` when the presses are too few."""
+    """Return polynomials [9] to [Q] of `EllipticityTest`; raises `InvalidQuantity` when the presses are too few."""
     found = degrees(SECOND_REACH, SECOND_HIGHEST)
     bound = Bound(PRESSES_A_TERM * len(found), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
-    at = polynomial_coordinates(to_unit(samples.parameters), samples.parameters)
+    at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
     design = second_factor(samples.parameters)[:, None] * terms(found, at)
     coefficients, *_ = np.linalg.lstsq(design, samples.second_harmonics, rcond=None)
     return LegendreSum(found, np.asarray(coefficients))
 
 
-def held_out_second_harmonics(round_spot: RoundSpot, samples: PressSamples) -> Array:
+def held_out_second_harmonics(ellipticity: EllipticityTest, samples: PressSamples) -> Array:
     """Return the root mean square error [Q] of second harmonics on presses that were kept apart."""
-    errors = round_spot.second_harmonics(to_unit(samples.parameters)) - samples.second_harmonics
+    errors = ellipticity.second_harmonics(normalise(samples.parameters)) - samples.second_harmonics
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))

@@ -1,6 +1,6 @@
 """What a mode makes of presses nobody has learned from: answers, bands of its intervals, coverage, and usual doubts.
 
-Bands come from one half of the simulated presses and are counted on the other. What is usual of each doubt
+Belt come from one half of the simulated presses and are counted on the other. What is usual of each doubt
 comes from recordings, because only they hold all that a recording does to a profile; so does a factor that widens the
 bands where recordings need it, from one half of them; coverage is counted on the other.
 """
@@ -13,21 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.mode import Mode
-from device.measurement.parameters import to_unit
+from device.measurement.parameters import normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
-from device.measurement.ramp_modes.ellipticity import RoundSpot
+from device.measurement.ramp_modes.ellipticity import EllipticityTest
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.noise import PressNoise
-from host_tools.press_models.confidence_belts import confidence_bands, widened
+from host_tools.press_models.confidence_belts import confidence_belts, widened
 from host_tools.press_models.noisy_presses import Pool
 from host_tools.press_models.recorded_presses import RecordedPresses, in_parallel
 from host_tools.press_models.train_ensemble import DenseEnsemble
 from host_tools.press_models.train_range import RangeNetwork
 
-USUAL_RATIO = 0.9875
+CRITICAL_RATIO = 0.9875
 """Share of all recorded presses inside the trained ranges whose misfit counts as usual, and likewise the elongation; of
 the nine in ten in which an inclusion stands out, share of those whose odds of a size or depth outside do. What is left
 of the 5 % of false flags is for chance: with so many recordings their share is known to half a per cent.
@@ -48,10 +48,10 @@ class Answered:
         """Return some of the presses."""
         return Answered(self.truth[chosen], self.mean[chosen], self.spread[chosen])
 
-    def covered(self, bands: tuple[Bands, ...]) -> tuple[Array, Array]:
+    def covered(self, belts: tuple[Belt, ...]) -> tuple[Array, Array]:
         """Return, as booleans [n, 3], whether each interval holds the truth, and whether it narrows the range down."""
         intervals = [
-            [one.interval(float(m), float(s)) for one, m, s in zip(bands, mean, spread, strict=True)]
+            [one.interval(float(m), float(s)) for one, m, s in zip(belts, mean, spread, strict=True)]
             for mean, spread in zip(self.mean, self.spread, strict=True)
         ]
         low, high, known = np.moveaxis(np.array(intervals), 2, 0)
@@ -62,7 +62,7 @@ class Answered:
 class ModeOutcome:
     """Bands and usual doubts of a mode; `simulated` presses that the bands have not seen, and `recorded` ones."""
 
-    bands: tuple[Bands, ...]
+    belts: tuple[Belt, ...]
     misfit_ratio: float
     elongation_deviations: float
     outside_log_odds: float
@@ -76,7 +76,7 @@ def judged_mode(
     answers: RampAnswers,
     pool: Pool,
     recorded: RecordedPresses,
-    round_spot: RoundSpot,
+    ellipticity: EllipticityTest,
     *,
     outside_log_odds: float,
     seed: int,
@@ -84,34 +84,36 @@ def judged_mode(
 ) -> ModeOutcome:
     """Return the outcome of a mode on a pool's presses with noise and on recorded ones, with its usual log odds."""
     rows = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([seed, 1])).astype(np.float64)
-    truth = pool.unit[:, :THREE].astype(np.float64)
+    truth = pool.normalised[:, :THREE].astype(np.float64)
     simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
     half = len(rows) // 2
     seen = simulated.part(slice(half))
-    bands = confidence_bands(seen.truth, seen.mean, seen.spread)
+    belts = confidence_belts(seen.truth, seen.mean, seen.spread)
     found = answers_to(mode, ensemble.estimate, answers, recorded.rows, jobs)
-    elongation = elongations(round_spot, recorded, found, mode)
-    return outcome_of(bands, simulated.part(slice(half, None)), recorded, found, elongation, outside_log_odds)
+    elongation = elongations(ellipticity, recorded, found, mode)
+    return outcome_of(belts, simulated.part(slice(half, None)), recorded, found, elongation, outside_log_odds)
 
 
-def elongations(round_spot: RoundSpot, recorded: RecordedPresses, found: Sequence[RampAnswer], mode: Mode) -> Array:
+def elongations(
+    ellipticity: EllipticityTest, recorded: RecordedPresses, found: Sequence[RampAnswer], mode: Mode
+) -> Array:
     """Return by how many standard deviations [n] recorded presses are not as round as their best fits."""
     pairs = zip(recorded.second_harmonics, found, strict=True)
-    return np.array([round_spot.elongation_deviations(second, answer.best, mode) for second, answer in pairs])
+    return np.array([ellipticity.elongation_deviations(second, answer.best, mode) for second, answer in pairs])
 
 
-def usual_log_odds(ranges: RangeNetwork, rows: Array, noise: PressNoise) -> float:
+def critical_log_odds(ranges: RangeNetwork, rows: Array, noise: PressNoise) -> float:
     """Return the largest usual log odds of recorded presses, rows [n, P], in which an inclusion stands out.
 
     Raises `InvalidQuantity` where it stands out in none.
     """
     seen = rows[[stands_out(row, noise) for row in rows]]
     require("presses in which an inclusion stands out", len(seen), Bound(1, np.inf, "presses"), "record more presses")
-    return float(np.quantile(ranges.log_odds(seen), USUAL_RATIO))
+    return float(np.quantile(ranges.log_odds(seen), CRITICAL_RATIO))
 
 
 def outcome_of(
-    bands: tuple[Bands, ...],
+    belts: tuple[Belt, ...],
     simulated: Answered,
     recorded: RecordedPresses,
     found: Sequence[RampAnswer],
@@ -121,16 +123,16 @@ def outcome_of(
     """Return the outcome of a mode: bands of simulated presses, answers to recorded ones and their elongation [n]."""
     usual = slice(len(found) // 2)
     answered = Answered(
-        to_unit(recorded.parameters)[:, :THREE],
+        normalise(recorded.parameters)[:, :THREE],
         np.array([answer.mean for answer in found]),
         np.array([answer.spread for answer in found]),
     )
     seen = answered.part(usual)
     misfit = [answer.misfit_ratio for answer in found]
     return ModeOutcome(
-        widened(bands, seen.truth, seen.mean, seen.spread),
-        float(np.quantile(misfit, USUAL_RATIO)),
-        float(np.quantile(elongation, USUAL_RATIO)),
+        widened(belts, seen.truth, seen.mean, seen.spread),
+        float(np.quantile(misfit, CRITICAL_RATIO)),
+        float(np.quantile(elongation, CRITICAL_RATIO)),
         outside_log_odds,
         simulated,
         answered.part(slice(usual.stop, None)),

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.confidence_belt import Bands
-from device.measurement.parameters import EVEN_STD, unknowns_from_unit
+from device.measurement.confidence_belt import Belt
+from device.measurement.parameters import EVEN_STD, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS
 from host_tools.press_models.mode_outcome import Answered
 
@@ -21,10 +21,10 @@ OCTILES = 8
 DIGITS = 4
 
 
-def statistics(answered: Answered, bands: tuple[Bands, ...]) -> dict[str, Any]:
+def statistics(answered: Answered, belts: tuple[Belt, ...]) -> dict[str, Any]:
     """Return the statistics of presses by unknown."""
-    covered, known = answered.covered(bands)
-    truth, mean = unknowns_from_unit(answered.truth), unknowns_from_unit(answered.mean)
+    covered, known = answered.covered(belts)
+    truth, mean = denormalise_unknowns(answered.truth), denormalise_unknowns(answered.mean)
     percent = 100 * (mean - truth) / truth
     error = answered.mean - answered.truth
     return {"presses": len(truth)} | {

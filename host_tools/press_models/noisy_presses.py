@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array, Single
-from device.measurement.parameters import to_unit
+from device.measurement.parameters import normalise
 from device.measurement.ramp_modes.noise import PressNoise, drift_directions, light_ratio, smooth_errors
 from device.measurement.ramp_modes.surrogate import PressSurrogate
 from host_tools.press_models.press_samples import draw_parameters
@@ -26,7 +26,7 @@ class Presses(Protocol):
     """What networks learn from: coordinates [n, 9] and rows [n, P] of presses, and how noise is added to them."""
 
     @property
-    def unit(self) -> Single:
+    def normalised(self) -> Single:
         """Coordinates [n, 9]."""
 
     @property
@@ -44,7 +44,7 @@ class Presses(Protocol):
 class Pool:
     """Coordinates [n, 9] and noise-free rows [n, P] of random presses, single precision, and their noise."""
 
-    unit: Single
+    normalised: Single
     rows: Single
     sampler: NoiseSampler
 
@@ -79,6 +79,6 @@ class NoiseSampler:
 
 def random_pool(surrogate: PressSurrogate, noise: PressNoise, count: int, seed: int) -> Pool:
     """Return `count` random presses of the surrogate."""
-    unit = to_unit(draw_parameters(count, np.random.default_rng(seed)))
-    rows = [surrogate.rows(unit[start : start + BLOCK]) for start in range(0, count, BLOCK)]
-    return Pool(unit.astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))
+    normalised = normalise(draw_parameters(count, np.random.default_rng(seed)))
+    rows = [surrogate.rows(normalised[start : start + BLOCK]) for start in range(0, count, BLOCK)]
+    return Pool(normalised.astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))

@@ -15,7 +15,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.parameters import BY_RATIO, HIGH, LOW, unknowns_from_unit
+from device.measurement.parameters import BY_RATIO, HIGH, LOW, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS
 from host_tools.paper_network.export import AGREEMENT, OnnxGraph, agreed_outputs
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling
@@ -69,7 +69,7 @@ def _add_physical(graph: OnnxGraph, mean: str) -> None:
 def physical_estimate(ensemble: DenseEnsemble, rows: Array) -> tuple[Array, Array]:
     """Return estimate (mm, mm, kPa) and spread (coordinates) [n, 3], as the exported network gives them."""
     mean, spread = ensemble.estimate(rows)
-    return unknowns_from_unit(mean), spread
+    return denormalise_unknowns(mean), spread
 
 
 def golden_vectors(ensemble: DenseEnsemble, network: bytes, rows: Array) -> dict[str, list[list[float]]]:

@@ -15,7 +15,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import NUISANCES, PARAMETERS, from_unit
+from device.measurement.parameters import NUISANCES, PARAMETERS, denormalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, harmonic, second_harmonic
 from device.measurement.recording.pixel_scale import PixelScale
@@ -74,13 +74,13 @@ def draw_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: 
     again.
     """
     unknowns = len(PARAMETERS) - len(NUISANCES)
-    unit = rng.uniform(-1, 1, (count, len(PARAMETERS)))
-    unit[:, unknowns:] = np.repeat(unit[::inclusions_a_skin, unknowns:], inclusions_a_skin, axis=0)[:count]
-    unit[:, -1] = 2 * np.sqrt(rng.uniform(0, 1, count)) - 1
-    values = from_unit(unit)
+    normalised = rng.uniform(-1, 1, (count, len(PARAMETERS)))
+    normalised[:, unknowns:] = np.repeat(normalised[::inclusions_a_skin, unknowns:], inclusions_a_skin, axis=0)[:count]
+    normalised[:, -1] = 2 * np.sqrt(rng.uniform(0, 1, count)) - 1
+    values = denormalise(normalised)
     while (buried := values[:, 0] + values[:, 1] > values[:, PARAMETERS.index("slab_thickness_mm")] - NEAREST_MM).any():
-        unit[buried, :2] = rng.uniform(-1, 1, (buried.sum(), 2))
-        values = from_unit(unit)
+        normalised[buried, :2] = rng.uniform(-1, 1, (buried.sum(), 2))
+        values = denormalise(normalised)
     return values
 
 
@@ -143,13 +143,16 @@ class _Scene:
         if (skin, slab) != (self._skin, self._slab):
             self._skin, self._slab = skin, slab
             self._image = ScatteredImage(self._tables.light, skin, LENS, SHAPE, SCALE)
-            self._bare = self._lights(inclusion, ProbePlacement(*BESIDE_MM))
-            bare = np.array([self._means(light).mean for light in self._bare])
-            self._growth = np.log(bare[:-1] / bare[-1])
+            self._baseline = self._lights(inclusion, ProbePlacement(*BESIDE_MM))
+            baseline = np.array([self._means(light).mean for light in self._baseline])
+            self._reference_response = np.log(baseline[:-1] / baseline[-1])
         lights = self._lights(inclusion, ProbePlacement(x_mm=at["offset_mm"]))
-        rings = [self._means(light / bare - np.float32(1)) for light, bare in zip(lights, self._bare, strict=True)]
+        rings = [
+            self._means(light / baseline - np.float32(1))
+            for light, baseline in zip(lights, self._baseline, strict=True)
+        ]
         stacked = RingMeans(*(np.array(part) for part in zip(*rings, strict=True)))
-        row = np.concatenate([stacked.mean.ravel(), self._growth.ravel(), harmonic(stacked, 1)])
+        row = np.concatenate([stacked.mean.ravel(), self._reference_response.ravel(), harmonic(stacked, 1)])
         return row, second_harmonic(stacked)[0].ravel()
 
     def _lights(self, inclusion: Inclusion, place: ProbePlacement) -> list[Image]:

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from device.measurement.arrays import Array, Single
-from device.measurement.confidence_belt import Bands
-from device.measurement.parameters import to_unit
+from device.measurement.confidence_belt import Belt
+from device.measurement.parameters import normalise
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import SEEN_BY
 from device.measurement.quick_mode.profile import QUICK_FORCES_N, QuickPress, quick_press
@@ -29,7 +29,7 @@ from device.measurement.recording.reference_light import EXPONENT
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.camera_noise import shrunk_covariance
-from host_tools.press_models.confidence_belts import confidence_bands, widened
+from host_tools.press_models.confidence_belts import confidence_belts, widened
 from host_tools.press_models.mode_outcome import Answered
 from host_tools.press_models.noisy_presses import Index, Pool, random_pool
 from host_tools.press_models.press_samples import draw_parameters, profile_rows
@@ -42,7 +42,7 @@ from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 class QuickPool:
     """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
 
-    unit: Single
+    normalised: Single
     rows: Single
     camera: Array
     levels: ErrorLevels = field(default_factory=ErrorLevels)
@@ -76,7 +76,7 @@ class QuickPool:
 def quick_pool(pool: Pool, camera: Array, seed: int) -> QuickPool:
     """Return a pool of ramps as held presses, each at a random force."""
     force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(pool.rows))
-    return QuickPool(pool.unit, quick_rows(pool.rows, force_n).astype(np.float32), camera)
+    return QuickPool(pool.normalised, quick_rows(pool.rows, force_n).astype(np.float32), camera)
 
 
 def quick_rows(rows: Single | Array, force_n: Array) -> Array:
@@ -87,7 +87,7 @@ def quick_rows(rows: Single | Array, force_n: Array) -> Array:
     return np.column_stack([np.einsum("nk,nkj->nj", weights, at_forces), force_n])
 
 
-USUAL_RATIO = 0.985
+CRITICAL_RATIO = 0.985
 """Share of recorded presses inside the trained ranges whose elongation counts as usual: the only doubt of its kind in
 mode quick, which has neither a best fit nor networks of the ranges."""
 
@@ -108,7 +108,7 @@ class QuickEffort:
 class QuickOutcome:
     """Bands and usual elongation; `simulated` presses that the bands have not seen, and `recorded` ones."""
 
-    bands: tuple[Bands, ...]
+    belts: tuple[Belt, ...]
     elongation_ratio: float
     simulated: Answered
     recorded: Answered
@@ -160,7 +160,7 @@ def train_quick(
     say(f"{asked.judged} presses and {asked.test_recordings} recordings for the limits")
     fresh = held(asked.judged, "judged presses of quick")
     noisy = fresh.noisy(np.arange(asked.judged), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
-    simulated = _answered(ensemble, noisy.astype(np.float64), fresh.unit.astype(np.float64))
+    simulated = _answered(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
     recording = derived_seed(seed, "judged recordings of quick")
     recorded = recorded_holds(tables, asked.test_recordings, recording, ErrorLevels(), jobs)
     none = pool.typical_noise()[:RINGS, :RINGS]
@@ -191,16 +191,16 @@ def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
 def _outcome(ensemble: DenseEnsemble, simulated: Answered, recorded: RecordedHolds) -> QuickOutcome:
     """Return bands and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
     half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
-    seen, answered = simulated.part(slice(half)), _answered(ensemble, recorded.rows, to_unit(recorded.parameters))
+    seen, answered = simulated.part(slice(half)), _answered(ensemble, recorded.rows, normalise(recorded.parameters))
     first = answered.part(usual)
-    bands = confidence_bands(seen.truth, seen.mean, seen.spread)
+    belts = confidence_belts(seen.truth, seen.mean, seen.spread)
     return QuickOutcome(
-        widened(bands, first.truth, first.mean, first.spread),
-        float(np.quantile(recorded.elongation[usual], USUAL_RATIO)),
+        widened(belts, first.truth, first.mean, first.spread),
+        float(np.quantile(recorded.elongation[usual], CRITICAL_RATIO)),
         simulated.part(slice(half, None)),
         answered.part(slice(usual.stop, None)),
     )
 
 
-def _answered(ensemble: DenseEnsemble, rows: Array, unit: Array) -> Answered:
-    return Answered(unit[:, : len(UNKNOWNS)], *ensemble.estimate(rows))
+def _answered(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> Answered:
+    return Answered(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))

@@ -15,7 +15,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.ramp_modes.ellipticity import RoundSpot
+from device.measurement.ramp_modes.ellipticity import EllipticityTest
 from device.measurement.ramp_modes.model import RAMP_MODES, RampAnswers
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.surrogate import PressSurrogate
@@ -27,7 +27,7 @@ from host_tools.press_models.fit_surrogate import (
     held_out_error,
     held_out_second_harmonics,
 )
-from host_tools.press_models.mode_outcome import ModeOutcome, judged_mode, usual_log_odds
+from host_tools.press_models.mode_outcome import ModeOutcome, critical_log_odds, judged_mode
 from host_tools.press_models.noisy_presses import random_pool
 from host_tools.press_models.press_samples import PressSamples, draw_parameters, sample_presses
 from host_tools.press_models.recorded_presses import record_presses
@@ -67,7 +67,7 @@ class TrainedRamp:
     noise: dict[Mode, PressNoise]
     ensemble: DenseEnsemble
     ranges: TrainedRange
-    round_spot: RoundSpot
+    ellipticity: EllipticityTest
     outcomes: dict[Mode, ModeOutcome]
     samples: PressSamples
     effort: Effort
@@ -100,7 +100,7 @@ def train_ramp(
         for mode in RAMP_MODES
     }
     noise = {mode: PressNoise(of_mode.rows) for mode, of_mode in camera.items()}
-    round_spot = RoundSpot(
+    ellipticity = EllipticityTest(
         surrogate,
         fit_second_harmonics(learned),
         {mode: of_mode.second_harmonics for mode, of_mode in camera.items()},
@@ -110,9 +110,9 @@ def train_ramp(
     ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     ranges = train_range(tables, wide, noise, effort=asked.ranges, seed=seed, jobs=jobs, say=say)
     answers = RampAnswers(surrogate, noise)
-    outcomes = judged(tables, ensemble, answers, ranges, round_spot, asked, seed=seed, jobs=jobs, say=say)
-    errors = held_out_error(surrogate, kept), held_out_second_harmonics(round_spot, kept)
-    return TrainedRamp(surrogate, *errors, noise, ensemble, ranges, round_spot, outcomes, samples, asked, seed)
+    outcomes = judged(tables, ensemble, answers, ranges, ellipticity, asked, seed=seed, jobs=jobs, say=say)
+    errors = held_out_error(surrogate, kept), held_out_second_harmonics(ellipticity, kept)
+    return TrainedRamp(surrogate, *errors, noise, ensemble, ranges, ellipticity, outcomes, samples, asked, seed)
 
 
 def judged(
@@ -120,7 +120,7 @@ def judged(
     ensemble: DenseEnsemble,
     answers: RampAnswers,
     ranges: TrainedRange,
-    round_spot: RoundSpot,
+    ellipticity: EllipticityTest,
     effort: Effort,
     *,
     seed: int,
@@ -135,8 +135,8 @@ def judged(
         say(f"{simulated} presses and {len(parameters)} recordings for the limits of mode {mode}")
         pool = random_pool(answers.surrogate, answers.noise[mode], simulated, simulating)
         recorded = record_presses(tables, parameters, mode, seed=recording, levels=ErrorLevels(), jobs=jobs)
-        usual = usual_log_odds(ranges.networks[mode], recorded.rows, answers.noise[mode])
+        usual = critical_log_odds(ranges.networks[mode], recorded.rows, answers.noise[mode])
         outcomes[mode] = judged_mode(
-            mode, ensemble, answers, pool, recorded, round_spot, outside_log_odds=usual, seed=simulating, jobs=jobs
+            mode, ensemble, answers, pool, recorded, ellipticity, outside_log_odds=usual, seed=simulating, jobs=jobs
         )
     return outcomes

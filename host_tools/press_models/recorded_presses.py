@@ -89,8 +89,8 @@ def smooth_field(shape: tuple[int, int], scale: PixelScale, length_mm: float, rn
     margin = int(np.ceil(4 * max(sigma_x, sigma_y)))
     white = rng.standard_normal((nodes[1] + 2 * margin, nodes[0] + 2 * margin)).astype(np.float32)
     smooth = cv2.GaussianBlur(white, (0, 0), sigma_x, sigmaY=sigma_y)[margin:-margin, margin:-margin]
-    unit = smooth * np.float32(2 * np.sqrt(np.pi * sigma_x * sigma_y))
-    return np.asarray(cv2.resize(unit, (width, height), interpolation=cv2.INTER_CUBIC), dtype=np.float32)
+    normalised = smooth * np.float32(2 * np.sqrt(np.pi * sigma_x * sigma_y))
+    return np.asarray(cv2.resize(normalised, (width, height), interpolation=cv2.INTER_CUBIC), dtype=np.float32)
 
 
 def _cubic_weights(force_n: float) -> NDArray[np.float64]:

@@ -91,7 +91,7 @@ def train_ensemble(
 
     The same seed gives the same ensemble whatever `jobs` (-1: all cores). Raises `InvalidQuantity` for too few presses.
     """
-    lesson = Lesson(2 * len(UNKNOWNS), pool.unit[:, : len(UNKNOWNS)], loss_and_gradient)
+    lesson = Lesson(2 * len(UNKNOWNS), pool.normalised[:, : len(UNKNOWNS)], loss_and_gradient)
     return DenseEnsemble(
         *train_members(pool, lesson, seed=seed, members=members, steps=steps, columns=columns, jobs=jobs)
     )

@@ -21,7 +21,7 @@ from scipy.special import expit
 
 from device.measurement.arrays import Array, Single
 from device.measurement.mode import Mode
-from device.measurement.parameters import PARAMETERS, to_unit
+from device.measurement.parameters import PARAMETERS, normalise
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.surrogate import DEPTH, SIZE, assemble, inclusion_factor, polynomial_coordinates
@@ -53,14 +53,14 @@ def draw_wide_parameters(count: int, rng: np.random.Generator, *, inclusions_a_s
     return values
 
 
-def is_outside(unit: Array | Single) -> NDArray[np.bool_]:
-    """Return whether size or depth lies outside its trained range [n], for coordinates [n, 9] of `to_unit`."""
-    return np.asarray((np.abs(unit[:, PLACE]) > 1).any(axis=1))
+def is_outside(normalised: Array | Single) -> NDArray[np.bool_]:
+    """Return whether size or depth lies outside its trained range [n], for coordinates [n, 9] of `normalise`."""
+    return np.asarray((np.abs(normalised[:, PLACE]) > 1).any(axis=1))
 
 
 def wide_coordinates(parameters: Array) -> Array:
     """Return the coordinates [n, 9] in which wide presses are polynomials: -1 to 1 over the wide ranges."""
-    at = polynomial_coordinates(to_unit(parameters), parameters)
+    at = polynomial_coordinates(normalise(parameters), parameters)
     low, high = ENDS.T
     at[:, PLACE] = 2 * (parameters[:, PLACE] - low) / (high - low) - 1
     return at
@@ -71,12 +71,12 @@ class WideSurrogate:
     """`press_surrogate.PressSurrogate` over the wide ranges."""
 
     inclusion_field: LegendreSum
-    bare: LegendreSum
+    baseline: LegendreSum
 
     def rows(self, parameters: Array) -> Array:
         """Return profile rows [n, P] at parameters [n, 9]."""
         at = wide_coordinates(parameters)
-        return assemble(inclusion_factor(parameters) * self.inclusion_field.values(at), self.bare.values(at))
+        return assemble(inclusion_factor(parameters) * self.inclusion_field.values(at), self.baseline.values(at))
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +174,10 @@ def wide_pool(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int
     rng = np.random.default_rng(derived_seed(seed, "training presses around the ranges"))
     parameters = draw_wide_parameters(count, rng)
     rows = [surrogate.rows(parameters[start : start + BLOCK]) for start in range(0, count, BLOCK)]
-    return Pool(to_unit(parameters).astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))
+    return Pool(normalise(parameters).astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))
 
 
 def train_network(pool: Pool, seed: int, effort: RangeEffort, jobs: int) -> RangeNetwork:
     """Return the networks trained on a pool's rows; raises as `train_members`."""
-    lesson = Lesson(1, is_outside(pool.unit).astype(np.float32), logistic_loss_and_gradient)
+    lesson = Lesson(1, is_outside(pool.normalised).astype(np.float32), logistic_loss_and_gradient)
     return RangeNetwork(*train_members(pool, lesson, seed=seed, members=effort.members, steps=effort.steps, jobs=jobs))

@@ -21,7 +21,7 @@ from scipy.stats import ncx2
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.parameters import HIGH, to_unit
+from device.measurement.parameters import HIGH, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
@@ -72,7 +72,7 @@ def round_deviations(solved: ProbeTables, parameters: Array, model: RampModel, m
     """Return how many standard deviations a press [9] of an ellipsoid, without noise, lies from any round one."""
     rows, second = exact_presses(solved, parameters[None])
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise[mode])
-    harmonics, sphere = np.stack([second[0], np.zeros_like(second[0])]), to_unit(parameters[None])[0]
+    harmonics, sphere = np.stack([second[0], np.zeros_like(second[0])]), normalise(parameters[None])[0]
     return twin_of(posterior, harmonics, sphere, model, mode)[1]
 
 
@@ -90,11 +90,13 @@ def twin_of(
     The search begins at the sphere as wide as the ellipsoid, coordinates [9]: first for the row, then for both.
     """
     start = best_fit(posterior, sphere)
-    factor = np.linalg.cholesky(model.round_spot.covariance(start, mode))
+    factor = np.linalg.cholesky(model.ellipticity.covariance(start, mode))
 
-    def residuals(unit: Array) -> Array:
-        of_second = solve_triangular(factor, model.round_spot.left(second, unit).T, lower=True, check_finite=False)
-        return np.concatenate([posterior.residuals(unit), of_second.ravel()])
+    def residuals(normalised: Array) -> Array:
+        of_second = solve_triangular(
+            factor, model.ellipticity.left(second, normalised).T, lower=True, check_finite=False
+        )
+        return np.concatenate([posterior.residuals(normalised), of_second.ravel()])
 
     found = least_squares(residuals, np.clip(start, -0.98, 0.98), bounds=(-1.0, 1.0), xtol=1e-7, ftol=1e-7)
     return np.asarray(found.x), float(np.sqrt(2 * found.cost))

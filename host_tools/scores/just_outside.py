@@ -24,7 +24,7 @@ from device.measurement.arrays import Array
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate, Quantity
 from device.measurement.mode import Mode
-from device.measurement.parameters import HIGH, LOW, NOMINAL, PARAMETERS, from_unit
+from device.measurement.parameters import HIGH, LOW, NOMINAL, PARAMETERS, denormalise
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.ramp_modes.estimate import estimate_ramp
 from device.measurement.ramp_modes.fit import PressPosterior
@@ -33,7 +33,7 @@ from device.measurement.ramp_modes.noise import ErrorLevels
 from device.simulation.physics.surface_table import PressRamps, Ramp
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
-from host_tools.press_models.mode_outcome import USUAL_RATIO
+from host_tools.press_models.mode_outcome import CRITICAL_RATIO
 from host_tools.press_models.press_samples import profile_rows
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
@@ -41,7 +41,7 @@ from host_tools.probe_tables.surface_table import press_ramps
 from host_tools.scenes.scene import Scene
 from host_tools.scores.outside import FALSE_AT_MOST, REFUSED_AT_LEAST, SHARE
 
-FALSE_FLAGS = 1 - USUAL_RATIO
+FALSE_FLAGS = 1 - CRITICAL_RATIO
 """Share of presses inside that this doubt may flag: misfit and elongation flag as many each, all three at most 5 %."""
 STARTS = 6
 """Fits from as many places, of which the best one counts."""
@@ -104,7 +104,7 @@ def nearest_twin(posterior: PressPosterior, seed: int) -> Twin:
         for start in starts
     ]
     best = min(fits, key=lambda fit: float(fit.cost))
-    return Twin(Inclusion(*map(float, from_unit(best.x)[:3])), float(np.sqrt(2 * best.cost)))
+    return Twin(Inclusion(*map(float, denormalise(best.x)[:3])), float(np.sqrt(2 * best.cost)))
 
 
 def holds(quantity: Quantity, truth: float) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import from_unit, to_unit
+from device.measurement.parameters import denormalise, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, PressSurrogate
@@ -46,9 +46,9 @@ def noise_free_chapter(
     require("presses without noise", presses, Bound(FEWEST_PRESSES, np.inf, "presses"), "ask for more")
     surrogate, std = answers.surrogate, np.sqrt(np.diag(answers.noise["precise"].camera))
     parameters = _parameters(presses, derived_seed(seed, "noise-free"))
-    unit = to_unit(parameters)
+    normalised = normalise(parameters)
     rows = in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], presses, jobs)
-    found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], unit[i], std), presses, jobs))
+    found = np.array(in_parallel(lambda i: known_nuisances_fit(surrogate, rows[i], normalised[i], std), presses, jobs))
     percent = 100 * np.abs(found - parameters[:, : len(UNKNOWNS)]) / parameters[:, : len(UNKNOWNS)]
     inside = _between(parameters[:, SIZE], DETERMINED_SIZES_MM) & _between(parameters[:, DEPTH], DETERMINED_DEPTHS_MM)
     everywhere = np.ones(presses, dtype=bool)
@@ -86,12 +86,12 @@ def _by_octiles(truths: Sequence[Array], percents: Sequence[Array]) -> Table:
     return Table("Mean errors in % by octiles of the truth, lowest first", header, tuple(rows))
 
 
-def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array, std: Array) -> Array:
+def known_nuisances_fit(surrogate: PressSurrogate, row: Array, normalised: Array, std: Array) -> Array:
     """Return size, depth and modulus that fit a row [P] best, the nuisances of coordinates [9] being known.
 
     Columns count by their standard deviations `std` [P].
     """
-    known = unit[len(UNKNOWNS) :]
+    known = normalised[len(UNKNOWNS) :]
 
     def whole(at: Array) -> Array:
         return np.concatenate([at, known])
@@ -109,7 +109,7 @@ def known_nuisances_fit(surrogate: PressSurrogate, row: Array, unit: Array, std:
         )
         for start in STARTS
     ]
-    return from_unit(whole(min(fits, key=lambda fit: fit.cost).x))[: len(UNKNOWNS)]
+    return denormalise(whole(min(fits, key=lambda fit: fit.cost).x))[: len(UNKNOWNS)]
 
 
 def _parameters(presses: int, seed: int) -> Array:

@@ -96,7 +96,7 @@ def compared(model: RampModel, mode: Mode, *, seed: int, scenes: int, jobs: int)
     mean, spread = model.networks(rows)
 
     def one(number: int) -> OneScene:
-        truth = pool.unit[number].astype(np.float64)
+        truth = pool.normalised[number].astype(np.float64)
         found = answers.answer(rows[number], mode, mean[number], spread[number])
         reference = sampled(PressPosterior(rows[number], answers.surrogate, answers.noise[mode]), truth, seed + number)
         return OneScene(truth[: len(UNKNOWNS)], reference, found.mean, found.spread)

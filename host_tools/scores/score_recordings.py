@@ -20,7 +20,7 @@ from rich.table import Table
 from device.measurement.arrays import Array
 from device.measurement.estimate import SPOKEN, Estimate
 from device.measurement.mode import Mode, mode_named
-from device.measurement.parameters import NOMINAL, unknowns_to_unit
+from device.measurement.parameters import NOMINAL, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from host_tools.press_models.mode_statistics import OCTILES, octile_ends, octile_of
@@ -56,7 +56,7 @@ class ScoredPress:
     def coordinate_errors(self) -> Array:
         """Return the errors [3] in coordinates of a press that is answered."""
         found = np.array([getattr(self.estimate, name).value for name in UNKNOWNS])
-        return unknowns_to_unit(found) - unknowns_to_unit(np.array(self.truth.as_tuple()))
+        return normalise_unknowns(found) - normalise_unknowns(np.array(self.truth.as_tuple()))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.estimate import SPOKEN
 from device.measurement.mode import Mode
-from device.measurement.parameters import to_unit
+from device.measurement.parameters import normalise
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.fit import EVENLY_HELD
 from device.measurement.ramp_modes.model import RAMP_MODES, RampAnswers
@@ -32,7 +32,10 @@ def span_chapter(answers: RampAnswers, tables: ProbeTables) -> Chapter:
     change = profile_rows(tables, parameters, span_ratio=1 + SPAN_ERROR_RATIO) - profile_rows(tables, parameters)
     benchmarks = []
     for mode in RAMP_MODES:
-        shifts = [_shift(answers, mode, unit, of_row) for unit, of_row in zip(to_unit(parameters), change, strict=True)]
+        shifts = [
+            _shift(answers, mode, normalised, of_row)
+            for normalised, of_row in zip(normalise(parameters), change, strict=True)
+        ]
         rms = np.sqrt(np.mean(np.square(shifts), axis=0))
         benchmarks += [
             at_most(f"{mode}, {SPOKEN[name]}", "shift over stated spread, RMS", float(rms[i]), NEGLIGIBLE)
@@ -46,9 +49,9 @@ def span_chapter(answers: RampAnswers, tables: ProbeTables) -> Chapter:
     )
 
 
-def _shift(answers: RampAnswers, mode: Mode, unit: Array, change: Array) -> Array:
+def _shift(answers: RampAnswers, mode: Mode, normalised: Array, change: Array) -> Array:
     """Return the shift of the linearised answer to one press over its spread [3], for a change [P] of its row."""
-    row, jacobian = answers.surrogate.rows_and_jacobian(unit)
+    row, jacobian = answers.surrogate.rows_and_jacobian(normalised)
     weighted = np.linalg.solve(answers.noise[mode].covariance(row), jacobian)
     covariance = np.linalg.inv(jacobian.T @ weighted + EVENLY_HELD.T @ EVENLY_HELD)
     unknowns = slice(len(UNKNOWNS))

@@ -9,13 +9,13 @@ from __future__ import annotations
 from device.measurement.arrays import Array
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.confidence_belt import bands_of
+from device.measurement.confidence_belt import belts_of
 from device.measurement.estimate import (
     NO_NUMBERS,
     NOTHING_STANDS_OUT,
     UNKNOWN_IMAGE,
     Estimate,
-    numbers_in_bands,
+    numbers_in_belts,
     origin_of,
     outside_training,
     require_trained_for,
@@ -25,7 +25,7 @@ from device.measurement.estimate import (
     without_numbers,
 )
 from device.measurement.paper_mode.feature_definitions import QUICK_FEATURES, units_of
-from device.measurement.parameters import unknowns_to_unit
+from device.measurement.parameters import normalise_unknowns
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.profile import QUICK_NAMES, quick_press
 from device.measurement.quick_mode.roundness import NOT_ROUND
@@ -49,7 +49,7 @@ class QuickModel:
         self.bundle = bundle
         try:
             entry = bundle.card["modes"]["quick"]
-            self.bands = bands_of(entry)
+            self.belts = belts_of(entry)
             self.elongation_ratio = float(entry["elongation_ratio"])
             faintest = (float(entry["faintest_contrast"][i]) for i in range(len(SEEN_BY)))
             self.faintest_contrast = dict(zip(SEEN_BY, faintest, strict=True))
@@ -87,5 +87,5 @@ def estimate_quick(recording: Recording, model: QuickModel, calibration: Calibra
     if rejections:
         return without_numbers("outside_range", " ".join([*rejections, NO_NUMBERS]), origin, features | outside)
     raw = model.bundle.estimate(row[None])
-    numbers = numbers_in_bands(unknowns_to_unit(raw.estimate[0]), raw.spread[0], model.bands)
+    numbers = numbers_in_belts(normalise_unknowns(raw.estimate[0]), raw.spread[0], model.belts)
     return with_numbers(numbers, features, origin)

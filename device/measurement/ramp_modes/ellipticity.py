@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.parameters import HIGH, PARAMETERS, from_unit
+from device.measurement.parameters import HIGH, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import LOADS, ErrorLevels, smooth_second_harmonics
@@ -43,7 +43,7 @@ DEGREES, COEFFICIENTS = "second_degrees", "second_coefficients"
 
 
 @dataclass(frozen=True, eq=False)
-class RoundSpot:
+class EllipticityTest:
     """Second harmonics of round inclusions, and how far noise takes them.
 
     `second`: polynomials [9] to [Q] of the second harmonic over `second_factor`; `camera`: of each mode the covariance
@@ -55,10 +55,10 @@ class RoundSpot:
     camera: Mapping[Mode, Array]
     levels: ErrorLevels = field(default_factory=ErrorLevels)
 
-    def second_harmonics(self, unit: Array) -> Array:
+    def second_harmonics(self, normalised: Array) -> Array:
         """Return the second harmonics [n, Q] of round inclusions along their offset, at coordinates [n, 9]."""
-        parameters = from_unit(unit)
-        return second_factor(parameters)[:, None] * self.second.values(polynomial_coordinates(unit, parameters))
+        parameters = denormalise(normalised)
+        return second_factor(parameters)[:, None] * self.second.values(polynomial_coordinates(normalised, parameters))
 
     def elongation_deviations(self, second_harmonic: Array, best: Array, mode: Mode) -> float:
         """Return how far a press' `second_harmonic` [2, K, J - 2] is from round, in standard deviations.
@@ -82,8 +82,8 @@ class RoundSpot:
         light = 1 + self._contrast(best)[:, 1:-1].ravel()
         return np.asarray(light[:, None] * light * (self.camera[mode] + smooth_second_harmonics(self.levels)))
 
-    def _contrast(self, unit: Array) -> Array:
-        return self.surrogate.rows(unit[None])[0, :CONTRAST_COLUMNS].reshape(LOADS, RINGS)
+    def _contrast(self, normalised: Array) -> Array:
+        return self.surrogate.rows(normalised[None])[0, :CONTRAST_COLUMNS].reshape(LOADS, RINGS)
 
 
 def second_factor(parameters: Array) -> Array:
@@ -98,14 +98,16 @@ def stretched(contrast: Array) -> Array:
     return np.asarray((RING_RADII_MM * slope_per_mm)[:, 1:-1].ravel())
 
 
-def round_arrays(modes: tuple[Mode, ...]) -> tuple[str, ...]:
+def ellipticity_arrays(modes: tuple[Mode, ...]) -> tuple[str, ...]:
     """Return the names of the arrays in the file of a bundle."""
     return DEGREES, COEFFICIENTS, *(f"camera_{mode}" for mode in modes)
 
 
-def round_spot_of(arrays: Mapping[str, NDArray[Any]], surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> RoundSpot:
-    """Return what the arrays of `round_arrays` say; raise `InvalidQuantity` when one is of another shape."""
-    degrees, coefficients, *cameras = (arrays[name] for name in round_arrays(modes))
+def ellipticity_test_of(
+    arrays: Mapping[str, NDArray[Any]], surrogate: PressSurrogate, modes: tuple[Mode, ...]
+) -> EllipticityTest:
+    """Return what the arrays of `ellipticity_arrays` say; raise `InvalidQuantity` when one is of another shape."""
+    degrees, coefficients, *cameras = (arrays[name] for name in ellipticity_arrays(modes))
     shapes = [one.shape for one in (degrees, coefficients, *cameras)]
     square = (SECOND_COLUMNS, SECOND_COLUMNS)
     expected = [(len(degrees), len(PARAMETERS)), (len(degrees), SECOND_COLUMNS), *[square] * len(modes)]
@@ -114,4 +116,4 @@ def round_spot_of(arrays: Mapping[str, NDArray[Any]], surrogate: PressSurrogate,
         raise InvalidQuantity("shapes of the second harmonics", shapes, str(expected), action)
     second = LegendreSum(degrees, coefficients.astype(np.float64))
     camera = dict(zip(modes, (one.astype(np.float64) for one in cameras), strict=True))
-    return RoundSpot(surrogate, second, camera)
+    return EllipticityTest(surrogate, second, camera)

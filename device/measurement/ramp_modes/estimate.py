@@ -17,7 +17,7 @@ from device.measurement.estimate import (
     NO_NUMBERS,
     NOTHING_STANDS_OUT,
     Estimate,
-    numbers_in_bands,
+    numbers_in_belts,
     origin_of,
     require_trained_for,
     saturation,
@@ -59,7 +59,7 @@ def estimate_ramp(recording: Recording, mode: Mode, model: RampModel, calibratio
     answer = model.answer(row, mode)
     found = CriticalValues(
         misfit_ratio=answer.misfit_ratio,
-        elongation_deviations=model.round_spot.elongation_deviations(profile.second_harmonic, answer.best, mode),
+        elongation_deviations=model.ellipticity.elongation_deviations(profile.second_harmonic, answer.best, mode),
         outside_log_odds=float(model.ranges.log_odds(row[None], mode)[0]),
     )
     features = with_critical(asdict(found), asdict(critical)) | {"residual": profile.residual}
@@ -67,7 +67,7 @@ def estimate_ramp(recording: Recording, mode: Mode, model: RampModel, calibratio
         features |= dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
     if reasons := rejections(found, critical):
         return without_numbers("outside_range", " ".join([*reasons, NO_NUMBERS]), origin, features)
-    return with_numbers(numbers_in_bands(answer.mean, answer.spread, model.bands[mode]), features, origin)
+    return with_numbers(numbers_in_belts(answer.mean, answer.spread, model.belts[mode]), features, origin)
 
 
 def stands_out(row: Array, noise: PressNoise) -> bool:
@@ -81,8 +81,8 @@ def contrast_deviations(row: Array, noise: PressNoise) -> float:
     By itself, or against the rim: whichever is more.
     """
     forces = len(PROFILE_FORCES_N)
-    bare = np.concatenate([np.zeros(forces * RINGS), row[forces * RINGS :]])
-    covariance = noise.covariance(bare)[: forces * RINGS, : forces * RINGS]
+    baseline = np.concatenate([np.zeros(forces * RINGS), row[forces * RINGS :]])
+    covariance = noise.covariance(baseline)[: forces * RINGS, : forces * RINGS]
     return max(
         float(weights @ row[: forces * RINGS]) / float(np.sqrt(weights @ covariance @ weights))
         for weights in (np.tile(rings / forces, forces) for rings in (MIDDLE, MIDDLE_LESS_RIM))

@@ -27,23 +27,23 @@ class PressPosterior:
         self._row, self._surrogate = row, surrogate
         self._factor = np.linalg.cholesky(noise.covariance(row))
 
-    def residuals(self, unit: Array) -> Array:
+    def residuals(self, normalised: Array) -> Array:
         """Return whitened residuals [P] at coordinates [9]."""
-        return self._whitened(self._surrogate.rows(unit[None])[0] - self._row)
+        return self._whitened(self._surrogate.rows(normalised[None])[0] - self._row)
 
-    def jacobian(self, unit: Array) -> Array:
+    def jacobian(self, normalised: Array) -> Array:
         """Return the derivatives [P, 9] of `residuals`."""
-        return self._whitened(self._surrogate.rows_and_jacobian(unit)[1])
+        return self._whitened(self._surrogate.rows_and_jacobian(normalised)[1])
 
-    def log_density(self, unit: Array) -> Array:
+    def log_density(self, normalised: Array) -> Array:
         """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, 9].
 
         Coordinates are even within their ranges before the press, but for the offset: its place is even over a disk.
         """
-        log = np.full(len(unit), -np.inf)
-        inside = np.all(np.abs(unit) <= 1, axis=1)
-        residuals = self._whitened((self._surrogate.rows(unit[inside]) - self._row).T)
-        log[inside] = np.log1p(unit[inside, OFFSET]) - 0.5 * np.sum(residuals**2, axis=0)
+        log = np.full(len(normalised), -np.inf)
+        inside = np.all(np.abs(normalised) <= 1, axis=1)
+        residuals = self._whitened((self._surrogate.rows(normalised[inside]) - self._row).T)
+        log[inside] = np.log1p(normalised[inside, OFFSET]) - 0.5 * np.sum(residuals**2, axis=0)
         return log
 
     def _whitened(self, columns: Array) -> Array:
@@ -53,9 +53,9 @@ class PressPosterior:
 def best_fit(posterior: PressPosterior, start: Array) -> Array:
     """Return the coordinates [9] that explain a row best, each held weakly to the middle of its range."""
     found = least_squares(
-        lambda unit: np.concatenate([posterior.residuals(unit), unit / EVEN_STD]),
+        lambda normalised: np.concatenate([posterior.residuals(normalised), normalised / EVEN_STD]),
         np.clip(start, -0.98, 0.98),
-        jac=lambda unit: np.vstack([posterior.jacobian(unit), EVENLY_HELD]),
+        jac=lambda normalised: np.vstack([posterior.jacobian(normalised), EVENLY_HELD]),
         bounds=(-1.0, 1.0),
         xtol=1e-6,
         ftol=1e-6,

@@ -17,17 +17,17 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.bundle import BundleRefused, ModelBundle
-from device.measurement.confidence_belt import bands_of
+from device.measurement.confidence_belt import belts_of
 from device.measurement.mode import Mode
 from device.measurement.paper_mode.feature_definitions import RADIAL_PROFILE_FEATURES, units_of
-from device.measurement.parameters import NUISANCES, from_unit, slope_of_unit, unknowns_to_unit
+from device.measurement.parameters import NUISANCES, denormalise, normalise_unknowns, slope_of_normalised
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.ramp_modes.ellipticity import RoundSpot
+from device.measurement.ramp_modes.ellipticity import EllipticityTest
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import sample_press
 from device.measurement.ramp_modes.radial_profile import ROW_NAMES
-from device.measurement.ramp_modes.range_classifier import RangeTest
+from device.measurement.ramp_modes.range_classifier import RangeClassifier
 from device.measurement.ramp_modes.surrogate import TISSUE, PressSurrogate
 
 SURROGATE_FILE = "surrogate.npz"
@@ -78,8 +78,8 @@ class RampAnswers:
         if mode != "precise":
             return _answer(posterior, best_fit(posterior, start), mean, spread)
         fit = sample_press(posterior, start)
-        values = from_unit(fit.mean)
-        tissue_kpa = float(values[TISSUE]), float((fit.spread * slope_of_unit(values))[TISSUE])
+        values = denormalise(fit.mean)
+        tissue_kpa = float(values[TISSUE]), float((fit.spread * slope_of_normalised(values))[TISSUE])
         unknowns = slice(len(UNKNOWNS))
         return _answer(posterior, fit.best, fit.mean[unknowns], fit.spread[unknowns])._replace(tissue_kpa=tissue_kpa)
 
@@ -95,12 +95,14 @@ class RampModel:
     `bands` and `critical` values are those of each mode.
     """
 
-    def __init__(self, bundle: ModelBundle, answers: RampAnswers, ranges: RangeTest, round_spot: RoundSpot) -> None:
+    def __init__(
+        self, bundle: ModelBundle, answers: RampAnswers, ranges: RangeClassifier, ellipticity: EllipticityTest
+    ) -> None:
         """Raises `BundleRefused` when the card of a bundle that reads `RAMP_UNITS` lacks the values of a mode."""
-        self.bundle, self.answers, self.ranges, self.round_spot = bundle, answers, ranges, round_spot
+        self.bundle, self.answers, self.ranges, self.ellipticity = bundle, answers, ranges, ellipticity
         try:
             entries = {mode: bundle.card["modes"][mode] for mode in RAMP_MODES}
-            self.bands = {mode: bands_of(entry) for mode, entry in entries.items()}
+            self.belts = {mode: belts_of(entry) for mode, entry in entries.items()}
             self.critical = {mode: _critical_values(entry) for mode, entry in entries.items()}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
             raise BundleRefused(
@@ -120,7 +122,7 @@ class RampModel:
     def networks(self, rows: Array) -> tuple[Array, Array]:
         """Return the networks' mean and spread [n, 3] of the unknowns' coordinates, for rows [n, P]."""
         raw = self.bundle.estimate(rows)
-        return unknowns_to_unit(raw.estimate), raw.spread
+        return normalise_unknowns(raw.estimate), raw.spread
 
 
 def _critical_values(entry: Mapping[str, Any]) -> CriticalValues:

@@ -20,7 +20,7 @@ from scipy.special import ive
 
 from device.measurement.arrays import Array
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET_COLUMNS, RESPONSE_COLUMNS
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS
 
 Rows = TypeVar("Rows", Array, NDArray[np.float32])
@@ -82,7 +82,7 @@ def drift_directions(rows: Rows) -> tuple[Rows, Rows]:
     gain, zero = np.zeros_like(rows), np.zeros_like(rows)
     gain[..., :CONTRAST_COLUMNS] = light[..., :CONTRAST_COLUMNS]
     gain[..., -OFFSET_COLUMNS:] = rows[..., -OFFSET_COLUMNS:]
-    below = rows[..., CONTRAST_COLUMNS : CONTRAST_COLUMNS + GROWTH_COLUMNS]
+    below = rows[..., CONTRAST_COLUMNS : CONTRAST_COLUMNS + RESPONSE_COLUMNS]
     log_light = below.reshape(*rows.shape[:-1], LOADS - 1, RINGS)  # over that at the largest force, where it is 0
     slope_per_n = np.einsum("kl,...lj->...kj", _SLOPE_PER_N[:, :-1].astype(rows.dtype), log_light)
     zero[..., :CONTRAST_COLUMNS] = -gain[..., :CONTRAST_COLUMNS] * slope_per_n.reshape(*rows.shape[:-1], -1)
@@ -106,12 +106,12 @@ def smooth_errors(levels: ErrorLevels) -> Array:
     """Return the covariance [P, P] of smooth errors of the light, for a light ratio of 1 everywhere."""
     flat, model = smooth_ring_errors(levels, harmonic=0)
     contrast = np.kron(np.ones((LOADS, LOADS)), flat) + np.kron(np.eye(LOADS), model)
-    growth = np.kron(np.eye(LOADS - 1) + 1, model)
+    reference_response = np.kron(np.eye(LOADS - 1) + 1, model)
     first_flat, first_model = smooth_ring_errors(levels, harmonic=1)
     first = first_flat + first_model / LOADS
-    covariance = np.zeros(2 * (CONTRAST_COLUMNS + GROWTH_COLUMNS + OFFSET_COLUMNS,))
-    a, b = CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS
-    covariance[:a, :a], covariance[a:b, a:b], covariance[b:, b:] = contrast, growth, first[1:, 1:]
+    covariance = np.zeros(2 * (CONTRAST_COLUMNS + RESPONSE_COLUMNS + OFFSET_COLUMNS,))
+    a, b = CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS
+    covariance[:a, :a], covariance[a:b, a:b], covariance[b:, b:] = contrast, reference_response, first[1:, 1:]
     return covariance
 
 

@@ -36,7 +36,7 @@ STEPS = 12
 
 @dataclass(frozen=True, eq=False)
 class PressFit:
-    """Posterior of the coordinates [9] of `press_parameters.to_unit`.
+    """Posterior of the coordinates [9] of `press_parameters.normalise`.
 
     `best`: the best fit; `mean`, `spread`: of the posterior; `effective_samples`: what the weighted ones are worth. Too
     few, because the best fit is driven into a corner of the ranges, tell nothing: the spread is then that of the ranges
@@ -119,9 +119,9 @@ def _best_in_cells(posterior: PressPosterior, best: Array) -> list[Array]:
 
 def _best_given_modulus(posterior: PressPosterior, modulus: float, start: Array) -> Array:
     def whole(rest: Array) -> Array:
-        unit = np.empty(len(start))
-        unit[REST], unit[MODULUS] = rest, modulus
-        return unit
+        normalised = np.empty(len(start))
+        normalised[REST], normalised[MODULUS] = rest, modulus
+        return normalised
 
     held = EVENLY_HELD[:-1, :-1]
     fit = least_squares(

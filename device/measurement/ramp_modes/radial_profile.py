@@ -53,21 +53,21 @@ class RadialProfile:
 
     force_n: Array
     contrast: Array
-    growth: Array
+    reference_response: Array
     offset: Array
     second_harmonic: Array
     residual: float
 
     def as_row(self) -> Array:
         """Return contrast, growth and offset as one row, in the order of `ROW_NAMES`."""
-        return np.concatenate([self.contrast.ravel(), self.growth.ravel(), self.offset])
+        return np.concatenate([self.contrast.ravel(), self.reference_response.ravel(), self.offset])
 
 
 def _row_names() -> tuple[str, ...]:
     rings, forces = [f"{r:.1f}_mm" for r in RING_RADII_MM], [f"{f:.2f}_n" for f in PROFILE_FORCES_N]
     contrast = [f"contrast_{f}_{r}" for f in forces for r in rings]
-    growth = [f"growth_{f}_{r}" for f in forces[:-1] for r in rings]
-    return (*contrast, *growth, *(f"offset_{r}" for r in rings[1:]))
+    reference_response = [f"growth_{f}_{r}" for f in forces[:-1] for r in rings]
+    return (*contrast, *reference_response, *(f"offset_{r}" for r in rings[1:]))
 
 
 ROW_NAMES = _row_names()
@@ -116,11 +116,11 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile
         for force, image in zip(press.force_n, press.images, strict=True)
     ]
     rings, residual = _at_profile_forces(press.force_n, frames)
-    bare = np.array([weights.means(light.at(force), everywhere).mean for force in PROFILE_FORCES_N])
+    baseline = np.array([weights.means(light.at(force), everywhere).mean for force in PROFILE_FORCES_N])
     return RadialProfile(
         force_n=PROFILE_FORCES_N,
         contrast=rings.mean,
-        growth=np.log(bare[:-1] / bare[-1]),
+        reference_response=np.log(baseline[:-1] / baseline[-1]),
         offset=harmonic(rings, 1),
         second_harmonic=second_harmonic(rings),
         residual=residual,

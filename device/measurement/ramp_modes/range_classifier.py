@@ -16,7 +16,7 @@ RANGE_FILE, ENTRY = "range.onnx", "range"
 golden features of the bundle."""
 
 
-class RangeTest:
+class RangeClassifier:
     """The verified networks of a bundle."""
 
     def __init__(self, files: BundleFiles, card: ModelCard, features: int, modes: tuple[Mode, ...]) -> None:

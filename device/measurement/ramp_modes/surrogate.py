@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, from_unit, slope_of_unit
+from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise, slope_of_normalised
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
@@ -25,7 +25,7 @@ SIZE, DEPTH, MODULUS, TISSUE, OFFSET = (
     PARAMETERS.index(name) for name in ("size_mm", "depth_mm", "youngs_modulus_kpa", "tissue_modulus_kpa", "offset_mm")
 )
 CONTRAST_COLUMNS = len(PROFILE_FORCES_N) * RINGS
-GROWTH_COLUMNS = (len(PROFILE_FORCES_N) - 1) * RINGS
+RESPONSE_COLUMNS = (len(PROFILE_FORCES_N) - 1) * RINGS
 OFFSET_COLUMNS = RINGS - 1
 Number = TypeVar("Number", float, Array)
 ARRAYS = ("lump_degrees", "lump_coefficients", "bare_degrees", "bare_coefficients")
@@ -47,33 +47,37 @@ class PressSurrogate:
     """`inclusion`: contrast and offset over the strength; `bare`: growth of the inclusion-free light."""
 
     inclusion_field: LegendreSum
-    bare: LegendreSum
+    baseline: LegendreSum
 
-    def rows(self, unit: Array) -> Array:
-        """Return profile rows [n, P] at coordinates [n, 9] of `press_parameters.to_unit`."""
-        parameters = from_unit(unit)
-        at = polynomial_coordinates(unit, parameters)
+    def rows(self, normalised: Array) -> Array:
+        """Return profile rows [n, P] at coordinates [n, 9] of `press_parameters.normalise`."""
+        parameters = denormalise(normalised)
+        at = polynomial_coordinates(normalised, parameters)
         factor = inclusion_factor(parameters)
-        return assemble(factor * self.inclusion_field.values(at), self.bare.values(at))
+        return assemble(factor * self.inclusion_field.values(at), self.baseline.values(at))
 
-    def rows_and_jacobian(self, unit: Array) -> tuple[Array, Array]:
+    def rows_and_jacobian(self, normalised: Array) -> tuple[Array, Array]:
         """Return the row [P] at coordinates [9] and its derivatives [P, 9] by them."""
-        parameters = from_unit(unit[None])
-        at = polynomial_coordinates(unit[None], parameters)
-        factor, inclusion, bare = inclusion_factor(parameters), self.inclusion_field.values(at), self.bare.values(at)
-        inclusion_slope, bare_slope = (
-            _by_unit(field.gradient(at)[:, 0], parameters[0]) for field in (self.inclusion_field, self.bare)
+        parameters = denormalise(normalised[None])
+        at = polynomial_coordinates(normalised[None], parameters)
+        factor, inclusion, baseline = (
+            inclusion_factor(parameters),
+            self.inclusion_field.values(at),
+            self.baseline.values(at),
+        )
+        inclusion_slope, baseline_slope = (
+            _by_normalised(field.gradient(at)[:, 0], parameters[0]) for field in (self.inclusion_field, self.baseline)
         )
         inclusion_slope = factor * inclusion_slope + _factor_slope(parameters[0]) * inclusion
-        return assemble(factor * inclusion, bare)[0], assemble(inclusion_slope, bare_slope).T
+        return assemble(factor * inclusion, baseline)[0], assemble(inclusion_slope, baseline_slope).T
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the polynomials by the names in `ARRAYS`, as a file holds them: single precision."""
         values = (
             self.inclusion_field.degrees,
             self.inclusion_field.coefficients,
-            self.bare.degrees,
-            self.bare.coefficients,
+            self.baseline.degrees,
+            self.baseline.coefficients,
         )
         kinds = (np.uint8, np.float32, np.uint8, np.float32)
         return {name: np.asarray(value, kind) for name, value, kind in zip(ARRAYS, values, kinds, strict=True)}
@@ -82,13 +86,13 @@ class PressSurrogate:
 def surrogate_of(arrays: Mapping[str, NDArray[Any]]) -> PressSurrogate:
     """Return the surrogate of the arrays in `ARRAYS`; raise `InvalidQuantity` when one is of another shape."""
     a, b, c, d = (arrays[name] for name in ARRAYS)
-    inclusion, bare = LegendreSum(a, b.astype(np.float64)), LegendreSum(c, d.astype(np.float64))
-    for field, columns in ((inclusion, CONTRAST_COLUMNS + OFFSET_COLUMNS), (bare, GROWTH_COLUMNS)):
+    inclusion, baseline = LegendreSum(a, b.astype(np.float64)), LegendreSum(c, d.astype(np.float64))
+    for field, columns in ((inclusion, CONTRAST_COLUMNS + OFFSET_COLUMNS), (baseline, RESPONSE_COLUMNS)):
         expected = (len(field.degrees), columns), (len(field.coefficients), len(PARAMETERS))
         if (field.coefficients.shape, field.degrees.shape) != expected:
             action = "install the model bundle again"
             raise InvalidQuantity("surrogate's shape", field.coefficients.shape, str(expected[0]), action)
-    return PressSurrogate(inclusion, bare)
+    return PressSurrogate(inclusion, baseline)
 
 
 def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
@@ -96,10 +100,10 @@ def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
     return (size_mm / (depth_mm + size_mm / 2)) ** 3
 
 
-def polynomial_coordinates(unit: Array, parameters: Array) -> Array:
+def polynomial_coordinates(normalised: Array, parameters: Array) -> Array:
     """Return coordinates [n, 9] in which presses are polynomials: the modulus' one is the contrast of stiffness."""
     low, high = CONTRAST_RANGE
-    at = np.array(unit)
+    at = np.array(normalised)
     at[:, MODULUS] = 2 * (stiffness_contrast(parameters[:, MODULUS], parameters[:, TISSUE]) - low) / (high - low) - 1
     return at
 
@@ -113,9 +117,9 @@ def inclusion_factor(parameters: Array) -> Array:
     ])  # fmt: skip
 
 
-def assemble(inclusion: Array, bare: Array) -> Array:
+def assemble(inclusion: Array, baseline: Array) -> Array:
     """Return rows [n, P] in the order of `press_profile.ROW_NAMES`: contrast, growth, offset."""
-    return np.hstack([inclusion[:, :CONTRAST_COLUMNS], bare, inclusion[:, CONTRAST_COLUMNS:]])
+    return np.hstack([inclusion[:, :CONTRAST_COLUMNS], baseline, inclusion[:, CONTRAST_COLUMNS:]])
 
 
 def _strength(parameters: Array) -> Array:
@@ -124,21 +128,24 @@ def _strength(parameters: Array) -> Array:
 
 def _factor_slope(at: Array) -> Array:
     """Return the derivatives [9, contrast + offset columns] of `inclusion_factor` by the coordinates."""
-    slope, by_unit = np.zeros((len(PARAMETERS), CONTRAST_COLUMNS + OFFSET_COLUMNS)), slope_of_unit(at)
+    slope, by_normalised = np.zeros((len(PARAMETERS), CONTRAST_COLUMNS + OFFSET_COLUMNS)), slope_of_normalised(at)
     strength, centre, place = float(_strength(at[None])[0]), at[DEPTH] + at[SIZE] / 2, at[OFFSET] / HIGH[OFFSET]
     by_size, by_depth = 3 / at[SIZE] - 1.5 / centre, -3 / centre
     both = np.repeat([1.0, place], [CONTRAST_COLUMNS, OFFSET_COLUMNS])
-    slope[SIZE], slope[DEPTH] = strength * by_size * by_unit[SIZE] * both, strength * by_depth * by_unit[DEPTH] * both
-    slope[OFFSET, CONTRAST_COLUMNS:] = strength / HIGH[OFFSET] * by_unit[OFFSET]
+    slope[SIZE], slope[DEPTH] = (
+        strength * by_size * by_normalised[SIZE] * both,
+        strength * by_depth * by_normalised[DEPTH] * both,
+    )
+    slope[OFFSET, CONTRAST_COLUMNS:] = strength / HIGH[OFFSET] * by_normalised[OFFSET]
     return slope
 
 
-def _by_unit(gradient: Array, at: Array) -> Array:
+def _by_normalised(gradient: Array, at: Array) -> Array:
     """Return derivatives [9, Q] by `unit` of derivatives by the polynomials' coordinates, at parameters [9]."""
-    (low, high), by_unit = CONTRAST_RANGE, slope_of_unit(at)
+    (low, high), by_normalised = CONTRAST_RANGE, slope_of_normalised(at)
     E, Et = at[MODULUS], at[TISSUE]
     by_contrast = gradient[MODULUS] * 2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2
     slope = gradient.copy()
-    slope[MODULUS] = by_contrast * Et * by_unit[MODULUS]
-    slope[TISSUE] = gradient[TISSUE] - by_contrast * E * by_unit[TISSUE]
+    slope[MODULUS] = by_contrast * Et * by_normalised[MODULUS]
+    slope[TISSUE] = gradient[TISSUE] - by_contrast * E * by_normalised[TISSUE]
     return slope

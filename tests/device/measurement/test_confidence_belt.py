@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.quantities import InvalidQuantity
 
 TRUTH, LOG_SPREAD = np.array([-1.0, 1.0]), np.log([0.01, 0.2])
 
 
-def bands(low, high):
-    return Bands(TRUTH, LOG_SPREAD, np.full((2, 2), low), np.full((2, 2), high))
+def belts(low, high):
+    return Belt(TRUTH, LOG_SPREAD, np.full((2, 2), low), np.full((2, 2), high))
 
 
 def test_constant_bounds_give_the_mean_plus_and_minus_that_many_spreads():
     """-1.64 <= (truth - 0.2) / 0.1 <= 1.64: from 0.036 to 0.364, to half a step of the grid."""
-    interval = bands(-1.64, 1.64).interval(0.2, 0.1)
+    interval = belts(-1.64, 1.64).interval(0.2, 0.1)
     assert (interval.low, interval.high) == (pytest.approx(0.036, abs=0.005), pytest.approx(0.364, abs=0.005))
     assert interval.is_identifiable
 
@@ -33,37 +33,37 @@ def test_what_the_grid_cuts_off_at_both_ends_is_given_back():
 
 def test_bounds_that_grow_with_the_truth_shift_the_interval():
     """At truth t the answer usually lies t spreads too low: t - 1 <= (t - m) / s <= t + 1 with s = 0.1, m = 0."""
-    shifted = Bands(TRUTH, LOG_SPREAD, np.array([[-2.0, -2.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [2.0, 2.0]]))
+    shifted = Belt(TRUTH, LOG_SPREAD, np.array([[-2.0, -2.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [2.0, 2.0]]))
     interval = shifted.interval(0.0, 0.1)
     assert interval.low == pytest.approx(-1 / 9, abs=0.005)
     assert interval.high == pytest.approx(1 / 9, abs=0.005)
 
 
 def test_an_interval_ends_where_the_range_does():
-    assert bands(-1.64, 1.64).interval(0.98, 0.1).high == 1.0
+    assert belts(-1.64, 1.64).interval(0.98, 0.1).high == 1.0
 
 
 def test_an_unknown_that_the_press_does_not_narrow_down_keeps_all_of_its_range():
     """Half of an even range's spread is 0.289."""
-    assert bands(-1.0, 1.0).interval(0.3, 0.29) == (-1.0, 1.0, False)
-    assert bands(-1.0, 1.0).interval(0.3, 0.28).is_identifiable
+    assert belts(-1.0, 1.0).interval(0.3, 0.29) == (-1.0, 1.0, False)
+    assert belts(-1.0, 1.0).interval(0.3, 0.28).is_identifiable
 
 
 def test_an_interval_that_is_all_of_the_range_narrows_nothing_down():
     """Six spreads of 0.25 reach from the middle beyond both ends."""
-    assert bands(-6.0, 6.0).interval(0.0, 0.25) == (-1.0, 1.0, False)
+    assert belts(-6.0, 6.0).interval(0.0, 0.25) == (-1.0, 1.0, False)
 
 
 @pytest.mark.parametrize("bound", [1.64, 6.0])
 def test_an_interval_is_made_of_what_json_knows(bound):
-    interval = bands(-bound, bound).interval(np.float64(0.2), np.float64(0.2))
+    interval = belts(-bound, bound).interval(np.float64(0.2), np.float64(0.2))
     assert [type(one) for one in interval] == [float, float, bool]
 
 
 def test_an_answer_unusual_for_every_truth_is_given_two_spreads_on_each_side():
-    assert bands(5.0, 6.0).interval(1.0, 0.1)[:2] == pytest.approx((0.8, 1.0))
+    assert belts(5.0, 6.0).interval(1.0, 0.1)[:2] == pytest.approx((0.8, 1.0))
 
 
 def test_tables_of_another_shape_are_refused():
     with pytest.raises(InvalidQuantity, match="shape of the bands"):
-        Bands(TRUTH, LOG_SPREAD, np.zeros((3, 2)), np.zeros((2, 2)))
+        Belt(TRUTH, LOG_SPREAD, np.zeros((3, 2)), np.zeros((2, 2)))

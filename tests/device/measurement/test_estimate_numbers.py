@@ -3,25 +3,25 @@
 import numpy as np
 import pytest
 
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.estimate import (
     UNKNOWN_QUANTITY,
     Numbers,
     Origin,
-    numbers_in_bands,
+    numbers_in_belts,
     with_numbers,
     without_numbers,
 )
 
 ORIGIN = Origin("standard", "demo", "00" * 32, "id", True)
-WITHIN_TWO = Bands(np.array([-1.0, 1.0]), np.array([-9.0, 0.0]), np.full((2, 2), -2.0), np.full((2, 2), 2.0))
+WITHIN_TWO = Belt(np.array([-1.0, 1.0]), np.array([-9.0, 0.0]), np.full((2, 2), -2.0), np.full((2, 2), 2.0))
 """Every truth within two spreads of the mean is usual, whatever truth and spread are."""
 HALF_CELL = 1 / 400
 """Truths are tried on a grid of 401: an interval reaches half a cell further than the last that holds."""
 
 
 def estimate_of(mean, spread):
-    numbers = numbers_in_bands(np.array(mean), np.array(spread), [WITHIN_TWO] * 3)
+    numbers = numbers_in_belts(np.array(mean), np.array(spread), [WITHIN_TWO] * 3)
     return with_numbers(numbers, {"misfit_ratio": 1.0}, ORIGIN)
 
 

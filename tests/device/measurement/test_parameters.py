@@ -10,17 +10,17 @@ from device.measurement.parameters import (
     NUISANCES,
     PARAMETERS,
     RANGES,
-    from_unit,
-    slope_of_unit,
-    to_unit,
-    unknowns_from_unit,
-    unknowns_to_unit,
+    denormalise,
+    denormalise_unknowns,
+    normalise,
+    normalise_unknowns,
+    slope_of_normalised,
 )
 from device.measurement.quantities import UNKNOWNS
 
 
 @pytest.fixture
-def unit() -> np.ndarray:
+def normalised() -> np.ndarray:
     return np.random.default_rng(1).uniform(-1, 1, (50, len(PARAMETERS)))
 
 
@@ -29,33 +29,33 @@ def test_the_unknowns_come_first_and_the_rest_are_nuisances():
     assert len(set(PARAMETERS)) == 9
 
 
-def test_coordinates_and_parameters_are_inverse_of_each_other(unit):
-    np.testing.assert_allclose(to_unit(from_unit(unit)), unit, atol=1e-13)
+def test_coordinates_and_parameters_are_inverse_of_each_other(normalised):
+    np.testing.assert_allclose(normalise(denormalise(normalised)), normalised, atol=1e-13)
 
 
 def test_coordinates_are_minus_one_and_one_at_the_ends_of_the_ranges():
-    np.testing.assert_allclose(to_unit(np.array([LOW, HIGH])), [-np.ones(9), np.ones(9)], atol=1e-14)
+    np.testing.assert_allclose(normalise(np.array([LOW, HIGH])), [-np.ones(9), np.ones(9)], atol=1e-14)
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
 def test_the_middle_is_the_geometric_mean_where_ratios_count_and_else_the_arithmetic(name):
     low, high, by_ratio = RANGES[name]
-    middle = from_unit(np.zeros(len(PARAMETERS)))[PARAMETERS.index(name)]
+    middle = denormalise(np.zeros(len(PARAMETERS)))[PARAMETERS.index(name)]
     assert middle == pytest.approx(np.sqrt(low * high) if by_ratio else (low + high) / 2, rel=1e-13)
 
 
-def test_neither_direction_changes_what_it_is_given(unit):
-    before, values = unit.copy(), from_unit(unit)
+def test_neither_direction_changes_what_it_is_given(normalised):
+    before, values = normalised.copy(), denormalise(normalised)
     given = values.copy()
-    to_unit(values)
-    np.testing.assert_array_equal(unit, before)
+    normalise(values)
+    np.testing.assert_array_equal(normalised, before)
     np.testing.assert_array_equal(values, given)
 
 
-def test_the_slope_is_the_parameters_by_the_coordinates(unit):
+def test_the_slope_is_the_parameters_by_the_coordinates(normalised):
     step = 1e-5
-    differences = (from_unit(unit + step) - from_unit(unit - step)) / (2 * step)
-    np.testing.assert_allclose(slope_of_unit(from_unit(unit)), differences, rtol=1e-8)
+    differences = (denormalise(normalised + step) - denormalise(normalised - step)) / (2 * step)
+    np.testing.assert_allclose(slope_of_normalised(denormalise(normalised)), differences, rtol=1e-8)
 
 
 def test_what_is_nominal_lies_inside_its_range():
@@ -65,7 +65,7 @@ def test_what_is_nominal_lies_inside_its_range():
 
 def test_the_unknowns_alone_have_the_same_coordinates_as_among_all():
     """Ends of the ranges and their middle, 40 kPa being the middle of 10 and 160 by ratio."""
-    unit, values = np.array([[-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array([[2.0, 12.0, 40.0], [8.5, 8.0, 160.0]])
-    np.testing.assert_allclose(unknowns_from_unit(unit), values)
-    np.testing.assert_allclose(unknowns_to_unit(values), unit, atol=1e-12)
-    np.testing.assert_allclose(unknowns_to_unit(values[0]), unit[0], atol=1e-12)
+    normalised, values = np.array([[-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array([[2.0, 12.0, 40.0], [8.5, 8.0, 160.0]])
+    np.testing.assert_allclose(denormalise_unknowns(normalised), values)
+    np.testing.assert_allclose(normalise_unknowns(values), normalised, atol=1e-12)
+    np.testing.assert_allclose(normalise_unknowns(values[0]), normalised[0], atol=1e-12)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from host_tools.inverse import confidence_belts as module
 
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.quantities import InvalidQuantity
-from host_tools.press_models import confidence_belts as module
-from host_tools.press_models.confidence_belts import confidence_bands, widened
+from host_tools.press_models.confidence_belts import confidence_belts, widened
 
 
 def shrunk_answers(count, seed, noise=0.15):
@@ -23,9 +23,9 @@ def shrunk_answers(count, seed, noise=0.15):
 
 def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
     """A Bayesian interval covers 0.9 on the average, but misses most truths at the ends of the range."""
-    bands = confidence_bands(*(column[:, None] for column in shrunk_answers(12_000, 1)))[0]
+    belts = confidence_belts(*(column[:, None] for column in shrunk_answers(12_000, 1)))[0]
     truth, mean, spread = shrunk_answers(6000, 2)
-    intervals = [bands.interval(m, s) for m, s in zip(mean, spread, strict=True)]
+    intervals = [belts.interval(m, s) for m, s in zip(mean, spread, strict=True)]
     inside = np.array([one.low <= t <= one.high for one, t in zip(intervals, truth, strict=True)])
     octile = np.minimum(((truth + 1) * 4).astype(int), 7)
     assert inside.mean() == pytest.approx(0.9, abs=0.02)
@@ -35,10 +35,10 @@ def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
 def test_bands_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
     """Quantiles twice too far out: the factor is a half, but for what chance does not let be told."""
     columns = [column[:, None] for column in shrunk_answers(4000, 3)]
-    [right] = confidence_bands(*columns)
+    [right] = confidence_belts(*columns)
     learned = module._learned
     monkeypatch.setattr(module, "_learned", lambda *presses: module._scaled(learned(*presses), 2.0))
-    [narrowed] = confidence_bands(*columns)
+    [narrowed] = confidence_belts(*columns)
     np.testing.assert_allclose(narrowed.high, right.high, rtol=0.05, atol=0.05)
     np.testing.assert_allclose(narrowed.low, right.low, rtol=0.05, atol=0.05)
 
@@ -46,7 +46,7 @@ def test_bands_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
 def test_too_few_presses_that_determine_an_unknown_are_refused():
     truth = np.linspace(-1, 1, 100)[:, None]
     with pytest.raises(InvalidQuantity, match="presses that determine an unknown is 100, but must be at least 120"):
-        confidence_bands(truth, truth, np.full_like(truth, 0.2))
+        confidence_belts(truth, truth, np.full_like(truth, 0.2))
 
 
 @pytest.mark.parametrize(("share", "is_determined"), [(0.04, False), (0.5, True)])
@@ -54,14 +54,14 @@ def test_an_unknown_that_presses_rarely_determine_is_never_called_determined(sha
     """Answers that are exactly right cannot tell how wide the bands of the few are to be."""
     truth = np.linspace(-1, 1, 1000)
     spread = np.where(np.arange(1000) % 100 < 100 * share, 0.1, 0.5)
-    bands = confidence_bands(*(column[:, None] for column in (truth, truth, spread)))[0]
-    assert bands.interval(0.3, 0.1).is_identifiable == is_determined
-    assert (bands.interval(0.3, 0.1)[:2] == (-1.0, 1.0)) != is_determined
+    belts = confidence_belts(*(column[:, None] for column in (truth, truth, spread)))[0]
+    assert belts.interval(0.3, 0.1).is_identifiable == is_determined
+    assert (belts.interval(0.3, 0.1)[:2] == (-1.0, 1.0)) != is_determined
 
 
-def flat_bands(bound: float) -> tuple[Bands, ...]:
+def flat_bands(bound: float) -> tuple[Belt, ...]:
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
-    return (Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
+    return (Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
 
 
 def test_bands_widen_by_the_factor_that_covers_as_many_recordings_as_chance_lets_be_told():
@@ -82,5 +82,5 @@ def test_bands_that_hold_recordings_stay_what_they_are():
 
 
 def test_recordings_that_determine_nothing_widen_nothing():
-    bands, none = flat_bands(1.0), np.zeros((20, 3))
-    assert widened(bands, none + 5.0, none, none + 1.0) == bands
+    belts, none = flat_bands(1.0), np.zeros((20, 3))
+    assert widened(belts, none + 5.0, none, none + 1.0) == belts

@@ -14,10 +14,10 @@ from small_surrogate import COLUMNS, random_surrogate, white_noise
 
 from device.files.bundle_file import read_ramp_model
 from device.measurement.bundle import BundleRefused
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.parameters import NUISANCES, PARAMETERS, RANGES
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.ellipticity import ROUND_FILE, SECOND_COLUMNS, RoundSpot
+from device.measurement.ramp_modes.ellipticity import ROUND_FILE, SECOND_COLUMNS, EllipticityTest
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.model import RAMP_MODES, SURROGATE_FILE, RampModel
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, ROW_NAMES
@@ -51,19 +51,19 @@ def made_ensemble(rows: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble
 
 def made_outcome(misfit_ratio: float) -> ModeOutcome:
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
-    bands = tuple(Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
+    belts = tuple(Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
     seen = Answered(truth, truth + 0.05, np.full((64, 3), 0.1))
-    return ModeOutcome(bands, misfit_ratio, 2.0 + misfit_ratio, 0.3, seen, seen)
+    return ModeOutcome(belts, misfit_ratio, 2.0 + misfit_ratio, 0.3, seen, seen)
 
 
-def made_round_spot(surrogate: PressSurrogate) -> RoundSpot:
+def made_ellipticity_test(surrogate: PressSurrogate) -> EllipticityTest:
     rng = np.random.default_rng(12)
     second = LegendreSum(
         rng.integers(0, 4, (6, len(PARAMETERS))).astype(np.uint8), rng.normal(size=(6, SECOND_COLUMNS))
     )
     factors = {mode: rng.normal(0, 1e-3, (SECOND_COLUMNS, SECOND_COLUMNS)) for mode in RAMP_MODES}
-    return RoundSpot(surrogate, second, {mode: factor @ factor.T for mode, factor in factors.items()})
+    return EllipticityTest(surrogate, second, {mode: factor @ factor.T for mode, factor in factors.items()})
 
 
 def made_ranges(rows: np.ndarray) -> TrainedRange:
@@ -89,7 +89,7 @@ def trained() -> TrainedRamp:
         noise={"standard": white_noise(2e-3), "precise": white_noise(1e-3)},
         ensemble=made_ensemble(rows),
         ranges=made_ranges(rows),
-        round_spot=made_round_spot(surrogate),
+        ellipticity=made_ellipticity_test(surrogate),
         outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
         samples=PressSamples(draw_parameters(PRESSES, rng), rows, np.zeros((PRESSES, SECOND_COLUMNS))),
         effort=DRY_RUN,
@@ -156,22 +156,22 @@ def test_the_device_gets_back_the_networks_coordinates(trained: TrainedRamp, mod
 
 def test_the_device_gets_back_surrogate_and_noise(trained: TrainedRamp, model: RampModel) -> None:
     """The surrogate to single precision."""
-    unit = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
-    expected = trained.surrogate.rows(unit)
-    np.testing.assert_allclose(model.answers.surrogate.rows(unit), expected, atol=1e-5 * np.abs(expected).max())
+    normalised = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
+    expected = trained.surrogate.rows(normalised)
+    np.testing.assert_allclose(model.answers.surrogate.rows(normalised), expected, atol=1e-5 * np.abs(expected).max())
     for mode, noise in trained.noise.items():
         np.testing.assert_array_equal(model.answers.noise[mode].camera, noise.camera)
 
 
 def test_the_device_gets_back_what_is_round(trained: TrainedRamp, model: RampModel) -> None:
     """Second harmonics to single precision, the camera's covariances exactly."""
-    unit = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
-    expected = trained.round_spot.second_harmonics(unit)
-    found = model.round_spot.second_harmonics(unit)
+    normalised = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
+    expected = trained.ellipticity.second_harmonics(normalised)
+    found = model.ellipticity.second_harmonics(normalised)
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
-    assert set(model.round_spot.camera) == set(RAMP_MODES)
-    for mode, camera in trained.round_spot.camera.items():
-        np.testing.assert_array_equal(model.round_spot.camera[mode], camera)
+    assert set(model.ellipticity.camera) == set(RAMP_MODES)
+    for mode, camera in trained.ellipticity.camera.items():
+        np.testing.assert_array_equal(model.ellipticity.camera[mode], camera)
 
 
 @pytest.mark.parametrize("mode", RAMP_MODES)
@@ -179,7 +179,7 @@ def test_the_device_tells_as_many_deviations_from_round_as_the_training(trained,
     """To single precision of surrogate and second harmonics."""
     second = np.random.default_rng(10).normal(0, 0.1, (2, len(PROFILE_FORCES_N), RINGS - 2))
     best = np.random.default_rng(11).uniform(-0.5, 0.5, len(PARAMETERS))
-    found, expected = (one.round_spot.elongation_deviations(second, best, mode) for one in (model, trained))
+    found, expected = (one.ellipticity.elongation_deviations(second, best, mode) for one in (model, trained))
     assert found == pytest.approx(expected, rel=1e-3)
     assert expected > 1
 
@@ -219,10 +219,10 @@ def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedRamp, mode
         3.2,
     )
     assert {critical.outside_log_odds for critical in model.critical.values()} == {0.3}
-    for bands_of_mode in model.bands.values():
-        assert [bands.high[0, 0] for bands in bands_of_mode] == [1.5, 1.6, 1.7]
-        assert [bands.low[1, 1] for bands in bands_of_mode] == [-1.5, -1.6, -1.7]
-    assert model.bands["standard"][0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
+    for bands_of_mode in model.belts.values():
+        assert [belts.high[0, 0] for belts in bands_of_mode] == [1.5, 1.6, 1.7]
+        assert [belts.low[1, 1] for belts in bands_of_mode] == [-1.5, -1.6, -1.7]
+    assert model.belts["standard"][0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
 
 
 def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trained, folder, model) -> None:

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host_tools.inverse import fit_ellipticity_test as module
 from small_surrogate import COLUMNS, random_surrogate
 
-from device.measurement.parameters import PARAMETERS, to_unit
+from device.measurement.parameters import PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS, RoundSpot
+from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS, EllipticityTest
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.surrogate import OFFSET
-from host_tools.press_models import fit_surrogate as module
 from host_tools.press_models.fit_surrogate import degrees, fit_second_harmonics, held_out_second_harmonics
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
 
@@ -29,19 +29,19 @@ def small(monkeypatch):
 
 
 @pytest.fixture
-def truth() -> RoundSpot:
+def truth() -> EllipticityTest:
     terms = degrees(SMALL, HIGHEST)
     coefficients = np.random.default_rng(1).normal(size=(len(terms), SECOND_COLUMNS))
-    return round_spot(LegendreSum(terms, coefficients))
+    return ellipticity(LegendreSum(terms, coefficients))
 
 
-def round_spot(second: LegendreSum) -> RoundSpot:
-    return RoundSpot(random_surrogate(), second, {})
+def ellipticity(second: LegendreSum) -> EllipticityTest:
+    return EllipticityTest(random_surrogate(), second, {})
 
 
-def samples_of(spot: RoundSpot, count: int, seed: int) -> PressSamples:
+def samples_of(spot: EllipticityTest, count: int, seed: int) -> PressSamples:
     parameters = draw_parameters(count, np.random.default_rng(seed))
-    return PressSamples(parameters, np.zeros((count, COLUMNS)), spot.second_harmonics(to_unit(parameters)))
+    return PressSamples(parameters, np.zeros((count, COLUMNS)), spot.second_harmonics(normalise(parameters)))
 
 
 def test_polynomials_are_recovered_from_their_own_values(truth):
@@ -51,7 +51,7 @@ def test_polynomials_are_recovered_from_their_own_values(truth):
 
 
 def test_the_error_on_presses_kept_apart_is_that_of_the_values(truth):
-    found = round_spot(fit_second_harmonics(samples_of(truth, 300, seed=2)))
+    found = ellipticity(fit_second_harmonics(samples_of(truth, 300, seed=2)))
     apart = samples_of(truth, 50, seed=3)
     assert held_out_second_harmonics(found, apart).max() < 1e-9
     apart.second_harmonics[:25, 7] += 0.01
@@ -67,17 +67,17 @@ def test_noise_is_averaged_over_presses_and_not_followed(truth):
     samples, std = samples_of(truth, 600, seed=2), 1e-3
     noise = np.random.default_rng(4).normal(0, std, samples.second_harmonics.shape)
     noisy = replace(samples, second_harmonics=samples.second_harmonics + noise)
-    error = held_out_second_harmonics(round_spot(fit_second_harmonics(noisy)), samples)
+    error = held_out_second_harmonics(ellipticity(fit_second_harmonics(noisy)), samples)
     assert np.mean(error) == pytest.approx(std * np.sqrt(len(truth.second.degrees) / 600), rel=0.1)
 
 
 def test_an_inclusion_on_the_axis_keeps_no_second_harmonic_whatever_the_noise(truth):
     samples = samples_of(truth, 300, seed=2)
     samples.second_harmonics[:] += 0.01
-    found = round_spot(fit_second_harmonics(samples))
-    unit = to_unit(samples.parameters[:5])
-    unit[:, OFFSET] = -1.0
-    np.testing.assert_array_equal(found.second_harmonics(unit), 0.0)
+    found = ellipticity(fit_second_harmonics(samples))
+    normalised = normalise(samples.parameters[:5])
+    normalised[:, OFFSET] = -1.0
+    np.testing.assert_array_equal(found.second_harmonics(normalised), 0.0)
 
 
 def test_too_few_presses_are_refused_by_name(truth):

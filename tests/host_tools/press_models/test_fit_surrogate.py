@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from device.measurement.parameters import PARAMETERS, to_unit
+from device.measurement.parameters import PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS
 from device.measurement.ramp_modes.legendre import LegendreSum
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET_COLUMNS, PressSurrogate
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET_COLUMNS, RESPONSE_COLUMNS, PressSurrogate
 from host_tools.press_models import fit_surrogate as module
 from host_tools.press_models.fit_surrogate import degrees, fit_surrogate, held_out_error
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
@@ -29,23 +29,23 @@ def small(monkeypatch):
 
 @pytest.fixture
 def truth() -> PressSurrogate:
-    rng, inclusion, bare = np.random.default_rng(1), degrees(SMALL_INCLUSION, {}), degrees(SMALL_BARE, {})
+    rng, inclusion, baseline = np.random.default_rng(1), degrees(SMALL_INCLUSION, {}), degrees(SMALL_BARE, {})
     return PressSurrogate(
         LegendreSum(inclusion, rng.normal(size=(len(inclusion), CONTRAST_COLUMNS + OFFSET_COLUMNS))),
-        LegendreSum(bare, rng.normal(size=(len(bare), GROWTH_COLUMNS))),
+        LegendreSum(baseline, rng.normal(size=(len(baseline), RESPONSE_COLUMNS))),
     )
 
 
 def samples_of(surrogate: PressSurrogate, count: int, seed: int) -> PressSamples:
     parameters = draw_parameters(count, np.random.default_rng(seed))
-    return PressSamples(parameters, surrogate.rows(to_unit(parameters)), np.zeros((count, SECOND_COLUMNS)))
+    return PressSamples(parameters, surrogate.rows(normalise(parameters)), np.zeros((count, SECOND_COLUMNS)))
 
 
 def test_a_polynomial_surrogate_is_recovered_from_its_own_rows(truth):
     found = fit_surrogate(samples_of(truth, 300, seed=2))
     np.testing.assert_array_equal(found.inclusion_field.degrees, truth.inclusion_field.degrees)
     np.testing.assert_allclose(found.inclusion_field.coefficients, truth.inclusion_field.coefficients, atol=1e-9)
-    np.testing.assert_allclose(found.bare.coefficients, truth.bare.coefficients, atol=1e-9)
+    np.testing.assert_allclose(found.baseline.coefficients, truth.baseline.coefficients, atol=1e-9)
 
 
 def test_the_error_on_presses_kept_apart_is_that_of_the_rows(truth):

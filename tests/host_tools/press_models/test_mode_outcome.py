@@ -6,29 +6,29 @@ import numpy as np
 import pytest
 from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
-from device.measurement.confidence_belt import Bands
-from device.measurement.parameters import EVEN_STD, PARAMETERS, from_unit
+from device.measurement.confidence_belt import Belt
+from device.measurement.parameters import EVEN_STD, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.model import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, MODULUS
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, RESPONSE_COLUMNS
 from device.measurement.recording.ring_means import RINGS
-from host_tools.press_models.confidence_belts import confidence_bands
+from host_tools.press_models.confidence_belts import confidence_belts
 from host_tools.press_models.mode_outcome import (
-    USUAL_RATIO,
+    CRITICAL_RATIO,
     Answered,
     ModeOutcome,
     answers_to,
+    critical_log_odds,
     elongations,
     judged_mode,
-    usual_log_odds,
 )
 from host_tools.press_models.noisy_presses import NoiseSampler, Pool
 from host_tools.press_models.recorded_presses import RecordedPresses
 
 STD, COUNT, RECORDED = 0.1, 4000, 150
 TOLD = np.arange(len(PARAMETERS)) != MODULUS
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 NOISE = white_noise(STD)
 
 
@@ -71,10 +71,10 @@ def gaussian(count: int, seed: int) -> Answered:
     )
 
 
-def exact_bands(bound: float) -> tuple[Bands, ...]:
+def exact_bands(bound: float) -> tuple[Belt, ...]:
     """Bands of an error that is never more than so many spreads, whatever truth and spread."""
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
-    return (Bands(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
+    return (Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
 
 
 def some(recorded: RecordedPresses, count: int) -> RecordedPresses:
@@ -88,7 +88,7 @@ def judged(answers: RampAnswers, pool: Pool, recorded: RecordedPresses, seed: in
 
 @pytest.fixture(scope="module")
 def slopes() -> np.ndarray:
-    slopes = np.random.default_rng(5).normal(0.0, 0.5, (len(PARAMETERS), GROWTH_COLUMNS))
+    slopes = np.random.default_rng(5).normal(0.0, 0.5, (len(PARAMETERS), RESPONSE_COLUMNS))
     slopes[MODULUS] = 0.0
     return slopes
 
@@ -100,19 +100,19 @@ def answers(slopes) -> RampAnswers:
 
 @pytest.fixture(scope="module")
 def pool() -> Pool:
-    unit = even(COUNT, len(PARAMETERS), 1)
+    normalised = even(COUNT, len(PARAMETERS), 1)
     rows = np.zeros((COUNT, COLUMNS))
-    rows[:, :3] = unit[:, :3]
-    return Pool(unit.astype(np.float32), rows.astype(np.float32), NoiseSampler(NOISE))
+    rows[:, :3] = normalised[:, :3]
+    return Pool(normalised.astype(np.float32), rows.astype(np.float32), NoiseSampler(NOISE))
 
 
 @pytest.fixture(scope="module")
 def recorded(answers) -> RecordedPresses:
     """Presses of unknowns in the middle, seen with the surrogate's noise; elongations 1 to 150."""
-    unit = even(RECORDED, len(PARAMETERS), 2) * 0.8
-    unit[:, :3] = 0.0
-    rows = answers.surrogate.rows(unit) + np.random.default_rng(3).normal(0, STD, (RECORDED, COLUMNS))
-    return RecordedPresses(from_unit(unit), rows, harmonics(np.arange(1.0, RECORDED + 1)))
+    normalised = even(RECORDED, len(PARAMETERS), 2) * 0.8
+    normalised[:, :3] = 0.0
+    rows = answers.surrogate.rows(normalised) + np.random.default_rng(3).normal(0, STD, (RECORDED, COLUMNS))
+    return RecordedPresses(denormalise(normalised), rows, harmonics(np.arange(1.0, RECORDED + 1)))
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
 def test_bands_of_one_half_of_gaussian_answers_cover_nine_in_ten_of_the_other():
     both = gaussian(5000, 2)
     seen, unseen = both.part(slice(3000)), both.part(slice(3000, None))
-    covered, _ = unseen.covered(confidence_bands(seen.truth, seen.mean, seen.spread))
+    covered, _ = unseen.covered(confidence_belts(seen.truth, seen.mean, seen.spread))
     np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.02)
 
 
@@ -151,25 +151,25 @@ def test_a_part_is_of_the_same_presses_in_all_its_arrays():
 
 def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome, pool):
     """Noise is as large as the light, 1 + a contrast that is even between -1 and 1: its mean square is 1 + 1/3."""
-    np.testing.assert_array_equal(outcome.simulated.truth, pool.unit[COUNT // 2 :, :3])
+    np.testing.assert_array_equal(outcome.simulated.truth, pool.normalised[COUNT // 2 :, :3])
     error = outcome.simulated.mean - outcome.simulated.truth
     np.testing.assert_allclose(error.std(axis=0), STD * np.sqrt(4 / 3), rtol=0.05)
-    assert (outcome.simulated.covered(outcome.bands)[0].mean(axis=0) > 0.875).all()
+    assert (outcome.simulated.covered(outcome.belts)[0].mean(axis=0) > 0.875).all()
 
 
 def test_bands_come_from_the_first_halves_alone(outcome, answers, pool, recorded):
     """Truths that lie elsewhere in the second half, simulated or recorded, leave the bands what they were."""
     parameters = recorded.parameters.copy()
-    parameters[RECORDED // 2 :, :3] = from_unit(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
+    parameters[RECORDED // 2 :, :3] = denormalise(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
     elsewhere = RecordedPresses(parameters, recorded.rows, recorded.second_harmonics)
-    unit = pool.unit.copy()
-    unit[COUNT // 2 :] *= -1
-    turned = Pool(unit, pool.rows, pool.sampler)
+    normalised = pool.normalised.copy()
+    normalised[COUNT // 2 :] *= -1
+    turned = Pool(normalised, pool.rows, pool.sampler)
     other = judged(answers, turned, elsewhere)
-    for one, again in zip(outcome.bands, other.bands, strict=True):
+    for one, again in zip(outcome.belts, other.belts, strict=True):
         np.testing.assert_array_equal(one.low, again.low)
         np.testing.assert_array_equal(one.high, again.high)
-    assert other.simulated.covered(other.bands)[0].mean() < 0.5
+    assert other.simulated.covered(other.belts)[0].mean() < 0.5
 
 
 def test_recorded_answers_keep_their_truth_and_the_networks_mean(outcome, recorded):
@@ -180,7 +180,7 @@ def test_recorded_answers_keep_their_truth_and_the_networks_mean(outcome, record
 
 def test_a_usual_elongation_is_one_that_few_recordings_pass(outcome, recorded):
     """Elongations of 1, 2 ... 150: the quantile 0.9875 lies at 1 + 0.9875 x 149."""
-    assert outcome.elongation_deviations == pytest.approx(1 + USUAL_RATIO * (RECORDED - 1))
+    assert outcome.elongation_deviations == pytest.approx(1 + CRITICAL_RATIO * (RECORDED - 1))
 
 
 def test_an_elongation_is_that_of_a_press_about_its_own_best_fit_in_its_mode(recorded):
@@ -207,12 +207,12 @@ def test_usual_log_odds_are_those_of_presses_in_which_an_inclusion_stands_out():
     rows = np.zeros((200, COLUMNS))
     rows[:100, :CONTRAST_COLUMNS] = np.linspace(40, 60, 100)[:, None]
     rows[100:, 0], rows[100:, 1:4] = 100.0, -50.0
-    assert usual_log_odds(FirstColumn(), rows, NOISE) == pytest.approx(np.quantile(rows[:100, 0], USUAL_RATIO))
+    assert critical_log_odds(FirstColumn(), rows, NOISE) == pytest.approx(np.quantile(rows[:100, 0], CRITICAL_RATIO))
 
 
 def test_where_no_inclusion_stands_out_nothing_is_usual():
     with pytest.raises(InvalidQuantity, match="presses in which an inclusion stands out is 0"):
-        usual_log_odds(FirstColumn(), np.zeros((5, COLUMNS)), NOISE)
+        critical_log_odds(FirstColumn(), np.zeros((5, COLUMNS)), NOISE)
 
 
 def test_the_log_odds_are_kept_as_they_are_told(outcome):

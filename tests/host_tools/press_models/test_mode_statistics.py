@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.confidence_belt import Bands
+from device.measurement.confidence_belt import Belt
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
 from host_tools.press_models.mode_outcome import Answered
@@ -11,7 +11,7 @@ from host_tools.press_models.mode_statistics import OCTILES, octile_of, statisti
 
 COUNT = 4000
 ENDS, NONE = np.array([-1.0, 1.0]), np.zeros((2, 2))
-BANDS = (Bands(ENDS, np.log([0.01, 1.0]), NONE - 2, NONE + 2),) * 3
+BANDS = (Belt(ENDS, np.log([0.01, 1.0]), NONE - 2, NONE + 2),) * 3
 """Two spreads on either side of the mean."""
 EVEN = np.tile((2 * np.arange(COUNT) + 1)[:, None] / COUNT - 1, 3)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from small_surrogate import COLUMNS, random_surrogate, white_noise
 
-from device.measurement.parameters import from_unit
+from device.measurement.parameters import denormalise
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, RESPONSE_COLUMNS
 from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models import noisy_presses
 from host_tools.press_models.noisy_presses import NoiseSampler, random_pool
@@ -20,7 +20,7 @@ DRAWS = 40_000
 def row() -> np.ndarray:
     row = np.zeros(COLUMNS)
     row[:CONTRAST_COLUMNS] = 0.3
-    row[CONTRAST_COLUMNS : CONTRAST_COLUMNS + GROWTH_COLUMNS] = np.repeat([-1.2, -0.7, -0.3], RINGS)
+    row[CONTRAST_COLUMNS : CONTRAST_COLUMNS + RESPONSE_COLUMNS] = np.repeat([-1.2, -0.7, -0.3], RINGS)
     return row
 
 
@@ -66,7 +66,7 @@ def test_a_pool_is_the_surrogates_rows_also_across_blocks(monkeypatch):
     monkeypatch.setattr(noisy_presses, "BLOCK", 7)
     surrogate = random_surrogate()
     pool = random_pool(surrogate, NOISE, 20, seed=4)
-    rows = surrogate.rows(pool.unit.astype(np.float64))
+    rows = surrogate.rows(pool.normalised.astype(np.float64))
     np.testing.assert_allclose(pool.rows, rows, atol=1e-5 * np.abs(rows).max())
-    assert pool.rows.dtype == pool.unit.dtype == np.float32
-    assert (from_unit(pool.unit.astype(np.float64))[:, 0] > 2.0 - 1e-5).all()
+    assert pool.rows.dtype == pool.normalised.dtype == np.float32
+    assert (denormalise(pool.normalised.astype(np.float64))[:, 0] > 2.0 - 1e-5).all()

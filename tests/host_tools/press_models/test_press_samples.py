@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from device.measurement.parameters import HIGH, LOW, NOMINAL, NUISANCES, PARAMETERS, to_unit
+from device.measurement.parameters import HIGH, LOW, NOMINAL, NUISANCES, PARAMETERS, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.radial_profile import RAMP_HIGH_N, press_profile
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS, OFFSET
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET, RESPONSE_COLUMNS
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.pressed_face import ProbePlacement
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
@@ -36,16 +36,16 @@ def at(inclusion: Inclusion, **changed: float) -> np.ndarray:
 def test_parameters_fill_their_ranges_and_no_more(drawn):
     assert (drawn >= LOW - 1e-12).all()
     assert (drawn <= HIGH + 1e-12).all()
-    np.testing.assert_allclose(to_unit(drawn).min(axis=0), -1, atol=0.05)
-    np.testing.assert_allclose(to_unit(drawn).max(axis=0), 1, atol=0.02)
+    np.testing.assert_allclose(normalise(drawn).min(axis=0), -1, atol=0.05)
+    np.testing.assert_allclose(normalise(drawn).max(axis=0), 1, atol=0.02)
 
 
 @pytest.mark.parametrize("name", [name for name in PARAMETERS if name not in ("size_mm", "depth_mm", "offset_mm")])
 def test_what_is_not_redrawn_is_even_over_its_range(drawn, name):
     """Mean 0 and variance 1/3 of its coordinate, within five standard errors."""
-    unit = to_unit(drawn)[:, PARAMETERS.index(name)]
-    assert unit.mean() == pytest.approx(0, abs=5 * np.sqrt(1 / 3 / COUNT))
-    assert np.mean(unit**2) == pytest.approx(1 / 3, abs=5 * np.sqrt(4 / 45 / COUNT))
+    normalised = normalise(drawn)[:, PARAMETERS.index(name)]
+    assert normalised.mean() == pytest.approx(0, abs=5 * np.sqrt(1 / 3 / COUNT))
+    assert np.mean(normalised**2) == pytest.approx(1 / 3, abs=5 * np.sqrt(4 / 45 / COUNT))
 
 
 def test_the_offset_is_even_over_its_disk(drawn):
@@ -89,9 +89,9 @@ def test_a_row_is_the_profile_of_a_recording_of_the_same_press(tables, row):
     recorded = press_profile(phantom_recording(INCLUSION, tables, seed=1, protocol=ramp)).as_row()
     assert row[0] > 0.02
     np.testing.assert_allclose(row[:CONTRAST_COLUMNS], recorded[:CONTRAST_COLUMNS], atol=3e-3)
-    growth = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
-    np.testing.assert_allclose(row[growth], recorded[growth], atol=0.01)
-    np.testing.assert_allclose(row[growth.stop :], recorded[growth.stop :], atol=1e-3)
+    reference_response = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
+    np.testing.assert_allclose(row[reference_response], recorded[reference_response], atol=0.01)
+    np.testing.assert_allclose(row[reference_response.stop :], recorded[reference_response.stop :], atol=1e-3)
 
 
 def test_several_inclusions_on_one_skin_give_the_rows_that_each_gives_alone(tables, row):
@@ -104,7 +104,7 @@ def test_several_inclusions_on_one_skin_give_the_rows_that_each_gives_alone(tabl
 
 def test_an_inclusion_beside_the_axis_shows_in_the_offset(tables):
     beside = profile_rows(tables, at(INCLUSION, offset_mm=1.5)[None])[0]
-    assert beside[CONTRAST_COLUMNS + GROWTH_COLUMNS :].max() > 5e-3
+    assert beside[CONTRAST_COLUMNS + RESPONSE_COLUMNS :].max() > 5e-3
 
 
 OFFSETS_MM = (0.0, 1.0, 2.0)

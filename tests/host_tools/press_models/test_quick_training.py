@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from device.measurement.parameters import PARAMETERS, from_unit
+from device.measurement.parameters import PARAMETERS, denormalise
 from device.measurement.quick_mode.profile import quick_press
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models import quick_training
 from host_tools.press_models.mode_outcome import Answered
-from host_tools.press_models.quick_training import USUAL_RATIO, RecordedHolds, recorded_holds
+from host_tools.press_models.quick_training import CRITICAL_RATIO, RecordedHolds, recorded_holds
 from host_tools.press_models.recorded_presses import EXACT, recorded_press
 from host_tools.press_models.seeds import press_seed
 
@@ -30,16 +30,16 @@ def answers(error: float) -> tuple[Answered, RecordedHolds]:
     rng = np.random.default_rng(1)
     truth = rng.uniform(-1, 1, (SIMULATED, 3))
     simulated = Answered(truth, truth + rng.normal(0, STD, truth.shape), np.full(truth.shape, STD))
-    unit = rng.uniform(-0.9, 0.9, (RECORDED, len(PARAMETERS)))
+    normalised = rng.uniform(-0.9, 0.9, (RECORDED, len(PARAMETERS)))
     rows = np.zeros((RECORDED, RINGS + 1))
-    rows[:, :3] = unit[:, :3] + rng.normal(0, error * STD, (RECORDED, 3))
-    return simulated, RecordedHolds(from_unit(unit), rows, np.arange(1.0, RECORDED + 1))
+    rows[:, :3] = normalised[:, :3] + rng.normal(0, error * STD, (RECORDED, 3))
+    return simulated, RecordedHolds(denormalise(normalised), rows, np.arange(1.0, RECORDED + 1))
 
 
 @pytest.mark.parametrize("error", [1.0, 1.6])
 def test_bands_cover_recordings_also_where_simulated_presses_promise_too_much(error):
     outcome = quick_training._outcome(FirstColumns(), *answers(error))
-    covered, known = outcome.recorded.covered(outcome.bands)
+    covered, known = outcome.recorded.covered(outcome.belts)
     assert known.all()
     assert covered.mean() == pytest.approx(0.9, abs=0.05)
 
@@ -48,7 +48,7 @@ def test_limits_come_from_the_first_half_of_the_recordings_and_the_second_is_kep
     simulated, recorded = answers(1.0)
     outcome = quick_training._outcome(FirstColumns(), simulated, recorded)
     half = RECORDED // 2
-    assert outcome.elongation_ratio == pytest.approx(1 + USUAL_RATIO * (half - 1))
+    assert outcome.elongation_ratio == pytest.approx(1 + CRITICAL_RATIO * (half - 1))
     np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[half:, :3])
     np.testing.assert_array_equal(outcome.simulated.truth, simulated.truth[SIMULATED // 2 :])
 

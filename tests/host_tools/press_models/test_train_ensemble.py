@@ -6,20 +6,20 @@ from small_surrogate import linear_surrogate, white_noise
 
 from device.measurement.parameters import PARAMETERS
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, DEPTH, GROWTH_COLUMNS, MODULUS, SIZE
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, DEPTH, MODULUS, RESPONSE_COLUMNS, SIZE
 from host_tools.press_models.dense_network import initial_layers
 from host_tools.press_models.noisy_presses import Pool, random_pool
 from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 
 STD, COUNT, STEPS = 0.3, 20_000, 300
 EVEN = 1 / np.sqrt(3)
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 
 
 @pytest.fixture(scope="module")
 def pool() -> Pool:
     """Half of the columns see the size and half the depth: each is known to about 0.3 / sqrt(16)."""
-    slopes = np.zeros((len(PARAMETERS), GROWTH_COLUMNS))
+    slopes = np.zeros((len(PARAMETERS), RESPONSE_COLUMNS))
     slopes[SIZE, ::2], slopes[DEPTH, 1::2] = 1.0, 1.0
     return random_pool(linear_surrogate(slopes), white_noise(STD), COUNT, seed=1)
 
@@ -34,12 +34,12 @@ def answers(pool, ensemble) -> tuple[np.ndarray, np.ndarray]:
     """Error and spread [n, 3] on fresh noise."""
     index = np.arange(5000)
     mean, spread = ensemble.estimate(pool.noisy(index, np.random.default_rng(9))[:, GROWTH].astype(np.float64))
-    return mean - pool.unit[index, :3], spread
+    return mean - pool.normalised[index, :3], spread
 
 
 def test_what_shows_is_learnt_almost_as_well_as_can_be(answers):
     error = np.sqrt(np.mean(answers[0] ** 2, axis=0))
-    possible = STD / np.sqrt(GROWTH_COLUMNS // 2)
+    possible = STD / np.sqrt(RESPONSE_COLUMNS // 2)
     assert (error[[SIZE, DEPTH]] < 0.25 * EVEN).all()
     assert (error[[SIZE, DEPTH]] > 0.8 * possible).all()
 
@@ -72,7 +72,7 @@ def test_the_same_seed_gives_the_same_ensemble_and_the_members_differ(pool):
 
 
 def test_too_few_presses_or_no_network_are_refused_by_name(pool):
-    few = Pool(pool.unit[:999], pool.rows[:999], pool.sampler)
+    few = Pool(pool.normalised[:999], pool.rows[:999], pool.sampler)
     with pytest.raises(InvalidQuantity, match="^presses is 999"):
         train_ensemble(few, seed=1, members=1, steps=1, jobs=1)
     with pytest.raises(InvalidQuantity, match="^members is 0"):
@@ -82,4 +82,4 @@ def test_too_few_presses_or_no_network_are_refused_by_name(pool):
 def test_an_untrained_network_is_no_better_than_a_guess(pool, ensemble):
     untrained = initial_layers(2 * ensemble.scaling.projection.shape[1], np.random.default_rng(1))
     mean, _ = DenseEnsemble(ensemble.scaling, (untrained,)).estimate(pool.rows[:2000, GROWTH].astype(np.float64))
-    assert np.std(mean - pool.unit[:2000, :3], axis=0).min() > 0.8 * EVEN
+    assert np.std(mean - pool.normalised[:2000, :3], axis=0).min() > 0.8 * EVEN

@@ -6,7 +6,7 @@ from scipy.special import expit
 from scipy.stats import norm
 from small_surrogate import COLUMNS, white_noise
 
-from device.measurement.parameters import to_unit
+from device.measurement.parameters import normalise
 from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS
 from host_tools.press_models import train_range
 from host_tools.press_models.fit_surrogate import INCLUSION_HIGHEST, INCLUSION_REACH
@@ -31,10 +31,10 @@ EFFORT = RangeEffort(members=1, steps=700)
 @pytest.fixture(scope="module")
 def pool() -> Pool:
     """Columns 44 and 45, whose noise does not depend on the light, are the coordinates of size and depth."""
-    unit = to_unit(draw_wide_parameters(COUNT, np.random.default_rng(1)))
+    normalised = normalise(draw_wide_parameters(COUNT, np.random.default_rng(1)))
     rows = np.zeros((COUNT, COLUMNS), np.float32)
-    rows[:, 44:46] = unit[:, :2]
-    return Pool(unit.astype(np.float32), rows, NoiseSampler(white_noise(STD)))
+    rows[:, 44:46] = normalised[:, :2]
+    return Pool(normalised.astype(np.float32), rows, NoiseSampler(white_noise(STD)))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def on_paper(seen: np.ndarray) -> np.ndarray:
 def test_the_odds_are_nearly_as_good_as_can_be(pool, network):
     """Mean of -ln(probability of what is so), on fresh noise, against that of the exact probability."""
     rows = pool.noisy(np.arange(COUNT), np.random.default_rng(9)).astype(float)
-    outside = is_outside(pool.unit)
+    outside = is_outside(pool.normalised)
     found, exact = expit(network.log_odds(rows)), np.clip(on_paper(rows[:, 44:46]), 1e-9, 1 - 1e-9)
     losses = [-np.mean(np.log(np.where(outside, p, 1 - p))) for p in (found, exact)]
     assert losses[1] < 0.4 < np.log(2)
@@ -97,12 +97,12 @@ def far_rows(parameters: np.ndarray) -> np.ndarray:
 
 def test_polynomials_follow_what_is_one_around_the_ranges_as_well(surrogate):
     apart = draw_wide_parameters(200, np.random.default_rng(3))
-    assert is_outside(to_unit(apart)).any()
+    assert is_outside(normalise(apart)).any()
     np.testing.assert_allclose(surrogate.rows(apart), far_rows(apart), atol=1e-6)
 
 
 def test_a_pool_keeps_coordinates_outside_and_is_drawn_anew_by_another_seed(surrogate):
     first, other = (wide_pool(surrogate, white_noise(STD), 300, seed) for seed in (1, 2))
-    assert 0.3 < is_outside(first.unit).mean() < 0.7
+    assert 0.3 < is_outside(first.normalised).mean() < 0.7
     np.testing.assert_allclose(first.rows[:, :44].std(axis=1), 0, atol=1e-5)
-    assert (first.unit != other.unit).all()
+    assert (first.normalised != other.normalised).all()

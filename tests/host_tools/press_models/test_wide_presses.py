@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, RANGES, to_unit
+from device.measurement.parameters import HIGH, LOW, PARAMETERS, RANGES, normalise
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.surrogate import (
     CONTRAST_COLUMNS,
     DEPTH,
-    GROWTH_COLUMNS,
     MODULUS,
     OFFSET_COLUMNS,
+    RESPONSE_COLUMNS,
     SIZE,
     PressSurrogate,
     polynomial_coordinates,
@@ -62,7 +62,7 @@ def test_inclusions_share_tissue_and_skin_and_not_their_place(drawn):
 
 
 def test_about_half_of_the_presses_lie_outside(drawn):
-    outside = is_outside(to_unit(drawn))
+    outside = is_outside(normalise(drawn))
     assert 0.4 < outside.mean() < 0.65
     expected = (drawn[:, SIZE] < 2) | (drawn[:, SIZE] > 15) | (drawn[:, DEPTH] < 4) | (drawn[:, DEPTH] > 12)
     np.testing.assert_array_equal(outside, expected)
@@ -72,7 +72,7 @@ def test_coordinates_are_one_at_the_wide_ends_and_elsewhere_the_probes_own(drawn
     ends = drawn[:2].copy()
     ends[:, :2] = np.transpose([SIZES, DEPTHS])
     np.testing.assert_allclose(wide_coordinates(ends)[:, :2], [[-1, -1], [1, 1]])
-    own = polynomial_coordinates(to_unit(drawn), drawn)
+    own = polynomial_coordinates(normalise(drawn), drawn)
     np.testing.assert_array_equal(wide_coordinates(drawn)[:, 2:], own[:, 2:])
 
 
@@ -83,8 +83,8 @@ def test_rows_are_put_together_as_the_probes_own_surrogate_does(drawn):
     degrees[:, :2] = 0
     fields = [
         LegendreSum(degrees, rng.normal(size=(6, columns)))
-        for columns in (CONTRAST_COLUMNS + OFFSET_COLUMNS, GROWTH_COLUMNS)
+        for columns in (CONTRAST_COLUMNS + OFFSET_COLUMNS, RESPONSE_COLUMNS)
     ]
-    inside = drawn[~is_outside(to_unit(drawn))][:20]
-    found, expected = WideSurrogate(*fields).rows(inside), PressSurrogate(*fields).rows(to_unit(inside))
+    inside = drawn[~is_outside(normalise(drawn))][:20]
+    found, expected = WideSurrogate(*fields).rows(inside), PressSurrogate(*fields).rows(normalise(inside))
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)

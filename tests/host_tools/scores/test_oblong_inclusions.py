@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from device.files.bundle_file import read_ramp_model
-from device.measurement.parameters import HIGH, LOW, to_unit
+from device.measurement.parameters import HIGH, LOW, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.ellipticity import stretched
 from device.measurement.ramp_modes.fit import PressPosterior
@@ -81,8 +81,8 @@ def distance(tables, model, offset_mm, along, across):
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise["standard"])
     pattern = 0.1 * stretched(rows[0, :CONTRAST_COLUMNS].reshape(-1, RINGS))
     harmonics = np.stack([second[0] + along * pattern, across * pattern])
-    best, found = twin_of(posterior, harmonics, to_unit(press_at(offset_mm)[None])[0], model, "standard")
-    weight = np.linalg.solve(model.round_spot.covariance(best, "standard"), pattern)
+    best, found = twin_of(posterior, harmonics, normalise(press_at(offset_mm)[None])[0], model, "standard")
+    weight = np.linalg.solve(model.ellipticity.covariance(best, "standard"), pattern)
     return found, float(np.sqrt(weight @ pattern))
 
 

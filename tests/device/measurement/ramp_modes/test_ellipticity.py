@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from small_surrogate import EXACT, GROWTH_COLUMNS, INCLUSION_COLUMNS
+from small_surrogate import EXACT, INCLUSION_COLUMNS, RESPONSE_COLUMNS
 
-from device.files.bundle_file import read_round_spot
-from device.measurement.parameters import HIGH, PARAMETERS, from_unit
+from device.files.bundle_file import read_ellipticity_test
+from device.measurement.parameters import HIGH, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.ellipticity import (
     COEFFICIENTS,
     DEGREES,
     SECOND_COLUMNS,
-    RoundSpot,
+    EllipticityTest,
     second_factor,
     stretched,
 )
@@ -33,18 +33,18 @@ CONSTANT = np.zeros((1, len(PARAMETERS)), np.uint8)
 
 def surrogate_of(contrast: np.ndarray) -> PressSurrogate:
     """Return a surrogate whose contrast [K, J] at `BEST` is the one asked for: a constant over the strength there."""
-    size_mm, depth_mm = from_unit(BEST)[:2]
+    size_mm, depth_mm = denormalise(BEST)[:2]
     coefficients = np.zeros((1, INCLUSION_COLUMNS))
     coefficients[0, :CONTRAST_COLUMNS] = contrast.ravel() / far_field_strength(size_mm, depth_mm)
-    return PressSurrogate(LegendreSum(CONSTANT, coefficients), LegendreSum(CONSTANT, np.zeros((1, GROWTH_COLUMNS))))
+    return PressSurrogate(LegendreSum(CONSTANT, coefficients), LegendreSum(CONSTANT, np.zeros((1, RESPONSE_COLUMNS))))
 
 
-def spot_of(levels: ErrorLevels = EXACT, std: float = STD) -> RoundSpot:
+def spot_of(levels: ErrorLevels = EXACT, std: float = STD) -> EllipticityTest:
     """Return round spots of the same contrast and of random second harmonics; in precise a half of the noise."""
     second = LegendreSum(CONSTANT, np.random.default_rng(2).normal(0.0, 0.2, (1, SECOND_COLUMNS)))
     white = np.eye(SECOND_COLUMNS)
     camera = {"standard": std**2 * white, "precise": (std / 2) ** 2 * white}
-    return RoundSpot(surrogate_of(CONTRAST), second, camera, levels)
+    return EllipticityTest(surrogate_of(CONTRAST), second, camera, levels)
 
 
 def read(along: np.ndarray, across: np.ndarray | float = 0.0) -> np.ndarray:
@@ -53,7 +53,7 @@ def read(along: np.ndarray, across: np.ndarray | float = 0.0) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def spot() -> RoundSpot:
+def spot() -> EllipticityTest:
     return spot_of()
 
 
@@ -100,19 +100,19 @@ def test_an_elliptical_spot_read_on_rings_has_the_second_harmonic_that_is_search
 
 def test_second_harmonics_grow_as_the_strength_of_the_inclusion_and_the_square_of_its_offset():
     """Size over the depth of the middle, cubed: 6 mm, 9 mm deep, have (6 / 12)^3."""
-    parameters = np.tile(from_unit(BEST), (4, 1))
+    parameters = np.tile(denormalise(BEST), (4, 1))
     parameters[:, :2] = (6.0, 9.0), (6.0, 9.0), (6.0, 9.0), (12.0, 6.0)
     parameters[:, OFFSET] = HIGH[OFFSET] * np.array([1.0, 0.5, 0.0, 1.0])
     np.testing.assert_allclose(second_factor(parameters), [1 / 8, 1 / 32, 0.0, 1.0], rtol=1e-14)
 
 
 def test_a_round_inclusions_second_harmonics_are_the_polynomials_times_their_factor(spot):
-    unit = np.tile(BEST, (3, 1))
-    unit[:, OFFSET] = 1.0, 0.0, -1.0
-    size_mm, depth_mm = from_unit(BEST)[:2]
+    normalised = np.tile(BEST, (3, 1))
+    normalised[:, OFFSET] = 1.0, 0.0, -1.0
+    size_mm, depth_mm = denormalise(BEST)[:2]
     factor = far_field_strength(size_mm, depth_mm) * np.array([1.0, 0.25, 0.0])
     expected = factor[:, None] * spot.second.coefficients
-    np.testing.assert_allclose(spot.second_harmonics(unit), expected, rtol=1e-12)
+    np.testing.assert_allclose(spot.second_harmonics(normalised), expected, rtol=1e-12)
 
 
 def test_a_spot_with_exactly_the_second_harmonic_of_a_round_inclusion_is_round(spot, of_round):
@@ -178,7 +178,7 @@ def test_deviations_of_round_inclusions_are_rayleighs():
         assert np.mean(found > np.sqrt(-2 * np.log(share))) == pytest.approx(share, abs=3 * error)
 
 
-def parts_of(spot: RoundSpot) -> dict[str, np.ndarray]:
+def parts_of(spot: EllipticityTest) -> dict[str, np.ndarray]:
     """Return what a file holds."""
     return {
         DEGREES: spot.second.degrees,
@@ -191,7 +191,7 @@ def test_what_is_loaded_is_what_was_saved(spot, tmp_path):
     """Polynomials in single precision; error levels are the usual ones."""
     path = tmp_path / "round.npz"
     np.savez(path, **parts_of(spot))
-    loaded = read_round_spot(path, spot.surrogate, MODES)
+    loaded = read_ellipticity_test(path, spot.surrogate, MODES)
     assert loaded.surrogate is spot.surrogate
     assert loaded.levels == ErrorLevels()
     np.testing.assert_array_equal(loaded.second.degrees, spot.second.degrees)
@@ -203,7 +203,7 @@ def test_what_is_loaded_is_what_was_saved(spot, tmp_path):
 
 def test_a_missing_file_is_refused_by_name(spot, tmp_path):
     with pytest.raises(InvalidQuantity, match=r"^second harmonics is .*absent\.npz"):
-        read_round_spot(tmp_path / "absent.npz", spot.surrogate, MODES)
+        read_ellipticity_test(tmp_path / "absent.npz", spot.surrogate, MODES)
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 cut short"])
@@ -211,7 +211,7 @@ def test_a_garbled_file_is_refused_by_name(spot, content, tmp_path):
     path = tmp_path / "garbled.npz"
     path.write_bytes(content)
     with pytest.raises(InvalidQuantity, match=r"^second harmonics is .*garbled\.npz"):
-        read_round_spot(path, spot.surrogate, MODES)
+        read_ellipticity_test(path, spot.surrogate, MODES)
 
 
 @pytest.mark.parametrize("name", [DEGREES, COEFFICIENTS, "camera_standard", "camera_precise"])
@@ -219,7 +219,7 @@ def test_a_file_without_one_of_its_parts_or_with_one_of_another_shape_is_refused
     path, parts = tmp_path / "partial.npz", parts_of(spot)
     np.savez(path, **{n: part for n, part in parts.items() if n != name})
     with pytest.raises(InvalidQuantity, match="^second harmonics is"):
-        read_round_spot(path, spot.surrogate, MODES)
+        read_ellipticity_test(path, spot.surrogate, MODES)
     np.savez(path, **parts | {name: parts[name][:, :-1]})
     with pytest.raises(InvalidQuantity, match="^shapes of the second harmonics is"):
-        read_round_spot(path, spot.surrogate, MODES)
+        read_ellipticity_test(path, spot.surrogate, MODES)

@@ -201,7 +201,7 @@ def test_a_round_inclusions_elongation_is_told_beside_the_other_features(ramp, r
 def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, ramp_model):
     """2 mm aside the second harmonic of a sphere is far above noise; its best fit's is as large."""
     aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
-    best, spot = ramp_model.answer(aside.as_row(), "precise").best, ramp_model.round_spot
+    best, spot = ramp_model.answer(aside.as_row(), "precise").best, ramp_model.ellipticity
     assert np.abs(aside.second_harmonic).max() > 0.005
     limit = ramp_model.critical["precise"].elongation_deviations
     assert spot.elongation_deviations(aside.second_harmonic, best, "precise") < limit

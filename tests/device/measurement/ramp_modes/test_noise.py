@@ -15,12 +15,12 @@ from device.measurement.ramp_modes.noise import (
     smooth_second_harmonics,
 )
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, GROWTH_COLUMNS
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, RESPONSE_COLUMNS
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS, ring_weights
 
 POWER = 0.8
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + GROWTH_COLUMNS)
+GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 
 
 @pytest.fixture

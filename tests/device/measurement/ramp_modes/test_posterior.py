@@ -80,8 +80,12 @@ def test_samples_that_all_miss_the_ranges_but_for_one_tell_nothing(inside, row, 
     posterior = PressPosterior(row, linear_surrogate(slopes), NOISE)
     density = posterior.log_density
 
-    def of_few(unit: np.ndarray) -> np.ndarray:
-        return np.where(np.arange(len(unit)) < inside, density(unit), -np.inf) if len(unit) > 1 else density(unit)
+    def of_few(normalised: np.ndarray) -> np.ndarray:
+        return (
+            np.where(np.arange(len(normalised)) < inside, density(normalised), -np.inf)
+            if len(normalised) > 1
+            else density(normalised)
+        )
 
     monkeypatch.setattr(posterior, "log_density", of_few)
     fit = sample_press(posterior, START)

@@ -74,10 +74,10 @@ def test_a_contrast_linear_in_force_and_radius_comes_back_at_every_force_and_rin
 
 def test_growth_is_the_logarithm_of_the_inclusion_free_light_over_that_at_the_largest_force():
     """The same at every ring, since the light's cubic is one times a factor of the place."""
-    bare = np.array([light(f)[0, 0] for f in PROFILE_FORCES_N])
-    found = press_profile(recording()).growth
+    baseline = np.array([light(f)[0, 0] for f in PROFILE_FORCES_N])
+    found = press_profile(recording()).reference_response
     np.testing.assert_allclose(
-        found, np.repeat(np.log(bare[:-1] / bare[-1])[:, None], len(RING_RADII_MM), 1), atol=1e-3
+        found, np.repeat(np.log(baseline[:-1] / baseline[-1])[:, None], len(RING_RADII_MM), 1), atol=1e-3
     )
 
 
@@ -140,7 +140,7 @@ def test_the_mean_harmonic_is_to_the_bit_the_one_that_the_networks_have_learnt_f
 
 def test_the_row_of_the_networks_is_contrast_growth_and_mean_offset_and_nothing_else():
     found = press_profile(recording(lambda force_n: cone(force_n) + 0.01 * X / (1 + R)))
-    row = np.concatenate([found.contrast.ravel(), found.growth.ravel(), found.offset])
+    row = np.concatenate([found.contrast.ravel(), found.reference_response.ravel(), found.offset])
     assert found.as_row().tobytes() == row.tobytes()
     card = json.loads((ROOT / "models" / "standard" / "model.json").read_text(encoding="utf-8"))
     assert [feature["name"] for feature in card["features"]] == list(ROW_NAMES)
@@ -151,7 +151,7 @@ def test_a_row_has_a_name_for_every_number():
     found = press_profile(recording())
     row = dict(zip(ROW_NAMES, found.as_row(), strict=True))
     assert row["contrast_0.25_n_1.8_mm"] == found.contrast[1, 2]
-    assert row["growth_0.12_n_9.0_mm"] == found.growth[0, -1]
+    assert row["growth_0.12_n_9.0_mm"] == found.reference_response[0, -1]
     assert row["offset_0.9_mm"] == found.offset[0]
 
 

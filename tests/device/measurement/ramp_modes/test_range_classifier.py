@@ -41,9 +41,9 @@ def test_an_inclusion_in_the_middle_of_the_ranges_lies_inside(ramp_model, mode):
 @pytest.mark.parametrize("mode", RAMP_MODES)
 def test_an_inclusion_is_the_likelier_outside_the_larger_it_is(ramp_model, mode):
     """Stiff and shallow ones, of 8.5, 13 and 15 mm."""
-    unit = np.zeros((3, len(PARAMETERS)))
-    unit[:, 0], unit[:, 1], unit[:, 2] = (0.0, 0.7, 1.0), -0.5, 0.5
-    odds = ramp_model.ranges.log_odds(ramp_model.answers.surrogate.rows(unit), mode)
+    normalised = np.zeros((3, len(PARAMETERS)))
+    normalised[:, 0], normalised[:, 1], normalised[:, 2] = (0.0, 0.7, 1.0), -0.5, 0.5
+    odds = ramp_model.ranges.log_odds(ramp_model.answers.surrogate.rows(normalised), mode)
     assert odds[0] < odds[1] < odds[2]
 
 

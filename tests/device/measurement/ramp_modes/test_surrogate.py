@@ -5,7 +5,7 @@ import pytest
 from small_surrogate import COLUMNS, INCLUSION_COLUMNS, random_surrogate
 
 from device.files.bundle_file import read_surrogate
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, from_unit, to_unit
+from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import ROW_NAMES
 from device.measurement.ramp_modes.surrogate import (
@@ -24,13 +24,13 @@ from device.measurement.ramp_modes.surrogate import (
 
 
 @pytest.fixture
-def unit() -> np.ndarray:
+def normalised() -> np.ndarray:
     return np.random.default_rng(1).uniform(-0.95, 0.95, (4, len(PARAMETERS)))
 
 
-def test_the_jacobian_equals_central_differences(unit):
+def test_the_jacobian_equals_central_differences(normalised):
     surrogate, step = random_surrogate(), 1e-5
-    for at in unit:
+    for at in normalised:
         row, jacobian = surrogate.rows_and_jacobian(at)
         away = step * np.eye(len(PARAMETERS))
         differences = ((surrogate.rows(at + away) - surrogate.rows(at - away)) / (2 * step)).T
@@ -38,8 +38,8 @@ def test_the_jacobian_equals_central_differences(unit):
         np.testing.assert_allclose(jacobian, differences, atol=1e-6 * np.abs(differences).max())
 
 
-def test_a_row_has_the_profiles_columns_in_the_profiles_order(unit):
-    assert random_surrogate().rows(unit).shape == (len(unit), len(ROW_NAMES))
+def test_a_row_has_the_profiles_columns_in_the_profiles_order(normalised):
+    assert random_surrogate().rows(normalised).shape == (len(normalised), len(ROW_NAMES))
     inclusion = np.arange(INCLUSION_COLUMNS)[None]
     row = assemble(inclusion, np.full((1, COLUMNS - INCLUSION_COLUMNS), -1.0))[0]
     kinds = np.array([name.split("_")[0] for name in ROW_NAMES])
@@ -49,7 +49,7 @@ def test_a_row_has_the_profiles_columns_in_the_profiles_order(unit):
 
 
 def test_an_inclusions_strength_is_its_size_over_the_depth_of_its_middle_cubed():
-    at = from_unit(np.zeros((1, len(PARAMETERS))))
+    at = denormalise(np.zeros((1, len(PARAMETERS))))
     at[0, SIZE], at[0, DEPTH], at[0, OFFSET] = 6.0, 9.0, HIGH[OFFSET]
     np.testing.assert_allclose(inclusion_factor(at), 0.125, rtol=1e-14)
     at[0, OFFSET] = HIGH[OFFSET] / 4
@@ -57,9 +57,9 @@ def test_an_inclusions_strength_is_its_size_over_the_depth_of_its_middle_cubed()
     np.testing.assert_allclose(inclusion_factor(at)[0, :CONTRAST_COLUMNS], 0.125, rtol=1e-14)
 
 
-def test_an_inclusion_on_the_axis_has_no_offset(unit):
-    unit[:, OFFSET] = -1.0
-    rows = random_surrogate().rows(unit)
+def test_an_inclusion_on_the_axis_has_no_offset(normalised):
+    normalised[:, OFFSET] = -1.0
+    rows = random_surrogate().rows(normalised)
     np.testing.assert_array_equal(rows[:, -OFFSET_COLUMNS:], 0.0)
     assert np.abs(rows[:, :CONTRAST_COLUMNS]).min() > 0
 
@@ -73,18 +73,18 @@ def test_the_modulus_coordinate_stays_inside_the_cube_and_touches_its_ends():
     tissue = PARAMETERS.index("tissue_modulus_kpa")
     corners = np.array([LOW, HIGH])
     corners[:, tissue] = HIGH[tissue], LOW[tissue]
-    at = polynomial_coordinates(to_unit(corners), corners)
+    at = polynomial_coordinates(normalise(corners), corners)
     np.testing.assert_allclose(at[:, MODULUS], [-1, 1], atol=1e-13)
 
 
-def test_a_saved_surrogate_comes_back_in_single_precision(unit, tmp_path):
+def test_a_saved_surrogate_comes_back_in_single_precision(normalised, tmp_path):
     surrogate, path = random_surrogate(), tmp_path / "surrogate.npz"
     np.savez(path, **surrogate.arrays())
     loaded = read_surrogate(path)
     np.testing.assert_array_equal(loaded.inclusion_field.degrees, surrogate.inclusion_field.degrees)
-    np.testing.assert_array_equal(loaded.bare.coefficients, surrogate.bare.coefficients.astype(np.float32))
-    rows = surrogate.rows(unit)
-    np.testing.assert_allclose(loaded.rows(unit), rows, atol=1e-6 * np.abs(rows).max())
+    np.testing.assert_array_equal(loaded.baseline.coefficients, surrogate.baseline.coefficients.astype(np.float32))
+    rows = surrogate.rows(normalised)
+    np.testing.assert_allclose(loaded.rows(normalised), rows, atol=1e-6 * np.abs(rows).max())
 
 
 def test_a_missing_file_is_refused_by_name(tmp_path):
