@@ -77,7 +77,7 @@ def read_surrogate(path: Path) -> PressSurrogate:
 
 
 def read_ellipticity_test(path: Path, surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> EllipticityTest:
-    """Read a round spot's file alone; raise `InvalidQuantity` when a part is missing or of another shape."""
+    """Read an ellipticity test's file alone; raise `InvalidQuantity` when a part is missing or of another shape."""
     return _ellipticity_test(path, _content("second harmonics", path, ellipticity_arrays(modes)), surrogate, modes)
 
 

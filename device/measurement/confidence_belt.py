@@ -34,7 +34,7 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Belt:
-    """Lowest and highest usual (truth - mean) / spread [A, B] at truths [A] and logarithms of the spread [B]."""
+    """A confidence belt (Neyman 1937): accepted (truth - mean) / spread [A, B], by truths [A] and log spreads [B]."""
 
     truth: Array
     log_spread: Array
@@ -45,7 +45,7 @@ class Belt:
         shape = len(self.truth), len(self.log_spread)
         if self.low.shape != shape or self.high.shape != shape:
             found = f"{self.low.shape} and {self.high.shape}"
-            raise InvalidQuantity("shape of the bands", found, str(shape), "install the model bundle again")
+            raise InvalidQuantity("shape of the belt", found, str(shape), "install the model bundle again")
 
     def interval(self, mean: float, spread: float) -> Interval:
         """Return the interval of an estimate in coordinates; all of the range when the press does not narrow it."""
@@ -53,16 +53,16 @@ class Belt:
             return Interval(-1.0, 1.0, False)
         truth = np.linspace(-1, 1, GRID)
         low, high = self.bounds(truth, spread)
-        usual = truth[(low <= (truth - mean) / spread) & ((truth - mean) / spread <= high)]
-        if not len(usual):  # an answer that is unusual for every truth: nothing narrower may be said
+        accepted = truth[(low <= (truth - mean) / spread) & ((truth - mean) / spread <= high)]
+        if not len(accepted):  # an answer that is unusual for every truth: nothing narrower may be said
             at = min(max(mean, -1.0), 1.0)
             return Interval(max(-1.0, at - 2 * spread), min(1.0, at + 2 * spread), True)
         half_step = 1 / (GRID - 1)
-        low_end, high_end = max(-1.0, float(usual[0]) - half_step), min(1.0, float(usual[-1]) + half_step)
+        low_end, high_end = max(-1.0, float(accepted[0]) - half_step), min(1.0, float(accepted[-1]) + half_step)
         return Interval(low_end, high_end, high_end - low_end < 2)
 
     def bounds(self, truth: Array, spread: float) -> tuple[Array, Array]:
-        """Return the lowest and highest usual (truth - mean) / spread [n] at truths [n]."""
+        """Return the lowest and highest accepted (truth - mean) / spread [n] at truths [n]."""
         log_spread = float(np.log(spread))
         return self._at(truth, log_spread, self.low), self._at(truth, log_spread, self.high)
 
@@ -72,6 +72,6 @@ class Belt:
 
 
 def belts_of(entry: Mapping[str, Any]) -> tuple[Belt, ...]:
-    """Return the bands of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
+    """Return the belts of each unknown that the card states for a mode; raises `KeyError` where one is missing."""
     parts = ("truth", "log_spread", "low", "high")
     return tuple(Belt(*(np.array(entry["bands"][name][part], dtype=np.float64) for part in parts)) for name in UNKNOWNS)

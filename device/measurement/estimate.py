@@ -158,11 +158,11 @@ class Numbers:
 
 
 def numbers_in_belts(mean: Array, spread: Array, belts: Sequence[Belt]) -> Numbers:
-    """Return the numbers of mean and spread [3] in coordinates (`press_parameters.normalise`), by each unknown's bands.
+    """Return the numbers of mean and spread [3] in coordinates (`press_parameters.normalise`), by each unknown's belts.
 
     The standard deviation is half of what mean - spread to mean + spread spans in the unknown's own unit.
     """
-    intervals = [band.interval(float(at), float(width)) for band, at, width in zip(belts, mean, spread, strict=True)]
+    intervals = [belt.interval(float(at), float(width)) for belt, at, width in zip(belts, mean, spread, strict=True)]
     low, high = (denormalise_unknowns(np.array([one[end] for one in intervals])) for end in (0, 1))
     below, above = (denormalise_unknowns(mean + sign * spread) for sign in (-1, 1))
     known = np.array([one.is_identifiable for one in intervals])

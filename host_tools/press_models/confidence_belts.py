@@ -1,8 +1,8 @@
-"""Simulated presses with noise to the bands behind every interval, one set for each unknown.
+"""Simulated presses with noise to the belts behind every interval, one set for each unknown.
 
 Bounds are quantiles of (truth - mean) / spread over the presses nearest in truth and in the logarithm of the spread.
-Where they cover other presses more often than chance explains, bands are narrowed by one factor. Recordings hold what
-the forward model and its noise do not know of: where these are covered less often than chance explains, bands are
+Where they cover other presses more often than chance explains, belts are narrowed by one factor. Recordings hold what
+the forward model and its noise do not know of: where these are covered less often than chance explains, belts are
 widened by one factor. Source of both: split conformal prediction, Lei et al., JASA 113, 2018.
 """
 
@@ -22,18 +22,18 @@ TRUTH_LENGTH = 0.15
 FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.06
 """Presses of which a bound is the quantile, and their share of all: 400 leave an error of 1.5 % of coverage."""
 FOLDS = 4
-"""Parts of the presses, each of which is covered by the bands of the others."""
+"""Parts of the presses, each of which is covered by the belts of the others."""
 RAREST_RATIO = 0.05
-"""An unknown that fewer presses than this share determine is left undetermined: its bands could not be judged."""
+"""An unknown that fewer presses than this share determine is left undetermined: its belts could not be judged."""
 NARROWEST = 1e-9
 WIDE_OPEN = 1e6
 """So many spreads hold all of the range."""
 
 
 def confidence_belts(truth: Array, mean: Array, spread: Array) -> tuple[Belt, ...]:
-    """Return bands for each unknown of truths, means and spreads [n, 3] in coordinates.
+    """Return belts for each unknown of truths, means and spreads [n, 3] in coordinates.
 
-    Only presses that determine an unknown count for it; where they are rare, the bands hold all of the range. Raises
+    Only presses that determine an unknown count for it; where they are rare, the belts hold all of the range. Raises
     `InvalidQuantity` when they are not rare, but too few to learn from.
     """
     return tuple(_bands(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
@@ -69,7 +69,7 @@ def _learned(truth: Array, mean: Array, spread: Array) -> Belt:
 
 
 def _crossed_factor(truth: Array, mean: Array, spread: Array) -> float:
-    """Return the factor with which bands of some presses cover the others at most by chance more than promised.
+    """Return the factor with which belts of some presses cover the others at most by chance more than promised.
 
     Quantiles of few presses that are not quite alike lie too far out. The presses take turns in being the others.
     """
@@ -88,7 +88,7 @@ def _wide_open() -> Belt:
 
 
 def widened(belts: tuple[Belt, ...], truth: Array, mean: Array, spread: Array) -> tuple[Belt, ...]:
-    """Return bands wide enough, about their middles, for truths, means and spreads [n, 3] of recorded presses.
+    """Return belts wide enough, about their middles, for truths, means and spreads [n, 3] of recorded presses.
 
     Wide enough is a coverage at most one standard error of chance below the promised one.
     """
@@ -104,7 +104,7 @@ def _widened(belts: Belt, truth: Array, mean: Array, spread: Array) -> Belt:
 
 
 def _needed(belts: Belt, truth: Array, mean: Array, spread: Array) -> Array:
-    """Return by which factor [n] the bands must be widened to hold each press."""
+    """Return by which factor [n] the belts must be widened to hold each press."""
     ends = np.array([
         np.ravel(belts.bounds(np.array([at]), float(width))) for at, width in zip(truth, spread, strict=True)
     ])  # fmt: skip

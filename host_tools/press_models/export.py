@@ -1,4 +1,5 @@
-"""Turns the trained modes into model bundles: model.onnx and model.json, for the ramps surrogate, range and round spot.
+"""Turns the trained modes into model bundles: model.onnx and model.json; for the ramps
+surrogate, range classifier and ellipticity test, too.
 
 The same parts give the same bytes. Source of the format: the model bundle of docs/contracts.md.
 """
@@ -164,7 +165,7 @@ def _error(of_columns: Array) -> dict[str, float]:
 
 
 def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
-    """Return bands and statistics of a mode."""
+    """Return belts and statistics of a mode."""
     return {
         "bands": {
             name: {part: np.round(getattr(belts, part), 4).tolist() for part in ("truth", "log_spread", "low", "high")}

@@ -1,8 +1,8 @@
-"""What a mode makes of presses nobody has learned from: answers, bands of its intervals, coverage, and usual doubts.
+"""What a mode makes of presses nobody has learned from: answers, belts of its intervals, coverage, and critical values.
 
-Belt come from one half of the simulated presses and are counted on the other. What is usual of each doubt
+Belts come from one half of the simulated presses and are counted on the other. The critical value of each rejection
 comes from recordings, because only they hold all that a recording does to a profile; so does a factor that widens the
-bands where recordings need it, from one half of them; coverage is counted on the other.
+belts where recordings need it, from one half of them; coverage is counted on the other.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from host_tools.press_models.train_ensemble import DenseEnsemble
 from host_tools.press_models.train_range import RangeNetwork
 
 CRITICAL_RATIO = 0.9875
-"""Share of all recorded presses inside the trained ranges whose misfit counts as usual, and likewise the elongation; of
-the nine in ten in which an inclusion stands out, share of those whose odds of a size or depth outside do. What is left
-of the 5 % of false flags is for chance: with so many recordings their share is known to half a per cent.
-"""
+"""Share of all recorded presses inside the trained ranges whose misfit is below its critical value, and likewise the
+elongation; of the nine in ten in which an inclusion stands out, share of those whose odds of a size or depth outside
+do. What is left of the 5 % of false flags is for chance: with so many recordings their share is known to half a
+per cent."""
 THREE = len(UNKNOWNS)
 EnsembleNetworks = Callable[[Array], tuple[Array, Array]]
 
@@ -60,7 +60,7 @@ class Answered:
 
 @dataclass(frozen=True, eq=False)
 class ModeOutcome:
-    """Bands and usual doubts of a mode; `simulated` presses that the bands have not seen, and `recorded` ones."""
+    """Belts and critical values of a mode; `simulated` presses that the belts have not seen, and `recorded` ones."""
 
     belts: tuple[Belt, ...]
     misfit_ratio: float
@@ -82,7 +82,7 @@ def judged_mode(
     seed: int,
     jobs: int = -1,
 ) -> ModeOutcome:
-    """Return the outcome of a mode on a pool's presses with noise and on recorded ones, with its usual log odds."""
+    """Return the outcome of a mode on a pool's presses with noise and on recorded ones, with its critical log odds."""
     rows = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([seed, 1])).astype(np.float64)
     truth = pool.normalised[:, :THREE].astype(np.float64)
     simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
@@ -103,7 +103,7 @@ def elongations(
 
 
 def critical_log_odds(ranges: RangeNetwork, rows: Array, noise: PressNoise) -> float:
-    """Return the largest usual log odds of recorded presses, rows [n, P], in which an inclusion stands out.
+    """Return the critical log odds of recorded presses, rows [n, P], in which an inclusion stands out.
 
     Raises `InvalidQuantity` where it stands out in none.
     """
@@ -120,7 +120,7 @@ def outcome_of(
     elongation: Array,
     outside_log_odds: float,
 ) -> ModeOutcome:
-    """Return the outcome of a mode: bands of simulated presses, answers to recorded ones and their elongation [n]."""
+    """Return the outcome of a mode: belts of simulated presses, answers to recorded ones and their elongation [n]."""
     usual = slice(len(found) // 2)
     answered = Answered(
         normalise(recorded.parameters)[:, :THREE],

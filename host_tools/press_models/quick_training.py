@@ -88,8 +88,8 @@ def quick_rows(rows: Single | Array, force_n: Array) -> Array:
 
 
 CRITICAL_RATIO = 0.985
-"""Share of recorded presses inside the trained ranges whose elongation counts as usual: the only doubt of its kind in
-mode quick, which has neither a best fit nor networks of the ranges."""
+"""Share of recorded presses inside the trained ranges whose elongation is below the critical value: the only
+rejection of its kind in mode quick, which has neither a best fit nor networks of the ranges."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class QuickEffort:
 
 @dataclass(frozen=True, eq=False)
 class QuickOutcome:
-    """Bands and usual elongation; `simulated` presses that the bands have not seen, and `recorded` ones."""
+    """Belts and critical elongation; `simulated` presses that the belts have not seen, and `recorded` ones."""
 
     belts: tuple[Belt, ...]
     elongation_ratio: float
@@ -189,7 +189,7 @@ def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
 
 
 def _outcome(ensemble: DenseEnsemble, simulated: Answered, recorded: RecordedHolds) -> QuickOutcome:
-    """Return bands and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
+    """Return belts and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
     half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
     seen, answered = simulated.part(slice(half)), _answered(ensemble, recorded.rows, normalise(recorded.parameters))
     first = answered.part(usual)

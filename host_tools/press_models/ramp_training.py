@@ -2,8 +2,9 @@
 
 Random presses make the surrogate, and the second harmonics of round inclusions; recordings of random presses the
 camera's noise; surrogate and noise endless training presses for the networks. Inclusions around the trained ranges make
-the networks that tell what lies outside. Presses that nobody has learned from give the bands of every interval;
-recordings with every drift give what misfit, elongation and odds are usual, and the errors that the card states.
+the networks that tell what lies outside. Presses that nobody has learned from give the belts of every interval;
+recordings with every drift give the critical values of misfit, elongation and odds, and the errors that the card
+states.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Coverage of the 90 % intervals, by the octiles of each unknown, as the model card states it.
 
-The card's presses were drawn when the model was trained; neither networks nor bands have seen them.
+The card's presses were drawn when the model was trained; neither networks nor belts have seen them.
 """
 
 from __future__ import annotations

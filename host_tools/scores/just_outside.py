@@ -42,7 +42,7 @@ from host_tools.scenes.scene import Scene
 from host_tools.scores.outside import FALSE_AT_MOST, REFUSED_AT_LEAST, SHARE
 
 FALSE_FLAGS = 1 - CRITICAL_RATIO
-"""Share of presses inside that this doubt may flag: misfit and elongation flag as many each, all three at most 5 %."""
+"""Share of presses inside that this test may flag: misfit and elongation flag as many each, all three at most 5 %."""
 STARTS = 6
 """Fits from as many places, of which the best one counts."""
 

@@ -39,13 +39,13 @@ SEEN_BY = {"middle_contrast": MIDDLE, "middle_less_rim_contrast": MIDDLE_LESS_RI
 
 
 class QuickModel:
-    """A verified bundle whose network reads one held press, with the bands of its intervals.
+    """A verified bundle whose network reads one held press, with the belts of its intervals.
 
     Critical values: `faintest_contrast` of each of `SEEN_BY`, less is noise; `elongation_ratio`, more is not round.
     """
 
     def __init__(self, bundle: ModelBundle) -> None:
-        """Raises `BundleRefused` when the card of a bundle that reads `QUICK_UNITS` lacks bands or a limit."""
+        """Raises `BundleRefused` when the card of a bundle that reads `QUICK_UNITS` lacks belts or a limit."""
         self.bundle = bundle
         try:
             entry = bundle.card["modes"]["quick"]

@@ -5,7 +5,7 @@ A round inclusion beside the axis shows a second harmonic, too; polynomials tell
 profile. What is left is searched for a spot that is stretched in some direction: the contrast f(r) becomes f(r) + e r
 df/dr cos(2 (angle - a)), whose second harmonic is r df/dr times e. How far e lies from 0, in standard deviations of all
 that camera, flat field and model leave open, is about Rayleigh's for a round inclusion; what the best fit itself does
-not know adds a little, so what is usual is measured on recordings. Source: Kay, Fundamentals of Statistical Signal
+not know adds a little, so the critical value is measured on recordings. Source: Kay, Fundamentals of Statistical Signal
 Processing II (1998), 13.4.3, a known pattern of unknown amplitude and phase; docs/modes.md counts how often inclusions
 that are not round, and pairs of inclusions, are refused.
 """

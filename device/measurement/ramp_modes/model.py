@@ -92,7 +92,7 @@ def _answer(posterior: PressPosterior, best: Array, mean: Array, spread: Array) 
 class RampModel:
     """A verified bundle: networks, forward model, what tells the ranges and what is round.
 
-    `bands` and `critical` values are those of each mode.
+    `belts` and `critical` values are those of each mode.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class RampModel:
             self.critical = {mode: _critical_values(entry) for mode, entry in entries.items()}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:
             raise BundleRefused(
-                bundle.folder, "modes", f"incomplete ({error})", "bands and critical values of every mode"
+                bundle.folder, "modes", f"incomplete ({error})", "belts and critical values of every mode"
             ) from error
 
     def prove(self) -> None:

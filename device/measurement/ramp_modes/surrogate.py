@@ -44,7 +44,9 @@ CONTRAST_RANGE = (
 
 @dataclass(frozen=True, eq=False)
 class PressSurrogate:
-    """`inclusion`: contrast and offset over the strength; `bare`: growth of the inclusion-free light."""
+    """`inclusion`: contrast and offset over the strength; `baseline`: reference force response, of the light beside
+    it.
+    """
 
     inclusion_field: LegendreSum
     baseline: LegendreSum
@@ -141,7 +143,7 @@ def _factor_slope(at: Array) -> Array:
 
 
 def _by_normalised(gradient: Array, at: Array) -> Array:
-    """Return derivatives [9, Q] by `unit` of derivatives by the polynomials' coordinates, at parameters [9]."""
+    """Return derivatives [9, Q] by `normalised` of derivatives by the polynomials' coordinates, at parameters [9]."""
     (low, high), by_normalised = CONTRAST_RANGE, slope_of_normalised(at)
     E, Et = at[MODULUS], at[TISSUE]
     by_contrast = gradient[MODULUS] * 2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2

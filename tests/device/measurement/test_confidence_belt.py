@@ -1,4 +1,4 @@
-"""Intervals from bands, with answers worked out on paper."""
+"""Intervals from belts, with answers worked out on paper."""
 
 import numpy as np
 import pytest
@@ -65,5 +65,5 @@ def test_an_answer_unusual_for_every_truth_is_given_two_spreads_on_each_side():
 
 
 def test_tables_of_another_shape_are_refused():
-    with pytest.raises(InvalidQuantity, match="shape of the bands"):
+    with pytest.raises(InvalidQuantity, match="shape of the belt"):
         Belt(TRUTH, LOG_SPREAD, np.zeros((3, 2)), np.zeros((2, 2)))

@@ -1,4 +1,4 @@
-"""Bands from simulated answers: they cover nine in ten, whatever the truth is."""
+"""Belts from simulated answers: they cover nine in ten, whatever the truth is."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_too_few_presses_that_determine_an_unknown_are_refused():
 
 @pytest.mark.parametrize(("share", "is_determined"), [(0.04, False), (0.5, True)])
 def test_an_unknown_that_presses_rarely_determine_is_never_called_determined(share, is_determined):
-    """Answers that are exactly right cannot tell how wide the bands of the few are to be."""
+    """Answers that are exactly right cannot tell how wide the belts of the few are to be."""
     truth = np.linspace(-1, 1, 1000)
     spread = np.where(np.arange(1000) % 100 < 100 * share, 0.1, 0.5)
     belts = confidence_belts(*(column[:, None] for column in (truth, truth, spread)))[0]
@@ -65,7 +65,7 @@ def flat_bands(bound: float) -> tuple[Belt, ...]:
 
 
 def test_bands_widen_by_the_factor_that_covers_as_many_recordings_as_chance_lets_be_told():
-    """Errors of 0.1, 0.2 ... 10 spreads in bands of 1: of a hundred, 90 less 3 by chance: the 87th, 8.7."""
+    """Errors of 0.1, 0.2 ... 10 spreads in belts of 1: of a hundred, 90 less 3 by chance: the 87th, 8.7."""
     error = np.repeat(np.arange(0.1, 10.05, 0.1)[:, None], 3, axis=1)
     spread = np.full_like(error, 0.05)
     wide = widened(flat_bands(1.0), error * spread, np.zeros_like(error), spread)

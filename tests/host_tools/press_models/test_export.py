@@ -1,4 +1,4 @@
-"""The bundle of the ramp modes: the network NumPy has, surrogate and round spot of its training, both modes' limits."""
+"""The bundle of the ramp modes: the network NumPy has, surrogate and ellipticity test, both modes' limits."""
 
 from __future__ import annotations
 
@@ -303,7 +303,7 @@ def test_a_missing_file_is_refused_by_the_device(trained: TrainedRamp, tmp_path:
 
 
 def test_a_card_that_states_no_hash_of_the_round_spot_is_refused_by_the_device(trained, tmp_path) -> None:
-    """As one of before there was a round spot, which does not hold the file either."""
+    """As one of before there was an ellipticity test, which does not hold the file either."""
     folder = write(trained, tmp_path / "demo")
     card = json.loads((folder / "model.json").read_text())
     del card["round_sha256"]

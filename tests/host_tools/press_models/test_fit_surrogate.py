@@ -22,7 +22,7 @@ SMALL_BARE = NONE | {"tissue_modulus_kpa": 2.0, "albedo": 1.0}
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    """Fifteen terms of the inclusion and four of the bare light instead of thousands."""
+    """Fifteen terms of the inclusion and four of the light beside it instead of thousands."""
     monkeypatch.setattr(module, "INCLUSION_REACH", SMALL_INCLUSION)
     monkeypatch.setattr(module, "BARE_REACH", SMALL_BARE)
 

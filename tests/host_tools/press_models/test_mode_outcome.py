@@ -1,4 +1,4 @@
-"""Bands, coverage and usual doubts of toys: answers with Gaussian errors of a spread that they know."""
+"""Belts, coverage and critical values of toys: answers with Gaussian errors of a spread that they know."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class FirstColumn:
 
 
 class FirstHarmonic:
-    """In place of a round spot: the first of the second harmonics is the deviations."""
+    """In place of an ellipticity test: the first of the second harmonics is the deviations."""
 
     def elongation_deviations(self, second: np.ndarray, best: np.ndarray, mode: str) -> float:
         return float(second[0, 0, 0])
@@ -72,7 +72,7 @@ def gaussian(count: int, seed: int) -> Answered:
 
 
 def exact_bands(bound: float) -> tuple[Belt, ...]:
-    """Bands of an error that is never more than so many spreads, whatever truth and spread."""
+    """Belts of an error that is never more than so many spreads, whatever truth and spread."""
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
     return (Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
 
@@ -158,7 +158,7 @@ def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome,
 
 
 def test_bands_come_from_the_first_halves_alone(outcome, answers, pool, recorded):
-    """Truths that lie elsewhere in the second half, simulated or recorded, leave the bands what they were."""
+    """Truths that lie elsewhere in the second half, simulated or recorded, leave the belts what they were."""
     parameters = recorded.parameters.copy()
     parameters[RECORDED // 2 :, :3] = denormalise(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
     elsewhere = RecordedPresses(parameters, recorded.rows, recorded.second_harmonics)
