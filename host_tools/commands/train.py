@@ -116,7 +116,7 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
     from device.measurement.ramp_modes.model import RAMP_MODES
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.press_models.export import export_profile
+    from host_tools.press_models.export import export_ramp
     from host_tools.press_models.ramp_training import DRY_RUN, Effort, train_ramp
     from host_tools.probe_tables.out_of_range_table import load_wide_table
     from host_tools.scores.dial import publish_dial
@@ -125,7 +125,7 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
     effort = DRY_RUN if dry_run else Effort()
     trained = train_ramp(tables, load_wide_table(wide or _wide()), effort=effort, seed=seed, say=note.print)
     with _refusals():
-        export_profile(
+        export_ramp(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
         )
     note.print("speed and accuracy of modes standard and precise")

@@ -35,7 +35,7 @@ from host_tools.press_models.seeds import derived_seed
 GOLDEN_ROWS = 8
 
 
-def export_profile(
+def export_ramp(
     trained: TrainedRamp, folder: Path, *, serials: tuple[str, ...], software_version: str, training_command: str
 ) -> None:
     """Write the bundle to `folder`, whole or not at all; raises `ExportRefused` when onnxruntime and NumPy differ.
@@ -83,7 +83,7 @@ def export_quick(
     software_version: str,
     training_command: str,
 ) -> None:
-    """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_profile`."""
+    """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_ramp`."""
     rows = trained.pool.rows[:GOLDEN_ROWS]
     network = build_network(trained.ensemble)
     card = {

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from host_tools.inverse import confidence_belts as module
 
 from device.measurement.confidence_belt import Belt
 from device.measurement.quantities import InvalidQuantity
+from host_tools.press_models import confidence_belts as module
 from host_tools.press_models.confidence_belts import confidence_belts, widened
 
 

@@ -27,7 +27,7 @@ from device.measurement.recording.ring_means import RINGS
 from host_tools.paper_network.export import ExportRefused
 from host_tools.press_models import export as exporting
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling, initial_layers
-from host_tools.press_models.export import GOLDEN_ROWS, export_profile
+from host_tools.press_models.export import GOLDEN_ROWS, export_ramp
 from host_tools.press_models.mode_outcome import Answered, ModeOutcome
 from host_tools.press_models.onnx_networks import build_network, build_range_networks, physical_estimate
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
@@ -98,7 +98,7 @@ def trained() -> TrainedRamp:
 
 
 def write(trained: TrainedRamp, folder: Path) -> Path:
-    export_profile(trained, folder, serials=SERIALS, software_version="1.2.3", training_command="host_tools train x")
+    export_ramp(trained, folder, serials=SERIALS, software_version="1.2.3", training_command="host_tools train x")
     return folder
 
 

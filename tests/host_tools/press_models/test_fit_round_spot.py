@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host_tools.inverse import fit_ellipticity_test as module
 from small_surrogate import COLUMNS, random_surrogate
 
 from device.measurement.parameters import PARAMETERS, normalise
@@ -14,6 +13,7 @@ from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS, EllipticityTest
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.surrogate import OFFSET
+from host_tools.press_models import fit_surrogate as module
 from host_tools.press_models.fit_surrogate import degrees, fit_second_harmonics, held_out_second_harmonics
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
 
