@@ -33,9 +33,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from device.files.recording_file import read_recording as read_recording
     from device.files.recording_file import write_recording as write_recording
+    from device.measurement.bundle import BundleRefused as BundleRefused
     from device.measurement.estimate import Estimate as Estimate
     from device.measurement.mode_models import ModeModels as ModeModels
-    from device.measurement.bundle import BundleRefused as BundleRefused
     from device.measurement.quantities import Inclusion as Inclusion
     from device.measurement.quantities import InvalidQuantity as InvalidQuantity
     from device.measurement.recording.recording import Recording as Recording

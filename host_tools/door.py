@@ -18,10 +18,10 @@ from host_tools.scenes.scene import Press, Scene
 if TYPE_CHECKING:
     import xarray as xr
 
+    from device.measurement.bundle import ModelBundle
     from device.measurement.calibration import Calibration
     from device.measurement.estimate import Estimate
     from device.measurement.mode_models import ModeModels
-    from device.measurement.bundle import ModelBundle
     from device.measurement.recording.recording import Recording
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.cramer_rao.bounds import Limits
@@ -160,8 +160,8 @@ def analyse(
     are those of the simulated probe unless given. Raise `InvalidQuantity` where recording, mode, model and certificate
     do not belong together.
     """
-    from device.files.recording_file import read_recording
     from device.files.certificate_file import read_calibration
+    from device.files.recording_file import read_recording
     from device.measurement.mode import mode_named
     from device.measurement.mode_models import analysed
 

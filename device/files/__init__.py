@@ -2,6 +2,5 @@
 
 Modules in reading order: `durable`, `toml_record`, `recording_file`, `bundle_file`, `certificate_file`, `text_table`.
 
-No physics and no hardware; of ours it imports `device.measurement` only, which never imports it: what measures opens no
-file.
+No physics and no hardware; of ours it imports `device.measurement` only.
 """

@@ -33,7 +33,7 @@ from device.measurement.ramp_modes.range_classifier import RANGE_FILE, RangeClas
 from device.measurement.ramp_modes.surrogate import ARRAYS, PressSurrogate, surrogate_of
 
 Arrays = Mapping[str, NDArray[Any]]
-Model = TypeVar("Model", QuickModel, RampModel)
+ModeModel = TypeVar("ModeModel", QuickModel, RampModel)
 DAMAGED = (EOFError, KeyError, ValueError, BadZipFile, OSError)
 """What NumPy raises for an archive that is damaged or lacks an array."""
 
@@ -122,5 +122,5 @@ def _not_an_archive(what: str, path: Path, names: tuple[str, ...]) -> InvalidQua
     return InvalidQuantity(what, path, f"a .npz with {', '.join(names)}", "install the model bundle again")
 
 
-def _if_there(folder: Path, read: Callable[[Path], Model]) -> Model | None:
+def _if_there(folder: Path, read: Callable[[Path], ModeModel]) -> ModeModel | None:
     return read(folder) if folder.exists() else None

@@ -1,7 +1,7 @@
 """What a press means: numbers in, numbers out. Shared with the workstation.
 
-Modules in reading order: `quantities`, `arrays`, `mode`, `parameters`, `bundle`, `calibration`,
-`confidence_belt`, `estimate`, `mode_models`.
+Modules in reading order: `quantities`, `arrays`, `mode`, `parameters`, `feature_definitions`, `bundle`,
+`calibration`, `confidence_belt`, `estimate`, `mode_models`.
 
 Rooms: `recording` (frames to a corrected image), `paper_mode`, `ramp_modes` (standard and precise), `quick_mode`. It
 imports nothing else of ours; what it reads from a disk is read in `device.files`.
@@ -24,6 +24,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from device.measurement.arrays import Array as Array
     from device.measurement.arrays import Single as Single
+    from device.measurement.bundle import BundleRefused as BundleRefused
+    from device.measurement.bundle import ModelBundle as ModelBundle
     from device.measurement.calibration import Calibration as Calibration
     from device.measurement.estimate import Estimate as Estimate
     from device.measurement.estimate import Quantity as Quantity
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     from device.measurement.mode import mode_of as mode_of
     from device.measurement.mode_models import ModeModels as ModeModels
     from device.measurement.mode_models import analysed as analysed
-    from device.measurement.bundle import BundleRefused as BundleRefused
-    from device.measurement.bundle import ModelBundle as ModelBundle
     from device.measurement.quantities import Bound as Bound
     from device.measurement.quantities import Inclusion as Inclusion
     from device.measurement.quantities import InvalidQuantity as InvalidQuantity

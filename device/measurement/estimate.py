@@ -33,6 +33,7 @@ NOTHING_STANDS_OUT = (
     "No inclusion can be told from the tissue here. Press again where you feel it; if the message stays, "
     "it is too small, too soft or too deep for the probe."
 )
+NOT_ROUND = "The inclusion is not round."
 NO_NUMBERS = (
     "No numbers are given. Press again a little beside it; if the message stays, note the finding without numbers."
 )

@@ -18,7 +18,7 @@ from device.measurement.ramp_modes.estimate import estimate_ramp
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from device.measurement.recording.recording import Recording
 
-Model = TypeVar("Model", QuickModel, RampModel)
+OwnModel = TypeVar("OwnModel", QuickModel, RampModel)
 
 
 class ModeModels(NamedTuple):
@@ -67,5 +67,5 @@ def analysed(recording: Recording, models: ModeModels, calibration: Calibration,
     return models.estimate(recording, mode or of_frames, calibration)
 
 
-def _if_for(serial: str, model: Model | None) -> Model | None:
+def _if_for(serial: str, model: OwnModel | None) -> OwnModel | None:
     return model if model and serial in model.bundle.card.get("serials", []) else None

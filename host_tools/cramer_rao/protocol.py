@@ -14,7 +14,7 @@ from typing import Literal, get_args
 
 from device.files.toml_record import read_toml
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.forward.derivatives.sensitive_presses import Strain
+from host_tools.forward.derivatives.sensitive_presses import RampStrain
 
 Observable = Literal["image", "scalars", "pressure", "displacement"]
 OBSERVABLES = get_args(Observable)
@@ -53,7 +53,7 @@ class PressProtocol:
     frames: int = 10
     reference_frames: int = 10
     observable: Observable = "image"
-    strain: Strain = "finite"
+    strain: RampStrain = "finite"
     offsets_mm: tuple[float, ...] = ()
     mean_level_counts: float = 100.0
     tissue_modulus_spread_ratio: float = 0.115
@@ -74,7 +74,7 @@ class PressProtocol:
         _require_forces(self.forces_n)
         for name in ("frames", "reference_frames"):
             require(name, getattr(self, name), Bound(1, 1_000_000, "frames"), "take at least one frame")
-        for name, known in (("observable", OBSERVABLES), ("strain", get_args(Strain))):
+        for name, known in (("observable", OBSERVABLES), ("strain", get_args(RampStrain))):
             if getattr(self, name) not in known:
                 raise InvalidQuantity(name, repr(getattr(self, name)), f"one of {', '.join(known)}", "choose one")
         for i, offset_mm in enumerate(self.offsets_mm):

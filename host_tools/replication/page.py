@@ -26,7 +26,7 @@ COLUMNS = ("linear light", "traced light")
 METHODS = ("", "SCG", "LM")
 MEANS = f"Mean relative error of {', '.join(WORDS)} (%)"
 
-Rows = Iterable[tuple[str, ...]]
+TableRows = Iterable[tuple[str, ...]]
 
 
 def paper_tables(study: PaperStudy) -> dict[str, Callable[[], Table]]:
@@ -158,13 +158,13 @@ def _counted(name: str, both: tuple[Runs, Runs], count: Callable[[Runs], int]) -
     return name, *(f"{count(found)} of {len(found.trials)}" for found in both)
 
 
-def _times(both: tuple[Runs, Runs]) -> Rows:
+def _times(both: tuple[Runs, Runs]) -> TableRows:
     scg, lm = both
     yield "time of one network (ms)", *(f"{found.milliseconds:.0f}" for found in both)
     yield "time, SCG = 1", "1", f"{lm.seconds / scg.seconds:.2f}"
 
 
-def _errors(both: tuple[Runs, Runs]) -> Rows:
+def _errors(both: tuple[Runs, Runs]) -> TableRows:
     yield "mean error of one network: size, depth, modulus (%)", *(_three(found.percent.mean(axis=0)) for found in both)
     yield "of the worst seed for each (%)", *(_three(found.percent.max(axis=0)) for found in both)
 

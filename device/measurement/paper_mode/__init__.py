@@ -1,6 +1,6 @@
 """Mode paper, the method of Lee & Won: three features of an image, three regressions, one network of 99 weights.
 
-Modules in reading order: `feature_definitions`, `features`, `inversion`, `intervals`.
+Modules in reading order: `features`, `intervals`, `estimate`.
 
 Nothing of the other modes.
 """

@@ -28,7 +28,7 @@ from device.measurement.estimate import (
     with_numbers,
     without_numbers,
 )
-from device.measurement.paper_mode.feature_definitions import INCLUSION_FIELD_FEATURES, units_of
+from device.measurement.feature_definitions import INCLUSION_FIELD_FEATURES, units_of
 from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings, extract_features
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording

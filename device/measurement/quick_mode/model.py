@@ -12,6 +12,7 @@ from device.measurement.calibration import Calibration
 from device.measurement.confidence_belt import belts_of
 from device.measurement.estimate import (
     NO_NUMBERS,
+    NOT_ROUND,
     NOTHING_STANDS_OUT,
     UNKNOWN_IMAGE,
     Estimate,
@@ -24,11 +25,10 @@ from device.measurement.estimate import (
     with_numbers,
     without_numbers,
 )
-from device.measurement.paper_mode.feature_definitions import QUICK_FEATURES, units_of
+from device.measurement.feature_definitions import QUICK_FEATURES, units_of
 from device.measurement.parameters import normalise_unknowns
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.profile import QUICK_NAMES, quick_press
-from device.measurement.quick_mode.roundness import NOT_ROUND
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS
 

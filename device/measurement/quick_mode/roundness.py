@@ -14,7 +14,6 @@ OFFSETS_SHARE, NOISE_CONTRAST = 0.3, 0.004
 """The second harmonic of a round inclusion off the axis is at most this share of its first, and noise is this
 contrast.
 """
-NOT_ROUND = "The inclusion is not round."
 
 
 def elongation_ratio(elongation: Array, offset: Array) -> float:

@@ -15,6 +15,7 @@ from device.measurement.arrays import Array
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import (
     NO_NUMBERS,
+    NOT_ROUND,
     NOTHING_STANDS_OUT,
     Estimate,
     numbers_in_belts,
@@ -27,7 +28,6 @@ from device.measurement.estimate import (
 )
 from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.quick_mode.roundness import NOT_ROUND
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, press_profile

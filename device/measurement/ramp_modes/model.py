@@ -18,8 +18,8 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.confidence_belt import belts_of
+from device.measurement.feature_definitions import RADIAL_PROFILE_FEATURES, units_of
 from device.measurement.mode import Mode
-from device.measurement.paper_mode.feature_definitions import RADIAL_PROFILE_FEATURES, units_of
 from device.measurement.parameters import NUISANCES, denormalise, normalise_unknowns, slope_of_normalised
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.ramp_modes.ellipticity import EllipticityTest

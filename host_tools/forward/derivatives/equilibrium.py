@@ -13,7 +13,7 @@ from ngsolve import BilinearForm, GridFunction
 from host_tools.forward.derivatives.sliding_parts import SlidingParts
 from host_tools.forward.face_state import FaceState
 from host_tools.forward.finite_strain.closed_contact import AXIAL
-from host_tools.forward.finite_strain.form_action import Vector, applied, product
+from host_tools.forward.finite_strain.form_action import StateVector, applied, product
 from host_tools.forward.finite_strain.loaded_face import face_state
 from host_tools.forward.finite_strain.newton import EnergyNewton
 from host_tools.forward.finite_strain.sliding import SlidingContact
@@ -34,26 +34,26 @@ class Equilibrium(Protocol):
     axial: int
     """Component of the unknowns that moves both bodies along z."""
     space: Any
-    push: Vector
+    push: StateVector
     """How the held unknowns move for each mm of indentation."""
     moduli: tuple[str, ...]
 
-    def forces(self) -> Vector:
+    def forces(self) -> StateVector:
         """Return the forces of both bodies on the mesh as it stands now."""
 
-    def forces_by(self, modulus: str) -> Vector:
+    def forces_by(self, modulus: str) -> StateVector:
         """Return the derivative of the forces by the logarithm of a modulus."""
 
-    def held_by(self, quantity: str) -> Vector:
+    def held_by(self, quantity: str) -> StateVector:
         """Return how the held unknowns move by the logarithm of a quantity at the same indentation."""
 
-    def tangent(self, motion: Vector) -> Vector:
+    def tangent(self, motion: StateVector) -> StateVector:
         """Return the change of the forces by a motion of the unknowns."""
 
-    def probe_tangent(self, motion: Vector) -> Vector:
+    def probe_tangent(self, motion: StateVector) -> StateVector:
         """Return the change of the probe's own forces by a motion of the unknowns."""
 
-    def solve(self, forces: Vector) -> Vector:
+    def solve(self, forces: StateVector) -> StateVector:
         """Return the motion of the free unknowns by which the tangent answers forces on them."""
 
 
@@ -82,27 +82,27 @@ class LinearEquilibrium:
             form += term
         return form
 
-    def forces(self) -> Vector:
+    def forces(self) -> StateVector:
         """See `Equilibrium`."""
         return applied(self._all, self.u.vec)
 
-    def forces_by(self, modulus: str) -> Vector:
+    def forces_by(self, modulus: str) -> StateVector:
         """See `Equilibrium`."""
         return applied(self._parts[modulus], self.u.vec)
 
-    def held_by(self, quantity: str) -> Vector:
+    def held_by(self, quantity: str) -> StateVector:
         """See `Equilibrium`: nothing moves."""
         return GridFunction(self.space).vec
 
-    def tangent(self, motion: Vector) -> Vector:
+    def tangent(self, motion: StateVector) -> StateVector:
         """See `Equilibrium`."""
         return applied(self._all, motion)
 
-    def probe_tangent(self, motion: Vector) -> Vector:
+    def probe_tangent(self, motion: StateVector) -> StateVector:
         """See `Equilibrium`."""
         return applied(self._probe, motion)
 
-    def solve(self, forces: Vector) -> Vector:
+    def solve(self, forces: StateVector) -> StateVector:
         """See `Equilibrium`."""
         form, rest, answer = self._condensed, forces.CreateVector(), forces.CreateVector()
         rest.data = forces
@@ -132,28 +132,28 @@ class SlidingEquilibrium:
         newton.assemble()
         contact.probe_energy.AssembleLinearization(self.u.vec)
 
-    def forces(self) -> Vector:
+    def forces(self) -> StateVector:
         """See `Equilibrium`."""
         return applied(self._contact.energy, self.u.vec)
 
-    def forces_by(self, modulus: str) -> Vector:
+    def forces_by(self, modulus: str) -> StateVector:
         """See `Equilibrium`."""
         return self._parts.forces_by(modulus, self.u.vec, self._contact.memory[1])
 
-    def held_by(self, quantity: str) -> Vector:
+    def held_by(self, quantity: str) -> StateVector:
         """See `Equilibrium`: the rim slips in proportion to the indentation."""
         slip = GridFunction(self.space)
         slip.vec[self._parts.rim] = self.face.indentation_mm * self._parts.rim_rates[quantity]
         return slip.vec
 
-    def tangent(self, motion: Vector) -> Vector:
+    def tangent(self, motion: StateVector) -> StateVector:
         """See `Equilibrium`."""
         return product(self._newton.energy.mat, motion)
 
-    def probe_tangent(self, motion: Vector) -> Vector:
+    def probe_tangent(self, motion: StateVector) -> StateVector:
         """See `Equilibrium`."""
         return product(self._contact.probe_energy.mat, motion)
 
-    def solve(self, forces: Vector) -> Vector:
+    def solve(self, forces: StateVector) -> StateVector:
         """See `Equilibrium`."""
         return self._newton.direction(forces)

@@ -33,7 +33,7 @@ from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.tiers import Meshed, build
 from host_tools.scenes.scene import Press, Scene
 
-Strain = Literal["small", "finite"]
+RampStrain = Literal["small", "finite"]
 ORDER = 3
 ORDERS = (ORDER, ORDER + 1)
 """Orders of the elements: what differs between them is theirs, not the inclusion's."""
@@ -57,7 +57,7 @@ Faces = dict[int, FaceSensitivity]
 """By the order of the elements, one face at one force."""
 
 
-def sensitive_ramp(scene: Scene, forces_n: Sequence[float], *, strain: Strain = "finite") -> Ramps:
+def sensitive_ramp(scene: Scene, forces_n: Sequence[float], *, strain: RampStrain = "finite") -> Ramps:
     """Return both faces and their derivatives at ascending forces (N), by elements of two orders on one mesh.
 
     Raise `InvalidQuantity` for a scene without an inclusion, off the axis, with layered tissue or too near to
@@ -82,7 +82,7 @@ def sensitive_ramp(scene: Scene, forces_n: Sequence[float], *, strain: Strain = 
     }
 
 
-def _plan(scene: Scene, forces_n: Sequence[float], strain: Strain) -> ModelPlan:
+def _plan(scene: Scene, forces_n: Sequence[float], strain: RampStrain) -> ModelPlan:
     plan = model_plan(scene.with_press(Press(force_n=max(forces_n))), strain=strain)
     if plan.symmetry != "axisymmetric" or plan.contact == "unilateral" or plan.formulation == "mixed":
         reasons = "; ".join(plan.reasons[choice] for choice in ("symmetry", "contact", "formulation"))
@@ -92,7 +92,7 @@ def _plan(scene: Scene, forces_n: Sequence[float], strain: Strain) -> ModelPlan:
 
 
 @lru_cache(maxsize=2)
-def _bare_ramp(scene: Scene, forces_n: tuple[float, ...], strain: Strain) -> tuple[Faces, ...]:
+def _bare_ramp(scene: Scene, forces_n: tuple[float, ...], strain: RampStrain) -> tuple[Faces, ...]:
     baseline_materials = baseline(scene)
     parts = {"tissue_modulus_kpa": only(baseline_materials, "tissue", "inclusion")}
     return _Ramp(scene, _plan(scene, forces_n, strain), baseline_materials, parts).at(forces_n, None)

@@ -19,7 +19,7 @@ from ngsolve import H1, GridFunction, InnerProduct
 from device.measurement.arrays import Array
 from host_tools.forward.derivatives.equilibrium import Equilibrium
 from host_tools.forward.face_state import MN_PER_N, FaceState
-from host_tools.forward.finite_strain.form_action import Vector, along
+from host_tools.forward.finite_strain.form_action import StateVector, along
 from host_tools.forward.small_strain.contact import pressure_of_forces
 
 FORCE = "force_n"
@@ -86,7 +86,7 @@ def face_sensitivity(press: Equilibrium, velocities: Mapping[str, Any]) -> FaceS
     return FaceSensitivity(press.face, rates)
 
 
-def _back(press: Equilibrium) -> Vector:
+def _back(press: Equilibrium) -> StateVector:
     push = GridFunction(press.space)
     push.components[press.axial].Set(-1.0, definedon=press.mesh.Boundaries("back"))
     return push.vec

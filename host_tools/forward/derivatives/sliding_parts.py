@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from ngsolve import BitArray
 
-from host_tools.forward.finite_strain.form_action import Vector, along, applied, product
+from host_tools.forward.finite_strain.form_action import StateVector, along, applied, product
 from host_tools.forward.finite_strain.sliding import SLIP, SlidingContact
 from host_tools.forward.materials import Parts
 
@@ -39,28 +39,28 @@ class SlidingParts:
         self.rim_rates = {name: self._rim_rate(self._along(velocity)) for name, velocity in velocities.items()}
         self.rim_rates |= {name: self._rim_rate(self._forces_by(name)) for name in parts}
 
-    def forces_by(self, modulus: str, state: Vector, spread: Vector) -> Vector:
+    def forces_by(self, modulus: str, state: StateVector, spread: StateVector) -> StateVector:
         """Return the forces that one modulus makes at a state."""
         part = self.by_modulus[modulus]
         part.spread.vec.data = spread
         return applied(part.energy, state)
 
-    def _rim_rate(self, change: Vector) -> float:
+    def _rim_rate(self, change: StateVector) -> float:
         motion = change.CreateVector()
         motion.data = -1.0 * (self._inverse * change)
         return float(motion[self.rim])
 
-    def _forces_by(self, modulus: str) -> Vector:
+    def _forces_by(self, modulus: str) -> StateVector:
         spread = self._contact.memory[1]
         return self._at_rest(lambda state: self.forces_by(modulus, state, spread))
 
-    def _along(self, velocity: Any) -> Vector:
-        def forces(state: Vector) -> Vector:
+    def _along(self, velocity: Any) -> StateVector:
+        def forces(state: StateVector) -> StateVector:
             return along(velocity, self._contact.mesh, lambda: applied(self._contact.energy, state))
 
         return self._at_rest(forces)
 
-    def _at_rest(self, forces: Callable[[Vector], Vector]) -> Vector:
+    def _at_rest(self, forces: Callable[[StateVector], StateVector]) -> StateVector:
         """Return the derivative of forces, at rest, along the rate of the press in small strain."""
         state = self._rate.CreateVector()
         state.data = LIGHT_MM * self._rate

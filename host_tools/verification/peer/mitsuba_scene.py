@@ -130,16 +130,16 @@ def _sensor(block: LightBlock, camera: MitsubaCamera) -> str:
     return f'<sensor type="orthographic"><transform name="to_world">{view}</transform>{film}</sensor>'
 
 
-Triple = tuple[float, float, float]
+Point = tuple[float, float, float]
 
 
-def _rectangle(half_x: float, half_y: float, centre: Triple, towards: Triple, inside: str) -> str:
+def _rectangle(half_x: float, half_y: float, centre: Point, towards: Point, inside: str) -> str:
     """Return a rectangle about a centre whose normal points towards a direction."""
     place = _placed(f'<scale value="{half_x:g}, {half_y:g}, 1"/>', centre, towards)
     return f'<shape type="rectangle">{place}{inside}</shape>'
 
 
-def _placed(scale: str, centre: Triple, towards: Triple) -> str:
+def _placed(scale: str, centre: Point, towards: Point) -> str:
     target = tuple(c + t for c, t in zip(centre, towards, strict=True))
     up = "0, 0, 1" if towards[2] == 0 else "0, 1, 0"
     look = f'<lookat origin="{_text(centre)}" target="{_text(target)}" up="{up}"/>'

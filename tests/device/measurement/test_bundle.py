@@ -17,8 +17,8 @@ from onnx import TensorProto, helper
 
 from device.files.bundle_file import read_paper_model, read_quick_model
 from device.measurement.bundle import BundleRefused
+from device.measurement.feature_definitions import INCLUSION_FIELD_FEATURES
 from device.measurement.paper_mode.estimate import PAPER_UNITS
-from device.measurement.paper_mode.feature_definitions import INCLUSION_FIELD_FEATURES
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QUICK_UNITS
 from device.measurement.quick_mode.profile import QUICK_NAMES

@@ -26,7 +26,7 @@ def test_what_the_grid_cuts_off_at_both_ends_is_given_back():
     So the ends are right on average: 1.64 spreads of 0.1 below and above the mean, where 401 truths stand 0.005 apart.
     """
     means = np.linspace(0.1, 0.2, 1001)
-    ends = np.array([bands(-1.64, 1.64).interval(mean, 0.1)[:2] for mean in means])
+    ends = np.array([belts(-1.64, 1.64).interval(mean, 0.1)[:2] for mean in means])
     assert (ends[:, 0] - means).mean() == pytest.approx(-0.164, abs=2e-4)
     assert (ends[:, 1] - means).mean() == pytest.approx(0.164, abs=2e-4)
 

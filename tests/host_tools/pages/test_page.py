@@ -30,7 +30,7 @@ BROKEN = Chapter("Broken", "It broke.", "Manual.", (at_most("three", "no number"
 @pytest.fixture
 def page(tmp_path):
     path = tmp_path / "verification.md"
-    named = zip(("patch", "hertz", "rates", "basis"), (GOOD, BAD, ABSENT, BROKEN), strict=True)
+    named = zip(("patch", "hertz", "rates", "hayes"), (GOOD, BAD, ABSENT, BROKEN), strict=True)
     chapters = {name: Timed(chapter, 1.5) for name, chapter in named}
     write_page(path, Results("verification", "host_tools verify --out verification.md", chapters))
     return path

@@ -2,22 +2,22 @@
 
 import pytest
 
-from device.measurement.paper_mode.feature_definitions import (
-    HELD_FEATURES,
+from device.measurement.feature_definitions import (
     INCLUSION_FIELD_FEATURES,
-    PROFILE_FEATURES,
+    QUICK_FEATURES,
+    RADIAL_PROFILE_FEATURES,
     definition_of,
 )
-from device.measurement.quick_mode.profile import HELD_NAMES
+from device.measurement.quick_mode.profile import QUICK_NAMES
 from device.measurement.ramp_modes.radial_profile import ROW_NAMES
 
 
-@pytest.mark.parametrize(("names", "group"), [(ROW_NAMES, PROFILE_FEATURES), (HELD_NAMES, HELD_FEATURES)])
+@pytest.mark.parametrize(("names", "group"), [(ROW_NAMES, RADIAL_PROFILE_FEATURES), (QUICK_NAMES, QUICK_FEATURES)])
 def test_every_name_of_a_row_is_defined_and_every_definition_is_of_a_name(names, group):
     assert {stem for stem in group for name in names if definition_of(name, group) is group[stem]} == set(group)
 
 
-@pytest.mark.parametrize("group", [INCLUSION_FIELD_FEATURES, PROFILE_FEATURES, HELD_FEATURES])
+@pytest.mark.parametrize("group", [INCLUSION_FIELD_FEATURES, RADIAL_PROFILE_FEATURES, QUICK_FEATURES])
 def test_every_number_has_a_unit_and_a_sentence(group):
     for name, definition in group.items():
         assert definition.sentence.endswith("."), name
@@ -25,6 +25,6 @@ def test_every_number_has_a_unit_and_a_sentence(group):
 
 
 def test_a_name_without_a_definition_is_refused():
-    assert definition_of("contrast_0.40_n_0.9_mm", PROFILE_FEATURES).unit == "1"
+    assert definition_of("contrast_0.40_n_0.9_mm", RADIAL_PROFILE_FEATURES).unit == "1"
     with pytest.raises(KeyError, match="contrasts"):
-        definition_of("contrasts_0.40_n", PROFILE_FEATURES)
+        definition_of("contrasts_0.40_n", RADIAL_PROFILE_FEATURES)
