@@ -27,10 +27,10 @@ from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.solve import solve
 from host_tools.forward.tiers import build
 from host_tools.scenes.scene import Scene
+from host_tools.verification.cross_check.calculix import ccx_available, solve_with_calculix
+from host_tools.verification.cross_check.revolved_mesh import Sector
+from host_tools.verification.cross_check.section import Sizes
 from host_tools.verification.level_tables import finest_plan
-from host_tools.verification.peer.calculix import ccx_available, solve_with_calculix
-from host_tools.verification.peer.revolved_mesh import Sector
-from host_tools.verification.peer.section import Sizes
 
 SCENE = Scene(Inclusion(10.0, 6.0, 80.0))
 CALCULIX_SIZES = Sizes(bulk_mm=6.0, rim_mm=0.07, growth=0.6, per_quarter_circle=8.0)
@@ -60,11 +60,11 @@ def _against_calculix() -> None:
         print("CalculiX is not installed (Debian: calculix-ccx): its ratio is left out")
         return
     began = time.perf_counter()
-    peer = solve_with_calculix(SCENE, [1.0], finite_strain=False, sizes=CALCULIX_SIZES, sector=QUARTER)[0]
-    peer_s = time.perf_counter() - began
-    name = f"the same in CalculiX, quarter, {peer.elements} elements"
-    _print(name, peer_s, (peer.w_at_mm(0.0), peer.force_n), exact)
-    print(f"{'CalculiX over ours':48} {peer_s / ours_s:10.0f} x")
+    calculix = solve_with_calculix(SCENE, [1.0], finite_strain=False, sizes=CALCULIX_SIZES, sector=QUARTER)[0]
+    calculix_s = time.perf_counter() - began
+    name = f"the same in CalculiX, quarter, {calculix.elements} elements"
+    _print(name, calculix_s, (calculix.w_at_mm(0.0), calculix.force_n), exact)
+    print(f"{'CalculiX over ours':48} {calculix_s / ours_s:10.0f} x")
 
 
 def _print(name: str, seconds: float, found: tuple[float, float], exact: tuple[float, float]) -> None:

@@ -58,8 +58,8 @@ def test_the_unit_shuts_the_daemon_in(tmp_path):
     """systemd's own score: 10 is exposed, 2 is well shut in; the threshold is in tenths."""
     command = ["systemd-analyze", "security", "--offline=true", "--threshold=20", "--no-pager"]
     path = here(tmp_path, UNIT.read_text())
-    judged = subprocess.run([*command, str(path)], capture_output=True, text=True, check=False)
-    assert judged.returncode == 0, judged.stdout
+    verified = subprocess.run([*command, str(path)], capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stdout
 
 
 def section_of(path: Path, name: str) -> configparser.SectionProxy:
@@ -116,5 +116,5 @@ def test_the_rule_names_the_load_cell_as_the_settings_do():
 
 @pytest.mark.skipif(udev_version() < 254, reason="no udevadm that verifies (systemd 254)")
 def test_udev_takes_the_rule():
-    judged = subprocess.run(["udevadm", "verify", str(RULES)], capture_output=True, text=True, check=False)
-    assert judged.returncode == 0, judged.stderr
+    verified = subprocess.run(["udevadm", "verify", str(RULES)], capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stderr

@@ -159,7 +159,7 @@ class Numbers:
 
 
 def numbers_in_belts(mean: Array, spread: Array, belts: Sequence[Belt]) -> Numbers:
-    """Return the numbers of mean and spread [3] in coordinates (`press_parameters.normalise`), by each unknown's belts.
+    """Return the numbers of mean and spread [3] in coordinates (`parameters.normalise`), by each unknown's belts.
 
     The standard deviation is half of what mean - spread to mean + spread spans in the unknown's own unit.
     """

@@ -117,13 +117,13 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
     from device.simulation.scenario import SERIALS
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.export import export_ramp
-    from host_tools.press_models.ramp_training import DRY_RUN, Effort, train_ramp
+    from host_tools.press_models.ramp_training import DRY_RUN, TrainingBudget, train_ramp
     from host_tools.probe_tables.out_of_range_table import load_wide_table
     from host_tools.scores.dial import publish_dial
 
     tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
-    effort = DRY_RUN if dry_run else Effort()
-    trained = train_ramp(tables, load_wide_table(wide or _wide()), effort=effort, seed=seed, say=note.print)
+    budget = DRY_RUN if dry_run else TrainingBudget()
+    trained = train_ramp(tables, load_wide_table(wide or _wide()), budget=budget, seed=seed, say=note.print)
     with _refusals():
         export_ramp(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command

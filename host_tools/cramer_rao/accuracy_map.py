@@ -15,9 +15,9 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
-from host_tools.cramer_rao.bounds import Limits, limit_of_sights, std_of_box
+from host_tools.cramer_rao.bounds import Limits, limit_of_observed, std_of_box
+from host_tools.cramer_rao.press import ObservedPress, observed_presses, rings_of
 from host_tools.cramer_rao.protocol import Observable, PressProtocol, read_protocol
-from host_tools.cramer_rao.sight import Sight, rings_of, sights
 from host_tools.forward.derivatives.sensitive_presses import Ramps, sensitive_ramp
 from host_tools.scenes.scene import Scene
 
@@ -25,7 +25,7 @@ SIZES_MM, DEPTHS_MM, MODULI_KPA = (3.0, 6.0, 10.0, 15.0), (4.0, 6.0, 8.0, 12.0),
 PROTOCOLS = Path(__file__).resolve().parents[2] / "protocols"
 STANDARD, PRECISE, NOT_SMOOTH = "standard", "precise", "standard, no smooth error"
 UNKNOWN_RATIO = 10.0
-SIGHTS: tuple[Observable, ...] = ("image", "pressure", "displacement")
+OBSERVABLES: tuple[Observable, ...] = ("image", "pressure", "displacement")
 """What is looked at; the scalars are made of the image."""
 
 Triple = tuple[float, float, float]
@@ -78,19 +78,22 @@ def mapped_scene(inclusion: Triple) -> MappedScene:
     """Solve one inclusion and return its bounds."""
     compared = ways()
     ramps = sensitive_ramp(Scene(Inclusion(*inclusion)), compared[STANDARD].forces_n)
-    seen = {order: {what: sights(ramp, what) for what in SIGHTS} for order, ramp in ramps.items()}
+    seen = {order: {what: observed_presses(ramp, what) for what in OBSERVABLES} for order, ramp in ramps.items()}
     return MappedScene(
         inclusion, {name: _limits(inclusion, ramps, seen, protocol) for name, protocol in compared.items()}
     )
 
 
 def _limits(
-    inclusion: Triple, ramps: Ramps, seen: Mapping[int, Mapping[Observable, list[Sight]]], protocol: PressProtocol
+    inclusion: Triple,
+    ramps: Ramps,
+    seen: Mapping[int, Mapping[Observable, list[ObservedPress]]],
+    protocol: PressProtocol,
 ) -> Limits:
     what: Observable = "image" if protocol.observable == "scalars" else protocol.observable
     rings = rings_of(next(iter(ramps.values())))
     loads, box_std = len(protocol.forces_n), std_of_box(Inclusion(*inclusion))
-    by_order = {order: limit_of_sights(by[what][-loads:], rings, protocol, box_std) for order, by in seen.items()}
+    by_order = {order: limit_of_observed(by[what][-loads:], rings, protocol, box_std) for order, by in seen.items()}
     return Limits(by_order, box_std)
 
 

@@ -47,7 +47,7 @@ def accuracy_facts(scenes: list[MappedScene], beside: Array) -> Facts:
     """Return the page's numbers, by the names the template uses; standard deviations are of the logarithm.
 
     Lists of three go by size, depth and modulus. `beside` [offsets, pairs, moduli] is what a place beside the axis
-    changes, of `beside_axis.beside_over_axis`.
+    changes, of `press_bound.beside_over_axis`.
     """
     return {
         "box": [[RANGES[name].low, RANGES[name].high] for name in UNKNOWNS],

@@ -18,9 +18,9 @@ from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_o
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from host_tools.cramer_rao.information import CramerRao, cramer_rao, with_nuisances
 from host_tools.cramer_rao.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe, scalars_of, with_growth
+from host_tools.cramer_rao.press import ObservedPress, observed_presses, rings_of
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
-from host_tools.cramer_rao.sight import Sight, rings_of, sights
 from host_tools.forward.derivatives.mesh_velocity import inclusion_of
 from host_tools.forward.derivatives.sensitive_presses import InclusionSensitivity, sensitive_offset, sensitive_ramp
 from host_tools.forward.derivatives.sensitivity import FORCE
@@ -105,10 +105,10 @@ def std_of_box(inclusion: Inclusion) -> Array:
 
 def limit_of(presses: Sequence[InclusionSensitivity], protocol: PressProtocol, box_std: Array) -> Limit:
     """Return the bound of a protocol on its presses, those beside the inclusion last, as they were solved."""
-    return limit_of_sights(sights(presses, protocol.observable), rings_of(presses), protocol, box_std)
+    return limit_of_observed(observed_presses(presses, protocol.observable), rings_of(presses), protocol, box_std)
 
 
-def limit_of_sights(seen: Sequence[Sight], rings: Rings, protocol: PressProtocol, box_std: Array) -> Limit:
+def limit_of_observed(seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol, box_std: Array) -> Limit:
     """Return the bound of a protocol on what its sensor sees: making that takes most of the time after the solve."""
     observed = observe(seen, rings, protocol)
     if protocol.observable == "scalars":

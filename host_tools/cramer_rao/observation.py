@@ -23,13 +23,15 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.simulation.physics.sensor import Sensor
+from host_tools.cramer_rao.press import ObservedPress
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
-from host_tools.cramer_rao.sight import Sight
 from host_tools.forward.derivatives.mesh_velocity import OFFSET
 
 
-def with_growth(observed: Observation, seen: Sequence[Sight], rings: Rings, protocol: PressProtocol) -> Observation:
+def with_growth(
+    observed: Observation, seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol
+) -> Observation:
     """Return the observation with (P - 1) K more numbers; P is the number of loads pressed on the axis."""
     ramp, count = seen[: len(protocol.forces_n)], len(rings.r_mm)
     rise = _rise(len(ramp), count)
@@ -124,39 +126,39 @@ class Observation:
     covariance: Array
 
 
-def observe(seen: Sequence[Sight], rings: Rings, protocol: PressProtocol) -> Observation:
+def observe(seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol) -> Observation:
     """Return the contrasts of all presses, one after the other, with the errors of a protocol."""
-    values = np.concatenate([sight.contrast for sight in seen])
-    derivatives = {name: np.concatenate([sight.derivatives[name] for sight in seen]) for name in seen[0].derivatives}
-    derivatives[GAIN] = np.concatenate([sight.ratio for sight in seen])
-    derivatives[ZERO] = np.concatenate([sight.by_force_error / sight.force_n for sight in seen])
-    for i, sight in enumerate(seen):
+    values = np.concatenate([press.contrast for press in seen])
+    derivatives = {name: np.concatenate([press.derivatives[name] for press in seen]) for name in seen[0].derivatives}
+    derivatives[GAIN] = np.concatenate([press.ratio for press in seen])
+    derivatives[ZERO] = np.concatenate([press.by_force_error / press.force_n for press in seen])
+    for i, press in enumerate(seen):
         before, after = (sum(len(other.contrast) for other in part) for part in (seen[:i], seen[i + 1 :]))
-        derivatives[f"{FORCE_ERROR}_{i}"] = np.pad(sight.by_force_error, (before, after))
-        if OFFSET in sight.derivatives:
-            derivatives[f"{PLACE}_{i}"] = np.pad(sight.derivatives[OFFSET], (before, after))
+        derivatives[f"{FORCE_ERROR}_{i}"] = np.pad(press.by_force_error, (before, after))
+        if OFFSET in press.derivatives:
+            derivatives[f"{PLACE}_{i}"] = np.pad(press.derivatives[OFFSET], (before, after))
     white = np.diag(np.concatenate(_white_noise(seen, rings, protocol)))
     return Observation(values, derivatives, white + protocol.systematic_ratio**2 * _smooth(seen, rings, protocol))
 
 
-def _white_noise(seen: Sequence[Sight], rings: Rings, protocol: PressProtocol) -> list[Array]:
+def _white_noise(seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol) -> list[Array]:
     """Return the variance of the contrast of each ring and harmonic, for each press."""
-    lights = _noise_of_light([sight.light for sight in seen], seen, rings, protocol, protocol.frames)
+    lights = _noise_of_light([press.light for press in seen], seen, rings, protocol, protocol.frames)
     references = noise_of_reference(seen, rings, protocol)
     variances = []
-    for sight, light, reference in zip(seen, lights, references, strict=True):
-        of_mean = (sight.light / sight.reference) ** 2 * (light + reference)
-        variances.append(np.concatenate([of_mean, np.tile(2 * of_mean, sight.harmonics - 1)]))
+    for press, light, reference in zip(seen, lights, references, strict=True):
+        of_mean = (press.light / press.reference) ** 2 * (light + reference)
+        variances.append(np.concatenate([of_mean, np.tile(2 * of_mean, press.harmonics - 1)]))
     return variances
 
 
-def noise_of_reference(seen: Sequence[Sight], rings: Rings, protocol: PressProtocol) -> list[Array]:
+def noise_of_reference(seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol) -> list[Array]:
     """Return the variance [K] of the logarithm of the reference on each ring, for each press."""
-    return _noise_of_light([sight.reference for sight in seen], seen, rings, protocol, protocol.reference_frames)
+    return _noise_of_light([press.reference for press in seen], seen, rings, protocol, protocol.reference_frames)
 
 
 def _noise_of_light(
-    lights: Sequence[Array], seen: Sequence[Sight], rings: Rings, protocol: PressProtocol, frames: int
+    lights: Sequence[Array], seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol, frames: int
 ) -> list[Array]:
     """Return the variance [K] of the logarithm of a light on each ring, for each press."""
     counts_per_light = protocol.mean_level_counts / float(np.average(seen[-1].reference, weights=rings.pixels))
@@ -171,12 +173,12 @@ def variance_counts(level_counts: Array) -> Array:
     return np.asarray((electrons + SENSOR.read_noise_e**2) / electrons_per_count**2 + 1 / 12)
 
 
-def _smooth(seen: Sequence[Sight], rings: Rings, protocol: PressProtocol) -> Array:
+def _smooth(seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol) -> Array:
     """Return the covariance of smooth errors of ratio 1: those of the light, alike in all presses, and each one's own.
 
     Different harmonics do not couple.
     """
-    parts = [(i, m, sight.ratio[: len(rings.r_mm)]) for i, sight in enumerate(seen) for m in range(sight.harmonics)]
+    parts = [(i, m, press.ratio[: len(rings.r_mm)]) for i, press in enumerate(seen) for m in range(press.harmonics)]
     zero = np.zeros((len(rings.r_mm), len(rings.r_mm)))
 
     def block(i: int, m: int, light: Array, j: int, n: int, other: Array) -> Array:

@@ -33,7 +33,7 @@ BOX_STD: Array = np.full(len(PARAMETERS), EVEN_STD)
 
 
 def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: Mapping[str, float] = NOMINAL) -> Array:
-    """Return the least standard deviations [3] in coordinates, which run from -1 to 1 (`press_parameters.normalise`).
+    """Return the least standard deviations [3] in coordinates, which run from -1 to 1 (`parameters.normalise`).
 
     nuisances: the true ones by their names in `PARAMETERS`; one that is not given is taken to be nominal. nan for a
     press outside the trained ranges, where the forward model says nothing, and for a mode whose bundle has no noise.

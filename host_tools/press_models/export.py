@@ -27,7 +27,13 @@ from device.measurement.ramp_modes.range_classifier import ENTRY, RANGE_FILE
 from host_tools.paper_network.export import write_folder
 from host_tools.press_models.mode_outcome import ModeOutcome
 from host_tools.press_models.mode_statistics import statistics
-from host_tools.press_models.onnx_networks import build_network, build_range_networks, golden_vectors, range_entry
+from host_tools.press_models.onnx_networks import (
+    budget_entry,
+    build_network,
+    build_range_networks,
+    golden_vectors,
+    range_entry,
+)
 from host_tools.press_models.quick_training import QuickOutcome, TrainedQuick
 from host_tools.press_models.ramp_training import TrainedRamp
 from host_tools.press_models.seeds import derived_seed
@@ -53,7 +59,7 @@ def export_ramp(
         "round_sha256": hashlib.sha256(ellipticity).hexdigest(),
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
-        "effort": asdict(trained.effort),
+        "effort": budget_entry(asdict(trained.budget)),
         "features": [{"name": name, "unit": unit} for name, unit in RAMP_UNITS.items()],
         "training_range": _training_range(dict(zip(RAMP_UNITS, trained.samples.rows.T, strict=True))),
         "surrogate_error": _error(trained.surrogate_error),
@@ -84,14 +90,14 @@ def export_quick(
     training_command: str,
 ) -> None:
     """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_ramp`."""
-    rows = trained.pool.rows[:GOLDEN_ROWS]
+    rows = trained.training_set.rows[:GOLDEN_ROWS]
     network = build_network(trained.ensemble)
     card = {
         **_card(folder, network, serials, software_version, training_command),
         "seed": trained.seed,
-        "dataset_sha256": hashlib.sha256(trained.pool.rows.tobytes()).hexdigest(),
+        "dataset_sha256": hashlib.sha256(trained.training_set.rows.tobytes()).hexdigest(),
         "surrogate_sha256": surrogate_sha256,
-        "effort": vars(trained.effort),
+        "effort": budget_entry(asdict(trained.budget)),
         "features": [{"name": name, "unit": unit} for name, unit in QUICK_UNITS.items()],
         "training_range": _training_range(dict(zip(QUICK_UNITS, _usual(trained).T, strict=True))),
         "modes": {
@@ -108,9 +114,9 @@ def export_quick(
 
 def _usual(trained: TrainedQuick) -> Array:
     """Return the ends [2, 12] between which rows with noise lie, but for one in two thousand at each."""
-    pool = trained.pool
-    noisy = pool.noisy(
-        np.arange(len(pool.rows)), np.random.default_rng(derived_seed(trained.seed, "usual rows of quick"))
+    training_set = trained.training_set
+    noisy = training_set.noisy(
+        np.arange(len(training_set.rows)), np.random.default_rng(derived_seed(trained.seed, "usual rows of quick"))
     )
     return np.quantile(noisy.astype(np.float64), [0.0005, 0.9995], axis=0)
 

@@ -22,7 +22,7 @@ from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.noise import PressNoise
 from host_tools.press_models.confidence_belts import confidence_belts, widened
-from host_tools.press_models.noisy_presses import Pool
+from host_tools.press_models.noisy_presses import PressSet
 from host_tools.press_models.recorded_presses import RecordedPresses, in_parallel
 from host_tools.press_models.train_ensemble import DenseEnsemble
 from host_tools.press_models.train_range import RangeNetwork
@@ -37,16 +37,16 @@ EnsembleNetworks = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Answered:
+class EvaluatedPresses:
     """Truth, mean and spread [n, 3] of presses, in coordinates."""
 
     truth: Array
     mean: Array
     spread: Array
 
-    def part(self, chosen: slice) -> Answered:
+    def part(self, chosen: slice) -> EvaluatedPresses:
         """Return some of the presses."""
-        return Answered(self.truth[chosen], self.mean[chosen], self.spread[chosen])
+        return EvaluatedPresses(self.truth[chosen], self.mean[chosen], self.spread[chosen])
 
     def covered(self, belts: tuple[Belt, ...]) -> tuple[Array, Array]:
         """Return, as booleans [n, 3], whether each interval holds the truth, and whether it narrows the range down."""
@@ -66,15 +66,15 @@ class ModeOutcome:
     misfit_ratio: float
     elongation_deviations: float
     outside_log_odds: float
-    simulated: Answered
-    recorded: Answered
+    simulated: EvaluatedPresses
+    recorded: EvaluatedPresses
 
 
-def judged_mode(
+def evaluate_mode(
     mode: Mode,
     ensemble: DenseEnsemble,
     answers: RampAnswers,
-    pool: Pool,
+    evaluation_set: PressSet,
     recorded: RecordedPresses,
     ellipticity: EllipticityTest,
     *,
@@ -82,10 +82,12 @@ def judged_mode(
     seed: int,
     jobs: int = -1,
 ) -> ModeOutcome:
-    """Return the outcome of a mode on a pool's presses with noise and on recorded ones, with its critical log odds."""
-    rows = pool.noisy(np.arange(len(pool.rows)), np.random.default_rng([seed, 1])).astype(np.float64)
-    truth = pool.normalised[:, :THREE].astype(np.float64)
-    simulated = Answered(truth, *(_answered(mode, ensemble, answers, rows, jobs)))
+    """Return the outcome of a mode on an evaluation set's presses with noise and on recorded ones, with its critical log odds."""
+    rows = evaluation_set.noisy(np.arange(len(evaluation_set.rows)), np.random.default_rng([seed, 1])).astype(
+        np.float64
+    )
+    truth = evaluation_set.normalised[:, :THREE].astype(np.float64)
+    simulated = EvaluatedPresses(truth, *(_evaluated(mode, ensemble, answers, rows, jobs)))
     half = len(rows) // 2
     seen = simulated.part(slice(half))
     belts = confidence_belts(seen.truth, seen.mean, seen.spread)
@@ -114,7 +116,7 @@ def critical_log_odds(ranges: RangeNetwork, rows: Array, noise: PressNoise) -> f
 
 def outcome_of(
     belts: tuple[Belt, ...],
-    simulated: Answered,
+    simulated: EvaluatedPresses,
     recorded: RecordedPresses,
     found: Sequence[RampAnswer],
     elongation: Array,
@@ -122,12 +124,12 @@ def outcome_of(
 ) -> ModeOutcome:
     """Return the outcome of a mode: belts of simulated presses, answers to recorded ones and their elongation [n]."""
     usual = slice(len(found) // 2)
-    answered = Answered(
+    evaluated = EvaluatedPresses(
         normalise(recorded.parameters)[:, :THREE],
         np.array([answer.mean for answer in found]),
         np.array([answer.spread for answer in found]),
     )
-    seen = answered.part(usual)
+    seen = evaluated.part(usual)
     misfit = [answer.misfit_ratio for answer in found]
     return ModeOutcome(
         widened(belts, seen.truth, seen.mean, seen.spread),
@@ -135,7 +137,7 @@ def outcome_of(
         float(np.quantile(elongation, CRITICAL_RATIO)),
         outside_log_odds,
         simulated,
-        answered.part(slice(usual.stop, None)),
+        evaluated.part(slice(usual.stop, None)),
     )
 
 
@@ -147,7 +149,9 @@ def answers_to(
     return in_parallel(lambda i: answers.answer(rows[i], mode, mean[i], spread[i]), len(rows), jobs)
 
 
-def _answered(mode: Mode, ensemble: DenseEnsemble, answers: RampAnswers, rows: Array, jobs: int) -> tuple[Array, Array]:
+def _evaluated(
+    mode: Mode, ensemble: DenseEnsemble, answers: RampAnswers, rows: Array, jobs: int
+) -> tuple[Array, Array]:
     """Return mean and spread [n, 3]; mode standard needs no fit for them."""
     if mode == "standard":
         return ensemble.estimate(rows)

@@ -15,18 +15,18 @@ from device.measurement.arrays import Array
 from device.measurement.confidence_belt import Belt
 from device.measurement.parameters import EVEN_STD, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS
-from host_tools.press_models.mode_outcome import Answered
+from host_tools.press_models.mode_outcome import EvaluatedPresses
 
 OCTILES = 8
 DIGITS = 4
 
 
-def statistics(answered: Answered, belts: tuple[Belt, ...]) -> dict[str, Any]:
+def statistics(evaluated: EvaluatedPresses, belts: tuple[Belt, ...]) -> dict[str, Any]:
     """Return the statistics of presses by unknown."""
-    covered, known = answered.covered(belts)
-    truth, mean = denormalise_unknowns(answered.truth), denormalise_unknowns(answered.mean)
+    covered, known = evaluated.covered(belts)
+    truth, mean = denormalise_unknowns(evaluated.truth), denormalise_unknowns(evaluated.mean)
     percent = 100 * (mean - truth) / truth
-    error = answered.mean - answered.truth
+    error = evaluated.mean - evaluated.truth
     return {"presses": len(truth)} | {
         name: _of_unknown(truth[:, i], percent[:, i], error[:, i], covered[:, i], known[:, i])
         for i, name in enumerate(UNKNOWNS)

@@ -41,7 +41,7 @@ class Presses(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Pool:
+class PressSet:
     """Coordinates [n, 9] and noise-free rows [n, P] of random presses, single precision, and their noise."""
 
     normalised: Single
@@ -77,8 +77,8 @@ class NoiseSampler:
         return np.asarray(noisy)
 
 
-def random_pool(surrogate: PressSurrogate, noise: PressNoise, count: int, seed: int) -> Pool:
+def random_press_set(surrogate: PressSurrogate, noise: PressNoise, count: int, seed: int) -> PressSet:
     """Return `count` random presses of the surrogate."""
     normalised = normalise(draw_parameters(count, np.random.default_rng(seed)))
     rows = [surrogate.rows(normalised[start : start + BLOCK]) for start in range(0, count, BLOCK)]
-    return Pool(normalised.astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))
+    return PressSet(normalised.astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ from host_tools.paper_network.export import AGREEMENT, OnnxGraph, agreed_outputs
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling
 from host_tools.press_models.train_ensemble import DenseEnsemble
 from host_tools.press_models.train_range import DEPTHS, SIZES, RangeNetwork, TrainedRange
+
+STORED_AS = {"trained_on": "pool", "evaluated": "judged"}
+"""Entries of a training budget that the committed cards know by older names."""
 
 
 def build_network(ensemble: DenseEnsemble) -> bytes:
@@ -88,6 +92,14 @@ def build_range_networks(networks: Mapping[Mode, RangeNetwork]) -> bytes:
     return graph.serialise(columns, dict.fromkeys(networks, 1))
 
 
+def budget_entry(budget: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a training budget as a card states it, under `effort`."""
+    return {
+        STORED_AS.get(name, name): budget_entry(value) if isinstance(value, Mapping) else value
+        for name, value in budget.items()
+    }
+
+
 def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str, Any]:
     """Return what the card says of the networks; `rows` [n, P] are the golden features of the bundle.
 
@@ -100,7 +112,7 @@ def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str,
         "size_mm": list(SIZES),
         "depth_mm": list(DEPTHS),
         "dataset_sha256": trained.dataset_sha256,
-        "effort": vars(trained.effort),
+        "effort": budget_entry(asdict(trained.budget)),
         "surrogate_error": {
             "largest": float(trained.surrogate_error.max()),
             "mean": float(trained.surrogate_error.mean()),

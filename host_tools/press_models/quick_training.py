@@ -30,8 +30,8 @@ from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.camera_noise import shrunk_covariance
 from host_tools.press_models.confidence_belts import confidence_belts, widened
-from host_tools.press_models.mode_outcome import Answered
-from host_tools.press_models.noisy_presses import Index, Pool, random_pool
+from host_tools.press_models.mode_outcome import EvaluatedPresses
+from host_tools.press_models.noisy_presses import Index, PressSet, random_press_set
 from host_tools.press_models.press_samples import draw_parameters, profile_rows
 from host_tools.press_models.recorded_presses import EXACT, in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
@@ -73,10 +73,10 @@ class QuickPool:
         return flat + model + 1e-14 * np.eye(RINGS)
 
 
-def quick_pool(pool: Pool, camera: Array, seed: int) -> QuickPool:
-    """Return a pool of ramps as held presses, each at a random force."""
-    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(pool.rows))
-    return QuickPool(pool.normalised, quick_rows(pool.rows, force_n).astype(np.float32), camera)
+def quick_pool(training_set: PressSet, camera: Array, seed: int) -> QuickPool:
+    """Return a set of ramps as held presses, each at a random force."""
+    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(ramps.rows))
+    return QuickPool(training_set.normalised, quick_rows(training_set.rows, force_n).astype(np.float32), camera)
 
 
 def quick_rows(rows: Single | Array, force_n: Array) -> Array:
@@ -93,14 +93,14 @@ rejection of its kind in mode quick, which has neither a best fit nor networks o
 
 
 @dataclass(frozen=True)
-class QuickEffort:
+class QuickBudget:
     """How many presses go into each step; the defaults take some five minutes on two cores."""
 
     recordings: int = 300
-    pool: int = 60_000
+    trained_on: int = 60_000
     members: int = 2
     steps: int = 5_000
-    judged: int = 30_000
+    evaluated: int = 30_000
     test_recordings: int = 600
 
 
@@ -110,8 +110,8 @@ class QuickOutcome:
 
     belts: tuple[Belt, ...]
     elongation_ratio: float
-    simulated: Answered
-    recorded: Answered
+    simulated: EvaluatedPresses
+    recorded: EvaluatedPresses
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,10 +119,10 @@ class TrainedQuick:
     """All parts of the bundle."""
 
     ensemble: DenseEnsemble
-    pool: QuickPool
+    training_set: QuickPool
     faintest_contrast: tuple[float, ...]
     outcome: QuickOutcome
-    effort: QuickEffort
+    budget: QuickBudget
     seed: int
 
 
@@ -140,32 +140,32 @@ def train_quick(
     surrogate: PressSurrogate,
     noise: PressNoise,
     *,
-    effort: QuickEffort | None = None,
+    budget: QuickBudget | None = None,
     seed: int = 1,
     jobs: int = -1,
     say: Callable[[str], None] = lambda step: None,
 ) -> TrainedQuick:
     """Return the trained parts; `noise` is of mode standard, whose camera's part is replaced by that of one frame."""
-    asked = effort or QuickEffort()
+    asked = budget or QuickBudget()
 
     def held(count: int, purpose: str) -> QuickPool:
         drawn = derived_seed(seed, purpose)
-        return quick_pool(random_pool(surrogate, noise, count, drawn), camera, drawn)
+        return quick_pool(random_press_set(surrogate, noise, count, drawn), camera, drawn)
 
     say(f"{asked.recordings} recordings of held presses")
     camera = _camera(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)
     say(f"{asked.members} networks")
-    pool = held(asked.pool, "training presses of quick")
-    ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
-    say(f"{asked.judged} presses and {asked.test_recordings} recordings for the limits")
-    fresh = held(asked.judged, "judged presses of quick")
-    noisy = fresh.noisy(np.arange(asked.judged), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
-    simulated = _answered(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
+    training_set = held(asked.trained_on, "training presses of quick")
+    ensemble = train_ensemble(training_set, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
+    say(f"{asked.evaluated} presses and {asked.test_recordings} recordings for the limits")
+    fresh = held(asked.evaluated, "judged presses of quick")
+    noisy = fresh.noisy(np.arange(asked.evaluated), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
+    simulated = _evaluated(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
     recording = derived_seed(seed, "judged recordings of quick")
     recorded = recorded_holds(tables, asked.test_recordings, recording, ErrorLevels(), jobs)
-    none = pool.typical_noise()[:RINGS, :RINGS]
+    none = training_set.typical_noise()[:RINGS, :RINGS]
     faintest = tuple(VISIBLE_DEVIATIONS * float(np.sqrt(weights @ none @ weights)) for weights in SEEN_BY.values())
-    return TrainedQuick(ensemble, pool, faintest, _outcome(ensemble, simulated, recorded), asked, seed)
+    return TrainedQuick(ensemble, training_set, faintest, _outcome(ensemble, simulated, recorded), asked, seed)
 
 
 def recorded_holds(tables: ProbeTables, count: int, seed: int, levels: ErrorLevels, jobs: int) -> RecordedHolds:
@@ -188,19 +188,19 @@ def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
     return shrunk_covariance((recorded.rows - exact)[:, :RINGS] / (1 + exact[:, :RINGS]))
 
 
-def _outcome(ensemble: DenseEnsemble, simulated: Answered, recorded: RecordedHolds) -> QuickOutcome:
+def _outcome(ensemble: DenseEnsemble, simulated: EvaluatedPresses, recorded: RecordedHolds) -> QuickOutcome:
     """Return belts and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
     half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
-    seen, answered = simulated.part(slice(half)), _answered(ensemble, recorded.rows, normalise(recorded.parameters))
-    first = answered.part(usual)
+    seen, evaluated = simulated.part(slice(half)), _evaluated(ensemble, recorded.rows, normalise(recorded.parameters))
+    first = evaluated.part(usual)
     belts = confidence_belts(seen.truth, seen.mean, seen.spread)
     return QuickOutcome(
         widened(belts, first.truth, first.mean, first.spread),
         float(np.quantile(recorded.elongation[usual], CRITICAL_RATIO)),
         simulated.part(slice(half, None)),
-        answered.part(slice(usual.stop, None)),
+        evaluated.part(slice(usual.stop, None)),
     )
 
 
-def _answered(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> Answered:
-    return Answered(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))
+def _evaluated(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> EvaluatedPresses:
+    return EvaluatedPresses(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))

@@ -28,33 +28,33 @@ from host_tools.press_models.fit_surrogate import (
     held_out_error,
     held_out_second_harmonics,
 )
-from host_tools.press_models.mode_outcome import ModeOutcome, critical_log_odds, judged_mode
-from host_tools.press_models.noisy_presses import random_pool
+from host_tools.press_models.mode_outcome import ModeOutcome, critical_log_odds, evaluate_mode
+from host_tools.press_models.noisy_presses import random_press_set
 from host_tools.press_models.press_samples import PressSamples, draw_parameters, sample_presses
 from host_tools.press_models.recorded_presses import record_presses
 from host_tools.press_models.seeds import derived_seed
 from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
-from host_tools.press_models.train_range import RangeEffort, TrainedRange, train_range
+from host_tools.press_models.train_range import RangeBudget, TrainedRange, train_range
 from host_tools.probe_tables.out_of_range_table import WideTable
 
 
 @dataclass(frozen=True)
-class Effort:
+class TrainingBudget:
     """How many presses go into each step; the defaults take some ninety minutes on two cores."""
 
     presses: int = 10_000
     held_out: int = 600
     noise_recordings: int = 200
-    pool: int = 120_000
+    trained_on: int = 120_000
     members: int = 4
     steps: int = 9_000
-    judged: int = 30_000
+    evaluated: int = 30_000
     fitted: int = 14_000
     test_recordings: int = 1_200
-    ranges: RangeEffort = field(default_factory=RangeEffort)
+    ranges: RangeBudget = field(default_factory=RangeBudget)
 
 
-DRY_RUN = Effort(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40, RangeEffort(4_600, 100, 20_000, 1, 900))
+DRY_RUN = TrainingBudget(3_200, 100, 40, 20_000, 2, 900, 12_000, 1_200, 40, RangeBudget(4_600, 100, 20_000, 1, 900))
 """Enough to try the chain; the model is a poor one."""
 
 
@@ -71,7 +71,7 @@ class TrainedRamp:
     ellipticity: EllipticityTest
     outcomes: dict[Mode, ModeOutcome]
     samples: PressSamples
-    effort: Effort
+    budget: TrainingBudget
     seed: int
 
 
@@ -79,7 +79,7 @@ def train_ramp(
     tables: ProbeTables,
     wide: WideTable,
     *,
-    effort: Effort | None = None,
+    budget: TrainingBudget | None = None,
     seed: int = 1,
     jobs: int = -1,
     say: Callable[[str], None] = lambda step: None,
@@ -88,7 +88,7 @@ def train_ramp(
 
     The same seed gives the same parts whatever `jobs`.
     """
-    asked = effort or Effort()
+    asked = budget or TrainingBudget()
     say(f"{asked.presses} random presses")
     samples = sample_presses(tables, asked.presses + asked.held_out, seed=derived_seed(seed, "surrogate"), jobs=jobs)
     learned, kept = samples.split(asked.presses)
@@ -107,22 +107,24 @@ def train_ramp(
         {mode: of_mode.second_harmonics for mode, of_mode in camera.items()},
     )
     say(f"{asked.members} networks")
-    pool = random_pool(surrogate, noise["standard"], asked.pool, derived_seed(seed, "training presses"))
-    ensemble = train_ensemble(pool, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
-    ranges = train_range(tables, wide, noise, effort=asked.ranges, seed=seed, jobs=jobs, say=say)
+    training_set = random_press_set(
+        surrogate, noise["standard"], asked.trained_on, derived_seed(seed, "training presses")
+    )
+    ensemble = train_ensemble(training_set, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
+    ranges = train_range(tables, wide, noise, budget=asked.ranges, seed=seed, jobs=jobs, say=say)
     answers = RampAnswers(surrogate, noise)
-    outcomes = judged(tables, ensemble, answers, ranges, ellipticity, asked, seed=seed, jobs=jobs, say=say)
+    outcomes = evaluate_modes(tables, ensemble, answers, ranges, ellipticity, asked, seed=seed, jobs=jobs, say=say)
     errors = held_out_error(surrogate, kept), held_out_second_harmonics(ellipticity, kept)
     return TrainedRamp(surrogate, *errors, noise, ensemble, ranges, ellipticity, outcomes, samples, asked, seed)
 
 
-def judged(
+def evaluate_modes(
     tables: ProbeTables,
     ensemble: DenseEnsemble,
     answers: RampAnswers,
     ranges: TrainedRange,
     ellipticity: EllipticityTest,
-    effort: Effort,
+    budget: TrainingBudget,
     *,
     seed: int,
     jobs: int = -1,
@@ -130,14 +132,22 @@ def judged(
 ) -> dict[Mode, ModeOutcome]:
     """Return what each mode makes of random presses with noise, and of recordings that drift."""
     simulating, recording = derived_seed(seed, "judged presses"), derived_seed(seed, "judged recordings")
-    parameters = draw_parameters(effort.test_recordings, np.random.default_rng(recording))
+    parameters = draw_parameters(budget.test_recordings, np.random.default_rng(recording))
     outcomes: dict[Mode, ModeOutcome] = {}
-    for mode, simulated in zip(RAMP_MODES, (effort.judged, effort.fitted), strict=True):
+    for mode, simulated in zip(RAMP_MODES, (budget.evaluated, budget.fitted), strict=True):
         say(f"{simulated} presses and {len(parameters)} recordings for the limits of mode {mode}")
-        pool = random_pool(answers.surrogate, answers.noise[mode], simulated, simulating)
+        evaluation_set = random_press_set(answers.surrogate, answers.noise[mode], simulated, simulating)
         recorded = record_presses(tables, parameters, mode, seed=recording, levels=ErrorLevels(), jobs=jobs)
         usual = critical_log_odds(ranges.networks[mode], recorded.rows, answers.noise[mode])
-        outcomes[mode] = judged_mode(
-            mode, ensemble, answers, pool, recorded, ellipticity, outside_log_odds=usual, seed=simulating, jobs=jobs
+        outcomes[mode] = evaluate_mode(
+            mode,
+            ensemble,
+            answers,
+            evaluation_set,
+            recorded,
+            ellipticity,
+            outside_log_odds=usual,
+            seed=simulating,
+            jobs=jobs,
         )
     return outcomes

@@ -54,8 +54,8 @@ SCALED_ON = 20_000
 FEWEST_PRESSES = 1000
 
 
-class Lesson(NamedTuple):
-    """What networks are to learn of a pool's presses: `target` [n, ...], by a loss of so many outputs."""
+class Task(NamedTuple):
+    """What networks are to learn of a training set's presses: `target` [n, ...], by a loss of so many outputs."""
 
     outputs: int
     target: Single
@@ -79,7 +79,7 @@ class DenseEnsemble:
 
 
 def train_ensemble(
-    pool: Presses,
+    training_set: Presses,
     *,
     seed: int,
     members: int,
@@ -87,19 +87,19 @@ def train_ensemble(
     columns: slice = slice(None),
     jobs: int = -1,
 ) -> DenseEnsemble:
-    """Return the ensemble trained on a pool's rows, or on some of their columns.
+    """Return the ensemble trained on a training set's rows, or on some of their columns.
 
     The same seed gives the same ensemble whatever `jobs` (-1: all cores). Raises `InvalidQuantity` for too few presses.
     """
-    lesson = Lesson(2 * len(UNKNOWNS), pool.normalised[:, : len(UNKNOWNS)], loss_and_gradient)
+    task = Task(2 * len(UNKNOWNS), training_set.normalised[:, : len(UNKNOWNS)], loss_and_gradient)
     return DenseEnsemble(
-        *train_members(pool, lesson, seed=seed, members=members, steps=steps, columns=columns, jobs=jobs)
+        *train_members(training_set, task, seed=seed, members=members, steps=steps, columns=columns, jobs=jobs)
     )
 
 
 def train_members(
-    pool: Presses,
-    lesson: Lesson,
+    training_set: Presses,
+    task: Task,
     *,
     seed: int,
     members: int,
@@ -107,29 +107,29 @@ def train_members(
     columns: slice = slice(None),
     jobs: int = -1,
 ) -> tuple[InputScaling, tuple[list[DenseLayer], ...]]:
-    """Return the scaling that networks share and the layers of each, trained on a lesson; as `train_ensemble`."""
-    require("presses", len(pool.rows), Bound(FEWEST_PRESSES, np.inf, "presses"), "draw more random presses")
+    """Return the scaling that networks share and the layers of each, trained on a task; as `train_ensemble`."""
+    require("presses", len(training_set.rows), Bound(FEWEST_PRESSES, np.inf, "presses"), "draw more random presses")
     require("members", members, Bound(1, 100, "networks"), "train at least one")
     rng = np.random.default_rng([seed, 0])
-    some = pool.noisy(rng.integers(len(pool.rows), size=min(SCALED_ON, len(pool.rows))), rng)
-    typical = pool.typical_noise()[columns, columns]
+    some = training_set.noisy(rng.integers(len(training_set.rows), size=min(SCALED_ON, len(training_set.rows))), rng)
+    typical = training_set.typical_noise()[columns, columns]
     scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical)
     with parallel_config(backend="loky", inner_max_num_threads=1):
         trained = Parallel(n_jobs=jobs)(
-            delayed(_member)(pool, lesson, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
+            delayed(_member)(training_set, task, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
             for member in range(members)
         )
     return scaling, tuple(trained)
 
 
 def _member(
-    pool: Presses, lesson: Lesson, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
+    training_set: Presses, task: Task, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
 ) -> list[DenseLayer]:
     """Return the layers of one network after `steps` batches of fresh noise."""
-    layers = initial_layers(2 * scaling.projection.shape[1], rng, lesson.outputs)
+    layers = initial_layers(2 * scaling.projection.shape[1], rng, task.outputs)
     adam = Adam(layers, rate=RATE, steps=steps)
     for _ in range(steps):
-        index = rng.integers(len(pool.rows), size=BATCH)
-        inputs = scaling.inputs(pool.noisy(index, rng)[:, columns])
-        adam.step(lesson.loss_and_gradient(layers, inputs, lesson.target[index])[1])
+        index = rng.integers(len(training_set.rows), size=BATCH)
+        inputs = scaling.inputs(training_set.noisy(index, rng)[:, columns])
+        adam.step(task.loss_and_gradient(layers, inputs, task.target[index])[1])
     return layers

@@ -28,10 +28,10 @@ from device.measurement.ramp_modes.surrogate import DEPTH, SIZE, assemble, inclu
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, activations_of, backward
 from host_tools.press_models.fit_surrogate import INCLUSION_REACH, fit_polynomials
-from host_tools.press_models.noisy_presses import BLOCK, NoiseSampler, Pool
+from host_tools.press_models.noisy_presses import BLOCK, NoiseSampler, PressSet
 from host_tools.press_models.press_samples import NEAREST_MM, PressSamples, draw_parameters, sample_presses
 from host_tools.press_models.seeds import derived_seed
-from host_tools.press_models.train_ensemble import Lesson, train_members
+from host_tools.press_models.train_ensemble import Task, train_members
 from host_tools.probe_tables.out_of_range_table import SHALLOWEST_MM, SIZES_MM, WideTable, deepest_mm
 
 SIZES, DEPTHS = (1.5, SIZES_MM[1]), (SHALLOWEST_MM, deepest_mm(1.5))
@@ -109,12 +109,12 @@ ones follow presses kept apart worse, where the largest and deepest inclusions a
 
 
 @dataclass(frozen=True)
-class RangeEffort:
+class RangeBudget:
     """How many presses go into each step; the defaults take some twenty minutes on two cores."""
 
     presses: int = 8_000
     held_out: int = 300
-    pool: int = 200_000
+    trained_on: int = 200_000
     members: int = 2
     steps: int = 20_000
 
@@ -129,7 +129,7 @@ class TrainedRange:
     networks: dict[Mode, RangeNetwork]
     surrogate_error: Array
     dataset_sha256: str
-    effort: RangeEffort
+    budget: RangeBudget
 
 
 def train_range(
@@ -137,13 +137,13 @@ def train_range(
     wide: WideTable,
     noise: Mapping[Mode, PressNoise],
     *,
-    effort: RangeEffort | None = None,
+    budget: RangeBudget | None = None,
     seed: int = 1,
     jobs: int = -1,
     say: Callable[[str], None] = lambda step: None,
 ) -> TrainedRange:
     """Return the networks; `say` hears what begins. The same seed gives the same ones whatever `jobs`."""
-    asked = effort or RangeEffort()
+    asked = budget or RangeBudget()
     say(f"{asked.presses} random presses in and around the ranges")
     samples = sample_presses(
         wide.around(tables),
@@ -155,7 +155,7 @@ def train_range(
     learned, kept = samples.split(asked.presses)
     surrogate = wide_surrogate(learned)
     say(f"{asked.members} networks for the ranges of each mode")
-    presses = wide_pool(surrogate, noise["standard"], asked.pool, seed)
+    presses = wide_press_set(surrogate, noise["standard"], asked.trained_on, seed)
     networks = {
         mode: train_network(replace(presses, sampler=NoiseSampler(of_mode)), seed, asked, jobs)
         for mode, of_mode in noise.items()
@@ -169,15 +169,19 @@ def wide_surrogate(samples: PressSamples) -> WideSurrogate:
     return WideSurrogate(*fit_polynomials(samples, wide_coordinates(samples.parameters), REACH, HIGHEST))
 
 
-def wide_pool(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int) -> Pool:
+def wide_press_set(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int) -> PressSet:
     """Return random presses in and around the ranges; coordinates of those outside lie outside -1 to 1."""
     rng = np.random.default_rng(derived_seed(seed, "training presses around the ranges"))
     parameters = draw_wide_parameters(count, rng)
     rows = [surrogate.rows(parameters[start : start + BLOCK]) for start in range(0, count, BLOCK)]
-    return Pool(normalise(parameters).astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise))
+    return PressSet(
+        normalise(parameters).astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise)
+    )
 
 
-def train_network(pool: Pool, seed: int, effort: RangeEffort, jobs: int) -> RangeNetwork:
-    """Return the networks trained on a pool's rows; raises as `train_members`."""
-    lesson = Lesson(1, is_outside(pool.normalised).astype(np.float32), logistic_loss_and_gradient)
-    return RangeNetwork(*train_members(pool, lesson, seed=seed, members=effort.members, steps=effort.steps, jobs=jobs))
+def train_network(training_set: PressSet, seed: int, budget: RangeBudget, jobs: int) -> RangeNetwork:
+    """Return the networks trained on a training set's rows; raises as `train_members`."""
+    task = Task(1, is_outside(training_set.normalised).astype(np.float32), logistic_loss_and_gradient)
+    return RangeNetwork(
+        *train_members(training_set, task, seed=seed, members=budget.members, steps=budget.steps, jobs=jobs)
+    )

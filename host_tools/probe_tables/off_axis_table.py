@@ -59,7 +59,7 @@ def tilt_per_degree(
 
 
 POINTS = (5, 4, 2, 6)
-"""Points in size, depth, contrast and offset."""
+"""Points in size, depth, mismatch and offset."""
 SMALLEST_SIZE_MM = 2.0
 OFFSETS_MM = (2.0, 16.0)
 MODES = 11
@@ -80,9 +80,9 @@ def cosine_modes(field: Array) -> Array:
     return np.asarray(series[:MODES])
 
 
-def inclusions_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, contrasts: Array) -> Array:
-    """Return the modes [M, 2, K, R] of one geometry at all contrasts, over these too, on one mesh."""
-    moduli_kpa = [NOMINAL.modulus_kpa(float(contrast)) for contrast in contrasts]
+def inclusions_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, mismatches: Array) -> Array:
+    """Return the modes [M, 2, K, R] of one geometry at all mismatches, over these too, on one mesh."""
+    moduli_kpa = [NOMINAL.modulus_kpa(float(mismatch)) for mismatch in mismatches]
     scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm)
     meshed = build(scene, replace(model_plan(scene), grading="coarse"))
     bare, *pressed = (
@@ -90,7 +90,7 @@ def inclusions_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, cont
         for materials in (baseline(scene), *(with_inclusion(_with_modulus(scene, E)) for E in moduli_kpa))
     )
     modes = np.stack([face_modes(meshed.rays.r_mm[0], face, bare) for face in pressed])
-    return modes / size_mm**3 / contrasts[:, None, None, None]
+    return modes / size_mm**3 / mismatches[:, None, None, None]
 
 
 def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
@@ -121,7 +121,8 @@ def build_off_axis_table(
     grid = list(product(range(points[0]), range(points[1]), range(points[3])))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     solved = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.contrast) for i, j, m in grid
+        delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.elastic_mismatch)
+        for i, j, m in grid
     )
     for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
         inclusion_field[i, j, :, m] = modes

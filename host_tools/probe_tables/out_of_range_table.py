@@ -32,14 +32,14 @@ from device.simulation.physics.surface_table import Ramp, SurfaceTable
 from device.simulation.physics.table_file import load_table, save_table
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.probe_tables.off_axis_table import OFFSETS_MM, inclusions_per_n_mm3
-from host_tools.probe_tables.surface_table import CONTRASTS, lump_per_n_mm3, scene_in
+from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES, lump_per_n_mm3, scene_in
 from host_tools.scenes.scene import Press, Scene
 
 NAME, SCHEMA = "wide_table", "tsis.wide_table/1"
 ACTION = "run `host_tools table --part wide` to make it again"
 SIZES_MM, SHALLOWEST_MM = (1.2, 18.0), 3.0
 POINTS, ASIDE_POINTS = (8, 9, 3), (6, 6, 2)
-"""Points in size, depth and contrast, on the axis and beside it."""
+"""Points in size, depth and mismatch, on the axis and beside it."""
 SMALLEST_ASIDE_MM = 1.8
 ASIDE_MM = OFFSETS_MM[0]
 """The first offset of the probe's own table: nearer the axis an inclusion's field fades into the centred one's."""
@@ -48,15 +48,15 @@ DEEPEST_MM, BEND_MM, BENT_OVER_MM = 17.9, 11.5, 1 / 0.7
 
 class WideAxes(NamedTuple):
     """Ascending points in size, in the share of the way from the shallowest to the deepest inclusion, and in
-    contrast.
+    mismatch.
     """
 
     size_mm: Array
     depth_share: Array
-    contrast: Array
+    elastic_mismatch: Array
 
     def inclusion_per_n(self, fields: Array, inclusion: Inclusion, slab: Slab) -> Array:
-        """Return an inclusion's field per newton from fields [2, S, D, M, ...] over force, strength and contrast.
+        """Return an inclusion's field per newton from fields [2, S, D, M, ...] over force, strength and mismatch.
 
         Raises `InvalidQuantity` for a size or depth outside the wide ranges.
         """
@@ -64,9 +64,9 @@ class WideAxes(NamedTuple):
         require("size_mm", size_mm, Bound(0.0, SIZES_MM[1], "mm"), CHOOSE)
         require("depth_mm", depth_mm, Bound(SHALLOWEST_MM, deepest_mm(size_mm), "mm"), CHOOSE)
         share = (depth_mm - SHALLOWEST_MM) / (deepest_mm(size_mm) - SHALLOWEST_MM)
-        contrast = slab.contrast(modulus_kpa)
-        place = max(size_mm, float(self.size_mm[0])), share, contrast
-        return far_field_strength(size_mm, depth_mm) * contrast * interpolated(fields, self, place)
+        mismatch = slab.elastic_mismatch(modulus_kpa)
+        place = max(size_mm, float(self.size_mm[0])), share, mismatch
+        return far_field_strength(size_mm, depth_mm) * mismatch * interpolated(fields, self, place)
 
     def carried_on(self, own: Array, fields: Array, inclusion: Inclusion, near: Inclusion, slab: Slab) -> Array:
         """Return an inclusion's field per newton where that of the nearest inclusion inside is `own`, as strong as far
@@ -128,7 +128,7 @@ def nearest(inclusion: Inclusion, table: SurfaceTable | OffAxisTable) -> Inclusi
 
 @dataclass(frozen=True)
 class WideTable:
-    """`centred` [2, S, D, M, F, R] and `aside` [2, S', D', M', K, R'] over force, strength and contrast; w, then p."""
+    """`centred` [2, S, D, M, F, R] and `aside` [2, S', D', M', K, R'] over force, strength and mismatch; w, then p."""
 
     centred: Array
     aside: Array
@@ -155,9 +155,9 @@ ARRAYS = tuple(WideTable.__dataclass_fields__)
 def made_for() -> dict[str, Any]:
     """Return for which inclusions and surroundings a table is made: one for others is refused."""
     inclusions = [
-        [*place, depth_at(*place[:2]), contrast]
+        [*place, depth_at(*place[:2]), mismatch]
         for points, smallest_mm in ((POINTS, SIZES_MM[0]), (ASIDE_POINTS, SMALLEST_ASIDE_MM))
-        for *place, contrast in product(*(map(float, one) for one in axes(points, smallest_mm)))
+        for *place, mismatch in product(*(map(float, one) for one in axes(points, smallest_mm)))
     ]
     return {
         "inclusions_sha256": hashlib.sha256(np.round(inclusions, 6).tobytes()).hexdigest(),
@@ -179,11 +179,11 @@ def load_wide_table(folder: Path) -> WideTable:
 
 
 def axes(points: tuple[int, int, int], smallest_size_mm: float) -> WideAxes:
-    """Return Chebyshev points over the wide sizes and depths and over the contrasts of the probe's own table."""
+    """Return Chebyshev points over the wide sizes and depths and over the mismatches of the probe's own table."""
     return WideAxes(
         points_with_ends(smallest_size_mm, SIZES_MM[1], points[0]),
         points_with_ends(0.0, 1.0, points[1]),
-        points_with_ends(*CONTRASTS, points[2]),
+        points_with_ends(*ELASTIC_MISMATCHES, points[2]),
     )
 
 
@@ -198,7 +198,7 @@ def build_wide_table(
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     centred, aside = axes(points, SIZES_MM[0]), axes(aside_points, SMALLEST_ASIDE_MM)
     work = [delayed(_centred)(*place) for place in product(*centred)]
-    work += [delayed(_aside)(*place, aside.contrast) for place in product(*aside[:2])]
+    work += [delayed(_aside)(*place, aside.elastic_mismatch) for place in product(*aside[:2])]
     fields = []
     for field in Parallel(n_jobs=jobs, return_as="generator")(work):
         fields.append(field)
@@ -210,16 +210,16 @@ def build_wide_table(
     )
 
 
-def _centred(size_mm: float, share: float, contrast: float) -> Array:
-    """Return what an inclusion adds [2, F, R] over force, strength and contrast."""
+def _centred(size_mm: float, share: float, mismatch: float) -> Array:
+    """Return what an inclusion adds [2, F, R] over force, strength and mismatch."""
     place = float(size_mm), depth_at(size_mm, share)
-    return lump_per_n_mm3(scene_in, NOMINAL, *place, float(contrast)) * _volume_over_strength(*place)
+    return lump_per_n_mm3(scene_in, NOMINAL, *place, float(mismatch)) * _volume_over_strength(*place)
 
 
-def _aside(size_mm: float, share: float, contrasts: Array) -> Array:
-    """Return the modes [M, 2, K, R] of inclusions `ASIDE_MM` beside the axis, over strength and contrast."""
+def _aside(size_mm: float, share: float, mismatches: Array) -> Array:
+    """Return the modes [M, 2, K, R] of inclusions `ASIDE_MM` beside the axis, over strength and mismatch."""
     place = float(size_mm), depth_at(size_mm, share)
-    return inclusions_per_n_mm3(*place, ASIDE_MM, contrasts) * _volume_over_strength(*place)
+    return inclusions_per_n_mm3(*place, ASIDE_MM, mismatches) * _volume_over_strength(*place)
 
 
 def depth_at(size_mm: float, share: float) -> float:

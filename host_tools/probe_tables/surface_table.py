@@ -1,9 +1,9 @@
 """Builds the virtual probe's table of faces from finite-element force ramps in finite strain.
 
-Chebyshev points in size, depth, contrast and force: 7 x 7 x 3 x 5 hold 0.5 % of an inclusion's largest deformation
+Chebyshev points in size, depth, mismatch and force: 7 x 7 x 3 x 5 hold 0.5 % of an inclusion's largest deformation
 between the points and 1 % of its largest pressure, ring means both
 (`tests/host_tools/probe_tables/test_surface_table.py`, fresh solves), because what is interpolated is the inclusion
-field over the force, the size cubed and the contrast. What other slabs change is solved as a star: one modulus or one
+field over the force, the size cubed and the mismatch. What other slabs change is solved as a star: one modulus or one
 thickness apart from the nominal slab, at every second size and depth, and each as the difference of two solves on one
 mesh.
 """
@@ -32,8 +32,8 @@ from host_tools.forward.solve import solve_ramp
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Tissue, TissueLayer
 
 POINTS = (7, 7, 3)
-"""Points in size, depth and contrast."""
-CONTRASTS = (0.1, 0.96)
+"""Points in size, depth and mismatch."""
+ELASTIC_MISMATCHES = (0.1, 0.96)
 """8-200 kPa in tissue of 4-6.25 kPa, with a little to spare; 6.4-305 kPa in the nominal slab."""
 SLAB_MODULI_KPA = (4.0, 5.0, 6.25)
 SLAB_THICKNESSES_MM = (27.5, 30.0, 36.0)
@@ -137,19 +137,19 @@ def _bare_per_n(scene_of: SceneOf, slab: Slab) -> Array:
     return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BARE)[0]
 
 
-def lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, contrast: float) -> Array:
-    """Return what an inclusion adds [2, F, R] over force, size cubed and contrast, at forces that indent alike."""
-    scene = scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(contrast)))
-    return _ramps_per_n(scene, FORCES_N * slab.stiffness_ratio)[1] / size_mm**3 / contrast
+def lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, mismatch: float) -> Array:
+    """Return what an inclusion adds [2, F, R] over force, size cubed and mismatch, at forces that indent alike."""
+    scene = scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(mismatch)))
+    return _ramps_per_n(scene, FORCES_N * slab.stiffness_ratio)[1] / size_mm**3 / mismatch
 
 
 def inclusion_axes(points: tuple[int, int, int], smallest_size_mm: float) -> InclusionAxes:
-    """Return Chebyshev points over the sizes and depths of the paper's box and over `CONTRASTS`."""
+    """Return Chebyshev points over the sizes and depths of the paper's box and over `ELASTIC_MISMATCHES`."""
     low, high = PAPER_BOX_LOW, PAPER_BOX_HIGH
     return InclusionAxes(
         points_with_ends(smallest_size_mm, high[0], points[0]),
         points_with_ends(low[1], high[1], points[1]),
-        points_with_ends(*CONTRASTS, points[2]),
+        points_with_ends(*ELASTIC_MISMATCHES, points[2]),
     )
 
 
@@ -174,12 +174,12 @@ def build_surface_table(
 
 def _grids(axes: InclusionAxes) -> list[InclusionAxes]:
     """Return the points of each of `SOLVED`: all of them in the nominal slab, the coarse ones for the star."""
-    coarse = InclusionAxes(axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.contrast)
+    coarse = InclusionAxes(axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.elastic_mismatch)
     return [axes, *[coarse] * (len(SOLVED) - 1)]
 
 
 def assembled(axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array]) -> SurfaceTable:
-    """Return the table of the fields [2, F, R] in the order of `SOLVED`, each inclusion's grid with the contrast
+    """Return the table of the fields [2, F, R] in the order of `SOLVED`, each inclusion's grid with the mismatch
     fastest.
     """
     remaining, inclusions = iter(lump_per_n_mm3), []

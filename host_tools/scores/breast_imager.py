@@ -55,7 +55,7 @@ def breast_imager_chapter(
             estimates(model, calibration, tables, mode, phantom, solved, press_seed(seed, REPEATS * number))
             for number, (phantom, solved) in enumerate(zip(phantoms, ramps, strict=True))
         ]
-        benchmarks += _judged(mode, phantoms, found, best[:, number_of_mode, 0])
+        benchmarks += _benchmarks(mode, phantoms, found, best[:, number_of_mode, 0])
         rows += [_row(mode, phantom, of_one) for phantom, of_one in zip(phantoms, found, strict=True)]
     return Chapter(
         title="The Breast Mechanical Imager's eight inclusions",
@@ -117,7 +117,7 @@ def estimates(
     return [estimate_ramp(recording, mode, model, calibration) for recording in recordings]
 
 
-def _judged(
+def _benchmarks(
     mode: Mode, phantoms: Sequence[Phantom], found: Sequence[Sequence[Estimate]], best_percent: Array
 ) -> list[Benchmark]:
     scored = [

@@ -30,7 +30,7 @@ def coverage_chapter(cards: Mapping[Mode, Mapping[str, Any]]) -> Chapter:
         for name in UNKNOWNS:
             case = f"{mode}, {SPOKEN[name]}"
             if entry["simulated"][name]["determined"]:
-                benchmarks += _judged(case, entry["simulated"]["presses"], entry["simulated"][name])
+                benchmarks += _benchmarks(case, entry["simulated"]["presses"], entry["simulated"][name])
                 benchmarks.append(_recorded(case, entry["recorded"]["presses"], entry["recorded"][name]))
             rows.append(_row(case, entry["simulated"][name]))
     numbers = ", ".join(f"{card['modes'][mode]['simulated']['presses']} in {mode}" for mode, card in cards.items())
@@ -47,15 +47,15 @@ def coverage_chapter(cards: Mapping[Mode, Mapping[str, Any]]) -> Chapter:
 HEADER = ("mode, unknown", "skill", "determined", *(f"octile {number}" for number in range(1, OCTILES + 1)))
 
 
-def _judged(case: str, presses: int, stated: dict[str, Any]) -> list[Benchmark]:
+def _benchmarks(case: str, presses: int, stated: dict[str, Any]) -> list[Benchmark]:
     middle = (LOWEST + HIGHEST) / 2
     pairs = zip(stated["coverage_per_octile"], stated["determined_per_octile"], strict=True)
     octiles = [covered for covered, known in pairs if known * presses / OCTILES >= FEWEST_IN_OCTILE]
     overall = _number(stated["coverage"])
-    judged = [Benchmark(case, "coverage", overall, 0.9, abs(overall - middle), HIGHEST - middle)]
+    benchmarks = [Benchmark(case, "coverage", overall, 0.9, abs(overall - middle), HIGHEST - middle)]
     if octiles:
-        judged.append(at_least(case, "coverage in the worst octile", min(octiles), LOWEST_IN_OCTILE))
-    return judged
+        benchmarks.append(at_least(case, "coverage in the worst octile", min(octiles), LOWEST_IN_OCTILE))
+    return benchmarks
 
 
 def _recorded(case: str, presses: int, stated: dict[str, Any]) -> Benchmark:

@@ -73,7 +73,7 @@ def round_deviations(solved: ProbeTables, parameters: Array, model: RampModel, m
     rows, second = exact_presses(solved, parameters[None])
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise[mode])
     harmonics, sphere = np.stack([second[0], np.zeros_like(second[0])]), normalise(parameters[None])[0]
-    return twin_of(posterior, harmonics, sphere, model, mode)[1]
+    return nearest_round(posterior, harmonics, sphere, model, mode)[1]
 
 
 def most_flagged(deviations: Array, false_flags: float) -> Array:
@@ -82,7 +82,7 @@ def most_flagged(deviations: Array, false_flags: float) -> Array:
     return np.asarray(ncx2.sf(-2 * np.log(false_flags), 2, np.square(deviations)))
 
 
-def twin_of(
+def nearest_round(
     posterior: PressPosterior, second: Array, sphere: Array, model: RampModel, mode: Mode
 ) -> tuple[Array, float]:
     """Return coordinates [9] and distance in standard deviations of the round inclusion nearest to row and harmonics.
@@ -137,7 +137,7 @@ def oblong_chapter(answer: EstimateOf, model: RampModel, tables: ProbeTables, *,
     for mode in RAMP_MODES:
         refused = np.array(in_parallel(partial(press, mode), len(parameters), jobs), float)
         apart = np.array(in_parallel(partial(_apart, solved, parameters, model, mode), len(parameters), jobs))
-        benchmarks.append(_judged(mode, apart, refused))
+        benchmarks.append(_benchmark(mode, apart, refused))
         rows += _rows(mode, inclusions, apart, refused)
         sums.append(_sum(mode, refused, apart))
     sums.append(_sum("quick", np.array(in_parallel(partial(press, "quick"), len(parameters), jobs), float)))
@@ -172,11 +172,11 @@ def _apart(solved: Sequence[ProbeTables], parameters: Array, model: RampModel, m
     return round_deviations(solved[number // SKINS], parameters[number], model, mode)
 
 
-def _judged(mode: Mode, apart: Array, refused: Array) -> Benchmark:
+def _benchmark(mode: Mode, apart: Array, refused: Array) -> Benchmark:
     """Return the benchmark of the presses that a test flags nearly always; NaN, and failed, without any."""
-    judged = most_flagged(apart, FALSE_AT_MOST) >= REFUSED_AT_LEAST
-    share = float(refused[judged].mean()) if judged.any() else float("nan")
-    case = f"{mode}, ellipsoids that a test could tell ({int(judged.sum())} presses)"
+    tellable = most_flagged(apart, FALSE_AT_MOST) >= REFUSED_AT_LEAST
+    share = float(refused[tellable].mean()) if tellable.any() else float("nan")
+    case = f"{mode}, ellipsoids that a test could tell ({int(tellable.sum())} presses)"
     return at_least(case, SHARE, share, REFUSED_AT_LEAST)
 
 

@@ -1,8 +1,8 @@
 """Inclusions just outside the trained ranges: how like one inside they look, and what the modes make of them.
 
 An image that some inclusion inside explains as well as the noise lets one see cannot be flagged by any test. How well
-that is possible is the distance of the press without noise from its nearest twin inside, whatever tissue and skin the
-twin has. Source: Neyman & Pearson, Phil. Trans. R. Soc. A 231 (1933): the best test between two means d standard
+that is possible is the distance of the press without noise from its nearest inclusion inside, whatever tissue and skin
+that one has. Source: Neyman & Pearson, Phil. Trans. R. Soc. A 231 (1933): the best test between two means d standard
 deviations apart has the power Phi(d - z).
 
 The chapter on inclusions just outside the trained ranges: refused, answered with the truth in the interval, or misled.
@@ -64,7 +64,7 @@ INCLUSIONS = (
 
 
 @dataclass(frozen=True)
-class Twin:
+class NearestInside:
     """The inclusion inside the ranges that looks most like one outside, and their distance in standard deviations."""
 
     inclusion: Inclusion
@@ -96,7 +96,7 @@ def inclusion_ramps(tables: ProbeTables, inclusion: Inclusion) -> PressRamps:
     return PressRamps(solved.r_mm, Ramp(own.bare.force_n, np.array(fields)), solved.inclusion_field)
 
 
-def nearest_twin(posterior: PressPosterior, seed: int) -> Twin:
+def nearest_inside(posterior: PressPosterior, seed: int) -> NearestInside:
     """Return what inside the ranges looks most like a press without noise."""
     starts = np.random.default_rng(seed).uniform(-0.9, 0.9, (STARTS, len(PARAMETERS)))
     fits = [
@@ -104,7 +104,7 @@ def nearest_twin(posterior: PressPosterior, seed: int) -> Twin:
         for start in starts
     ]
     best = min(fits, key=lambda fit: float(fit.cost))
-    return Twin(Inclusion(*map(float, denormalise(best.x)[:3])), float(np.sqrt(2 * best.cost)))
+    return NearestInside(Inclusion(*map(float, denormalise(best.x)[:3])), float(np.sqrt(2 * best.cost)))
 
 
 def holds(quantity: Quantity, truth: float) -> bool:
@@ -135,13 +135,13 @@ def just_outside_chapter(model: RampModel, calibration: Calibration, tables: Pro
     benchmarks: list[Benchmark] = []
     rows: list[tuple[str, ...]] = []
     for mode in RAMP_MODES:
-        twins = in_parallel(partial(_twin, model, mode, tables, ramps), len(INCLUSIONS), jobs)
+        nearest_ones = in_parallel(partial(_nearest, model, mode, tables, ramps), len(INCLUSIONS), jobs)
         press = partial(_press, model, calibration, tables, mode, ramps, seed)
         found = in_parallel(press, PRESSES * len(INCLUSIONS), jobs)
-        for number, (inclusion, twin) in enumerate(zip(INCLUSIONS, twins, strict=True)):
+        for number, (inclusion, nearest) in enumerate(zip(INCLUSIONS, nearest_ones, strict=True)):
             of_one = found[PRESSES * number : PRESSES * (number + 1)]
-            benchmarks += _judged(mode, inclusion, twin, of_one)
-            rows.append(_row(mode, inclusion, twin, of_one))
+            benchmarks += _benchmarks(mode, inclusion, nearest, of_one)
+            rows.append(_row(mode, inclusion, nearest, of_one))
     return Chapter(
         title="Just outside the trained ranges",
         claim=CLAIM,
@@ -156,9 +156,11 @@ def just_outside_chapter(model: RampModel, calibration: Calibration, tables: Pro
     )
 
 
-def _twin(model: RampModel, mode: Mode, tables: ProbeTables, ramps: Sequence[PressRamps], number: int) -> Twin:
+def _nearest(
+    model: RampModel, mode: Mode, tables: ProbeTables, ramps: Sequence[PressRamps], number: int
+) -> NearestInside:
     row = profile_rows(tables, at_nominal(INCLUSIONS[number])[None], ramps=ramps[number])[0]
-    return nearest_twin(PressPosterior(row, model.answers.surrogate, model.answers.noise[mode]), seed=number)
+    return nearest_inside(PressPosterior(row, model.answers.surrogate, model.answers.noise[mode]), seed=number)
 
 
 def _press(
@@ -176,8 +178,8 @@ def _press(
     return estimate_ramp(recording, mode, model, calibration)
 
 
-def _judged(mode: Mode, inclusion: Inclusion, twin: Twin, found: Sequence[Estimate]) -> list[Benchmark]:
-    if twin.most_flagged() < REFUSED_AT_LEAST:
+def _benchmarks(mode: Mode, inclusion: Inclusion, nearest: NearestInside, found: Sequence[Estimate]) -> list[Benchmark]:
+    if nearest.most_flagged() < REFUSED_AT_LEAST:
         return []
     case = "{}, {} mm, {} mm deep, {} kPa".format(mode, *spoken(inclusion))
     return [at_least(case, SHARE, _refused(found), REFUSED_AT_LEAST)]
@@ -187,9 +189,9 @@ def _refused(found: Sequence[Estimate]) -> float:
     return float(np.mean([one.size_mm.value is None for one in found]))
 
 
-def _row(mode: Mode, inclusion: Inclusion, twin: Twin, found: Sequence[Estimate]) -> tuple[str, ...]:
+def _row(mode: Mode, inclusion: Inclusion, nearest: NearestInside, found: Sequence[Estimate]) -> tuple[str, ...]:
     answered = [one for one in found if one.size_mm.value is not None]
     held = [[holds(getattr(one, name), getattr(inclusion, name)) for one in answered] for name in UNKNOWNS]
     shares = (f"{np.mean(of_unknown):.0%}" if of_unknown else "-" for of_unknown in held)
-    most = f"{twin.deviations:.1f}", f"{twin.most_flagged():.0%}", f"{twin.most_flagged(FALSE_AT_MOST):.0%}"
-    return mode, *spoken(inclusion), *spoken(twin.inclusion), *most, f"{_refused(found):.0%}", *shares
+    most = f"{nearest.deviations:.1f}", f"{nearest.most_flagged():.0%}", f"{nearest.most_flagged(FALSE_AT_MOST):.0%}"
+    return mode, *spoken(inclusion), *spoken(nearest.inclusion), *most, f"{_refused(found):.0%}", *shares

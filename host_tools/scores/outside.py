@@ -141,10 +141,10 @@ def outside_chapter(answer: EstimateOf, kinds: Sequence[Kind], *, jobs: int = -1
                 f"{mode}, {_spoken(kind)}",
                 refused_share(answer, kind, mode, counts_unseen=number > 0, jobs=jobs),
             )
-            judged = (
+            benchmark = (
                 at_least(case, SHARE, share, REFUSED_AT_LEAST) if number else at_most(case, SHARE, share, FALSE_AT_MOST)
             )
-            benchmarks.append(judged)
+            benchmarks.append(benchmark)
     quick = tuple(
         (_spoken(kind), f"{refused_share(answer, kind, 'quick', counts_unseen=number > 0, jobs=jobs):.0%}")
         for number, kind in enumerate(kinds)

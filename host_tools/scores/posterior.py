@@ -19,7 +19,7 @@ from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from host_tools.pages.benchmark import Chapter, Table, at_most
-from host_tools.press_models.noisy_presses import random_pool
+from host_tools.press_models.noisy_presses import random_press_set
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 
@@ -91,12 +91,12 @@ def posterior_chapter(
 def compared(model: RampModel, mode: Mode, *, seed: int, scenes: int, jobs: int) -> list[OneScene]:
     """Return a mode's answers to random presses of the forward model, beside the reference posterior."""
     answers = model.answers
-    pool = random_pool(answers.surrogate, answers.noise[mode], scenes, seed)
-    rows = pool.noisy(np.arange(scenes), np.random.default_rng([seed, 1])).astype(np.float64)
+    evaluation_set = random_press_set(answers.surrogate, answers.noise[mode], scenes, seed)
+    rows = evaluation_set.noisy(np.arange(scenes), np.random.default_rng([seed, 1])).astype(np.float64)
     mean, spread = model.networks(rows)
 
     def one(number: int) -> OneScene:
-        truth = pool.normalised[number].astype(np.float64)
+        truth = evaluation_set.normalised[number].astype(np.float64)
         found = answers.answer(rows[number], mode, mean[number], spread[number])
         reference = sampled(PressPosterior(rows[number], answers.surrogate, answers.noise[mode]), truth, seed + number)
         return OneScene(truth[: len(UNKNOWNS)], reference, found.mean, found.spread)

@@ -3,5 +3,6 @@
 Modules in reading order: `elastic`, `patch`, `rates`, `hertz`, `hayes`, `eshelby`, `incompressible`, `balance`,
 `symmetries`, `smoothness`, `scene_rates`, `mechanics`, `extremes`, `effectivity`, `level_tables`, `chapters`.
 
-Rooms: `light` (the same for the optics), `peer` (the other programs). Measured here, bounded in tests/physics.
+Rooms: `light` (the same for the optics), `cross_check` (other programs solve the same).
+Measured here, bounded in tests/physics.
 """

@@ -22,8 +22,8 @@ from host_tools.forward.solve import solve_ramp
 from host_tools.forward.tiers import build
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_most, relative
 from host_tools.scenes.scene import Press, Scene
-from host_tools.verification.peer.calculix import CalculixFailed, ccx_available, ccx_version, solve_with_calculix
-from host_tools.verification.peer.calculix_deck import Process
+from host_tools.verification.cross_check.calculix import CalculixFailed, ccx_available, ccx_version, solve_with_calculix
+from host_tools.verification.cross_check.calculix_deck import Process
 
 SCENE = Scene(Inclusion(10.0, 6.0, 80.0))
 INDENTATIONS_MM, RADII_MM = (1.0, 2.0, 3.0), (0.0, 3.0, 6.0, 9.0)
@@ -88,18 +88,18 @@ def calculix(refinement: float, *, finite_strain: bool) -> ProgramRamp:
 
 
 SMALL, SMALL_BLUNT = "small strain, ours", "small strain, ours, mesh of finite strain"
-PEER_SMALL, PEER_COARSE = "small strain, CalculiX", "small strain, CalculiX, coarse"
+CALCULIX_SMALL, CALCULIX_COARSE = "small strain, CalculiX", "small strain, CalculiX, coarse"
 SLIDING = "finite strain, ours, sliding"
 EDGE = "finite strain, ours, sliding, with the force of the edge"
-PEER_SLIDING = "finite strain, CalculiX, sliding, coarse"
+CALCULIX_SLIDING = "finite strain, CalculiX, sliding, coarse"
 RUNS: dict[str, Callable[[], ProgramRamp]] = {
     SMALL: lambda: ours(model_plan(SCENE)),
     SMALL_BLUNT: lambda: ours(replace(model_plan(SCENE), grading=model_plan(SCENE, strain="finite").grading)),
-    PEER_SMALL: lambda: calculix(FINE, finite_strain=False),
-    PEER_COARSE: lambda: calculix(COARSE, finite_strain=False),
+    CALCULIX_SMALL: lambda: calculix(FINE, finite_strain=False),
+    CALCULIX_COARSE: lambda: calculix(COARSE, finite_strain=False),
     SLIDING: lambda: ours(model_plan(SCENE, strain="finite")),
     EDGE: lambda: with_edge_force(model_plan(SCENE, strain="finite")),
-    PEER_SLIDING: lambda: calculix(COARSE, finite_strain=True),
+    CALCULIX_SLIDING: lambda: calculix(COARSE, finite_strain=True),
 }
 ProgramsFound = dict[str, ProgramRamp]
 
@@ -108,14 +108,16 @@ def benchmarks(found: ProgramsFound) -> tuple[Benchmark, ...]:
     """Return ours against CalculiX: force, w and inclusion field in small strain and in finite strain with true
     sliding.
     """
-    small, peer = found[SMALL], found[PEER_SMALL]
+    small, theirs = found[SMALL], found[CALCULIX_SMALL]
     case = f"small strain, {INDENTATIONS_MM[0]:g} mm"
     rows = [
-        relative(case, "force (N)", small.force_n[0], peer.force_n[0], SMALL_BOUND),
-        relative(case, "w at r = 0 (mm)", small.w_mm[0, 0], peer.w_mm[0, 0], SMALL_BOUND),
-        relative(case, "inclusion field at r = 0 (mm)", small.inclusion_mm[0, 0], peer.inclusion_mm[0, 0], SMALL_BOUND),
+        relative(case, "force (N)", small.force_n[0], theirs.force_n[0], SMALL_BOUND),
+        relative(case, "w at r = 0 (mm)", small.w_mm[0, 0], theirs.w_mm[0, 0], SMALL_BOUND),
+        relative(
+            case, "inclusion field at r = 0 (mm)", small.inclusion_mm[0, 0], theirs.inclusion_mm[0, 0], SMALL_BOUND
+        ),
     ]
-    mine, theirs = found[SLIDING], found[PEER_SLIDING]
+    mine, theirs = found[SLIDING], found[CALCULIX_SLIDING]
     for i, indentation_mm in enumerate(INDENTATIONS_MM):
         case = f"finite strain, sliding, {indentation_mm:g} mm"
         rows += [
@@ -152,8 +154,8 @@ def _tables(found: ProgramsFound) -> tuple[Table, ...]:
 def _times(found: ProgramsFound) -> Table:
     rows = []
     for name, ramp in found.items():
-        peer = found[PEER_SLIDING if name.startswith("finite") else PEER_SMALL]
-        rows.append((name, f"{ramp.seconds:.2f}", f"{peer.seconds / ramp.seconds:.1f}"))
+        theirs = found[CALCULIX_SLIDING if name.startswith("finite") else CALCULIX_SMALL]
+        rows.append((name, f"{ramp.seconds:.2f}", f"{theirs.seconds / ramp.seconds:.1f}"))
     caption = "Wall time of all loads, with the inclusion and without it, meshing included"
     return Table(caption, ("model", "seconds", "CalculiX over it"), tuple(rows))
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from device.config import Config
 from device.errors import ModelError, StorageError
 from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
-from device.instrument.self_test.report import CheckResult, broken, judged, not_tested
+from device.instrument.self_test.report import CheckResult, broken, compared, not_tested
 from device.measurement.bundle import GOLDEN_TOLERANCE, BundleRefused, ModelBundle
 from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.recording.led_sides import SIDES
@@ -52,11 +52,11 @@ def camera_results(dark: Sequence[Counts], max_dark_counts: float) -> list[Check
     is_hot = mean > np.median(mean) + HOT_COUNTS
     level = Bound(-np.inf, max_dark_counts, "counts")
     return [
-        judged(CAMERA, "dark level", mean.mean(), level, "Shade the probe, and check that no side stays on."),
-        judged(
+        compared(CAMERA, "dark level", mean.mean(), level, "Shade the probe, and check that no side stays on."),
+        compared(
             CAMERA, "noise", _noise_counts(frames[:, ~is_hot]), NOISE, "Let it cool; then have the camera replaced."
         ),
-        judged(CAMERA, "hot pixels", is_hot.mean(), HOT_SHARE, "Let it cool; then have the camera replaced."),
+        compared(CAMERA, "hot pixels", is_hot.mean(), HOT_SHARE, "Let it cool; then have the camera replaced."),
     ]
 
 
@@ -102,12 +102,12 @@ def _side(number: int, halves: NDArray[np.float64]) -> CheckResult:
     remedy = "Hold it with its middle on the block and repeat the test."
     if lights != number:
         remedy = f"It lights {SIDES[lights]}: put the plugs of {SIDES[number]} and {SIDES[lights]} where they belong."
-    return judged(LIGHT, f"LED {SIDES[number]}", own_ratio, OWN_SIDE, remedy)
+    return compared(LIGHT, f"LED {SIDES[number]}", own_ratio, OWN_SIDE, remedy)
 
 
 def _dark_side(number: int, level: float, fewest: Bound) -> CheckResult:
     remedy = "It gives no light: check the LED board's cable; have the LED replaced."
-    return judged(LIGHT, f"LED {SIDES[number]}", level, fewest, remedy)
+    return compared(LIGHT, f"LED {SIDES[number]}", level, fewest, remedy)
 
 
 def _halves(counts: Counts) -> NDArray[np.float64]:
@@ -129,8 +129,8 @@ def rest_results(force_n: float, zero_shift_n: float, max_rest_n: float, max_shi
     moved = "Hold the probe free and start again; if it stays, have the load cell checked and commissioned anew."
     rest, shift = Bound(-max_rest_n, max_rest_n, "N"), Bound(-max_shift_n, max_shift_n, "N")
     return [
-        judged(LOAD_CELL, "zero", force_n, rest, free),
-        judged(LOAD_CELL, "zero since commissioning", zero_shift_n + force_n, shift, moved),
+        compared(LOAD_CELL, "zero", force_n, rest, free),
+        compared(LOAD_CELL, "zero since commissioning", zero_shift_n + force_n, shift, moved),
     ]
 
 
@@ -138,7 +138,7 @@ def weight_result(force_n: float, weight_n: float, max_rest_n: float) -> CheckRe
     """Return whether a known weight is measured as what it is, within 2 % or the zero's tolerance."""
     tolerance_n = max(WEIGHT_TOLERANCE_RATIO * weight_n, max_rest_n)
     bound = Bound(weight_n - tolerance_n, weight_n + tolerance_n, "N")
-    return judged(
+    return compared(
         LOAD_CELL, "known weight", force_n, bound, "Check cell.sensitivity_counts_per_n, or calibrate the cell."
     )
 
@@ -162,8 +162,8 @@ def clock_results(drift_s: float, max_jump_s: float, now: str, synchronised: Pat
     age_days = (datetime.fromisoformat(now) - NOT_BEFORE).total_seconds() / 86_400
     steady = Bound(-max_jump_s, max_jump_s, "s")
     return [
-        judged(CLOCK, "steady clock", drift_s, steady, "Check the board's clock and its time server."),
-        judged(CLOCK, f"date after {NOT_BEFORE:%Y-%m-%d}", age_days, DATE, SET_IT),
+        compared(CLOCK, "steady clock", drift_s, steady, "Check the board's clock and its time server."),
+        compared(CLOCK, f"date after {NOT_BEFORE:%Y-%m-%d}", age_days, DATE, SET_IT),
         _time_server(synchronised),
     ]
 
@@ -187,7 +187,7 @@ def disk_results(store: Store, min_free_mb: float) -> list[CheckResult]:
 def _free_space(store: Store, min_free_mb: float) -> CheckResult:
     bound = Bound(min_free_mb, float("inf"), "MB")
     try:
-        return judged(STORAGE, "free space", store.free_mb, bound, "Copy recordings away and delete them there.")
+        return compared(STORAGE, "free space", store.free_mb, bound, "Copy recordings away and delete them there.")
     except StorageError as error:
         return broken("free space", error)
 
@@ -199,7 +199,7 @@ def _read_back(store: Store) -> CheckResult:
     except StorageError as error:
         return broken("write and read", error)
     wrong = abs(len(found) - len(content)) + sum(a != b for a, b in zip(found, content, strict=False))
-    return judged(STORAGE, "write and read", wrong, WHOLE, "Save the recordings and have the disk replaced.")
+    return compared(STORAGE, "write and read", wrong, WHOLE, "Save the recordings and have the disk replaced.")
 
 
 MODEL = "Model"
@@ -226,4 +226,4 @@ def _result(name: str, folder: Path, load: Callable[[Path], ModelBundle]) -> Che
         bundle = load(folder)
     except (BundleRefused, InvalidQuantity) as error:
         return broken(check, ModelError(str(error), REINSTALL))
-    return judged(MODEL, check, bundle.golden_error_ratio, GOLDEN, REINSTALL)
+    return compared(MODEL, check, bundle.golden_error_ratio, GOLDEN, REINSTALL)

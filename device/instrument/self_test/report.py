@@ -43,7 +43,7 @@ class CheckResult:
         return asdict(self)
 
 
-def judged(part: str, check: str, value: float, bound: Bound, remedy: str) -> CheckResult:
+def compared(part: str, check: str, value: float, bound: Bound, remedy: str) -> CheckResult:
     """Return whether a measured value is in its bound; the remedy is told only if it is not."""
     value, is_in_bound = float(value), bound.holds(value)
     verdict: Verdict = "passed" if is_in_bound else "failed"

@@ -47,7 +47,7 @@ class CalibrationWatch:
         self._ending: CalibrationEndsSoon | None = None
         self._drift: SlightDriftError | LargeDriftError | None = None
         self._unchecked: UncheckedCalibration | None = None
-        self._is_judged = False
+        self._is_checked = False
 
     @property
     def id(self) -> str:
@@ -85,8 +85,8 @@ class CalibrationWatch:
             return
         load_n = max((frame.force_n for frame in unloaded), key=abs)
         if abs(load_n) <= UNTOUCHED_N:
-            self._drift = _judged(self.calibration.untouched.drift(unloaded))
-            self._is_judged, self._unchecked = True, None
+            self._drift = _checked(self.calibration.untouched.drift(unloaded))
+            self._is_checked, self._unchecked = True, None
             if isinstance(self._drift, LargeDriftError):
                 raise self._drift
         else:
@@ -96,7 +96,7 @@ class CalibrationWatch:
         """Note that frames say nothing; raise the `LargeDriftError` of the last that did, with what keeps it there."""
         if isinstance(self._drift, LargeDriftError):
             raise LargeDriftError(f"{self._drift.cause} It was not compared again: {why}", f"Wipe the face. {FREE}")
-        if not self._is_judged:
+        if not self._is_checked:
             self._unchecked = UncheckedCalibration(f"The face was not compared since the start: {why}", FREE)
 
     def warned(self, others: Sequence[DeviceError]) -> tuple[DeviceError, ...]:
@@ -105,7 +105,7 @@ class CalibrationWatch:
         return (*(one for one in others if not isinstance(one, OWN_WARNINGS)), *own)
 
 
-def _judged(drift: Drift) -> SlightDriftError | LargeDriftError | None:
+def _checked(drift: Drift) -> SlightDriftError | LargeDriftError | None:
     size = abs(drift.change_ratio)
     if size > BLOCK_RATIO:
         return LargeDriftError(f"{_described(drift)}, above {BLOCK_RATIO:.0%}.", WIPE)

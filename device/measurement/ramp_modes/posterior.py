@@ -36,7 +36,7 @@ STEPS = 12
 
 @dataclass(frozen=True, eq=False)
 class PressFit:
-    """Posterior of the coordinates [9] of `press_parameters.normalise`.
+    """Posterior of the coordinates [9] of `parameters.normalise`.
 
     `best`: the best fit; `mean`, `spread`: of the posterior; `effective_samples`: what the weighted ones are worth. Too
     few, because the best fit is driven into a corner of the ranges, tell nothing: the spread is then that of the ranges

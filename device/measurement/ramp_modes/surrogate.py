@@ -1,7 +1,7 @@
 """The forward model of a press in a millisecond: unknowns and nuisances to the row of the press profile.
 
 Polynomials in nine parameters, fitted to simulated presses by `host_tools train`. What is polynomial is the contrast
-over size^3 / distance^3, the strength of a small sphere far away, and the modulus enters by Eshelby's contrast: both
+over size^3 / distance^3, the strength of a small sphere far away, and the modulus enters by Eshelby's mismatch: both
 take out what no polynomial follows well. Differentiable, so that a press can be fitted by Gauss-Newton.
 """
 
@@ -31,14 +31,14 @@ Number = TypeVar("Number", float, Array)
 ARRAYS = ("lump_degrees", "lump_coefficients", "bare_degrees", "bare_coefficients")
 
 
-def stiffness_contrast(modulus_kpa: Array, tissue_kpa: Array) -> Array:
+def elastic_mismatch(modulus_kpa: Array, tissue_kpa: Array) -> Array:
     """Return (E - Et) / (E + 3/2 Et), the dipole strength of an incompressible sphere (Eshelby 1957)."""
     return np.asarray((modulus_kpa - tissue_kpa) / (modulus_kpa + 1.5 * tissue_kpa))
 
 
-CONTRAST_RANGE = (
-    float(stiffness_contrast(LOW[MODULUS], HIGH[TISSUE])),
-    float(stiffness_contrast(HIGH[MODULUS], LOW[TISSUE])),
+ELASTIC_MISMATCH_RANGE = (
+    float(elastic_mismatch(LOW[MODULUS], HIGH[TISSUE])),
+    float(elastic_mismatch(HIGH[MODULUS], LOW[TISSUE])),
 )
 
 
@@ -52,7 +52,7 @@ class PressSurrogate:
     baseline: LegendreSum
 
     def rows(self, normalised: Array) -> Array:
-        """Return profile rows [n, P] at coordinates [n, 9] of `press_parameters.normalise`."""
+        """Return profile rows [n, P] at coordinates [n, 9] of `parameters.normalise`."""
         parameters = denormalise(normalised)
         at = polynomial_coordinates(normalised, parameters)
         factor = inclusion_factor(parameters)
@@ -103,10 +103,10 @@ def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
 
 
 def polynomial_coordinates(normalised: Array, parameters: Array) -> Array:
-    """Return coordinates [n, 9] in which presses are polynomials: the modulus' one is the contrast of stiffness."""
-    low, high = CONTRAST_RANGE
+    """Return coordinates [n, 9] in which presses are polynomials: the modulus' one is the elastic mismatch."""
+    low, high = ELASTIC_MISMATCH_RANGE
     at = np.array(normalised)
-    at[:, MODULUS] = 2 * (stiffness_contrast(parameters[:, MODULUS], parameters[:, TISSUE]) - low) / (high - low) - 1
+    at[:, MODULUS] = 2 * (elastic_mismatch(parameters[:, MODULUS], parameters[:, TISSUE]) - low) / (high - low) - 1
     return at
 
 
@@ -120,7 +120,7 @@ def inclusion_factor(parameters: Array) -> Array:
 
 
 def assemble(inclusion: Array, baseline: Array) -> Array:
-    """Return rows [n, P] in the order of `press_profile.ROW_NAMES`: contrast, growth, offset."""
+    """Return rows [n, P] in the order of `radial_profile.ROW_NAMES`: contrast, growth, offset."""
     return np.hstack([inclusion[:, :CONTRAST_COLUMNS], baseline, inclusion[:, CONTRAST_COLUMNS:]])
 
 
@@ -144,10 +144,10 @@ def _factor_slope(at: Array) -> Array:
 
 def _by_normalised(gradient: Array, at: Array) -> Array:
     """Return derivatives [9, Q] by `normalised` of derivatives by the polynomials' coordinates, at parameters [9]."""
-    (low, high), by_normalised = CONTRAST_RANGE, slope_of_normalised(at)
+    (low, high), by_normalised = ELASTIC_MISMATCH_RANGE, slope_of_normalised(at)
     E, Et = at[MODULUS], at[TISSUE]
-    by_contrast = gradient[MODULUS] * 2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2
+    by_mismatch = gradient[MODULUS] * 2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2
     slope = gradient.copy()
-    slope[MODULUS] = by_contrast * Et * by_normalised[MODULUS]
-    slope[TISSUE] = gradient[TISSUE] - by_contrast * E * by_normalised[TISSUE]
+    slope[MODULUS] = by_mismatch * Et * by_normalised[MODULUS]
+    slope[TISSUE] = gradient[TISSUE] - by_mismatch * E * by_normalised[TISSUE]
     return slope

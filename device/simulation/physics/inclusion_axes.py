@@ -1,4 +1,4 @@
-"""Where an inclusion lies on the axes of a table of inclusions: size, depth and contrast, or refused when outside.
+"""Where an inclusion lies on the axes of a table of inclusions: size, depth and mismatch, or refused when outside.
 
 Sizes begin above zero: a smaller inclusion's field is the smallest one's, scaled with its volume, so none adds nothing.
 """
@@ -20,18 +20,18 @@ class InclusionAxes(NamedTuple):
 
     size_mm: Array
     depth_mm: Array
-    contrast: Array
+    elastic_mismatch: Array
 
     def inclusion_per_n(self, fields_per_n_mm3: Array, inclusion: Inclusion, slab: Slab) -> Array:
-        """Return an inclusion's field per newton from fields [2, S, D, M, ...] over force, cubed size and contrast.
+        """Return an inclusion's field per newton from fields [2, S, D, M, ...] over force, cubed size and mismatch.
 
-        Raises `InvalidQuantity` for an inclusion outside the axes, whose contrast is that in `slab`.
+        Raises `InvalidQuantity` for an inclusion outside the axes, whose mismatch is that in `slab`.
         """
         size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
-        softest, stiffest = (slab.modulus_kpa(float(end)) for end in self.contrast[[0, -1]])
+        softest, stiffest = (slab.modulus_kpa(float(end)) for end in self.elastic_mismatch[[0, -1]])
         require("size_mm", size_mm, Bound(0.0, float(self.size_mm[-1]), "mm"), ACTION)
         require("depth_mm", depth_mm, Bound(float(self.depth_mm[0]), float(self.depth_mm[-1]), "mm"), ACTION)
         require("youngs_modulus_kpa", modulus_kpa, Bound(softest, stiffest, "kPa"), ACTION)
-        contrast = slab.contrast(modulus_kpa)
-        place = max(size_mm, float(self.size_mm[0])), depth_mm, contrast
-        return size_mm**3 * contrast * interpolated(fields_per_n_mm3, self, place)
+        mismatch = slab.elastic_mismatch(modulus_kpa)
+        place = max(size_mm, float(self.size_mm[0])), depth_mm, mismatch
+        return size_mm**3 * mismatch * interpolated(fields_per_n_mm3, self, place)

@@ -2,7 +2,7 @@
 
 Small strain in three dimensions: fields are proportional to the force (or the tilt) and depend on radius and on the
 angle from the direction of the inclusion, as a cosine series. All in the nominal slab; `PressedFace` carries them over
-to another one. Between the solved moduli the inclusion's contrast counts (`slab.py`). Written by `host_tools table`.
+to another one. Between the solved moduli the inclusion's mismatch counts (`slab.py`). Written by `host_tools table`.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ FORGOTTEN = 1e-3
 
 @dataclass(frozen=True)
 class OffAxisTable:
-    """`lump_per_n_mm3` [2, S, D, M, O, K, R], over the contrast too; `tilt_per_deg` [2, R] times the angle's cosine.
+    """`lump_per_n_mm3` [2, S, D, M, O, K, R], over the mismatch too; `tilt_per_deg` [2, R] times the angle's cosine.
 
     w comes first, then p.
     """
 
     size_mm: Array
     depth_mm: Array
-    contrast: Array
+    elastic_mismatch: Array
     offset_mm: Array
     r_mm: Array
     lump_per_n_mm3: Array
@@ -63,7 +63,7 @@ class OffAxisTable:
         return np.asarray(modes * (min(offset_mm / first_mm, 1.0) ** power)[:, None])
 
     def _modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
-        axes = InclusionAxes(self.size_mm, self.depth_mm, self.contrast)
+        axes = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch)
         at_offsets = axes.inclusion_per_n(self.lump_per_n_mm3, inclusion, NOMINAL)
         return interpolated(at_offsets, [self.offset_mm], [offset_mm])
 

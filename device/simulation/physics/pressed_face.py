@@ -1,7 +1,7 @@
 """Force, position and tilt to the deformation and pressure of the whole face, on one grid of points.
 
 An inclusion off the axis is solved in small strain in the nominal slab, and changes with force and slab as the centred
-one of its contrast does; moving the centred field instead would be wrong, because a probe that cannot turn answers with
+one of its elastic mismatch does; moving the centred field instead would be wrong: a probe that cannot turn answers with
 a moment. A tilt adds its own fields, as stiff as the tissue; where the pressure would pull the face has lifted, and the
 rest carries the force. What each costs in accuracy: docs/simulated_probe.md.
 """
@@ -48,7 +48,7 @@ class PressedFace:
         slab: Slab = NOMINAL,
     ) -> None:
         """Pressing far off the axis later raises `InvalidQuantity` for an inclusion that the table does not hold."""
-        self._ramps, self._off_axis, self._twin = ramps, off_axis, slab.nominal_twin(inclusion)
+        self._ramps, self._off_axis, self._equivalent = ramps, off_axis, slab.nominal_equivalent(inclusion)
         self._x_mm, self._y_mm = np.broadcast_arrays(x_mm, y_mm)
         from_axis_mm = np.hypot(self._x_mm, self._y_mm)
         self._from_axis = RadialProfiles(ramps.r_mm, from_axis_mm)
@@ -83,7 +83,7 @@ class PressedFace:
 
     def _aside_per_n(self, x_mm: float, y_mm: float) -> list[Image]:
         """Return w and p for 1 N of an inclusion at -(x, y) from the axis, but for the centred inclusion's share."""
-        modes = self._off_axis.modes(self._twin, float(np.hypot(x_mm, y_mm)))
+        modes = self._off_axis.modes(self._equivalent, float(np.hypot(x_mm, y_mm)))
         angle = np.arctan2(self._y_mm, self._x_mm) - np.arctan2(-y_mm, -x_mm)
         return [
             np.asarray(sum(self._solid(mode) * np.cos(k * angle) for k, mode in enumerate(field)), np.float32)

@@ -1,8 +1,8 @@
 """The patient's tissue under the probe: a slab's modulus and thickness, and how stiff an inclusion is against it.
 
-What an inclusion adds to the face depends on its contrast with the tissue, not on its modulus alone: for an
+What an inclusion adds to the face depends on its elastic mismatch with the tissue, not on its modulus alone: for an
 incompressible sphere it is (E - Et) / (E + 3/2 Et), in which the field is all but linear; 0 for tissue, 1 for a rigid
-sphere. Source: Eshelby, Proc. R. Soc. A 241 (1957), on the contrast.
+sphere. Source: Eshelby, Proc. R. Soc. A 241 (1957), on the mismatch.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ class Slab:
         """Young's modulus over the nominal one: the force ratio at which this slab is indented as deeply."""
         return self.youngs_modulus_kpa / NOMINAL_KPA
 
-    def contrast(self, youngs_modulus_kpa: float) -> float:
-        """Return an inclusion's contrast in this slab, (E - Et) / (E + 3/2 Et)."""
+    def elastic_mismatch(self, youngs_modulus_kpa: float) -> float:
+        """Return an inclusion's mismatch in this slab, (E - Et) / (E + 3/2 Et)."""
         return (youngs_modulus_kpa - self.youngs_modulus_kpa) / (youngs_modulus_kpa + 1.5 * self.youngs_modulus_kpa)
 
-    def modulus_kpa(self, contrast: float) -> float:
-        """Return the Young's modulus of an inclusion of a contrast below 1 in this slab."""
-        return self.youngs_modulus_kpa * (1 + 1.5 * contrast) / (1 - contrast)
+    def modulus_kpa(self, mismatch: float) -> float:
+        """Return the Young's modulus of an inclusion of a mismatch below 1 in this slab."""
+        return self.youngs_modulus_kpa * (1 + 1.5 * mismatch) / (1 - mismatch)
 
-    def nominal_twin(self, inclusion: Inclusion) -> Inclusion:
-        """Return the inclusion that has the same contrast in the nominal slab: its modulus over `stiffness_ratio`."""
+    def nominal_equivalent(self, inclusion: Inclusion) -> Inclusion:
+        """Return the inclusion that has the same mismatch in the nominal slab: its modulus over `stiffness_ratio`."""
         return replace(inclusion, youngs_modulus_kpa=inclusion.youngs_modulus_kpa / self.stiffness_ratio)
 
 

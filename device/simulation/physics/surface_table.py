@@ -3,7 +3,7 @@
 For every inclusion (1-15 mm, 4-12 mm deep, 8-200 kPa), slab of tissue and force it gives deformation w(r) and contact
 pressure p(r) of the face: those without an inclusion, and what the inclusion adds. Finite strain with true sliding, so
 neither is proportional to the force; both are kept per newton, and what an inclusion adds also per mm3 of its size
-cubed and over its contrast, because those are smooth. Chebyshev polynomials in size, depth, contrast and force; a slab
+cubed and over its mismatch, because those are smooth. Chebyshev polynomials in size, depth, mismatch and force; a slab
 other than the nominal adds a change that is quadratic in ln Et and in 1/T. Written by `host_tools table`. Source:
 Trefethen, Approximation Theory and Approximation Practice, chapter 5 (barycentric interpolation).
 """
@@ -59,7 +59,7 @@ class Ramp:
 class PressRamps(NamedTuple):
     """The ramp without an inclusion and what one inclusion adds, at radii `r_mm` [R].
 
-    `nominal_inclusion_field` is what one of the same contrast adds in the nominal slab, None where that is `inclusion`
+    `nominal_inclusion_field` is what one of the same mismatch adds in the nominal slab, None where that is `inclusion`
     itself.
     """
 
@@ -74,13 +74,13 @@ class SurfaceTable:
     """`bare_per_n` [2, F, R] without an inclusion, `lump_per_n_mm3` [2, S, D, M, F, R] what one adds; w first, then p.
 
     Both are of the nominal slab. `bare_change_per_n` [4, ...] and `lump_change_per_n_mm3` [4, ...] are what the first
-    and last of `slab_modulus_kpa` [3] and of `slab_thickness_mm` [3] change at the same contrast and the same force
+    and last of `slab_modulus_kpa` [3] and of `slab_thickness_mm` [3] change at the same mismatch and the same force
     over the tissue's modulus, at `COARSE` sizes and depths; the middle ones are nominal.
     """
 
     size_mm: Array
     depth_mm: Array
-    contrast: Array
+    elastic_mismatch: Array
     slab_modulus_kpa: Array
     slab_thickness_mm: Array
     force_n: Array
@@ -97,13 +97,13 @@ class SurfaceTable:
         """
         inclusion_field = self.inclusion_field(inclusion, slab)
         bare = self._ramp(slab, self.bare_per_n + self._changed(self.bare_change_per_n, slab))
-        nominal = None if slab == NOMINAL else self.inclusion_field(slab.nominal_twin(inclusion))
+        nominal = None if slab == NOMINAL else self.inclusion_field(slab.nominal_equivalent(inclusion))
         return PressRamps(self.r_mm, bare, inclusion_field, nominal)
 
     def inclusion_field(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
         """Return what an inclusion adds to the ramp in a slab; refuses one outside the table."""
-        fine = InclusionAxes(self.size_mm, self.depth_mm, self.contrast)
-        coarse = InclusionAxes(self.size_mm[COARSE], self.depth_mm[COARSE], self.contrast)
+        fine = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch)
+        coarse = InclusionAxes(self.size_mm[COARSE], self.depth_mm[COARSE], self.elastic_mismatch)
         change = coarse.inclusion_per_n(self._changed(self.lump_change_per_n_mm3, slab), inclusion, slab)
         return self._ramp(slab, fine.inclusion_per_n(self.lump_per_n_mm3, inclusion, slab) + change)
 

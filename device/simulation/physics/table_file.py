@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 from device.files.durable import write_durably
 from device.measurement.quantities import InvalidQuantity
 
+STORED_AS = {"elastic_mismatch": "contrast"}
+"""Arrays that the committed files know by an older name."""
+
 
 def save_table(folder: Path, name: str, arrays: Mapping[str, NDArray[Any]], record: Mapping[str, object]) -> None:
     """Write arrays and their record, which carries `schema` and `command`, with the hash over both."""
     content = io.BytesIO()
-    named: dict[str, Any] = dict(arrays)
+    named: dict[str, Any] = {_stored(key): array for key, array in arrays.items()}
     np.savez_compressed(content, **named)
     described = {**record, "sha256": _digest(content.getvalue(), record)}
     write_durably(folder / f"{name}.npz", content.getvalue())
@@ -49,9 +52,13 @@ def load_table(
     if record.get("sha256") != digest:
         raise InvalidQuantity(f"{title}'s hash", digest[:12], f"{str(record.get('sha256'))[:12]} as stated", action)
     with np.load(io.BytesIO(content)) as stored:
-        if missing := sorted(set(keys) - set(stored.files)):
+        if missing := sorted(set(map(_stored, keys)) - set(stored.files)):
             raise InvalidQuantity(f"{title}'s arrays", stored.files, f"with {', '.join(missing)}", action)
-        return {key: stored[key] for key in keys}, record
+        return {key: stored[_stored(key)] for key in keys}, record
+
+
+def _stored(key: str) -> str:
+    return STORED_AS.get(key, key)
 
 
 def _digest(content: bytes, record: Mapping[str, object]) -> str:

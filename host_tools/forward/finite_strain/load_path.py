@@ -40,7 +40,7 @@ def press_along(
     estimate_error: bool = False,
     edge_force: bool = False,
 ) -> tuple[LoadedFace, ...]:
-    """Return the face at every one of ascending indentations (mm), with its refined twin if errors are wanted.
+    """Return the face at every one of ascending indentations (mm), with its refined copy if errors are wanted.
 
     `edge_force` asks for the other reading of the rim (`sliding.py`), which only comparisons
     need. Raises `InvalidQuantity` for indentations that do not ascend from above 0, `PathEnded` for one out of reach.

@@ -34,5 +34,5 @@ def optics_chapters(
         "statistics": optics_statistics,
         "lookup": optics_lookup,
     }
-    peer = partial(cross_check.chapter, rays, wanted=mitsuba, python=mitsuba_python)
-    return {**{name: partial(room.chapter, rays) for name, room in rooms.items()}, "mitsuba": peer}
+    rendered = partial(cross_check.chapter, rays, wanted=mitsuba, python=mitsuba_python)
+    return {**{name: partial(room.chapter, rays) for name, room in rooms.items()}, "mitsuba": rendered}

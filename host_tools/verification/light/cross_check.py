@@ -20,10 +20,15 @@ from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_least, at_most, relative
+from host_tools.verification.cross_check.mitsuba import (
+    MitsubaFailed,
+    mitsuba_python,
+    mitsuba_version,
+    render_with_mitsuba,
+)
+from host_tools.verification.cross_check.mitsuba_scene import MitsubaCamera
 from host_tools.verification.light.pictures import LINES, draw_map
 from host_tools.verification.light.scenes import FACE_RADIUS_MM, GRID_MM, TOUCHED, bump
-from host_tools.verification.peer.mitsuba import MitsubaFailed, mitsuba_python, mitsuba_version, render_with_mitsuba
-from host_tools.verification.peer.mitsuba_scene import MitsubaCamera
 
 TITLE = "Another program: Mitsuba 3"
 CLAIM = "Mitsuba follows light from the camera to the LEDs, the tracer from the LEDs to the camera."

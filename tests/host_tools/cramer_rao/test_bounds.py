@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host_tools.cramer_rao.press import observed_presses, rings_of
 
 from device.measurement.parameters import RANGES
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.cramer_rao.bounds import Limit, Limits, limit_of, limits, std_of_box
 from host_tools.cramer_rao.information import CramerRao
 from host_tools.cramer_rao.protocol import SPREADS, PressProtocol
-from host_tools.cramer_rao.sight import rings_of, sights
 from host_tools.forward.derivatives.sensitive_presses import sensitive_ramp
 from host_tools.scenes.scene import Scene
 
@@ -85,11 +85,11 @@ def test_three_scalars_know_less_than_the_image_they_are_made_of(ramp):
 
 
 def test_the_reference_alone_says_nothing_of_the_inclusion(ramp):
-    for sight in sights(ramp, "displacement"):
-        assert set(sight.reference_derivatives).isdisjoint(("size_mm", "depth_mm", "youngs_modulus_kpa"))
-        assert len(sight.contrast) == len(rings_of(ramp).r_mm)
+    for press in observed_presses(ramp, "displacement"):
+        assert set(press.reference_derivatives).isdisjoint(("size_mm", "depth_mm", "youngs_modulus_kpa"))
+        assert len(press.contrast) == len(rings_of(ramp).r_mm)
         # in small strain the contrast is the same at every force
-        assert sight.derivatives["force_n"] == pytest.approx(0, abs=1e-6)
+        assert press.derivatives["force_n"] == pytest.approx(0, abs=1e-6)
 
 
 def bound(*std):

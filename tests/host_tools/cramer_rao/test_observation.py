@@ -4,28 +4,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host_tools.cramer_rao.press import ObservedPress
 
 from host_tools.cramer_rao.observation import GAIN, ZERO, observe, variance_counts, with_growth
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
-from host_tools.cramer_rao.sight import Sight
 
 RINGS = Rings.within(0.9)
 COUNT = len(RINGS.r_mm)
 CALM = PressProtocol(forces_n=(0.3, 0.6), systematic_ratio=0.0)
 
 
-def sight(force_n, reference, contrast):
+def press(force_n, reference, contrast):
     light = reference * (1 + contrast)
     by_force = 0.6 * (1 + contrast)
     growing = {"force_n": np.full(COUNT, 0.6), "tissue_modulus_kpa": np.full(COUNT, -0.1 * force_n)}
     derivatives = {"force_n": 0.2 * contrast, "tissue_modulus_kpa": -contrast, "size_mm": 2 * contrast}
-    return Sight(force_n, contrast, derivatives, by_force, light, reference, growing)
+    return ObservedPress(force_n, contrast, derivatives, by_force, light, reference, growing)
 
 
 SEEN = (
-    sight(0.3, np.array([2.0, 1.8, 1.5]), np.array([0.1, 0.08, 0.05])),
-    sight(0.6, np.array([4.0, 3.5, 3.0]), np.array([0.2, 0.15, 0.1])),
+    press(0.3, np.array([2.0, 1.8, 1.5]), np.array([0.1, 0.08, 0.05])),
+    press(0.6, np.array([4.0, 3.5, 3.0]), np.array([0.2, 0.15, 0.1])),
 )
 
 

@@ -28,7 +28,7 @@ from host_tools.paper_network.export import ExportRefused
 from host_tools.press_models import export as exporting
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling, initial_layers
 from host_tools.press_models.export import GOLDEN_ROWS, export_ramp
-from host_tools.press_models.mode_outcome import Answered, ModeOutcome
+from host_tools.press_models.mode_outcome import EvaluatedPresses, ModeOutcome
 from host_tools.press_models.onnx_networks import build_network, build_range_networks, physical_estimate
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
 from host_tools.press_models.ramp_training import DRY_RUN, TrainedRamp
@@ -53,7 +53,7 @@ def made_outcome(misfit_ratio: float) -> ModeOutcome:
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
     belts = tuple(Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
-    seen = Answered(truth, truth + 0.05, np.full((64, 3), 0.1))
+    seen = EvaluatedPresses(truth, truth + 0.05, np.full((64, 3), 0.1))
     return ModeOutcome(belts, misfit_ratio, 2.0 + misfit_ratio, 0.3, seen, seen)
 
 
@@ -92,7 +92,7 @@ def trained() -> TrainedRamp:
         ellipticity=made_ellipticity_test(surrogate),
         outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
         samples=PressSamples(draw_parameters(PRESSES, rng), rows, np.zeros((PRESSES, SECOND_COLUMNS))),
-        effort=DRY_RUN,
+        budget=DRY_RUN,
         seed=11,
     )
 
@@ -196,7 +196,9 @@ def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, f
     entry = model.bundle.card["range"]
     assert entry["sha256"] == hashlib.sha256((folder / RANGE_FILE).read_bytes()).hexdigest()
     assert (entry["size_mm"], entry["depth_mm"]) == (list(SIZES), list(DEPTHS))
-    assert (entry["dataset_sha256"], entry["effort"]) == ("0123", vars(DRY_RUN.ranges))
+    assert entry["dataset_sha256"] == "0123"
+    budget = DRY_RUN_BUDGET.ranges
+    assert (entry["effort"]["pool"], entry["effort"]["steps"]) == (budget.trained_on, budget.steps)
     assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
     for mode in RAMP_MODES:
         expected = trained.ranges.networks[mode].log_odds(np.array(model.bundle.card["golden"]["features"]))
@@ -230,7 +232,9 @@ def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trai
     assert tuple(card["serials"]) == tuple(card["serials"]) == SERIALS
     assert (card["name"], card["software_version"], card["seed"]) == ("demo", "1.2.3", 11)
     assert card["training_command"] == "host_tools train x"
-    assert card["effort"]["members"] == DRY_RUN.members
+    assert card["effort"]["members"] == DRY_RUN_BUDGET.members
+    assert card["effort"]["judged"] == DRY_RUN_BUDGET.evaluated
+    assert card["effort"]["ranges"]["pool"] == DRY_RUN_BUDGET.ranges.trained_on
     assert card["dataset_sha256"] == hashlib.sha256(trained.samples.rows.tobytes()).hexdigest()
     assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
     assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()

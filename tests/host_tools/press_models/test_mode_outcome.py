@@ -16,14 +16,14 @@ from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models.confidence_belts import confidence_belts
 from host_tools.press_models.mode_outcome import (
     CRITICAL_RATIO,
-    Answered,
+    EvaluatedPresses,
     ModeOutcome,
     answers_to,
     critical_log_odds,
     elongations,
-    judged_mode,
+    evaluate_mode,
 )
-from host_tools.press_models.noisy_presses import NoiseSampler, Pool
+from host_tools.press_models.noisy_presses import NoiseSampler, PressSet
 from host_tools.press_models.recorded_presses import RecordedPresses
 
 STD, COUNT, RECORDED = 0.1, 4000, 150
@@ -64,9 +64,9 @@ def harmonics(deviations: np.ndarray) -> np.ndarray:
     return found
 
 
-def gaussian(count: int, seed: int) -> Answered:
+def gaussian(count: int, seed: int) -> EvaluatedPresses:
     truth = even(count, 3, seed)
-    return Answered(
+    return EvaluatedPresses(
         truth, truth + np.random.default_rng([seed, 1]).normal(0, STD, truth.shape), np.full((count, 3), STD)
     )
 
@@ -81,9 +81,9 @@ def some(recorded: RecordedPresses, count: int) -> RecordedPresses:
     return RecordedPresses(recorded.parameters[:count], recorded.rows[:count], recorded.second_harmonics[:count])
 
 
-def judged(answers: RampAnswers, pool: Pool, recorded: RecordedPresses, seed: int = 4) -> ModeOutcome:
-    toys = FirstColumns(), answers, pool, recorded, FirstHarmonic()
-    return judged_mode("standard", *toys, outside_log_odds=0.3, seed=seed, jobs=1)
+def evaluate_modes(answers: RampAnswers, press_set: PressSet, recorded: RecordedPresses, seed: int = 4) -> ModeOutcome:
+    toys = FirstColumns(), answers, press_set, recorded, FirstHarmonic()
+    return evaluate_mode("standard", *toys, outside_log_odds=0.3, seed=seed, jobs=1)
 
 
 @pytest.fixture(scope="module")
@@ -99,11 +99,11 @@ def answers(slopes) -> RampAnswers:
 
 
 @pytest.fixture(scope="module")
-def pool() -> Pool:
+def press_set() -> PressSet:
     normalised = even(COUNT, len(PARAMETERS), 1)
     rows = np.zeros((COUNT, COLUMNS))
     rows[:, :3] = normalised[:, :3]
-    return Pool(normalised.astype(np.float32), rows.astype(np.float32), NoiseSampler(NOISE))
+    return PressSet(normalised.astype(np.float32), rows.astype(np.float32), NoiseSampler(NOISE))
 
 
 @pytest.fixture(scope="module")
@@ -116,8 +116,8 @@ def recorded(answers) -> RecordedPresses:
 
 
 @pytest.fixture(scope="module")
-def outcome(answers, pool, recorded) -> ModeOutcome:
-    return judged(answers, pool, recorded)
+def outcome(answers, press_set, recorded) -> ModeOutcome:
+    return evaluate_modes(answers, press_set, recorded)
 
 
 def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
@@ -137,7 +137,7 @@ def test_an_interval_covers_the_truth_inside_it_and_not_the_one_beside_it():
     """0.1 +- 2 x 0.1 holds -0.05 and 0.29, not 0.32 and -0.15; a spread above half the prior's tells nothing."""
     truth = np.array([[-0.05, 0.32, 0.9], [0.29, -0.15, -0.9]])
     spread = np.array([[0.1, 0.1, 0.51 * EVEN_STD]] * 2)
-    covered, known = Answered(truth, np.full((2, 3), 0.1), spread).covered(exact_bands(2.0))
+    covered, known = EvaluatedPresses(truth, np.full((2, 3), 0.1), spread).covered(exact_bands(2.0))
     np.testing.assert_array_equal(covered, [[True, False, True]] * 2)
     np.testing.assert_array_equal(known, [[True, True, False]] * 2)
 
@@ -149,23 +149,23 @@ def test_a_part_is_of_the_same_presses_in_all_its_arrays():
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[4:7])
 
 
-def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome, pool):
+def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome, press_set):
     """Noise is as large as the light, 1 + a contrast that is even between -1 and 1: its mean square is 1 + 1/3."""
-    np.testing.assert_array_equal(outcome.simulated.truth, pool.normalised[COUNT // 2 :, :3])
+    np.testing.assert_array_equal(outcome.simulated.truth, press_set.normalised[COUNT // 2 :, :3])
     error = outcome.simulated.mean - outcome.simulated.truth
     np.testing.assert_allclose(error.std(axis=0), STD * np.sqrt(4 / 3), rtol=0.05)
     assert (outcome.simulated.covered(outcome.belts)[0].mean(axis=0) > 0.875).all()
 
 
-def test_bands_come_from_the_first_halves_alone(outcome, answers, pool, recorded):
+def test_bands_come_from_the_first_halves_alone(outcome, answers, press_set, recorded):
     """Truths that lie elsewhere in the second half, simulated or recorded, leave the belts what they were."""
     parameters = recorded.parameters.copy()
     parameters[RECORDED // 2 :, :3] = denormalise(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
     elsewhere = RecordedPresses(parameters, recorded.rows, recorded.second_harmonics)
-    normalised = pool.normalised.copy()
+    normalised = press_set.normalised.copy()
     normalised[COUNT // 2 :] *= -1
-    turned = Pool(normalised, pool.rows, pool.sampler)
-    other = judged(answers, turned, elsewhere)
+    turned = PressSet(normalised, press_set.rows, press_set.sampler)
+    other = evaluate_modes(answers, turned, elsewhere)
     for one, again in zip(outcome.belts, other.belts, strict=True):
         np.testing.assert_array_equal(one.low, again.low)
         np.testing.assert_array_equal(one.high, again.high)
@@ -219,9 +219,9 @@ def test_the_log_odds_are_kept_as_they_are_told(outcome):
     assert outcome.outside_log_odds == 0.3
 
 
-def test_the_same_seed_gives_the_same_answers_and_another_one_other_noise(outcome, answers, pool, recorded):
+def test_the_same_seed_gives_the_same_answers_and_another_one_other_noise(outcome, answers, press_set, recorded):
     few = some(recorded, 2)
-    again, other = (judged(answers, pool, few, seed) for seed in (4, 5))
+    again, other = (evaluate_modes(answers, press_set, few, seed) for seed in (4, 5))
     np.testing.assert_array_equal(again.simulated.mean, outcome.simulated.mean)
     assert (other.simulated.mean != again.simulated.mean).mean() > 0.99
 

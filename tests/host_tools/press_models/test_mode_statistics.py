@@ -6,7 +6,7 @@ import pytest
 from device.measurement.confidence_belt import Belt
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
-from host_tools.press_models.mode_outcome import Answered
+from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.mode_statistics import OCTILES, octile_of, statistics
 
 COUNT = 4000
@@ -18,7 +18,7 @@ EVEN = np.tile((2 * np.arange(COUNT) + 1)[:, None] / COUNT - 1, 3)
 
 def of(mean, spread=0.1, truth=EVEN):
     mean, spread = (np.broadcast_to(part, truth.shape) for part in (mean, spread))
-    return statistics(Answered(truth, np.array(mean), np.array(spread)), BANDS)
+    return statistics(EvaluatedPresses(truth, np.array(mean), np.array(spread)), BANDS)
 
 
 def test_a_perfect_answer_has_skill_1_and_no_error():

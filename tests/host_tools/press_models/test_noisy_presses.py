@@ -9,7 +9,7 @@ from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, RESPONSE_COLUMNS
 from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models import noisy_presses
-from host_tools.press_models.noisy_presses import NoiseSampler, random_pool
+from host_tools.press_models.noisy_presses import NoiseSampler, random_press_set
 
 CAMERA = np.random.default_rng(1).normal(0, 2e-4, (COLUMNS, COLUMNS))
 NOISE = PressNoise(CAMERA @ CAMERA.T + 1e-6 * np.eye(COLUMNS))
@@ -53,7 +53,7 @@ def test_brighter_rows_are_noisier_as_a_ratio_of_their_light():
 
 
 def test_the_same_seed_gives_the_same_rows_and_another_one_others():
-    first, again, other = (random_pool(random_surrogate(), NOISE, 20, seed) for seed in (4, 4, 5))
+    first, again, other = (random_press_set(random_surrogate(), NOISE, 20, seed) for seed in (4, 4, 5))
     np.testing.assert_array_equal(first.rows, again.rows)
     assert (first.rows != other.rows).any(axis=1).all()
     index = np.arange(20)
@@ -62,11 +62,11 @@ def test_the_same_seed_gives_the_same_rows_and_another_one_others():
     assert (once != fresh).any(axis=1).all()
 
 
-def test_a_pool_is_the_surrogates_rows_also_across_blocks(monkeypatch):
+def test_a_press_set_is_the_surrogates_rows_also_across_blocks(monkeypatch):
     monkeypatch.setattr(noisy_presses, "BLOCK", 7)
     surrogate = random_surrogate()
-    pool = random_pool(surrogate, NOISE, 20, seed=4)
-    rows = surrogate.rows(pool.normalised.astype(np.float64))
-    np.testing.assert_allclose(pool.rows, rows, atol=1e-5 * np.abs(rows).max())
-    assert pool.rows.dtype == pool.normalised.dtype == np.float32
-    assert (denormalise(pool.normalised.astype(np.float64))[:, 0] > 2.0 - 1e-5).all()
+    press_set = random_press_set(surrogate, NOISE, 20, seed=4)
+    rows = surrogate.rows(press_set.normalised.astype(np.float64))
+    np.testing.assert_allclose(press_set.rows, rows, atol=1e-5 * np.abs(rows).max())
+    assert press_set.rows.dtype == press_set.normalised.dtype == np.float32
+    assert (denormalise(press_set.normalised.astype(np.float64))[:, 0] > 2.0 - 1e-5).all()

@@ -10,7 +10,7 @@ from device.measurement.quick_mode.profile import quick_press
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.recording.ring_means import RINGS
 from host_tools.press_models import quick_training
-from host_tools.press_models.mode_outcome import Answered
+from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.quick_training import CRITICAL_RATIO, RecordedHolds, recorded_holds
 from host_tools.press_models.recorded_presses import EXACT, recorded_press
 from host_tools.press_models.seeds import press_seed
@@ -25,11 +25,11 @@ class FirstColumns:
         return rows[:, :3], np.full((len(rows), 3), STD)
 
 
-def answers(error: float) -> tuple[Answered, RecordedHolds]:
+def answers(error: float) -> tuple[EvaluatedPresses, RecordedHolds]:
     """Simulated answers with Gaussian errors of the stated spread, and recordings whose errors are so much larger."""
     rng = np.random.default_rng(1)
     truth = rng.uniform(-1, 1, (SIMULATED, 3))
-    simulated = Answered(truth, truth + rng.normal(0, STD, truth.shape), np.full(truth.shape, STD))
+    simulated = EvaluatedPresses(truth, truth + rng.normal(0, STD, truth.shape), np.full(truth.shape, STD))
     normalised = rng.uniform(-0.9, 0.9, (RECORDED, len(PARAMETERS)))
     rows = np.zeros((RECORDED, RINGS + 1))
     rows[:, :3] = normalised[:, :3] + rng.normal(0, error * STD, (RECORDED, 3))

@@ -10,36 +10,36 @@ from device.measurement.parameters import normalise
 from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS
 from host_tools.press_models import train_range
 from host_tools.press_models.fit_surrogate import INCLUSION_HIGHEST, INCLUSION_REACH
-from host_tools.press_models.noisy_presses import NoiseSampler, Pool
+from host_tools.press_models.noisy_presses import NoiseSampler, PressSet
 from host_tools.press_models.press_samples import PressSamples
 from host_tools.press_models.train_range import (
-    RangeEffort,
+    RangeBudget,
     RangeNetwork,
     WideSurrogate,
     draw_wide_parameters,
     is_outside,
     train_network,
-    wide_pool,
+    wide_press_set,
     wide_surrogate,
 )
 
 STD, COUNT = 0.3, 20_000
 GROWTH = slice(44, 77)
-EFFORT = RangeEffort(members=1, steps=700)
+BUDGET = RangeBudget(members=1, steps=700)
 
 
 @pytest.fixture(scope="module")
-def pool() -> Pool:
+def press_set() -> PressSet:
     """Columns 44 and 45, whose noise does not depend on the light, are the coordinates of size and depth."""
     normalised = normalise(draw_wide_parameters(COUNT, np.random.default_rng(1)))
     rows = np.zeros((COUNT, COLUMNS), np.float32)
     rows[:, 44:46] = normalised[:, :2]
-    return Pool(normalised.astype(np.float32), rows, NoiseSampler(white_noise(STD)))
+    return PressSet(normalised.astype(np.float32), rows, NoiseSampler(white_noise(STD)))
 
 
 @pytest.fixture(scope="module")
-def network(pool) -> RangeNetwork:
-    return train_network(pool, 1, EFFORT, 1)
+def network(press_set) -> RangeNetwork:
+    return train_network(press_set, 1, BUDGET, 1)
 
 
 def seen_at(size: float, depth: float, count: int = 1) -> np.ndarray:
@@ -54,10 +54,10 @@ def on_paper(seen: np.ndarray) -> np.ndarray:
     return 1 - inside.prod(axis=1)
 
 
-def test_the_odds_are_nearly_as_good_as_can_be(pool, network):
+def test_the_odds_are_nearly_as_good_as_can_be(press_set, network):
     """Mean of -ln(probability of what is so), on fresh noise, against that of the exact probability."""
-    rows = pool.noisy(np.arange(COUNT), np.random.default_rng(9)).astype(float)
-    outside = is_outside(pool.normalised)
+    rows = press_set.noisy(np.arange(COUNT), np.random.default_rng(9)).astype(float)
+    outside = is_outside(press_set.normalised)
     found, exact = expit(network.log_odds(rows)), np.clip(on_paper(rows[:, 44:46]), 1e-9, 1 - 1e-9)
     losses = [-np.mean(np.log(np.where(outside, p, 1 - p))) for p in (found, exact)]
     assert losses[1] < 0.4 < np.log(2)
@@ -71,9 +71,9 @@ def test_the_farther_beyond_an_end_the_larger_the_odds(network):
         assert odds[0] < -1 < 1 < odds[-1]
 
 
-def test_the_same_seed_gives_the_same_network(pool):
-    few = RangeEffort(members=2, steps=3)
-    first, again, other = (train_network(pool, seed, few, 1).log_odds(seen_at(1.0, 0.0)) for seed in (1, 1, 2))
+def test_the_same_seed_gives_the_same_network(press_set):
+    few = RangeBudget(members=2, steps=3)
+    first, again, other = (train_network(press_set, seed, few, 1).log_odds(seen_at(1.0, 0.0)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert (first != other).all()
 
@@ -101,8 +101,8 @@ def test_polynomials_follow_what_is_one_around_the_ranges_as_well(surrogate):
     np.testing.assert_allclose(surrogate.rows(apart), far_rows(apart), atol=1e-6)
 
 
-def test_a_pool_keeps_coordinates_outside_and_is_drawn_anew_by_another_seed(surrogate):
-    first, other = (wide_pool(surrogate, white_noise(STD), 300, seed) for seed in (1, 2))
+def test_a_press_set_keeps_coordinates_outside_and_is_drawn_anew_by_another_seed(surrogate):
+    first, other = (wide_press_set(surrogate, white_noise(STD), 300, seed) for seed in (1, 2))
     assert 0.3 < is_outside(first.normalised).mean() < 0.7
     np.testing.assert_allclose(first.rows[:, :44].std(axis=1), 0, atol=1e-5)
     assert (first.normalised != other.normalised).all()

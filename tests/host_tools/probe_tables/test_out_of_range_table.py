@@ -29,14 +29,14 @@ FEW, FEW_ASIDE = (3, 4, 2), (2, 3, 2)
 LARGE_AND_DEEP = Inclusion(14.0, 14.5, 60.0)
 
 
-def of_place(size_mm: float, depth_mm: float, contrast: float) -> float:
-    """A field over force, strength and contrast that is linear in size, contrast and the share of the depth."""
+def of_place(size_mm: float, depth_mm: float, mismatch: float) -> float:
+    """A field over force, strength and mismatch that is linear in size, mismatch and the share of the depth."""
     share = (depth_mm - SHALLOWEST_MM) / (deepest_mm(size_mm) - SHALLOWEST_MM)
-    return 1.0 + 0.1 * size_mm + contrast + 0.4 * share
+    return 1.0 + 0.1 * size_mm + mismatch + 0.4 * share
 
 
-def over_volume(size_mm: float, depth_mm: float, contrast: float) -> float:
-    return of_place(size_mm, depth_mm, contrast) * far_field_strength(size_mm, depth_mm) / size_mm**3
+def over_volume(size_mm: float, depth_mm: float, mismatch: float) -> float:
+    return of_place(size_mm, depth_mm, mismatch) * far_field_strength(size_mm, depth_mm) / size_mm**3
 
 
 @pytest.fixture
@@ -45,14 +45,14 @@ def built(monkeypatch, tables) -> WideTable:
     forces, radii = tables.centred.lump_per_n_mm3.shape[-2:]
     modes, aside_radii = tables.off_axis.lump_per_n_mm3.shape[-2:]
 
-    def centred(scene_of, slab, size_mm, depth_mm, contrast):
+    def centred(scene_of, slab, size_mm, depth_mm, mismatch):
         assert slab == NOMINAL
-        return np.multiply.outer([1.0, 2.0], np.full((forces, radii), over_volume(size_mm, depth_mm, contrast)))
+        return np.multiply.outer([1.0, 2.0], np.full((forces, radii), over_volume(size_mm, depth_mm, mismatch)))
 
-    def aside(size_mm, depth_mm, offset_mm, contrasts):
+    def aside(size_mm, depth_mm, offset_mm, mismatches):
         assert offset_mm == ASIDE_MM
         ones = np.multiply.outer([1.0, 2.0], np.ones((modes, aside_radii)))
-        return np.array([over_volume(size_mm, depth_mm, contrast) * ones for contrast in contrasts])
+        return np.array([over_volume(size_mm, depth_mm, mismatch) * ones for mismatch in mismatches])
 
     monkeypatch.setattr(out_of_range_table, "lump_per_n_mm3", centred)
     monkeypatch.setattr(out_of_range_table, "inclusions_per_n_mm3", aside)
@@ -92,15 +92,15 @@ OUTSIDE = (LARGE_AND_DEEP, Inclusion(0.5, 3.2, 20.0), Inclusion(17.0, 6.0, 150.0
 
 def on_paper(one: Inclusion, slab: Slab = NOMINAL) -> float:
     size_mm, depth_mm, modulus_kpa = one.as_tuple()
-    contrast = slab.contrast(modulus_kpa)
-    return of_smallest(one, SIZES_MM[0], contrast) * far_field_strength(size_mm, depth_mm) * contrast
+    mismatch = slab.elastic_mismatch(modulus_kpa)
+    return of_smallest(one, SIZES_MM[0], mismatch) * far_field_strength(size_mm, depth_mm) * mismatch
 
 
-def of_smallest(one: Inclusion, smallest_mm: float, contrast: float) -> float:
+def of_smallest(one: Inclusion, smallest_mm: float, mismatch: float) -> float:
     """A smaller inclusion than the smallest has its field at the same share of its own depths."""
     share = (one.depth_mm - SHALLOWEST_MM) / (deepest_mm(one.size_mm) - SHALLOWEST_MM)
     size_mm = max(one.size_mm, smallest_mm)
-    return of_place(size_mm, depth_at(size_mm, share), contrast)
+    return of_place(size_mm, depth_at(size_mm, share), mismatch)
 
 
 @pytest.mark.parametrize("slab", [NOMINAL, Slab(5.5, 28.0)])
@@ -132,9 +132,9 @@ def test_an_inclusion_beside_the_axis_is_carried_on_likewise(built, tables, one)
     near = nearest(one, tables.off_axis)
     ratio = far_field_strength(one.size_mm, one.depth_mm) / far_field_strength(near.size_mm, near.depth_mm)
     scaled = [
-        of_smallest(one, SMALLEST_ASIDE_MM, NOMINAL.contrast(one.youngs_modulus_kpa))
+        of_smallest(one, SMALLEST_ASIDE_MM, NOMINAL.elastic_mismatch(one.youngs_modulus_kpa))
         * far_field_strength(one.size_mm, one.depth_mm)
-        * NOMINAL.contrast(one.youngs_modulus_kpa)
+        * NOMINAL.elastic_mismatch(one.youngs_modulus_kpa)
         for one in (one, near)
     ]
     gained = (scaled[0] - ratio * scaled[1]) * np.array([1.0, 2.0])[:, None, None]

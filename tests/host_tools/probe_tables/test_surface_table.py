@@ -112,12 +112,12 @@ def test_layers_that_stand_in_for_the_base_give_the_slabs_own_deformation():
 
 
 def test_solves_are_assembled_on_their_axes():
-    """Fields that say size, depth, contrast and slab: at a point that was solved the table gives back what it was."""
+    """Fields that say size, depth, mismatch and slab: at a point that was solved the table gives back what it was."""
     axes = inclusion_axes((5, 3, 2), 1.0)
-    coarse = (axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.contrast)
+    coarse = (axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.elastic_mismatch)
 
-    def field(slab, size_mm, depth_mm, contrast):
-        said = size_mm + 100 * depth_mm + 1e4 * contrast + slab.youngs_modulus_kpa * slab.thickness_mm
+    def field(slab, size_mm, depth_mm, mismatch):
+        said = size_mm + 100 * depth_mm + 1e4 * mismatch + slab.youngs_modulus_kpa * slab.thickness_mm
         return np.full((2, len(FORCES_N), 4), said) * np.array([1.0, 3.0])[:, None, None]
 
     grids = [axes, *[coarse] * (len(SOLVED) - 1)]

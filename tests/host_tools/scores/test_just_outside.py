@@ -1,6 +1,4 @@
-"""How like an inclusion inside the ranges one outside looks: against the normal law, and a press whose twin is
-itself.
-"""
+"""How alike inclusions outside and inside the ranges look: by the normal law, and a press that is its own nearest."""
 
 from pathlib import Path
 
@@ -15,13 +13,13 @@ from host_tools.press_models.press_samples import profile_rows
 from host_tools.scores.just_outside import (
     FALSE_FLAGS,
     INCLUSIONS,
-    Twin,
-    _judged,
+    NearestInside,
+    _benchmarks,
     _row,
     at_nominal,
     holds,
     inclusion_ramps,
-    nearest_twin,
+    nearest_inside,
 )
 from host_tools.scores.outside import FALSE_AT_MOST
 
@@ -31,21 +29,21 @@ INSIDE = Inclusion(9.0, 5.0, 60.0)
 
 @pytest.mark.parametrize(("deviations", "share"), [(0.0, 0.05), (1.6449, 0.5), (3.2897, 0.95)])
 def test_the_best_test_flags_as_the_normal_law_says(deviations, share):
-    assert Twin(INSIDE, deviations).most_flagged(0.05) == pytest.approx(share, abs=1e-4)
+    assert NearestInside(INSIDE, deviations).most_flagged(0.05) == pytest.approx(share, abs=1e-4)
 
 
 def test_one_of_three_doubts_has_less_than_a_third_of_the_false_flags():
     """1.25 % of the presses inside: a test that flags half of what is 2.24 deviations apart."""
     assert 3 * FALSE_FLAGS < FALSE_AT_MOST
-    assert Twin(INSIDE, 2.2414).most_flagged() == pytest.approx(0.5, abs=1e-4)
+    assert NearestInside(INSIDE, 2.2414).most_flagged() == pytest.approx(0.5, abs=1e-4)
 
 
-def test_an_inclusion_inside_is_its_own_twin(tables):
+def test_an_inclusion_inside_is_its_own_nearest(tables):
     answers = read_ramp_model(MODELS / "standard").answers
     row = profile_rows(tables, at_nominal(INSIDE)[None])[0]
-    twin = nearest_twin(PressPosterior(row, answers.surrogate, answers.noise["standard"]), seed=0)
-    assert twin.deviations < 1.5
-    assert (twin.inclusion.size_mm, twin.inclusion.depth_mm) == pytest.approx((9.0, 5.0), rel=0.02)
+    nearest = nearest_inside(PressPosterior(row, answers.surrogate, answers.noise["standard"]), seed=0)
+    assert nearest.deviations < 1.5
+    assert (nearest.inclusion.size_mm, nearest.inclusion.depth_mm) == pytest.approx((9.0, 5.0), rel=0.02)
 
 
 def test_the_ramp_of_an_inclusion_inside_is_the_tables_own(tables):
@@ -85,11 +83,11 @@ def test_a_refusal_is_asked_for_only_where_a_test_could_tell():
     large = quantity(14.0, 15.0, high_is_open=True)
     found = [estimate(large, quantity(6.5, 8.0), quantity(20.0, 90.0)), estimate(*[UNKNOWN_QUANTITY] * 3)]
     for too_alike in (3.0, 3.7):
-        assert _judged("standard", INCLUSIONS[0], Twin(INSIDE, too_alike), found) == []
-    [benchmark] = _judged("standard", INCLUSIONS[0], Twin(INSIDE, 4.0), found)
+        assert _benchmarks("standard", INCLUSIONS[0], NearestInside(INSIDE, too_alike), found) == []
+    [benchmark] = _benchmarks("standard", INCLUSIONS[0], NearestInside(INSIDE, 4.0), found)
     assert benchmark.measured == 0.5
     assert not benchmark.passed
-    assert _row("standard", INCLUSIONS[0], Twin(INSIDE, 4.0), found)[8:] == (
+    assert _row("standard", INCLUSIONS[0], NearestInside(INSIDE, 4.0), found)[8:] == (
         "96%",
         "99%",
         "50%",

@@ -9,7 +9,7 @@ from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
 from device.measurement.ramp_modes.noise import ErrorLevels
 from host_tools.press_models.recorded_presses import recorded_press
 from host_tools.scores import ellipsoids
-from host_tools.scores.ellipsoids import ELLIPSOIDS, SKINS, _judged, draw_oblong, most_flagged, oblong_chapter, skins
+from host_tools.scores.ellipsoids import ELLIPSOIDS, SKINS, _benchmark, draw_oblong, most_flagged, oblong_chapter, skins
 from host_tools.scores.outside import FALSE_AT_MOST
 
 PRESSES = SKINS * ELLIPSOIDS
@@ -20,13 +20,13 @@ def test_only_presses_that_a_test_could_tell_are_judged():
     apart = np.where(np.arange(PRESSES) < 40, 6.0, 2.0)
     refused = apart > 2
     refused[[3, 7]] = False
-    benchmark = _judged("standard", apart, refused)
+    benchmark = _benchmark("standard", apart, refused)
     assert benchmark.measured == pytest.approx(38 / 40)
     assert benchmark.passed
     assert "(40 presses)" in benchmark.case
     refused[11] = False
-    assert not _judged("standard", apart, refused).passed
-    assert not _judged("standard", np.full(len(apart), 2.0), refused).passed  # none is left to be judged
+    assert not _benchmark("standard", apart, refused).passed
+    assert not _benchmark("standard", np.full(len(apart), 2.0), refused).passed  # none is left to be judged
 
 
 def test_four_deviations_are_what_a_test_tells_nearly_always():

@@ -1,4 +1,4 @@
-"""Ellipsoids and what any test could tell: a round inclusion is its own twin, a stretched spot lies as far as it is."""
+"""Ellipsoids and what any test could tell: a round one is its own nearest, a stretched spot lies as far as it is."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +20,9 @@ from host_tools.scores.ellipsoids import (
     Oblong,
     draw_oblong,
     most_flagged,
+    nearest_round,
     round_deviations,
     spoken,
-    twin_of,
 )
 from host_tools.scores.just_outside import at_nominal
 
@@ -64,7 +64,7 @@ def test_tables_of_an_ellipsoid_hold_it_off_the_axis_and_are_the_probes_own_othe
 
 
 @pytest.mark.parametrize("offset_mm", [0.0, 1.5, 2.0])
-def test_a_round_inclusion_is_its_own_twin_beside_the_axis_too(tables, model, offset_mm):
+def test_a_round_inclusion_is_its_own_nearest_beside_the_axis_too(tables, model, offset_mm):
     """The tables' own inclusion in place of an ellipsoid: what is left is the polynomials' error."""
     assert round_deviations(tables, press_at(offset_mm), model, "standard") < 1.5
 
@@ -81,7 +81,7 @@ def distance(tables, model, offset_mm, along, across):
     posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise["standard"])
     pattern = 0.1 * stretched(rows[0, :CONTRAST_COLUMNS].reshape(-1, RINGS))
     harmonics = np.stack([second[0] + along * pattern, across * pattern])
-    best, found = twin_of(posterior, harmonics, normalise(press_at(offset_mm)[None])[0], model, "standard")
+    best, found = nearest_round(posterior, harmonics, normalise(press_at(offset_mm)[None])[0], model, "standard")
     weight = np.linalg.solve(model.ellipticity.covariance(best, "standard"), pattern)
     return found, float(np.sqrt(weight @ pattern))
 
@@ -94,7 +94,7 @@ def test_a_spot_stretched_across_the_offset_lies_as_far_from_round_as_its_stretc
     assert found == pytest.approx(np.hypot(round_deviations, length), rel=0.03)
 
 
-def test_a_spot_stretched_along_the_offset_has_a_round_twin_that_is_nearer_than_its_stretch(tables, model):
+def test_a_spot_stretched_along_the_offset_has_a_round_inclusion_nearer_than_its_stretch(tables, model):
     """Another place, depth or skin makes a part of it."""
     found, length = distance(tables, model, 1.5, along=1.0, across=0.0)
     assert 0.5 * length < found < 0.97 * length

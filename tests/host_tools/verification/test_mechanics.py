@@ -3,7 +3,7 @@
 import pytest
 
 from host_tools.verification import mechanics
-from host_tools.verification.peer.calculix import CalculixFailed
+from host_tools.verification.cross_check.calculix import CalculixFailed
 
 
 def test_without_the_program_the_chapter_says_why_it_is_skipped(monkeypatch):

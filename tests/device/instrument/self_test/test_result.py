@@ -3,21 +3,21 @@
 import pytest
 
 from device.errors import DiskFullError
-from device.instrument.self_test.report import CheckResult, broken, judged, not_tested, overall
+from device.instrument.self_test.report import CheckResult, broken, compared, not_tested, overall
 from device.measurement.quantities import Bound
 
 BOUND = Bound(-0.02, 0.02, "N")
 
 
 def test_a_value_in_its_bound_passes_without_advice():
-    result = judged("Load cell", "zero", 0.01, BOUND, "Hold it free.")
+    result = compared("Load cell", "zero", 0.01, BOUND, "Hold it free.")
     assert (result.verdict, result.remedy) == ("passed", "")
     assert (result.measured, result.bound) == ("0.01 N", "at least -0.02 and at most 0.02 N")
 
 
 @pytest.mark.parametrize("value", [0.03, float("nan")])
 def test_a_value_outside_or_that_is_none_fails_with_what_to_do(value):
-    result = judged("Load cell", "zero", value, BOUND, "Hold it free.")
+    result = compared("Load cell", "zero", value, BOUND, "Hold it free.")
     assert (result.verdict, result.remedy) == ("failed", "Hold it free.")
 
 

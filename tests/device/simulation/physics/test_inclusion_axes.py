@@ -1,4 +1,4 @@
-"""The axes of a table of inclusions: exact for polynomials in size, depth and contrast, refused outside."""
+"""The axes of a table of inclusions: exact for polynomials in size, depth and mismatch, refused outside."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from device.simulation.physics.slab import NOMINAL, Slab
 AXES = InclusionAxes(points_with_ends(1.0, 15.0, 4), points_with_ends(4.0, 12.0, 3), points_with_ends(0.1, 0.96, 3))
 
 
-def polynomial(size_mm, depth_mm, contrast):
-    return (1 - size_mm**3 / 1000) * (depth_mm**2 - depth_mm) * (2 + contrast - contrast**2)
+def polynomial(size_mm, depth_mm, mismatch):
+    return (1 - size_mm**3 / 1000) * (depth_mm**2 - depth_mm) * (2 + mismatch - mismatch**2)
 
 
 FIELDS = np.multiply.outer([1.0, 3.0], polynomial(*np.meshgrid(*AXES, indexing="ij")))
@@ -20,10 +20,10 @@ FIELDS = np.multiply.outer([1.0, 3.0], polynomial(*np.meshgrid(*AXES, indexing="
 
 @pytest.mark.parametrize("slab", [NOMINAL, Slab(4.0), Slab(6.25, 36.0)])
 @pytest.mark.parametrize("truth", [(9.3, 7.7, 55.0), (15.0, 4.0, 200.0), (1.0, 12.0, 8.0)])
-def test_a_polynomial_in_size_depth_and_contrast_is_exact(slab, truth):
+def test_a_polynomial_in_size_depth_and_elastic_mismatch_is_exact(slab, truth):
     size_mm, depth_mm, modulus_kpa = truth
-    contrast = slab.contrast(modulus_kpa)
-    expected = size_mm**3 * contrast * polynomial(size_mm, depth_mm, contrast)
+    mismatch = slab.elastic_mismatch(modulus_kpa)
+    expected = size_mm**3 * mismatch * polynomial(size_mm, depth_mm, mismatch)
     found = AXES.inclusion_per_n(FIELDS, Inclusion(*truth), slab)
     np.testing.assert_allclose(found, [expected, 3 * expected], rtol=1e-12)
 
@@ -50,7 +50,7 @@ def test_an_inclusion_outside_the_axes_is_refused_by_what_is_outside(inclusion, 
 
 
 def test_the_moduli_that_are_held_follow_the_tissue():
-    """Contrast 0.1 is 8 kPa in tissue of 6.26 kPa, but 7.7 kPa in tissue of 6 kPa."""
+    """A mismatch of 0.1 is 8 kPa in tissue of 6.26 kPa, but 7.7 kPa in tissue of 6 kPa."""
     inclusion = Inclusion(10.0, 6.0, 7.8)
     assert AXES.inclusion_per_n(FIELDS, inclusion, Slab(6.0)).all()
     with pytest.raises(InvalidQuantity, match="youngs_modulus_kpa is 7.8"):

@@ -13,7 +13,7 @@ from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.virtual_probe import VirtualProbe
 
 FIRST = Inclusion(10.0, 5.0, 80.0)
-TWIN = Neighbour(10.0, 5.0, 80.0, x_mm=12.0)
+MIRRORED = Neighbour(10.0, 5.0, 80.0, x_mm=12.0)
 FORCE_N = 0.4
 X_MM = np.linspace(-12, 12, 97, dtype=np.float32)[None, :]
 Y_MM = X_MM.T
@@ -62,8 +62,8 @@ def test_over_the_neighbour_the_probe_sees_it_as_it_sees_it_alone(both, alone):
         np.testing.assert_allclose(field, expected, atol=1e-5 * expected.max())
 
 
-def test_half_way_between_twins_the_face_is_the_same_on_both_sides(both, alone):
-    w_mm, p_kpa = both(TWIN).at(FORCE_N, ProbePlacement(6.0, 0.0))
+def test_half_way_between_two_alike_the_face_is_the_same_on_both_sides(both, alone):
+    w_mm, p_kpa = both(MIRRORED).at(FORCE_N, ProbePlacement(6.0, 0.0))
     for field in (w_mm, p_kpa):
         np.testing.assert_allclose(field, field[:, ::-1], atol=1e-4 * field.max())
     one_mm = alone(FIRST).at(FORCE_N, ProbePlacement(6.0, 0.0))[0]
@@ -81,12 +81,12 @@ def test_a_second_inclusion_in_the_same_place_doubles_what_the_first_adds(both, 
 @pytest.mark.parametrize("place", [ProbePlacement(), ProbePlacement(6.0, 0.0), ProbePlacement(tilt_x_deg=1.5)])
 def test_both_inclusions_together_still_carry_the_force_once(both, place):
     """The sum over the cells of 0.25 mm misses the rim's curve: 2 %."""
-    assert both(TWIN).at(FORCE_N, place)[1].sum() * CELL_MM2 * 1e-3 == pytest.approx(FORCE_N, rel=0.02)
+    assert both(MIRRORED).at(FORCE_N, place)[1].sum() * CELL_MM2 * 1e-3 == pytest.approx(FORCE_N, rel=0.02)
 
 
 def test_a_tilt_is_felt_once_and_not_once_an_inclusion(both, alone):
     tilted = ProbePlacement(tilt_x_deg=1.0)
-    found = both(TWIN).at(FORCE_N, tilted)[0] - both(TWIN).at(FORCE_N, ProbePlacement())[0]
+    found = both(MIRRORED).at(FORCE_N, tilted)[0] - both(MIRRORED).at(FORCE_N, ProbePlacement())[0]
     expected = alone(FIRST).at(FORCE_N, tilted)[0] - alone(FIRST).at(FORCE_N, ProbePlacement())[0]
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
 

@@ -92,8 +92,8 @@ def test_a_small_offset_departs_from_the_centred_field_in_proportion(face):
 
 
 @pytest.mark.parametrize("slab", [NOMINAL, Slab(4.4, 27.6), Slab(6.25, 36.0)])
-def test_off_the_axis_an_inclusion_changes_with_the_slab_as_the_centred_one_of_its_contrast(tables, slab):
-    """What it adds 4 mm aside is the nominal twin's, times the ratio of both on the axis (root mean square)."""
+def test_off_the_axis_an_inclusion_changes_with_the_slab_as_the_centred_one_of_its_mismatch(tables, slab):
+    """What it adds 4 mm aside is the nominal equivalent's, times the ratio of both on the axis (root mean square)."""
 
     def added_mm(inclusion, slab):
         inclusion_field, none = (
@@ -103,7 +103,7 @@ def test_off_the_axis_an_inclusion_changes_with_the_slab_as_the_centred_one_of_i
         aside = ProbePlacement(4.0, 0.0)
         return inclusion_field.at(0.5, aside)[0] - none.at(0.5, aside)[0]
 
-    both = (INCLUSION, slab), (slab.nominal_twin(INCLUSION), NOMINAL)
+    both = (INCLUSION, slab), (slab.nominal_equivalent(INCLUSION), NOMINAL)
     centred_mm = (tables.centred.inclusion_field(*one).at(0.5).w_mm for one in both)
     squares, nominal_squares = (tables.centred.r_mm @ w_mm**2 for w_mm in centred_mm)
     aside, nominal_aside = (added_mm(*one) for one in both)

@@ -1,4 +1,4 @@
-"""The tissue under the probe: its bounds, and the contrast of an inclusion in it on paper."""
+"""The tissue under the probe: its bounds, and the mismatch of an inclusion in it on paper."""
 
 import pytest
 
@@ -24,21 +24,21 @@ def test_tissue_outside_the_tables_is_refused_by_what_is_outside(tissue, quantit
         Slab(**tissue)
 
 
-def test_the_contrast_is_none_for_tissue_and_one_for_a_rigid_sphere():
-    assert Slab(4.0).contrast(4.0) == 0.0
-    assert Slab(4.0).contrast(1e9) == pytest.approx(1.0)
-    assert NOMINAL.contrast(30.0) == pytest.approx(25.0 / 37.5)
+def test_the_elastic_mismatch_is_none_for_tissue_and_one_for_a_rigid_sphere():
+    assert Slab(4.0).elastic_mismatch(4.0) == 0.0
+    assert Slab(4.0).elastic_mismatch(1e9) == pytest.approx(1.0)
+    assert NOMINAL.elastic_mismatch(30.0) == pytest.approx(25.0 / 37.5)
 
 
 @pytest.mark.parametrize("modulus_kpa", [8.0, 60.0, 200.0])
-def test_a_modulus_comes_back_from_its_contrast(modulus_kpa):
+def test_a_modulus_comes_back_from_its_elastic_mismatch(modulus_kpa):
     slab = Slab(6.0, 28.0)
-    assert slab.modulus_kpa(slab.contrast(modulus_kpa)) == pytest.approx(modulus_kpa)
+    assert slab.modulus_kpa(slab.elastic_mismatch(modulus_kpa)) == pytest.approx(modulus_kpa)
 
 
-def test_the_nominal_twin_has_the_same_contrast_and_place():
+def test_the_nominal_equivalent_has_the_same_elastic_mismatch_and_place():
     slab, inclusion = Slab(4.0), Inclusion(9.0, 5.0, 60.0)
-    twin = slab.nominal_twin(inclusion)
-    assert twin == Inclusion(9.0, 5.0, 75.0)
-    assert NOMINAL.contrast(twin.youngs_modulus_kpa) == pytest.approx(slab.contrast(60.0))
-    assert NOMINAL.nominal_twin(inclusion) == inclusion
+    equivalent = slab.nominal_equivalent(inclusion)
+    assert equivalent == Inclusion(9.0, 5.0, 75.0)
+    assert NOMINAL.elastic_mismatch(equivalent.youngs_modulus_kpa) == pytest.approx(slab.elastic_mismatch(60.0))
+    assert NOMINAL.nominal_equivalent(inclusion) == inclusion

@@ -15,9 +15,9 @@ FORCE_N = points_inside(0.0, 0.8, 3)
 SLAB_KPA, SLAB_MM = np.array([4.0, 5.0, 6.25]), np.array([28.5, 30.0, 36.0])
 
 
-def polynomial(size_mm, depth_mm, contrast, force_n):
-    """A polynomial of degree 2, 2, 2 and 2 in size, depth, contrast and force, different at every radius."""
-    smooth = (1 + size_mm - 0.1 * size_mm**2) * (2 - depth_mm**2 / 50) * (contrast**2 - 3 * contrast)
+def polynomial(size_mm, depth_mm, mismatch, force_n):
+    """A polynomial of degree 2, 2, 2 and 2 in size, depth, mismatch and force, different at every radius."""
+    smooth = (1 + size_mm - 0.1 * size_mm**2) * (2 - depth_mm**2 / 50) * (mismatch**2 - 3 * mismatch)
     return np.multiply.outer(smooth * (1 + force_n - 2 * force_n**2), 1 + R_MM)
 
 
@@ -48,22 +48,22 @@ def small_table():
 
 
 @pytest.mark.parametrize("inclusion", [(3.3, 7.7, 55.0), (15.0, 4.0, 200.0), (1.0, 12.0, 8.0), (9.0, 5.0, 99.0)])
-def test_an_inclusion_field_is_interpolated_in_size_depth_contrast_and_force(small_table, inclusion):
+def test_an_inclusion_field_is_interpolated_in_size_depth_elastic_mismatch_and_force(small_table, inclusion):
     size, depth, modulus = inclusion
     face = small_table.inclusion_field(Inclusion(*inclusion)).at(0.37)
-    contrast = NOMINAL.contrast(modulus)
-    expected = 0.37 * size**3 * contrast * polynomial(size, depth, contrast, 0.37)
+    mismatch = NOMINAL.elastic_mismatch(modulus)
+    expected = 0.37 * size**3 * mismatch * polynomial(size, depth, mismatch, 0.37)
     np.testing.assert_allclose(face.w_mm, expected, rtol=1e-9)
     np.testing.assert_allclose(face.p_kpa, 3 * expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("slab", [Slab(4.4, 27.6), Slab(6.25, 30.0), Slab(5.0, 36.0), Slab(5.8, 33.0)])
-def test_another_slab_adds_its_change_at_the_same_contrast_and_scaled_force(small_table, slab):
+def test_another_slab_adds_its_change_at_the_same_elastic_mismatch_and_scaled_force(small_table, slab):
     ramps = small_table.ramps(Inclusion(9.0, 5.0, 99.0), slab)
-    contrast, nominal_n = slab.contrast(99.0), 0.3
+    mismatch, nominal_n = slab.elastic_mismatch(99.0), 0.3
     force_n = nominal_n * slab.youngs_modulus_kpa / 5.0
     changed = 1 + slab_effect(slab.youngs_modulus_kpa, slab.thickness_mm)
-    expected = changed * force_n * 9.0**3 * contrast * polynomial(9.0, 5.0, contrast, nominal_n)
+    expected = changed * force_n * 9.0**3 * mismatch * polynomial(9.0, 5.0, mismatch, nominal_n)
     np.testing.assert_allclose(ramps.inclusion_field.at(force_n).w_mm, expected, rtol=1e-9)
     np.testing.assert_allclose(ramps.bare.at(force_n).w_mm, changed * force_n * (0.4 + R_MM / 20), rtol=1e-9)
 
@@ -80,7 +80,7 @@ def test_the_nominal_slab_has_no_change_and_is_its_own_reference(small_table):
     assert after.nominal_inclusion_field is None
 
 
-def test_in_another_slab_the_reference_is_the_inclusion_of_the_same_contrast_in_the_nominal_one(small_table):
+def test_in_another_slab_the_reference_is_the_inclusion_of_the_same_elastic_mismatch_in_the_nominal_one(small_table):
     reference = small_table.ramps(Inclusion(9.0, 5.0, 80.0), Slab(4.0)).nominal_inclusion_field
     expected = small_table.inclusion_field(Inclusion(9.0, 5.0, 100.0))
     np.testing.assert_allclose(reference.fields_per_n, expected.fields_per_n, rtol=1e-12)

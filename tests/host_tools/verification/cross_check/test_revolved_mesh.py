@@ -1,4 +1,4 @@
-"""The peer's mesh fills exactly the bodies it stands for, with sound elements. Shape functions: CalculiX manual."""
+"""The mesh for CalculiX fills exactly its bodies, with sound elements. Shape functions: CalculiX manual."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.scenes.scene import Scene
-from host_tools.verification.peer.revolved_mesh import RevolvedMesh, Sector, revolve
-from host_tools.verification.peer.section import Sizes, half_section
+from host_tools.verification.cross_check.revolved_mesh import RevolvedMesh, Sector, revolve
+from host_tools.verification.cross_check.section import Sizes, half_section
 
 SCENE = Scene(Inclusion(10.0, 6.0, 100.0))
 CORNERS = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)])

@@ -6,9 +6,9 @@ import pytest
 
 from device.measurement.quantities import Inclusion
 from host_tools.scenes.scene import Scene
-from host_tools.verification.peer.calculix_deck import Elastic, Process, deck, materials
-from host_tools.verification.peer.revolved_mesh import Sector, revolve
-from host_tools.verification.peer.section import Sizes, half_section
+from host_tools.verification.cross_check.calculix_deck import Elastic, Process, deck, materials
+from host_tools.verification.cross_check.revolved_mesh import Sector, revolve
+from host_tools.verification.cross_check.section import Sizes, half_section
 
 SCENE = Scene(Inclusion(10.0, 6.0, 120.0))
 

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from host_tools.scenes.scene import Scene
-from host_tools.verification.peer.revolved_mesh import RevolvedMesh
-from host_tools.verification.peer.section import INCLUSION, TISSUE
+from host_tools.verification.cross_check.revolved_mesh import RevolvedMesh
+from host_tools.verification.cross_check.section import INCLUSION, TISSUE
 
 MOST_INCREMENTS = 1000
 OUTPUT = (

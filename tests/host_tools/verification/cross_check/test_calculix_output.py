@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from host_tools.verification.peer.calculix import Printed, UnreadableOutput, parse_dat
+from host_tools.verification.cross_check.calculix import Printed, UnreadableOutput, parse_dat
 
 TRANSCRIPT = """
  displacements (vx,vy,vz) for set RAY and time  0.4000000E+01

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from device.measurement.arrays import Array
-from host_tools.verification.peer.blocks import Indices, Mask, QuadSection
+from host_tools.verification.cross_check.blocks import Indices, Mask, QuadSection
 
 ON_AXIS_MM = 1e-7
 

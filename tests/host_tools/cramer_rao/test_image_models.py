@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from host_tools.cramer_rao.press import SKIN, IdealImageModel, LightImageModel, Profiles, smooth
 
 from host_tools.cramer_rao.rings import Rings
-from host_tools.cramer_rao.sight import SKIN, IdealPicture, LightPicture, Profiles, smooth
 from host_tools.forward.face_state import Rays
 from host_tools.scenes.scene import Waveguide
 
@@ -17,22 +17,22 @@ INCLUSION = Profiles(np.zeros_like(RAYS.r_mm), np.exp(-(RAYS.r_mm**2) / 18))
 
 @pytest.fixture(scope="module")
 def light():
-    return LightPicture(RAYS, RINGS)
+    return LightImageModel(RAYS, RINGS)
 
 
 @pytest.mark.parametrize(("quantity", "level"), [("pressure", 3.0), ("displacement", 0.5)])
 def test_an_ideal_sensor_shows_its_quantity_and_no_skin(quantity, level):
-    picture, even = IdealPicture(RAYS, RINGS, quantity), np.ones_like(RAYS.r_mm)
-    assert picture.light(Profiles(0.5 * even, 3.0 * even)) == pytest.approx(np.full(len(RINGS.r_mm), level))
-    assert picture.change(FACE, INCLUSION) == pytest.approx(picture.light(INCLUSION))
-    assert not any(change.any() for change in picture.changes_by_skin(FACE).values())
+    image, even = IdealImageModel(RAYS, RINGS, quantity), np.ones_like(RAYS.r_mm)
+    assert image.light(Profiles(0.5 * even, 3.0 * even)) == pytest.approx(np.full(len(RINGS.r_mm), level))
+    assert image.change(FACE, INCLUSION) == pytest.approx(image.light(INCLUSION))
+    assert not any(change.any() for change in image.changes_by_skin(FACE).values())
 
 
 def test_an_ideal_sensor_sees_an_inclusion_beside_the_axis_in_the_first_harmonic():
     """1 + cos(angle) has the mean 1 and the first harmonic 1."""
     rays = Rays.over(Waveguide(), angles=16)
     field = np.ones_like(rays.r_mm) + np.cos(rays.angle_rad)[:, None]
-    harmonics = IdealPicture(rays, RINGS, "displacement").light(Profiles(field, field)).reshape(4, -1)
+    harmonics = IdealImageModel(rays, RINGS, "displacement").light(Profiles(field, field)).reshape(4, -1)
     assert harmonics == pytest.approx(np.outer([1, 1, 0, 0], np.ones(len(RINGS.r_mm))), abs=1e-12)
 
 

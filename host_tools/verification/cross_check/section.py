@@ -14,7 +14,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
 from host_tools.scenes.scene import Scene
-from host_tools.verification.peer.blocks import (
+from host_tools.verification.cross_check.blocks import (
     Block,
     QuadSection,
     joined,

@@ -14,7 +14,7 @@ from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.skin import Skin
 from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
-from host_tools.verification.peer.mitsuba_scene import MitsubaCamera, write_mitsuba_scene
+from host_tools.verification.cross_check.mitsuba_scene import MitsubaCamera, write_mitsuba_scene
 
 BLOCK = LightBlock(led_coupling="embedded", glass_refractive_index=1.41, glass_thickness_mm=0.0)
 SKIN = Skin(refractive_index=1.41, albedo=0.4, spread_mm=0.0)

@@ -27,9 +27,9 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.scenes.scene import Scene
-from host_tools.verification.peer.calculix_deck import Process, deck, materials
-from host_tools.verification.peer.revolved_mesh import Sector, revolve
-from host_tools.verification.peer.section import Sizes, half_section
+from host_tools.verification.cross_check.calculix_deck import Process, deck, materials
+from host_tools.verification.cross_check.revolved_mesh import Sector, revolve
+from host_tools.verification.cross_check.section import Sizes, half_section
 
 HEADING = re.compile(r"^ *(displacements|total force) \([^)]*\) for set (\w+) and time +(\S+) *$", re.MULTILINE)
 
@@ -88,7 +88,7 @@ class CalculixFailed(RuntimeError):  # noqa: N818 - reads as what it says
 
 
 @dataclass(frozen=True)
-class PeerSolution:
+class CalculixSolution:
     """One indentation. `w_mm` is the face's vertical displacement relative to the back, at the undeformed `r_mm`.
 
     The radii are those of the nodes from the axis to the rim: ends and middles of quadratic elements in turn.
@@ -130,7 +130,7 @@ def solve_with_calculix(
     process: Process | None = None,
     threads: int = 1,
     timeout_s: float = 1800.0,
-) -> tuple[PeerSolution, ...]:
+) -> tuple[CalculixSolution, ...]:
     """Press a round, flat, centred probe to each of the rising indentations, in mm.
 
     `homogeneous` fills the inclusion of the same mesh with tissue, for the inclusion field. Refinements 1, 1.5 and 2
@@ -150,10 +150,10 @@ def solve_with_calculix(
         states *= len(indentations_mm)
     seconds, version = time.monotonic() - started, ccx_version()
 
-    def solution(indentation_mm: float, state: Printed) -> PeerSolution:
+    def solution(indentation_mm: float, state: Printed) -> CalculixSolution:
         scale = 1.0 if finite_strain else indentation_mm / steps_mm[-1]
         ray = mesh.node_sets["RAY"]
-        return PeerSolution(
+        return CalculixSolution(
             indentation_mm=indentation_mm,
             r_mm=mesh.nodes_mm[ray, 0],
             w_mm=indentation_mm + scale * np.array([state.displacement_mm[int(node) + 1][2] for node in ray]),

@@ -53,7 +53,7 @@ class Profiles(NamedTuple):
     p_kpa: Array
 
 
-class Picture(Protocol):
+class ImageModel(Protocol):
     """What a sensor sees on K rings, in a unit of its own: M harmonics of the angle, one after the other [M K]."""
 
     def light(self, face: Profiles) -> Array:
@@ -66,7 +66,7 @@ class Picture(Protocol):
         """Return the derivatives of the light by the logarithm of each quantity of `SKIN`."""
 
 
-class IdealPicture:
+class IdealImageModel:
     """Light in proportion to the pressure or the displacement itself."""
 
     def __init__(self, rays: Rays, rings: Rings, quantity: str) -> None:
@@ -74,20 +74,20 @@ class IdealPicture:
         self._cosines = _cosines(rays.angle_rad, harmonics(rays)) / len(rays.angle_rad)
 
     def light(self, face: Profiles) -> Array:
-        """See `Picture`."""
+        """See `ImageModel`."""
         field = smooth(self._r_mm, face.p_kpa) if self._shows_pressure else face.w_mm
         return self._rings.of_profile(self._r_mm, self._cosines @ field).ravel()
 
     def change(self, face: Profiles, change: Profiles) -> Array:
-        """See `Picture`: it is linear."""
+        """See `ImageModel`: it is linear."""
         return self.light(change)
 
     def changes_by_skin(self, face: Profiles) -> dict[str, Array]:
-        """See `Picture`: no skin comes in."""
+        """See `ImageModel`: no skin comes in."""
         return {name: np.zeros(len(self._cosines) * len(self._rings.r_mm)) for name in SKIN}
 
 
-class LightPicture:
+class LightImageModel:
     """Light that the touched skin gives back, as the virtual probe's camera has it before the lens."""
 
     def __init__(self, rays: Rays, rings: Rings) -> None:
@@ -101,11 +101,11 @@ class LightPicture:
         self._fade, self._inside = np.exp(-beyond_mm / FADE_MM), beyond_mm == 0
 
     def light(self, face: Profiles) -> Array:
-        """See `Picture`; 1/(sr mm2) per unit of LED light."""
+        """See `ImageModel`; 1/(sr mm2) per unit of LED light."""
         return self._seen(face, self._skin)
 
     def change(self, face: Profiles, change: Profiles) -> Array:
-        """See `Picture`: by central differences, of the pressure alone.
+        """See `ImageModel`: by central differences, of the pressure alone.
 
         Deformation changes the light by a hundredth of what pressure does (docs/optics.md), which cannot be told from
         the noise of the traced table along its depths: counted, it makes bounds up to two times smaller, and those of
@@ -120,7 +120,7 @@ class LightPicture:
         return (self.light(more) - self.light(less)) / (2 * step)
 
     def changes_by_skin(self, face: Profiles) -> dict[str, Array]:
-        """See `Picture`: by central differences."""
+        """See `ImageModel`: by central differences."""
         changes = {}
         for name in SKIN:
             nominal, factors = getattr(self._skin, name), np.exp([SKIN_STEP, -SKIN_STEP]).tolist()
@@ -183,7 +183,7 @@ WINDOW_RATIO = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class ObservedPress:
     """One press as a sensor sees it, on K rings: M harmonics of the contrast, one after the other, and the light.
 
     `contrast` [M K] and its derivatives by the logarithm of each quantity; `by_force_error` by that of the press's
@@ -217,22 +217,22 @@ def rings_of(presses: Sequence[InclusionSensitivity]) -> Rings:
     return Rings.within(WINDOW_RATIO * float(presses[0].rays.r_mm[0, -1]))
 
 
-def sights(presses: Sequence[InclusionSensitivity], observable: Observable) -> list[Sight]:
+def observed_presses(presses: Sequence[InclusionSensitivity], observable: Observable) -> list[ObservedPress]:
     """Return what a sensor sees of every press; the scalars are those of the image."""
     rings = rings_of(presses)
-    return [_sight(press, _picture(press.rays, rings, observable), len(rings.r_mm)) for press in presses]
+    return [_observed(press, _image_model(press.rays, rings, observable), len(rings.r_mm)) for press in presses]
 
 
-def _picture(rays: Rays, rings: Rings, observable: Observable) -> Picture:
+def _image_model(rays: Rays, rings: Rings, observable: Observable) -> ImageModel:
     if observable in ("image", "scalars"):
-        return LightPicture(rays, rings)
-    return IdealPicture(rays, rings, observable)
+        return LightImageModel(rays, rings)
+    return IdealImageModel(rays, rings, observable)
 
 
-def _sight(press: InclusionSensitivity, picture: Picture, rings: int) -> Sight:
+def _observed(press: InclusionSensitivity, image: ImageModel, rings: int) -> ObservedPress:
     """Return the contrast (light - reference) / mean reference; the reference has harmonics by its mesh only."""
-    light, changes = _seen(press.pressed, picture)
-    reference, reference_changes = _seen(press.bare, picture)
+    light, changes = _seen(press.pressed, image)
+    reference, reference_changes = _seen(press.bare, image)
     repeated = len(light) // rings
 
     def of_mean(values: Array) -> Array:
@@ -246,11 +246,13 @@ def _sight(press: InclusionSensitivity, picture: Picture, rings: int) -> Sight:
         derivatives[name] = (change - further - contrast * of_mean(further)) / mean
     of_mesh_alone = (*UNKNOWNS, OFFSET)
     growing = {name: (c / mean)[:rings] for name, c in reference_changes.items() if name not in of_mesh_alone}
-    return Sight(press.force_n, contrast, derivatives, changes[FORCE] / mean, light[:rings], reference[:rings], growing)
+    return ObservedPress(
+        press.force_n, contrast, derivatives, changes[FORCE] / mean, light[:rings], reference[:rings], growing
+    )
 
 
-def _seen(found: FaceSensitivity, picture: Picture) -> tuple[Array, dict[str, Array]]:
+def _seen(found: FaceSensitivity, image: ImageModel) -> tuple[Array, dict[str, Array]]:
     """Return the light of a face and its derivatives by name."""
     face = Profiles(found.face.w_mm, found.face.p_kpa)
-    changes = {name: picture.change(face, Profiles(rate.w_mm, rate.p_kpa)) for name, rate in found.rates.items()}
-    return picture.light(face), changes | picture.changes_by_skin(face)
+    changes = {name: image.change(face, Profiles(rate.w_mm, rate.p_kpa)) for name, rate in found.rates.items()}
+    return image.light(face), changes | image.changes_by_skin(face)

@@ -1,4 +1,4 @@
-"""The peer renders with the interpreter it is given, and names its failures."""
+"""Mitsuba renders with the interpreter it is given, and names its failures."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from host_tools.optics.tracer import trace
-from host_tools.verification.light.cross_check import BLOCK, SKIN, chapter, scene
-from host_tools.verification.peer.mitsuba import (
+from host_tools.verification.cross_check.mitsuba import (
     INTERPRETER_VARIABLE,
     MitsubaFailed,
     mitsuba_python,
     mitsuba_version,
     render_with_mitsuba,
 )
-from host_tools.verification.peer.mitsuba_scene import MitsubaCamera
+from host_tools.verification.cross_check.mitsuba_scene import MitsubaCamera
+from host_tools.verification.light.cross_check import BLOCK, SKIN, chapter, scene
 
 # No continuous integration of ours installs it, so its absence is never a failure.
 needs_mitsuba = pytest.mark.skipif(

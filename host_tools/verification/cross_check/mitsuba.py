@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from device.simulation.physics.skin import Skin
 from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
-from host_tools.verification.peer.mitsuba_scene import MitsubaCamera, write_mitsuba_scene
+from host_tools.verification.cross_check.mitsuba_scene import MitsubaCamera, write_mitsuba_scene
 
 RENDERER = Path(__file__).with_name("mitsuba_render.py")
 INTERPRETER_VARIABLE = "TSIS_MITSUBA_PYTHON"
@@ -89,11 +89,11 @@ def render_with_mitsuba(
     return Rendered(centres_mm, centres_mm, images.mean(axis=0), noise, version)
 
 
-def _run(python: Path, scene: Path, effort: tuple[str, str], timeout_s: float) -> NDArray[np.float64]:
+def _run(python: Path, scene: Path, variant_and_rays: tuple[str, str], timeout_s: float) -> NDArray[np.float64]:
     """Return the images [pass, y, x] of a scene."""
     out = scene.with_name("images.npy")
     # Isolated (-I), or `import mitsuba` would find the module beside the renderer.
-    command = [str(python), "-I", str(RENDERER), str(scene), str(out), VARIANT, *effort]
+    command = [str(python), "-I", str(RENDERER), str(scene), str(out), VARIANT, *variant_and_rays]
     try:
         ended = subprocess.run(command, timeout=timeout_s, capture_output=True, text=True)
     except subprocess.TimeoutExpired as error:

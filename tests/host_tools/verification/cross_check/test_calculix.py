@@ -1,4 +1,4 @@
-"""The peer solves scenes whose answers are known, and names its failures."""
+"""CalculiX solves scenes whose answers are known, and names its failures."""
 
 from __future__ import annotations
 
@@ -10,9 +10,14 @@ import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.scenes.scene import Scene, Tissue, Waveguide
-from host_tools.verification.peer.calculix import CalculixFailed, PeerSolution, ccx_available, solve_with_calculix
-from host_tools.verification.peer.calculix_deck import Process
-from host_tools.verification.peer.section import Sizes
+from host_tools.verification.cross_check.calculix import (
+    CalculixFailed,
+    CalculixSolution,
+    ccx_available,
+    solve_with_calculix,
+)
+from host_tools.verification.cross_check.calculix_deck import Process
+from host_tools.verification.cross_check.section import Sizes
 
 REFERENCE = Scene(
     Inclusion(10.0, 6.0, 100.0),
@@ -69,7 +74,7 @@ def test_indentations_that_cannot_be_pressed_are_refused(indentations_mm: list[f
 def test_between_nodes_w_follows_the_elements_own_quadratic() -> None:
     r_mm = np.array([0.0, 1.0, 2.0, 2.5, 3.0])
     quadratics = np.where(r_mm <= 2, 1 + r_mm**2, 5 + (r_mm - 2))
-    solution = PeerSolution(1.0, r_mm, quadratics, 0.2, False, 2, 20, 1.0, "2.20")
+    solution = CalculixSolution(1.0, r_mm, quadratics, 0.2, False, 2, 20, 1.0, "2.20")
     assert [solution.w_at_mm(r) for r in (0.0, 0.5, 2.0, 2.9, 3.0)] == pytest.approx([1.0, 1.25, 5.0, 5.9, 6.0])
     with pytest.raises(InvalidQuantity, match="r_mm is 3.1"):
         replace(solution, w_mm=quadratics).w_at_mm(3.1)
