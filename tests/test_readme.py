@@ -1,4 +1,4 @@
-"""The README is executed: its commands exist, and what it prints of them is what they print."""
+"""README and results are executed: their commands exist, and what a page prints of them is what they print."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import sys
 import pytest
 from daemon_process import ROOT
 
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```console\n\$ (.*)\n((?:.*\n)*?)```", README)
-PYTHON_BLOCKS = re.findall(r"```python\n((?:.*\n)*?)```", README)
+PAGES = ("README.md", "docs/results.md")
+TEXTS = {page: (ROOT / page).read_text(encoding="utf-8") for page in PAGES}
+BLOCKS = [block for text in TEXTS.values() for block in re.findall(r"```console\n\$ (.*)\n((?:.*\n)*?)```", text)]
+PYTHON_BLOCKS = re.findall(r"```python\n((?:.*\n)*?)```", TEXTS["README.md"])
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
@@ -28,7 +29,7 @@ def _scores(command):
         if block[0].startswith("host_tools")
     ],
 )
-def test_a_command_prints_what_the_readme_shows(command, shown):
+def test_a_command_prints_what_the_page_shows(command, shown):
     """Word for word, numbers within 2 %: another processor rounds differently, and E amplifies it.
 
     A last line of dots stands for all that is printed behind it.
@@ -44,7 +45,7 @@ def test_a_command_prints_what_the_readme_shows(command, shown):
 
 
 def test_every_make_verb_of_the_readme_exists():
-    verbs = set(re.findall(r"(?:`|\$ )make ([a-z]+)", README))
+    verbs = set(re.findall(r"(?:`|\$ )make ([a-z]+)", TEXTS["README.md"]))
     known = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert {"run", "test", "train"} <= verbs <= known
 

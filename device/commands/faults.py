@@ -15,6 +15,7 @@ from device.files.text_table import aligned
 
 PAGE = """# Faults
 
+This page answers what a fault code means, and which part it names.
 Written by `python -m device faults --markdown > docs/faults.md` from the classes of `device/errors.py`.
 
 The first digit of a code is the part. The screen shows code and title with what was measured and what to do;

@@ -9,6 +9,7 @@ from device.settings.catalogue import SETTINGS, Known
 
 PAGE = """# Settings
 
+This page answers what can be set, in which file, and within which bounds.
 Written by `python -m device config show --markdown > docs/settings.md`.
 A setting is written in a TOML file under its section: `press.target_n` is `target_n = 0.5` below `[press]`.
 What is out of its range is refused, never clipped.
@@ -33,8 +34,8 @@ before the daemon is started;
 `python -m device config show --changed` prints what is not as by default, and which file says so. Both take `--json`.
 
 After a start with good files, what they set is kept in `config.last_good.toml` in the data folder.
-When the files are bad at a later start, the daemon starts with that instead: every problem is in its log,
-and warning E002 is on the screen, in the status and with each press and measurement until a start with good files.
+When the files are bad at a later start, the daemon starts with that instead, and every problem is in its log.
+Warning E002 is on the screen, in the status and with each press and measurement, until a start with good files.
 Without last good settings the start is refused.
 
 ## Above all sections
