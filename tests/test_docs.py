@@ -8,6 +8,7 @@ import tomllib
 import pytest
 import typer
 from daemon_process import ROOT
+from prose import GENERATED, sentences, words
 from typer.testing import CliRunner
 
 from device.__main__ import _parser
@@ -19,6 +20,10 @@ FORWARD_MODEL = (ROOT / "docs" / "forward_model.md").read_text(encoding="utf-8")
 MEASUREMENT = (ROOT / "docs" / "measurement.md").read_text(encoding="utf-8")
 CONTRACTS = (ROOT / "docs" / "contracts.md").read_text(encoding="utf-8")
 PAGES = sorted((ROOT / "docs").glob("*.md"))
+WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(page for page in PAGES if page.name not in GENERATED)]
+"""TODO(merge): all pages, once those that code writes keep to it as well."""
+MOST_WORDS = 40
+PLACES = re.compile(r"`((?:device|host_tools|tests|models|docs|scenarios|protocols|systemd|requirements)/[\w./*-]*)`")
 
 
 def test_the_scene_file_of_the_forward_model_is_a_scene():
@@ -59,3 +64,41 @@ def test_the_daemons_commands_to_calibrate_a_new_probe_are_commands():
 def test_every_file_that_the_forward_model_names_exists():
     for path in re.findall(r"`(forward/[a-z_/]+\.py)`", FORWARD_MODEL):
         assert (ROOT / "host_tools" / path).is_file(), path
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
+def test_no_sentence_is_longer_than_a_reader_can_hold(page):
+    long = {sentence: words(sentence) for sentence in sentences(page.read_text(encoding="utf-8"))}
+    assert {sentence: count for sentence, count in long.items() if count > MOST_WORDS} == {}
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
+def test_every_file_and_room_that_a_page_names_exists(page):
+    """A room is named by its folder with a slash at the end."""
+    named = PLACES.findall(page.read_text(encoding="utf-8"))
+    missing = [place for place in named if not (list(ROOT.glob(place)) if "*" in place else (ROOT / place).exists())]
+    assert missing == []
+    assert len(named) > 5 or page.name not in ("architecture.md", "contracts.md")
+
+
+def test_every_room_stands_in_the_architecture_with_what_it_may_import():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## Which room knows which")[1]
+    for program in ("device", "host_tools"):
+        for room in (ROOT / program).glob("*/__init__.py"):
+            assert f"`{program}/{room.parent.name}/`" in page, room.parent.name
+
+
+def test_every_page_stands_in_the_index_and_begins_with_what_it_answers():
+    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+    for page in WRITTEN:
+        if page in PAGES and page.name != "README.md":
+            assert f"]({page.name})" in index, page.name
+            assert re.search("This page (answers|says)", page.read_text(encoding="utf-8")[:400]), page.name
+
+
+def test_what_the_sentences_of_a_page_are():
+    text = (
+        "# Title\n\nOne two. Three\nfour `a.b c`.\n\n- item one\n- item two\n\n| a | table |\n\n```\ncode here\n```\n"
+    )
+    assert list(sentences(text)) == ["One two.", "Three four Code.", "item one", "item two"]
+    assert words("0.3 % of [it] - all") == 4
