@@ -19,6 +19,7 @@ from device.measurement.parameters import EVEN_STD
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
 COVERAGE = 0.9
+"""Level of the intervals of every mode. Belts are tabulated for one: another takes a new training."""
 IDENTIFIABLE_RATIO = 0.5
 """An unknown is determined when its spread is under half of what its range alone would give."""
 GRID = 401

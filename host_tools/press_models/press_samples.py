@@ -50,7 +50,7 @@ class Draw(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PressSamples:
-    """Parameters [n, 9] in the order of `PARAMETERS`, rows [n, P] in that of `press_profile.ROW_NAMES`.
+    """Parameters [n, 9] in the order of `PARAMETERS`, rows [n, P] in that of `radial_profile.ROW_NAMES`.
 
     `second_harmonics` [n, Q]: of the contrast, along the offset, of all forces and all rings but the two at the ends.
     """

@@ -6,7 +6,7 @@ What drifts between a reference press and the press on the lesion, put into a re
 
 The LEDs' brightness, the cell's zero, and two smooth errors of the light: one that all press frames share (a flat field
 that has moved), and one of the reference that changes with the force (a forward model that is not the truth). As
-`press_noise.ErrorLevels` says and the estimates believe in; whether they rightly do is measured on such recordings.
+`noise.ErrorLevels` says and the estimates believe in; whether they rightly do is measured on such recordings.
 """
 
 from __future__ import annotations

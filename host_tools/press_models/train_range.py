@@ -68,7 +68,7 @@ def wide_coordinates(parameters: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class WideSurrogate:
-    """`press_surrogate.PressSurrogate` over the wide ranges."""
+    """`PressSurrogate` over the wide ranges."""
 
     inclusion_field: LegendreSum
     baseline: LegendreSum

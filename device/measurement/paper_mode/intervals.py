@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity, require
 
-COVERAGE = 0.9
 NEIGHBOURS = 40
 IDENTIFIABLE_RATIO = 0.5
 """An unknown counts as identifiable when its interval is under half of what the training box alone would give."""

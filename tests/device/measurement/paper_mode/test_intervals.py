@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from device.measurement.paper_mode.intervals import COVERAGE, HeldOut
+from device.measurement.confidence_belt import COVERAGE
+from device.measurement.paper_mode.intervals import HeldOut
 from device.measurement.quantities import InvalidQuantity
 
 LOW, HIGH = np.array([1.0, 4.0, 40.0]), np.array([15.0, 12.0, 120.0])
