@@ -1,7 +1,8 @@
 """The daemon's errors: each class one fault, and the only place where its code, title, meaning and status are written.
 
 The first sentence of a class's docstring is the fault's meaning. docs/faults.md, the screen's headings and the codes in
-the API's schema are made from these classes (device/fault_table.py); docs/simulated_probe.md says how a fault is provoked.
+the API's schema are made from these classes (device/fault_table.py); docs/simulated_probe.md says how a fault is
+provoked.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from host_tools.cramer_rao.bounds import Limits, limit_of_observed, std_of_box
-from host_tools.cramer_rao.press import ObservedPress, observed_presses, rings_of
+from host_tools.cramer_rao.observed_press import ObservedPress, observed_presses, rings_of
 from host_tools.cramer_rao.protocol import Observable, PressProtocol, read_protocol
 from host_tools.forward.derivatives.sensitive_presses import Ramps, sensitive_ramp
 from host_tools.scenes.scene import Scene

@@ -18,7 +18,7 @@ from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_o
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from host_tools.cramer_rao.information import CramerRao, cramer_rao, with_nuisances
 from host_tools.cramer_rao.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe, scalars_of, with_growth
-from host_tools.cramer_rao.press import ObservedPress, observed_presses, rings_of
+from host_tools.cramer_rao.observed_press import ObservedPress, observed_presses, rings_of
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
 from host_tools.forward.derivatives.mesh_velocity import inclusion_of

@@ -23,7 +23,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.simulation.physics.sensor import Sensor
-from host_tools.cramer_rao.press import ObservedPress
+from host_tools.cramer_rao.observed_press import ObservedPress
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
 from host_tools.forward.derivatives.mesh_velocity import OFFSET

@@ -82,7 +82,7 @@ def evaluate_mode(
     seed: int,
     jobs: int = -1,
 ) -> ModeOutcome:
-    """Return the outcome of a mode on an evaluation set's presses with noise and on recorded ones, with its critical log odds."""
+    """Return the outcome of a mode on an evaluation set with noise and on recorded presses."""
     rows = evaluation_set.noisy(np.arange(len(evaluation_set.rows)), np.random.default_rng([seed, 1])).astype(
         np.float64
     )

@@ -39,7 +39,7 @@ from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 
 
 @dataclass(frozen=True, eq=False)
-class QuickPool:
+class QuickPressSet:
     """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
 
     normalised: Single
@@ -73,10 +73,10 @@ class QuickPool:
         return flat + model + 1e-14 * np.eye(RINGS)
 
 
-def quick_pool(training_set: PressSet, camera: Array, seed: int) -> QuickPool:
+def quick_press_set(training_set: PressSet, camera: Array, seed: int) -> QuickPressSet:
     """Return a set of ramps as held presses, each at a random force."""
-    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(ramps.rows))
-    return QuickPool(training_set.normalised, quick_rows(training_set.rows, force_n).astype(np.float32), camera)
+    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(training_set.rows))
+    return QuickPressSet(training_set.normalised, quick_rows(training_set.rows, force_n).astype(np.float32), camera)
 
 
 def quick_rows(rows: Single | Array, force_n: Array) -> Array:
@@ -119,7 +119,7 @@ class TrainedQuick:
     """All parts of the bundle."""
 
     ensemble: DenseEnsemble
-    training_set: QuickPool
+    training_set: QuickPressSet
     faintest_contrast: tuple[float, ...]
     outcome: QuickOutcome
     budget: QuickBudget
@@ -148,9 +148,9 @@ def train_quick(
     """Return the trained parts; `noise` is of mode standard, whose camera's part is replaced by that of one frame."""
     asked = budget or QuickBudget()
 
-    def held(count: int, purpose: str) -> QuickPool:
+    def held(count: int, purpose: str) -> QuickPressSet:
         drawn = derived_seed(seed, purpose)
-        return quick_pool(random_press_set(surrogate, noise, count, drawn), camera, drawn)
+        return quick_press_set(random_press_set(surrogate, noise, count, drawn), camera, drawn)
 
     say(f"{asked.recordings} recordings of held presses")
     camera = _camera(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host_tools.cramer_rao.press import observed_presses, rings_of
 
 from device.measurement.parameters import RANGES
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.cramer_rao.bounds import Limit, Limits, limit_of, limits, std_of_box
 from host_tools.cramer_rao.information import CramerRao
+from host_tools.cramer_rao.observed_press import observed_presses, rings_of
 from host_tools.cramer_rao.protocol import SPREADS, PressProtocol
 from host_tools.forward.derivatives.sensitive_presses import sensitive_ramp
 from host_tools.scenes.scene import Scene

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from host_tools.cramer_rao.press import SKIN, IdealImageModel, LightImageModel, Profiles, smooth
 
+from host_tools.cramer_rao.observed_press import SKIN, IdealImageModel, LightImageModel, Profiles, smooth
 from host_tools.cramer_rao.rings import Rings
 from host_tools.forward.face_state import Rays
 from host_tools.scenes.scene import Waveguide

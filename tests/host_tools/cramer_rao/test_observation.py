@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host_tools.cramer_rao.press import ObservedPress
 
 from host_tools.cramer_rao.observation import GAIN, ZERO, observe, variance_counts, with_growth
+from host_tools.cramer_rao.observed_press import ObservedPress
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
 

@@ -197,7 +197,7 @@ def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, f
     assert entry["sha256"] == hashlib.sha256((folder / RANGE_FILE).read_bytes()).hexdigest()
     assert (entry["size_mm"], entry["depth_mm"]) == (list(SIZES), list(DEPTHS))
     assert entry["dataset_sha256"] == "0123"
-    budget = DRY_RUN_BUDGET.ranges
+    budget = DRY_RUN.ranges
     assert (entry["effort"]["pool"], entry["effort"]["steps"]) == (budget.trained_on, budget.steps)
     assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
     for mode in RAMP_MODES:
@@ -232,9 +232,9 @@ def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trai
     assert tuple(card["serials"]) == tuple(card["serials"]) == SERIALS
     assert (card["name"], card["software_version"], card["seed"]) == ("demo", "1.2.3", 11)
     assert card["training_command"] == "host_tools train x"
-    assert card["effort"]["members"] == DRY_RUN_BUDGET.members
-    assert card["effort"]["judged"] == DRY_RUN_BUDGET.evaluated
-    assert card["effort"]["ranges"]["pool"] == DRY_RUN_BUDGET.ranges.trained_on
+    assert card["effort"]["members"] == DRY_RUN.members
+    assert card["effort"]["judged"] == DRY_RUN.evaluated
+    assert card["effort"]["ranges"]["pool"] == DRY_RUN.ranges.trained_on
     assert card["dataset_sha256"] == hashlib.sha256(trained.samples.rows.tobytes()).hexdigest()
     assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
     assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()
