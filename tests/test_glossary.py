@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import pytest
 from daemon_process import ROOT
-from prose import CODE, GENERATED
+from prose import CODE
 
 from device.measurement.mode import MODES
 
@@ -51,30 +51,32 @@ RULES = (
     Rule("judged", "evaluated", (NAMES,), where=TRAINING),
     Rule("sights?", "observed press", (NAMES,)),
     Rule("ideal picture|light picture", "image model", (NAMES,)),
-    # TODO(merge): the rows below come true with the new names of modes and estimates; then remove the comment signs.
-    # Rule("held (model|profile|press|features|units|names|rows|estimate)", "quick", (NAMES,)),
-    # Rule("profile model", "ramp model; standard_model in the settings", (NAMES, SCREEN)),
-    # Rule("held model|profile model", "quick model, ramp model", (PROSE,)),
-    # Rule("confidence bands?|bands of", "confidence belt", (NAMES, PROSE)),
-    # Rule("bands", "belts", (NAMES,), where="confidence_belt|press_models|scores"),
-    # Rule("doubts?( about)?", "out-of-distribution test, rejection"),
-    # Rule("growth", "reference force response", (NAMES, PROSE), where="ramp_modes|press_models|limits|paper_mode"),
-    # Rule("bare", "baseline, inclusion-free", (NAMES, PROSE)),
-    # Rule("to unit|from unit|unknowns from unit|slope of unit|by unit", "normalised", (NAMES,)),
-    # Rule("train( [^.]*)? --profile", "train --mode", (PROSE, SCREEN)),
+    Rule("held (model|profile|features|units|names|rows|estimate)", "quick", (NAMES,)),
+    Rule("profile model", "ramp model; standard_model in the settings", (NAMES, SCREEN)),
+    Rule("held model|profile model", "quick model, ramp model", (PROSE,)),
+    Rule("confidence bands?|bands of", "confidence belt", (NAMES, PROSE)),
+    Rule("bands", "belts", (NAMES,), where="confidence_belt|press_models|scores"),
+    Rule("doubts?( about)?", "out-of-distribution test, rejection"),
+    Rule("growth", "reference force response", (NAMES, PROSE), where="ramp_modes|press_models|cramer_rao|paper_mode"),
+    Rule("bare", "baseline, inclusion-free", (NAMES,)),
+    Rule("to unit|from unit|unknowns from unit|slope of unit|by unit", "normalised", (NAMES,)),
+    Rule("--profile", "--mode", (PROSE, SCREEN)),
 )
 KEPT = {
     "lump_per_n_mm3": "array in the committed tables",
     "lump_change_per_n_mm3": "array in the committed tables",
     "lump_degrees": "array in the committed surrogate",
     "lump_coefficients": "array in the committed surrogate",
+    "bare_per_n": "array in the committed tables",
+    "bare_change_per_n": "array in the committed tables",
+    "bare_degrees": "array in the committed surrogate",
+    "bare_coefficients": "array in the committed surrogate",
     "effort": "entry of the committed cards",
     "TSIS_REQUIRE_PEERS": "read by continuous integration",
 }
 """Names inside files that others keep, with the reason why they stay."""
-TO_COME = {"QuickModel", "RampModel", "ConfidenceBelt", "force_response", "normalised", "critical"}
-"""TODO(merge): names that the glossary has and the code does not yet; empty once it has them, as it calls them."""
-PENDING = GENERATED  # TODO(merge): empty once these pages are written from results
+TO_COME: set[str] = set()
+PENDING: tuple[str, ...] = ()
 
 
 class Text(NamedTuple):

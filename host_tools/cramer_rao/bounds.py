@@ -17,7 +17,15 @@ from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, slope_of_normalised
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from host_tools.cramer_rao.information import CramerRao, cramer_rao, with_nuisances
-from host_tools.cramer_rao.observation import FORCE_ERROR, GAIN, PLACE, ZERO, observe, scalars_of, with_growth
+from host_tools.cramer_rao.observation import (
+    FORCE_ERROR,
+    GAIN,
+    PLACE,
+    ZERO,
+    observe,
+    scalars_of,
+    with_reference_response,
+)
 from host_tools.cramer_rao.observed_press import ObservedPress, observed_presses, rings_of
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
@@ -114,7 +122,7 @@ def limit_of_observed(seen: Sequence[ObservedPress], rings: Rings, protocol: Pre
     if protocol.observable == "scalars":
         observed = scalars_of(observed, len(seen), rings)
     else:
-        observed = with_growth(observed, seen, rings, protocol)
+        observed = with_reference_response(observed, seen, rings, protocol)
     spreads = _spreads(protocol, len(seen))
     nuisances = np.stack([observed.derivatives[name] for name in spreads], axis=1)
     covariance = with_nuisances(observed.covariance, nuisances, np.array(list(spreads.values())))

@@ -29,7 +29,7 @@ from host_tools.cramer_rao.rings import Rings
 from host_tools.forward.derivatives.mesh_velocity import OFFSET
 
 
-def with_growth(
+def with_reference_response(
     observed: Observation, seen: Sequence[ObservedPress], rings: Rings, protocol: PressProtocol
 ) -> Observation:
     """Return the observation with (P - 1) K more numbers; P is the number of loads pressed on the axis."""

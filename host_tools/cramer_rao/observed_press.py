@@ -232,7 +232,7 @@ def _image_model(rays: Rays, rings: Rings, observable: Observable) -> ImageModel
 def _observed(press: InclusionSensitivity, image: ImageModel, rings: int) -> ObservedPress:
     """Return the contrast (light - reference) / mean reference; the reference has harmonics by its mesh only."""
     light, changes = _seen(press.pressed, image)
-    reference, reference_changes = _seen(press.bare, image)
+    reference, reference_changes = _seen(press.baseline, image)
     repeated = len(light) // rings
 
     def of_mean(values: Array) -> Array:

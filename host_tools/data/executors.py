@@ -20,7 +20,7 @@ from joblib import Parallel, delayed
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Row
-from host_tools.data.rows import Truth, bare_row
+from host_tools.data.rows import Truth, empty_row
 
 if TYPE_CHECKING:
     from distributed import Client, Future, KilledWorker
@@ -114,7 +114,7 @@ def solve_on_cluster(
     for (index, truth), outcome in _outcomes(client, solve, suspects, 1):
         if isinstance(outcome, KilledWorker):
             reason = f"KilledWorker: {outcome.allowed_failures + 1} workers died of this scene, see their logs"
-            yield bare_row(index, truth, reason=reason)
+            yield empty_row(index, truth, reason=reason)
         else:
             yield outcome
 

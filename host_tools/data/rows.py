@@ -27,18 +27,18 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
     try:
         solutions = _solve_loads(plan.scene(truth), plan.forces_n, plan.strain)
     except (NgException, ValueError, ArithmeticError, RuntimeError) as error:
-        return bare_row(index, truth, reason=f"{type(error).__name__}: {error}")
+        return empty_row(index, truth, reason=f"{type(error).__name__}: {error}")
     for solution, force_n in zip(solutions, plan.forces_n, strict=True):
         if not solution.pressure_is_positive:
-            return bare_row(index, truth, reason=f"the contact opens under {force_n:g} N")
+            return empty_row(index, truth, reason=f"the contact opens under {force_n:g} N")
     columns = [_columns(solution) for solution in solutions]
     if plan.has_load_axis:
         of_loads = {name: [column[name] for column in columns] for name in columns[0]}
-        return bare_row(index, truth) | of_loads | {"r_mm": columns[0]["r_mm"]}
-    return bare_row(index, truth) | columns[0]
+        return empty_row(index, truth) | of_loads | {"r_mm": columns[0]["r_mm"]}
+    return empty_row(index, truth) | columns[0]
 
 
-def bare_row(index: int, truth: Truth, *, reason: str = "") -> Row:
+def empty_row(index: int, truth: Truth, *, reason: str = "") -> Row:
     """Return what is known of a scene without a solution; `reason` says why there is none."""
     return {"index": index, **dict(zip(UNKNOWNS, map(float, truth), strict=True)), "reason": reason}
 

@@ -44,8 +44,8 @@ def solve_ramp(
     plan = plan or model_plan(scene.with_press(presses[-1]))
     turned, angle_rad = aligned(scene)
     meshed = build(turned, plan)
-    bare = meshed.model.press(baseline(turned), presses, estimate_error=estimate_error)
-    pressed = bare
+    inclusion_free = meshed.model.press(baseline(turned), presses, estimate_error=estimate_error)
+    pressed = inclusion_free
     if turned.has_inclusion:
         pressed = meshed.model.press(with_inclusion(turned), presses, estimate_error=estimate_error)
     rays = replace(meshed.rays, angle_rad=meshed.rays.angle_rad + angle_rad)
@@ -59,5 +59,5 @@ def solve_ramp(
             stated_error(plan, meshed.rays, one, without),
             scene.with_press(press),
         )
-        for press, one, without in zip(presses, pressed, bare, strict=True)
+        for press, one, without in zip(presses, pressed, inclusion_free, strict=True)
     )

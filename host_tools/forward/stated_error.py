@@ -26,14 +26,14 @@ CANCELLING = ("total_deformation_mm3", "deformation_area_mm2")
 """At equal force the total all but cancels, and the area steps when the half maximum leaves the window."""
 
 
-def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, bare: Loaded) -> dict[str, float]:
+def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, baseline: Loaded) -> dict[str, float]:
     """Return the estimated relative error by feature; empty when no other order was solved for.
 
     Of force and indentation the one that was prescribed has none.
     """
-    if pressed.other is None or bare.other is None:
+    if pressed.other is None or baseline.other is None:
         return {}
-    found, other = numbers(rays, pressed.state, bare.state), numbers(rays, pressed.other, bare.other)
+    found, other = numbers(rays, pressed.state, baseline.state), numbers(rays, pressed.other, baseline.other)
     steps = {name: _step(value, other[name]) for name, value in found.items()}
     factor = STEP_UP_FACTOR if plan.symmetry == "axisymmetric" else STEP_DOWN_FACTOR
     if plan.symmetry == "axisymmetric" and plan.strain == "small":
@@ -48,7 +48,7 @@ def _step(value: float, other: float) -> float:
     return step if step > ROUNDING else 0.0
 
 
-def numbers(rays: Rays, pressed: FaceState, bare: FaceState) -> dict[str, float]:
+def numbers(rays: Rays, pressed: FaceState, baseline: FaceState) -> dict[str, float]:
     """Return force, indentation and O1-O3 of the inclusion field by name."""
-    inclusion = deformation(rays.r_mm, pressed.w_mm - bare.w_mm, pressed.total_mm3 - bare.total_mm3)
+    inclusion = deformation(rays.r_mm, pressed.w_mm - baseline.w_mm, pressed.total_mm3 - baseline.total_mm3)
     return {"force_n": pressed.force_n, "indentation_mm": pressed.indentation_mm, **asdict(inclusion)}

@@ -36,10 +36,10 @@ def confidence_belts(truth: Array, mean: Array, spread: Array) -> tuple[Belt, ..
     Only presses that determine an unknown count for it; where they are rare, the belts hold all of the range. Raises
     `InvalidQuantity` when they are not rare, but too few to learn from.
     """
-    return tuple(_bands(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
+    return tuple(_belt(*columns) for columns in zip(truth.T, mean.T, spread.T, strict=True))
 
 
-def _bands(truth: Array, mean: Array, spread: Array) -> Belt:
+def _belt(truth: Array, mean: Array, spread: Array) -> Belt:
     known = _determined(spread)
     if known.mean() < RAREST_RATIO:
         return _wide_open()

@@ -39,7 +39,7 @@ INCLUSION_REACH = {
 }
 """A term counts when its degrees over these add up to at most 1."""
 INCLUSION_HIGHEST = {"size_mm": 9, "depth_mm": 8}
-BARE_REACH = dict.fromkeys(PARAMETERS, 0.5) | {
+BASELINE_REACH = dict.fromkeys(PARAMETERS, 0.5) | {
     "tissue_modulus_kpa": 4.0,
     "slab_thickness_mm": 4.0,
     "contact_pressure_kpa": 5.0,
@@ -64,7 +64,7 @@ def fit_polynomials(
 
     Raises as `fit_surrogate`.
     """
-    lump_degrees, baseline_degrees = degrees(reach, highest), degrees(BARE_REACH, {})
+    lump_degrees, baseline_degrees = degrees(reach, highest), degrees(BASELINE_REACH, {})
     bound = Bound(PRESSES_A_TERM * len(lump_degrees), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
     require(

@@ -53,12 +53,12 @@ def solved_inclusion(scene: Scene, table: OffAxisTable) -> SolvedInclusion:
     """Return the table of a scene's inclusion, on the radii and with the tilt of the probe's own table."""
     pressed = scene.with_press(Press(force_n=1.0))
     meshed = build(pressed, replace(model_plan(pressed), grading="coarse"))
-    bare, inclusion_field = (
+    inclusion_free, inclusion_field = (
         meshed.model.press(materials, [pressed.press], estimate_error=False)[0].state
         for materials in (baseline(pressed), with_inclusion(pressed))
     )
     own = {name: getattr(table, name) for name in OffAxisTable.__dataclass_fields__}
-    return SolvedInclusion(**own, modes_per_n=face_modes(meshed.rays.r_mm[0], inclusion_field, bare))
+    return SolvedInclusion(**own, modes_per_n=face_modes(meshed.rays.r_mm[0], inclusion_field, inclusion_free))
 
 
 @dataclass(frozen=True)

@@ -85,11 +85,11 @@ def inclusions_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, mism
     moduli_kpa = [NOMINAL.modulus_kpa(float(mismatch)) for mismatch in mismatches]
     scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm)
     meshed = build(scene, replace(model_plan(scene), grading="coarse"))
-    bare, *pressed = (
+    inclusion_free, *pressed = (
         meshed.model.press(materials, [scene.press], estimate_error=False)[0].state
         for materials in (baseline(scene), *(with_inclusion(_with_modulus(scene, E)) for E in moduli_kpa))
     )
-    modes = np.stack([face_modes(meshed.rays.r_mm[0], face, bare) for face in pressed])
+    modes = np.stack([face_modes(meshed.rays.r_mm[0], face, inclusion_free) for face in pressed])
     return modes / size_mm**3 / mismatches[:, None, None, None]
 
 
@@ -98,12 +98,12 @@ def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
     return replace(scene, inclusion=replace(scene.inclusion, youngs_modulus_kpa=modulus_kpa))
 
 
-def face_modes(r_mm: Array, face: FaceState, bare: FaceState) -> Array:
+def face_modes(r_mm: Array, face: FaceState, inclusion_free: FaceState) -> Array:
     """Return the cosine series [2, K, R] of what an inclusion adds to deformation and pressure, on the radii of the
     table.
     """
-    p_kpa = np.array([ring_means(r_mm, ray) for ray in face.p_kpa - bare.p_kpa])
-    return np.stack([cosine_modes(face.w_mm - bare.w_mm), cosine_modes(p_kpa)])[..., ::EVERY]
+    p_kpa = np.array([ring_means(r_mm, ray) for ray in face.p_kpa - inclusion_free.p_kpa])
+    return np.stack([cosine_modes(face.w_mm - inclusion_free.w_mm), cosine_modes(p_kpa)])[..., ::EVERY]
 
 
 def build_off_axis_table(

@@ -49,7 +49,7 @@ RING_MM = 1.0
 """Pressures are kept as means over rings of this width: at points they ring inside the elements by some 2 % of an
 inclusion's peak, their forces do not. Light spreads as far in the skin.
 """
-BARE = Level("blunt_fine", 3)
+BASELINE = Level("blunt_fine", 3)
 """The level of the ramps without an inclusion."""
 
 
@@ -64,9 +64,9 @@ def ramp(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -
 
 def fields(solution: Solution) -> tuple[Array, Array]:
     """Return (w, p) [2, R] without the inclusion, and what the inclusion adds, at the radii that the table keeps."""
-    bare, pressed = solution.baseline, solution.pressed
+    baseline, pressed = solution.baseline, solution.pressed
     without, inclusion_materials = (
-        np.stack([face.w_mm[0], ring_means(solution.r_mm, face.p_kpa[0])]) for face in (bare, pressed)
+        np.stack([face.w_mm[0], ring_means(solution.r_mm, face.p_kpa[0])]) for face in (baseline, pressed)
     )
     return without[:, ::EVERY], (inclusion_materials - without)[:, ::EVERY]
 
@@ -81,16 +81,16 @@ def ring_means(r_mm: Array, p_kpa: Array) -> Array:
 
 def _ramps_per_n(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Array, Array]:
     """Return both kinds of fields over the force, each [2, F, R]."""
-    bare, inclusion_field = zip(*(fields(solution) for solution in ramp(scene, forces_n, level)), strict=True)
+    baseline, inclusion_field = zip(*(fields(solution) for solution in ramp(scene, forces_n, level)), strict=True)
     over = forces_n[None, :, None]
-    return np.stack(bare, axis=1) / over, np.stack(inclusion_field, axis=1) / over
+    return np.stack(baseline, axis=1) / over, np.stack(inclusion_field, axis=1) / over
 
 
 def press_ramps(scene: Scene) -> PressRamps:
     """Return the ramps of one scene, solved for it alone: for what the table does not hold."""
-    bare, inclusion_field = _ramps_per_n(scene)
-    r_mm = np.linspace(0.0, scene.waveguide.radius_mm, bare.shape[-1])
-    return PressRamps(r_mm, Ramp(FORCES_N, bare), Ramp(FORCES_N, inclusion_field))
+    baseline, inclusion_field = _ramps_per_n(scene)
+    r_mm = np.linspace(0.0, scene.waveguide.radius_mm, baseline.shape[-1])
+    return PressRamps(r_mm, Ramp(FORCES_N, baseline), Ramp(FORCES_N, inclusion_field))
 
 
 def scene_in(slab: Slab, inclusion: Inclusion | None = None) -> Scene:
@@ -133,8 +133,8 @@ thickness from the fourth."""
 SceneOf = Callable[[Slab, Inclusion | None], Scene]
 
 
-def _bare_per_n(scene_of: SceneOf, slab: Slab) -> Array:
-    return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BARE)[0]
+def _baseline_per_n(scene_of: SceneOf, slab: Slab) -> Array:
+    return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BASELINE)[0]
 
 
 def lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, mismatch: float) -> Array:
@@ -163,13 +163,13 @@ def build_surface_table(
     axes = inclusion_axes(points, SMALLEST_SIZE_MM)
     places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid)]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    bare = Parallel(n_jobs=jobs)(delayed(_bare_per_n)(*one) for one in SOLVED)
+    baseline = Parallel(n_jobs=jobs)(delayed(_baseline_per_n)(*one) for one in SOLVED)
     solving = Parallel(n_jobs=jobs, return_as="generator")(delayed(lump_per_n_mm3)(*place) for place in places)
     inclusion_field = []
     for field in solving:
         inclusion_field.append(field)
         on_point(len(inclusion_field), len(places))
-    return assembled(axes, bare, inclusion_field)
+    return assembled(axes, baseline, inclusion_field)
 
 
 def _grids(axes: InclusionAxes) -> list[InclusionAxes]:

@@ -1,9 +1,9 @@
 """How often the ramp modes refuse ellipsoids that are longer than wide, beside how often any test could.
 
-What being longer adds to a sphere is solved by finite elements for each, its long axis along or across its offset, and
-carried on to the probe's own sphere (`stretched_inclusion`). How far a press of it lies from its nearest round twin
-inside the ranges - in the profile and in the second harmonics at once, whatever tissue and skin the twin has - bounds
-any test that, as the probe, does not know which way an inclusion is longer.
+What being longer adds to a sphere is solved by finite elements for each, its long axis along or across its offset,
+and carried on to the probe's own sphere (`stretched_inclusion`). How far a press of it lies from its nearest round
+inclusion inside the ranges - in the profile and in the second harmonics at once, whatever tissue and skin that one
+has - bounds any test that, as the probe, does not know which way an inclusion is longer.
 Source: Lehmann & Romano, Testing Statistical Hypotheses (2005), 6.3: of tests that treat all directions alike the best
 one rejects by the length, whose square is a noncentral chi-square of two degrees of freedom.
 """

@@ -92,8 +92,8 @@ def inclusion_ramps(tables: ProbeTables, inclusion: Inclusion) -> PressRamps:
     if np.array_equal(inside_mm, [size_mm, depth_mm]):
         return own
     solved = press_ramps(Scene(inclusion))
-    fields = [[np.interp(solved.r_mm, own.r_mm, of_load) for of_load in field] for field in own.bare.fields_per_n]
-    return PressRamps(solved.r_mm, Ramp(own.bare.force_n, np.array(fields)), solved.inclusion_field)
+    fields = [[np.interp(solved.r_mm, own.r_mm, of_load) for of_load in field] for field in own.baseline.fields_per_n]
+    return PressRamps(solved.r_mm, Ramp(own.baseline.force_n, np.array(fields)), solved.inclusion_field)
 
 
 def nearest_inside(posterior: PressPosterior, seed: int) -> NearestInside:

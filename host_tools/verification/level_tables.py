@@ -70,8 +70,8 @@ def relative_errors(found: Solution, truth: Solution) -> LevelErrors:
 
 def _features(solution: Solution, *, per: str) -> dict[str, float]:
     """Return force, indentation and O1-O3 of the inclusion when both presses are scaled to one unit of either."""
-    pressed, bare = (state.scaled(1 / getattr(state, per)) for state in (solution.pressed, solution.baseline))
-    return numbers(solution.rays, pressed, bare)
+    pressed, baseline = (state.scaled(1 / getattr(state, per)) for state in (solution.pressed, solution.baseline))
+    return numbers(solution.rays, pressed, baseline)
 
 
 def _relative(found: float, truth: float) -> float:

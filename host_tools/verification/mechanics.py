@@ -51,27 +51,28 @@ def ours(plan: ModelPlan) -> ProgramRamp:
     solutions = solve_ramp(SCENE, [Press(indentation_mm=value) for value in INDENTATIONS_MM], plan)
     seconds = time.perf_counter() - began
     w_mm = np.array([np.interp(RADII_MM, s.r_mm, s.w_mm) for s in solutions])
-    bare_mm = np.array([np.interp(RADII_MM, s.r_mm, s.w_baseline_mm) for s in solutions])
-    return ProgramRamp(np.array([s.force_n for s in solutions]), w_mm, w_mm - bare_mm, seconds)
+    baseline_mm = np.array([np.interp(RADII_MM, s.r_mm, s.w_baseline_mm) for s in solutions])
+    return ProgramRamp(np.array([s.force_n for s in solutions]), w_mm, w_mm - baseline_mm, seconds)
 
 
 def with_edge_force(plan: ModelPlan) -> ProgramRamp:
     """Solve by the forward model, but with the slip of the rim an unknown, too."""
     began, meshed = time.perf_counter(), build(SCENE, plan)
-    pressed, bare = (
+    pressed, inclusion_free = (
         press_along(meshed.mesh, materials, INDENTATIONS_MM, order=plan.order, rays=meshed.rays, edge_force=True)
         for materials in (with_inclusion(SCENE), baseline(SCENE))
     )
     seconds, r_mm = time.perf_counter() - began, meshed.rays.r_mm[0]
-    w_mm, bare_mm = (
-        np.array([np.interp(RADII_MM, r_mm, loaded.face.w_mm[0]) for loaded in ramp]) for ramp in (pressed, bare)
+    w_mm, baseline_mm = (
+        np.array([np.interp(RADII_MM, r_mm, loaded.face.w_mm[0]) for loaded in ramp])
+        for ramp in (pressed, inclusion_free)
     )
-    return ProgramRamp(np.array([loaded.face.force_n for loaded in pressed]), w_mm, w_mm - bare_mm, seconds)
+    return ProgramRamp(np.array([loaded.face.force_n for loaded in pressed]), w_mm, w_mm - baseline_mm, seconds)
 
 
 def calculix(refinement: float, *, finite_strain: bool) -> ProgramRamp:
     """Solve by CalculiX, with the inclusion and with the inclusion filled with tissue."""
-    pressed, bare = (
+    pressed, inclusion_free = (
         solve_with_calculix(
             SCENE,
             INDENTATIONS_MM,
@@ -82,9 +83,11 @@ def calculix(refinement: float, *, finite_strain: bool) -> ProgramRamp:
         )
         for homogeneous in (False, True)
     )
-    w_mm, bare_mm = (np.array([[s.w_at_mm(r) for r in RADII_MM] for s in states]) for states in (pressed, bare))
-    seconds = pressed[0].seconds + bare[0].seconds
-    return ProgramRamp(np.array([s.force_n for s in pressed]), w_mm, w_mm - bare_mm, seconds)
+    w_mm, baseline_mm = (
+        np.array([[s.w_at_mm(r) for r in RADII_MM] for s in states]) for states in (pressed, inclusion_free)
+    )
+    seconds = pressed[0].seconds + inclusion_free[0].seconds
+    return ProgramRamp(np.array([s.force_n for s in pressed]), w_mm, w_mm - baseline_mm, seconds)
 
 
 SMALL, SMALL_BLUNT = "small strain, ours", "small strain, ours, mesh of finite strain"

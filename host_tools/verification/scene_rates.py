@@ -47,10 +47,10 @@ def solve_level(resolution: Resolution, order: int, scene: Scene = SCENE) -> Sol
     """Press a scene by 1 mm on a mesh of given element sizes."""
     mesh, rays = axisymmetric_mesh(scene, order=order, resolution=resolution), Rays.over(scene.waveguide)
     press, sampler = LinearPress(mesh, AXISYMMETRIC, order), FaceSampler(mesh, rays, "axisymmetric")
-    bare, inclusion = (
+    inclusion_free, inclusion = (
         press.face_state(press.displacement(m), m, sampler) for m in (baseline(scene), with_inclusion(scene))
     )
-    field = deformation(rays.r_mm, inclusion.w_mm - bare.w_mm, inclusion.total_mm3 - bare.total_mm3)
+    field = deformation(rays.r_mm, inclusion.w_mm - inclusion_free.w_mm, inclusion.total_mm3 - inclusion_free.total_mm3)
     features = SceneFeatures(inclusion.force_n, field.max_deformation_mm, field.central_deformation_mm3)
     return Solved(features, press.contact.space.ndof)
 

@@ -61,8 +61,9 @@ class PressNoise:
 
 
 def light_ratio(rows: Rows) -> Rows:
-    """Return by how much a ratio of the light moves each column of rows [..., P]: 1 + contrast there, 1 in growth.
+    """Return by how much a ratio of the light moves each column of rows [..., P].
 
+    It is 1 + contrast in the contrasts and 1 in the reference response.
     An offset is the first harmonic of the contrast, mean over the loads: what is seen there is the mean light's.
     """
     light = np.ones_like(rows)
@@ -76,7 +77,7 @@ def drift_directions(rows: Rows) -> tuple[Rows, Rows]:
     """Return what a unit of gain and a newton of zero drift add to rows [..., P], to first order.
 
     A cell that reads a newton too much looks up the reference light a newton too high: d ln(light) / d force of it,
-    which the growth in the row tells, ring by ring.
+    which the reference response in the row tells, ring by ring.
     """
     light = light_ratio(rows)
     gain, zero = np.zeros_like(rows), np.zeros_like(rows)

@@ -44,11 +44,11 @@ AGAIN = "press slowly harder from the first touch to 0.6 N, beside the lesion an
 class RadialProfile:
     """What a press says about inclusion, tissue and skin; K forces `force_n`, J rings `RING_RADII_MM`.
 
-    contrast [K, J]: ring means of the tactile image. growth [K - 1, J]: ln of the inclusion-free light at each force
-    over that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean over the
-    forces, without the ring in the middle. second_harmonic [2, K, J - 2]: the second harmonic at each force, along and
-    across the direction of the bright side, also without the outermost ring. residual: root mean square, over rings and
-    frames, of what the polynomial in the force leaves.
+    contrast [K, J]: ring means of the tactile image. reference_response [K - 1, J]: ln of the inclusion-free light at
+    each force over that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean
+    over the forces, without the ring in the middle. second_harmonic [2, K, J - 2]: the second harmonic at each force,
+    along and across the direction of the bright side, also without the outermost ring. residual: root mean square,
+    over rings and frames, of what the polynomial in the force leaves.
     """
 
     force_n: Array
@@ -59,7 +59,7 @@ class RadialProfile:
     residual: float
 
     def as_row(self) -> Array:
-        """Return contrast, growth and offset as one row, in the order of `ROW_NAMES`."""
+        """Return contrast, reference response and offset as one row, in the order of `ROW_NAMES`."""
         return np.concatenate([self.contrast.ravel(), self.reference_response.ravel(), self.offset])
 
 

@@ -120,7 +120,7 @@ def inclusion_factor(parameters: Array) -> Array:
 
 
 def assemble(inclusion: Array, baseline: Array) -> Array:
-    """Return rows [n, P] in the order of `radial_profile.ROW_NAMES`: contrast, growth, offset."""
+    """Return rows [n, P] in the order of `radial_profile.ROW_NAMES`: contrast, reference response, offset."""
     return np.hstack([inclusion[:, :CONTRAST_COLUMNS], baseline, inclusion[:, CONTRAST_COLUMNS:]])
 
 

@@ -57,7 +57,7 @@ class NeighbouredFace:
         """Return w_mm and p_kpa [ny, nx] of both inclusions; `place` is relative to the first."""
         away = self._from_first
         second = replace(place, x_mm=place.x_mm - away.x_mm, y_mm=place.y_mm - away.y_mm)
-        bare = replace(place, x_mm=FAR_AWAY.x_mm, y_mm=FAR_AWAY.y_mm)
-        fields = self._first.at(force_n, place), self._second.at(force_n, second), self._first.at(force_n, bare)
+        baseline = replace(place, x_mm=FAR_AWAY.x_mm, y_mm=FAR_AWAY.y_mm)
+        fields = self._first.at(force_n, place), self._second.at(force_n, second), self._first.at(force_n, baseline)
         w_mm, p_kpa = (one + two - none for one, two, none in zip(*fields, strict=True))
         return w_mm, p_kpa

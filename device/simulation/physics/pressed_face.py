@@ -60,9 +60,9 @@ class PressedFace:
         """Return w_mm and p_kpa [ny, nx]; the pressure is never negative and carries the force."""
         if force_n <= 0:
             return np.zeros(self._x_mm.shape, np.float32), np.zeros(self._x_mm.shape, np.float32)
-        bare, inclusion_field = self._ramps.bare.at(force_n), self._ramps.inclusion_field.at(force_n)
+        baseline, inclusion_field = self._ramps.baseline.at(force_n), self._ramps.inclusion_field.at(force_n)
         share = self._off_axis.centred_share(float(np.hypot(place.x_mm, place.y_mm)))
-        w_mm, p_kpa = (self._from_axis(b + share * extra) for b, extra in zip(bare, inclusion_field, strict=True))
+        w_mm, p_kpa = (self._from_axis(b + share * extra) for b, extra in zip(baseline, inclusion_field, strict=True))
         if share < 1:
             grown_w, grown_p = (np.float32(force_n * growth) for growth in self._growth(inclusion_field, force_n))
             further_w, further_p = self._aside(place.x_mm, place.y_mm)

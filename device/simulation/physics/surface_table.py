@@ -64,7 +64,7 @@ class PressRamps(NamedTuple):
     """
 
     r_mm: Array
-    bare: Ramp
+    baseline: Ramp
     inclusion_field: Ramp
     nominal_inclusion_field: Ramp | None = None
 
@@ -96,9 +96,9 @@ class SurfaceTable:
         They reach to 0.78 N times the tissue's modulus over 5 kPa: as deep in every tissue.
         """
         inclusion_field = self.inclusion_field(inclusion, slab)
-        bare = self._ramp(slab, self.bare_per_n + self._changed(self.bare_change_per_n, slab))
+        baseline = self._ramp(slab, self.bare_per_n + self._changed(self.bare_change_per_n, slab))
         nominal = None if slab == NOMINAL else self.inclusion_field(slab.nominal_equivalent(inclusion))
-        return PressRamps(self.r_mm, bare, inclusion_field, nominal)
+        return PressRamps(self.r_mm, baseline, inclusion_field, nominal)
 
     def inclusion_field(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
         """Return what an inclusion adds to the ramp in a slab; refuses one outside the table."""

@@ -48,7 +48,7 @@ class InclusionSensitivity:
     force_n: float
     rays: Rays
     pressed: FaceSensitivity
-    bare: FaceSensitivity
+    baseline: FaceSensitivity
 
 
 Ramps = dict[int, tuple[InclusionSensitivity, ...]]
@@ -65,15 +65,15 @@ def sensitive_ramp(scene: Scene, forces_n: Sequence[float], *, strain: RampStrai
     """
     # any modulus but the tissue's own, so that the inclusion is meshed: one ramp without it serves every modulus
     stiffer = replace(inclusion_of(scene), youngs_modulus_kpa=2 * scene.tissue.youngs_modulus_kpa)
-    bare = _bare_ramp(replace(scene, inclusion=stiffer), tuple(forces_n), strain)
+    inclusion_free = _baseline_ramp(replace(scene, inclusion=stiffer), tuple(forces_n), strain)
     inclusion_materials = with_inclusion(scene)
     parts = {
         "youngs_modulus_kpa": only(inclusion_materials, "inclusion"),
         "tissue_modulus_kpa": only(inclusion_materials, "tissue"),
     }
     ramp = _Ramp(scene, _plan(scene, forces_n, strain), inclusion_materials, parts)
-    pressed = ramp.at(forces_n, [without[ORDER].face.indentation_mm for without in bare])
-    rays, loads = ramp.meshed.rays, list(zip(forces_n, pressed, bare, strict=True))
+    pressed = ramp.at(forces_n, [without[ORDER].face.indentation_mm for without in inclusion_free])
+    rays, loads = ramp.meshed.rays, list(zip(forces_n, pressed, inclusion_free, strict=True))
     return {
         order: tuple(
             InclusionSensitivity(force, rays, inclusion[order], without[order]) for force, inclusion, without in loads
@@ -92,7 +92,7 @@ def _plan(scene: Scene, forces_n: Sequence[float], strain: RampStrain) -> ModelP
 
 
 @lru_cache(maxsize=2)
-def _bare_ramp(scene: Scene, forces_n: tuple[float, ...], strain: RampStrain) -> tuple[Faces, ...]:
+def _baseline_ramp(scene: Scene, forces_n: tuple[float, ...], strain: RampStrain) -> tuple[Faces, ...]:
     baseline_materials = baseline(scene)
     parts = {"tissue_modulus_kpa": only(baseline_materials, "tissue", "inclusion")}
     return _Ramp(scene, _plan(scene, forces_n, strain), baseline_materials, parts).at(forces_n, None)
@@ -176,12 +176,12 @@ def sensitive_offset(scene: Scene, offset_mm: float, force_n: float) -> dict[int
         "youngs_modulus_kpa": only(inclusion_materials, "inclusion"),
         "tissue_modulus_kpa": only(inclusion_materials, "tissue"),
     }
-    bare_parts = {"tissue_modulus_kpa": only(baseline_materials, "tissue", "inclusion")}
+    baseline_parts = {"tissue_modulus_kpa": only(baseline_materials, "tissue", "inclusion")}
     found = {}
     for order in ORDERS:
         pressed = _at_force(force_n, meshed, order, inclusion_materials, parts, velocities)
-        bare = _at_force(force_n, meshed, order, baseline_materials, bare_parts, velocities)
-        found[order] = InclusionSensitivity(force_n, meshed.rays, pressed, bare)
+        inclusion_free = _at_force(force_n, meshed, order, baseline_materials, baseline_parts, velocities)
+        found[order] = InclusionSensitivity(force_n, meshed.rays, pressed, inclusion_free)
     return found
 
 

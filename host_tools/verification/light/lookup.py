@@ -92,19 +92,19 @@ def pressed_scenes(lookup: LookupOptics, table: SurfaceTable, seed: int = 21) ->
     random = np.random.default_rng(seed)
     x, y = np.meshgrid(lookup.x_mm.astype(float), lookup.y_mm.astype(float))
     round_the_middle = RadialProfiles(table.r_mm, np.hypot(x, y))
-    bare = table.ramps(Inclusion(0.0, 6.0, 80.0)).bare.at(PRESS_N)
-    w_bare, p_bare = (round_the_middle(field) for field in bare)
-    p_bare = p_bare * round_the_middle.inside
-    yield HeldOutScene("press, no inclusion", w_bare, p_bare, (1.0, 1.0, 1.0, 1.0), Skin())
+    baseline = table.ramps(Inclusion(0.0, 6.0, 80.0)).baseline.at(PRESS_N)
+    w_baseline, p_baseline = (round_the_middle(field) for field in baseline)
+    p_baseline = p_baseline * round_the_middle.inside
+    yield HeldOutScene("press, no inclusion", w_baseline, p_baseline, (1.0, 1.0, 1.0, 1.0), Skin())
     for size, depth, modulus in ((15.0, 4.0, 120.0), (8.0, 4.0, 80.0), (10.0, 8.0, 60.0), (15.0, 5.0, 40.0)):
         at_x, at_y = random.uniform(-3.5, 3.5, 2)
         round_the_inclusion = RadialProfiles(table.r_mm, np.hypot(x - at_x, y - at_y))
         inclusion = table.inclusion_field(Inclusion(size, depth, modulus)).at(PRESS_N)
         w_inclusion, p_inclusion = (round_the_inclusion(field) for field in inclusion)
-        p = np.maximum(p_bare + p_inclusion * round_the_middle.inside, 0)
+        p = np.maximum(p_baseline + p_inclusion * round_the_middle.inside, 0)
         leds = tuple(random.uniform(0.6, 1.0, 4).tolist())
         name = f"press, inclusion {size:g} mm, {depth:g} mm deep, {modulus:g} kPa"
-        yield HeldOutScene(name, w_bare + w_inclusion, p, leds, Skin())
+        yield HeldOutScene(name, w_baseline + w_inclusion, p, leds, Skin())
 
 
 def cell_means(fine_mm: Array, half_width_mm: float, cells: int) -> Array:

@@ -87,8 +87,8 @@ def test_a_phantom_in_a_thicker_slab_is_solved_for_itself(tables):
     and the inclusion is one that the table does not hold."""
     one = next(breast_imager())
     ramps = one.ramps()
-    assert ramps.bare.at(0.5).w_mm[0] == pytest.approx(
-        tables.centred.ramps(Inclusion(0.0, 5.0, 80.0)).bare.at(0.5).w_mm[0], rel=0.1
+    assert ramps.baseline.at(0.5).w_mm[0] == pytest.approx(
+        tables.centred.ramps(Inclusion(0.0, 5.0, 80.0)).baseline.at(0.5).w_mm[0], rel=0.1
     )
     recording = phantom_recording(one.inclusion, tables, seed=1, protocol=PhantomProtocol(frames=1), ramps=ramps)
     assert recording.truth == one.inclusion

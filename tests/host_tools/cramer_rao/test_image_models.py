@@ -51,9 +51,9 @@ def test_light_follows_the_pressure_over_that_of_the_skin(light):
 
 def test_a_paler_skin_gives_back_more_than_in_proportion(light):
     """What the face sends back once more comes on top."""
-    growth = light.changes_by_skin(FACE)["albedo"] / light.light(FACE)
-    assert (growth > 1).all()
-    assert (growth < 1.6).all()
+    reference_response = light.changes_by_skin(FACE)["albedo"] / light.light(FACE)
+    assert (reference_response > 1).all()
+    assert (reference_response < 1.6).all()
     assert set(light.changes_by_skin(FACE)) == set(SKIN)
 
 

@@ -1,11 +1,11 @@
-"""What is seen of two presses: noise of the camera on paper, smooth errors, gain, zero, and the growth of the light."""
+"""What is seen of two presses: the camera's noise on paper, smooth errors, gain, zero, and the reference response."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from host_tools.cramer_rao.observation import GAIN, ZERO, observe, variance_counts, with_growth
+from host_tools.cramer_rao.observation import GAIN, ZERO, observe, variance_counts, with_reference_response
 from host_tools.cramer_rao.observed_press import ObservedPress
 from host_tools.cramer_rao.protocol import PressProtocol
 from host_tools.cramer_rao.rings import Rings
@@ -63,26 +63,26 @@ def test_a_zero_of_the_cell_counts_double_at_half_the_force():
 
 
 def rows(log_lights):
-    """Return contrasts and growth of the logarithms of lights and references, as an image gives them."""
+    """Return contrasts and reference response of the logarithms of lights and references, as an image gives them."""
     light, reference = np.split(log_lights, 2)
     return np.concatenate([np.exp(light - reference) - 1, reference[:COUNT] - reference[COUNT:]])
 
 
-def test_growth_shares_the_noise_of_the_reference_with_the_contrast():
+def test_reference_response_shares_the_noise_of_the_reference_with_the_contrast():
     """The covariance of the rows is that of the light, through their derivatives by it."""
     logs = np.log(np.concatenate([one.light for one in SEEN] + [one.reference for one in SEEN]))
     level = np.exp(logs) * 100 / np.average(SEEN[1].reference, weights=RINGS.pixels)
     variance = variance_counts(level) / level**2 / 5 / np.tile(RINGS.pixels, 4)
     steps = 1e-6 * np.eye(len(logs))
     slope = np.stack([rows(logs + s) - rows(logs - s) for s in steps], axis=1) / 2e-6
-    found = with_growth(observe(SEEN, RINGS, CALM), SEEN, RINGS, CALM)
+    found = with_reference_response(observe(SEEN, RINGS, CALM), SEEN, RINGS, CALM)
     assert found.values == pytest.approx(rows(logs))
     expected = slope @ np.diag(variance) @ slope.T
     assert found.covariance == pytest.approx(expected, rel=1e-6, abs=1e-9 * expected.max())
 
 
-def test_growth_tells_of_the_tissue_and_nothing_of_the_inclusion():
-    found = with_growth(observe(SEEN, RINGS, CALM), SEEN, RINGS, CALM).derivatives
+def test_reference_response_tells_of_the_tissue_and_nothing_of_the_inclusion():
+    found = with_reference_response(observe(SEEN, RINGS, CALM), SEEN, RINGS, CALM).derivatives
     assert found["tissue_modulus_kpa"][-COUNT:] == pytest.approx(np.full(COUNT, 0.03))
     assert not found["size_mm"][-COUNT:].any()
     assert not found[GAIN][-COUNT:].any()
@@ -91,4 +91,4 @@ def test_growth_tells_of_the_tissue_and_nothing_of_the_inclusion():
 def test_one_load_does_not_grow():
     alone = replace(CALM, forces_n=(0.6,))
     observed = observe(SEEN[1:], RINGS, alone)
-    assert with_growth(observed, SEEN[1:], RINGS, alone).values == pytest.approx(observed.values)
+    assert with_reference_response(observed, SEEN[1:], RINGS, alone).values == pytest.approx(observed.values)

@@ -19,7 +19,7 @@ STD = 0.05
 
 @pytest.fixture
 def linear() -> RampAnswers:
-    """Growth is linear in all coordinates but the modulus, which shows in nothing."""
+    """The reference response is linear in all coordinates but the modulus, which shows in nothing."""
     return RampAnswers(
         linear_surrogate(random_slopes()), {"standard": white_noise(STD), "precise": white_noise(STD / 2)}
     )

@@ -14,7 +14,7 @@ from host_tools.data.dataset import read_dataset
 from host_tools.data.dataset_file import BLOCK_SCENES, write_dataset
 from host_tools.data.journal import Journal
 from host_tools.data.plan import SweepPlan
-from host_tools.data.rows import bare_row
+from host_tools.data.rows import empty_row
 from host_tools.data.sweep import sweep
 
 
@@ -39,7 +39,7 @@ def test_stated_errors_are_relative_and_a_failed_row_is_nan(tmp_path):
     plan = SweepPlan(2, 1)
     failed, truth = plan.truths()
     solved = synthetic_row(1, truth) | {"force_n": 0.5, "stated_error_force_n": 1e-3}
-    dataset = _written(tmp_path, plan, [bare_row(0, failed, reason="no mesh — π"), solved])
+    dataset = _written(tmp_path, plan, [empty_row(0, failed, reason="no mesh — π"), solved])
     assert (dataset["force_n"].attrs["units"], dataset["stated_error_force_n"].attrs["units"]) == ("N", "1")
     np.testing.assert_array_equal(dataset["stated_error_force_n"].values, [np.nan, 1e-3])
     assert np.isnan(dataset["w_mm"].values[0]).all()
@@ -49,7 +49,7 @@ def test_stated_errors_are_relative_and_a_failed_row_is_nan(tmp_path):
 def test_a_sweep_that_solved_nothing_writes_no_file(tmp_path):
     plan = SweepPlan(1, 1)
     with pytest.raises(InvalidQuantity, match="the first reason was: no mesh"):
-        _written(tmp_path, plan, [bare_row(0, plan.truths()[0], reason="no mesh")])
+        _written(tmp_path, plan, [empty_row(0, plan.truths()[0], reason="no mesh")])
     assert not (tmp_path / "s.nc").exists()
 
 

@@ -38,15 +38,15 @@ def test_the_contact_pressure_is_positive_everywhere(truth):
 
 
 def test_no_inclusion_is_the_limit_of_a_vanishing_one():
-    bare, tiny = solve(Scene(None)), solve(Scene(Inclusion(0.001, 6.0, 80.0)))
-    assert bare.inclusion_field.max_deformation_mm == 0.0
+    baseline, tiny = solve(Scene(None)), solve(Scene(Inclusion(0.001, 6.0, 80.0)))
+    assert baseline.inclusion_field.max_deformation_mm == 0.0
     assert abs(tiny.inclusion_field.max_deformation_mm) < 1e-9
-    np.testing.assert_allclose(tiny.w_mm, bare.w_mm, rtol=2e-4)
+    np.testing.assert_allclose(tiny.w_mm, baseline.w_mm, rtol=2e-4)
 
 
 def test_an_inclusion_of_tissue_is_no_inclusion():
-    same, bare = solve(Scene(Inclusion(10.0, 6.0, 5.0))), solve(Scene(None))
-    np.testing.assert_array_equal(same.w_mm, bare.w_mm)
+    same, baseline = solve(Scene(Inclusion(10.0, 6.0, 5.0))), solve(Scene(None))
+    np.testing.assert_array_equal(same.w_mm, baseline.w_mm)
     assert same.inclusion_field.total_deformation_mm3 == 0.0
 
 

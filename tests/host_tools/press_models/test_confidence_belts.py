@@ -32,7 +32,7 @@ def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
     assert min(inside[octile == k].mean() for k in range(8)) > 0.85
 
 
-def test_bands_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
+def test_belts_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
     """Quantiles twice too far out: the factor is a half, but for what chance does not let be told."""
     columns = [column[:, None] for column in shrunk_answers(4000, 3)]
     [right] = confidence_belts(*columns)
@@ -59,28 +59,28 @@ def test_an_unknown_that_presses_rarely_determine_is_never_called_determined(sha
     assert (belts.interval(0.3, 0.1)[:2] == (-1.0, 1.0)) != is_determined
 
 
-def flat_bands(bound: float) -> tuple[Belt, ...]:
+def flat_belts(bound: float) -> tuple[Belt, ...]:
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
     return (Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
 
 
-def test_bands_widen_by_the_factor_that_covers_as_many_recordings_as_chance_lets_be_told():
+def test_belts_widen_by_the_factor_that_covers_as_many_recordings_as_chance_lets_be_told():
     """Errors of 0.1, 0.2 ... 10 spreads in belts of 1: of a hundred, 90 less 3 by chance: the 87th, 8.7."""
     error = np.repeat(np.arange(0.1, 10.05, 0.1)[:, None], 3, axis=1)
     spread = np.full_like(error, 0.05)
-    wide = widened(flat_bands(1.0), error * spread, np.zeros_like(error), spread)
+    wide = widened(flat_belts(1.0), error * spread, np.zeros_like(error), spread)
     for one in wide:
         np.testing.assert_allclose(one.high, 8.7, atol=0.05)
         np.testing.assert_allclose(one.low, -one.high)
 
 
-def test_bands_that_hold_recordings_stay_what_they_are():
+def test_belts_that_hold_recordings_stay_what_they_are():
     error = np.repeat(np.linspace(-1, 1, 50)[:, None], 3, axis=1)
     spread = np.full_like(error, 0.05)
-    same = widened(flat_bands(2.0), error * spread, np.zeros_like(error), spread)
+    same = widened(flat_belts(2.0), error * spread, np.zeros_like(error), spread)
     np.testing.assert_allclose(same[0].high, 2.0)
 
 
 def test_recordings_that_determine_nothing_widen_nothing():
-    belts, none = flat_bands(1.0), np.zeros((20, 3))
+    belts, none = flat_belts(1.0), np.zeros((20, 3))
     assert widened(belts, none + 5.0, none, none + 1.0) == belts

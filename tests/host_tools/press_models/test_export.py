@@ -221,9 +221,9 @@ def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedRamp, mode
         3.2,
     )
     assert {critical.outside_log_odds for critical in model.critical.values()} == {0.3}
-    for bands_of_mode in model.belts.values():
-        assert [belts.high[0, 0] for belts in bands_of_mode] == [1.5, 1.6, 1.7]
-        assert [belts.low[1, 1] for belts in bands_of_mode] == [-1.5, -1.6, -1.7]
+    for belts_of_mode in model.belts.values():
+        assert [belts.high[0, 0] for belts in belts_of_mode] == [1.5, 1.6, 1.7]
+        assert [belts.low[1, 1] for belts in belts_of_mode] == [-1.5, -1.6, -1.7]
     assert model.belts["standard"][0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
 
 

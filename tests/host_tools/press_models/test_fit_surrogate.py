@@ -17,19 +17,19 @@ from host_tools.press_models.press_samples import PressSamples, draw_parameters
 
 NONE = dict.fromkeys(PARAMETERS, 0.5)
 SMALL_INCLUSION = dict.fromkeys(PARAMETERS, 1.0) | {"size_mm": 3.0, "depth_mm": 2.0}
-SMALL_BARE = NONE | {"tissue_modulus_kpa": 2.0, "albedo": 1.0}
+SMALL_BASELINE = NONE | {"tissue_modulus_kpa": 2.0, "albedo": 1.0}
 
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Fifteen terms of the inclusion and four of the light beside it instead of thousands."""
     monkeypatch.setattr(module, "INCLUSION_REACH", SMALL_INCLUSION)
-    monkeypatch.setattr(module, "BARE_REACH", SMALL_BARE)
+    monkeypatch.setattr(module, "BASELINE_REACH", SMALL_BASELINE)
 
 
 @pytest.fixture
 def truth() -> PressSurrogate:
-    rng, inclusion, baseline = np.random.default_rng(1), degrees(SMALL_INCLUSION, {}), degrees(SMALL_BARE, {})
+    rng, inclusion, baseline = np.random.default_rng(1), degrees(SMALL_INCLUSION, {}), degrees(SMALL_BASELINE, {})
     return PressSurrogate(
         LegendreSum(inclusion, rng.normal(size=(len(inclusion), CONTRAST_COLUMNS + OFFSET_COLUMNS))),
         LegendreSum(baseline, rng.normal(size=(len(baseline), RESPONSE_COLUMNS))),

@@ -28,7 +28,7 @@ from host_tools.press_models.recorded_presses import RecordedPresses
 
 STD, COUNT, RECORDED = 0.1, 4000, 150
 TOLD = np.arange(len(PARAMETERS)) != MODULUS
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
+RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 NOISE = white_noise(STD)
 
 
@@ -71,7 +71,7 @@ def gaussian(count: int, seed: int) -> EvaluatedPresses:
     )
 
 
-def exact_bands(bound: float) -> tuple[Belt, ...]:
+def exact_belts(bound: float) -> tuple[Belt, ...]:
     """Belts of an error that is never more than so many spreads, whatever truth and spread."""
     ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
     return (Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
@@ -121,12 +121,12 @@ def outcome(answers, press_set, recorded) -> ModeOutcome:
 
 
 def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
-    covered, known = gaussian(3000, 1).covered(exact_bands(1.645))
+    covered, known = gaussian(3000, 1).covered(exact_belts(1.645))
     assert known.all()
     np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.015)
 
 
-def test_bands_of_one_half_of_gaussian_answers_cover_nine_in_ten_of_the_other():
+def test_belts_of_one_half_of_gaussian_answers_cover_nine_in_ten_of_the_other():
     both = gaussian(5000, 2)
     seen, unseen = both.part(slice(3000)), both.part(slice(3000, None))
     covered, _ = unseen.covered(confidence_belts(seen.truth, seen.mean, seen.spread))
@@ -137,7 +137,7 @@ def test_an_interval_covers_the_truth_inside_it_and_not_the_one_beside_it():
     """0.1 +- 2 x 0.1 holds -0.05 and 0.29, not 0.32 and -0.15; a spread above half the prior's tells nothing."""
     truth = np.array([[-0.05, 0.32, 0.9], [0.29, -0.15, -0.9]])
     spread = np.array([[0.1, 0.1, 0.51 * EVEN_STD]] * 2)
-    covered, known = EvaluatedPresses(truth, np.full((2, 3), 0.1), spread).covered(exact_bands(2.0))
+    covered, known = EvaluatedPresses(truth, np.full((2, 3), 0.1), spread).covered(exact_belts(2.0))
     np.testing.assert_array_equal(covered, [[True, False, True]] * 2)
     np.testing.assert_array_equal(known, [[True, True, False]] * 2)
 
@@ -149,7 +149,7 @@ def test_a_part_is_of_the_same_presses_in_all_its_arrays():
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[4:7])
 
 
-def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome, press_set):
+def test_simulated_answers_are_of_the_half_that_the_belts_have_not_seen(outcome, press_set):
     """Noise is as large as the light, 1 + a contrast that is even between -1 and 1: its mean square is 1 + 1/3."""
     np.testing.assert_array_equal(outcome.simulated.truth, press_set.normalised[COUNT // 2 :, :3])
     error = outcome.simulated.mean - outcome.simulated.truth
@@ -157,7 +157,7 @@ def test_simulated_answers_are_of_the_half_that_the_bands_have_not_seen(outcome,
     assert (outcome.simulated.covered(outcome.belts)[0].mean(axis=0) > 0.875).all()
 
 
-def test_bands_come_from_the_first_halves_alone(outcome, answers, press_set, recorded):
+def test_belts_come_from_the_first_halves_alone(outcome, answers, press_set, recorded):
     """Truths that lie elsewhere in the second half, simulated or recorded, leave the belts what they were."""
     parameters = recorded.parameters.copy()
     parameters[RECORDED // 2 :, :3] = denormalise(np.full((1, len(PARAMETERS)), 0.9))[0, :3]

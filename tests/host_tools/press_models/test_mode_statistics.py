@@ -11,14 +11,14 @@ from host_tools.press_models.mode_statistics import OCTILES, octile_of, statisti
 
 COUNT = 4000
 ENDS, NONE = np.array([-1.0, 1.0]), np.zeros((2, 2))
-BANDS = (Belt(ENDS, np.log([0.01, 1.0]), NONE - 2, NONE + 2),) * 3
+BELTS = (Belt(ENDS, np.log([0.01, 1.0]), NONE - 2, NONE + 2),) * 3
 """Two spreads on either side of the mean."""
 EVEN = np.tile((2 * np.arange(COUNT) + 1)[:, None] / COUNT - 1, 3)
 
 
 def of(mean, spread=0.1, truth=EVEN):
     mean, spread = (np.broadcast_to(part, truth.shape) for part in (mean, spread))
-    return statistics(EvaluatedPresses(truth, np.array(mean), np.array(spread)), BANDS)
+    return statistics(EvaluatedPresses(truth, np.array(mean), np.array(spread)), BELTS)
 
 
 def test_a_perfect_answer_has_skill_1_and_no_error():

@@ -37,7 +37,7 @@ def answers(error: float) -> tuple[EvaluatedPresses, RecordedHolds]:
 
 
 @pytest.mark.parametrize("error", [1.0, 1.6])
-def test_bands_cover_recordings_also_where_simulated_presses_promise_too_much(error):
+def test_belts_cover_recordings_also_where_simulated_presses_promise_too_much(error):
     outcome = quick_training._outcome(FirstColumns(), *answers(error))
     covered, known = outcome.recorded.covered(outcome.belts)
     assert known.all()

@@ -13,7 +13,7 @@ from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 
 STD, COUNT, STEPS = 0.3, 20_000, 300
 EVEN = 1 / np.sqrt(3)
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
+RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +26,14 @@ def press_set() -> PressSet:
 
 @pytest.fixture(scope="module")
 def ensemble(press_set) -> DenseEnsemble:
-    return train_ensemble(press_set, seed=1, members=2, steps=STEPS, columns=GROWTH, jobs=1)
+    return train_ensemble(press_set, seed=1, members=2, steps=STEPS, columns=RESPONSE, jobs=1)
 
 
 @pytest.fixture(scope="module")
 def answers(press_set, ensemble) -> tuple[np.ndarray, np.ndarray]:
     """Error and spread [n, 3] on fresh noise."""
     index = np.arange(5000)
-    mean, spread = ensemble.estimate(press_set.noisy(index, np.random.default_rng(9))[:, GROWTH].astype(np.float64))
+    mean, spread = ensemble.estimate(press_set.noisy(index, np.random.default_rng(9))[:, RESPONSE].astype(np.float64))
     return mean - press_set.normalised[index, :3], spread
 
 
@@ -54,7 +54,7 @@ def test_what_does_not_show_keeps_the_spread_of_its_prior(answers):
 
 
 def test_an_ensembles_variance_is_that_of_its_members_and_of_their_means(press_set, ensemble):
-    rows = press_set.rows[:5, GROWTH].astype(np.float64)
+    rows = press_set.rows[:5, RESPONSE].astype(np.float64)
     alone = [DenseEnsemble(ensemble.scaling, (member,)).estimate(rows) for member in ensemble.members]
     (first, first_spread), (second, second_spread) = alone
     mean, spread = ensemble.estimate(rows)
@@ -65,7 +65,7 @@ def test_an_ensembles_variance_is_that_of_its_members_and_of_their_means(press_s
 
 
 def test_the_same_seed_gives_the_same_ensemble_and_the_members_differ(press_set):
-    first, again = (train_ensemble(press_set, seed=3, members=2, steps=2, columns=GROWTH, jobs=1) for _ in range(2))
+    first, again = (train_ensemble(press_set, seed=3, members=2, steps=2, columns=RESPONSE, jobs=1) for _ in range(2))
     for one, other in zip(first.members, again.members, strict=True):
         np.testing.assert_array_equal(one[0].weights, other[0].weights)
     assert np.abs(first.members[0][0].weights - first.members[1][0].weights).max() > 0.01
@@ -81,5 +81,5 @@ def test_too_few_presses_or_no_network_are_refused_by_name(press_set):
 
 def test_an_untrained_network_is_no_better_than_a_guess(press_set, ensemble):
     untrained = initial_layers(2 * ensemble.scaling.projection.shape[1], np.random.default_rng(1))
-    mean, _ = DenseEnsemble(ensemble.scaling, (untrained,)).estimate(press_set.rows[:2000, GROWTH].astype(np.float64))
+    mean, _ = DenseEnsemble(ensemble.scaling, (untrained,)).estimate(press_set.rows[:2000, RESPONSE].astype(np.float64))
     assert np.std(mean - press_set.normalised[:2000, :3], axis=0).min() > 0.8 * EVEN

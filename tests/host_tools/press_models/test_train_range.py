@@ -24,7 +24,7 @@ from host_tools.press_models.train_range import (
 )
 
 STD, COUNT = 0.3, 20_000
-GROWTH = slice(44, 77)
+RESPONSE = slice(44, 77)
 BUDGET = RangeBudget(members=1, steps=700)
 
 

@@ -160,7 +160,7 @@ def test_nearer_the_axis_an_inclusion_fades_into_the_centred_one_as_in_the_probe
 
 def test_without_an_inclusion_the_face_is_the_probes_own(built, tables):
     for slab in (NOMINAL, Slab(4.5, 32.0)):
-        found, expected = (table.ramps(Inclusion(8.0, 6.0, 60.0), slab).bare for table in (
+        found, expected = (table.ramps(Inclusion(8.0, 6.0, 60.0), slab).baseline for table in (
             built.around(tables).centred, tables.centred))  # fmt: skip
         np.testing.assert_array_equal(found.fields_per_n, expected.fields_per_n)
 

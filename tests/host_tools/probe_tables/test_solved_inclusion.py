@@ -34,8 +34,8 @@ def added(tables, table, place: At, force_n: float = FORCE_N) -> tuple[np.ndarra
     """Return the deformation and the pressure that an inclusion adds to the face of the tissue alone."""
     ramps = tables.centred.ramps(INCLUSION)
     face, known = (PressedFace(ramps, one, INCLUSION, X_MM, X_MM.T) for one in (table, tables.off_axis))
-    found, bare = face.at(force_n, place), known.at(force_n, At(80.0, 0.0))
-    return found[0] - bare[0], found[1] - bare[1]
+    found, baseline = face.at(force_n, place), known.at(force_n, At(80.0, 0.0))
+    return found[0] - baseline[0], found[1] - baseline[1]
 
 
 def test_a_sphere_under_the_probe_is_the_centred_tables(tables, sphere):

@@ -9,7 +9,7 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import COARSE
 from host_tools.probe_tables.surface_table import (
-    BARE,
+    BASELINE,
     FORCES_N,
     RING_MM,
     SOLVED,
@@ -82,10 +82,10 @@ def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(
 @pytest.mark.long
 def test_the_inclusion_free_face_is_the_models(table):
     """At a force between the table's, on the same mesh: 0.1 % of the peak."""
-    bare = table.ramps(Inclusion(0.0, 6.0, 80.0)).bare.at(0.3)
-    fresh = fields(ramp(scene_in(NOMINAL), np.array([0.3]), BARE)[0])[0]
+    baseline = table.ramps(Inclusion(0.0, 6.0, 80.0)).baseline.at(0.3)
+    fresh = fields(ramp(scene_in(NOMINAL), np.array([0.3]), BASELINE)[0])[0]
     for value in (0, 1):
-        assert worst_over_peak(bare[value], fresh[value], slice(None)) < 1e-3
+        assert worst_over_peak(baseline[value], fresh[value], slice(None)) < 1e-3
 
 
 @pytest.mark.long
@@ -94,8 +94,8 @@ def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table):
     known, solved, inside, slab = [], [], table.r_mm <= 9.9, Slab(5.8, 33.0)
     for one in (slab, NOMINAL):
         scene = scene_on_one_mesh(one, thicknesses_mm=sorted([slab.thickness_mm, 30.0]))
-        solved.append(fields(ramp(scene, np.array([0.3]), BARE)[0])[0])
-        known.append(table.ramps(Inclusion(0.0, 6.0, 80.0), one).bare.at(0.3))
+        solved.append(fields(ramp(scene, np.array([0.3]), BASELINE)[0])[0])
+        known.append(table.ramps(Inclusion(0.0, 6.0, 80.0), one).baseline.at(0.3))
     departure = (np.array(known[0]) - known[1]) - (solved[0] - solved[1])
     assert (np.abs(departure)[:, inside].max(axis=1) < 0.003 * np.abs(solved[1])[:, inside].max(axis=1)).all()
 
@@ -104,7 +104,7 @@ def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table):
 def test_layers_that_stand_in_for_the_base_give_the_slabs_own_deformation():
     """1 mm less of a slab of 30 mm: the layer below it is as good as rigid, 0.1 % of the peak."""
     layered, own = (
-        fields(ramp(scene, np.array([0.3]), BARE)[0])[0][0]
+        fields(ramp(scene, np.array([0.3]), BASELINE)[0])[0][0]
         for scene in (scene_on_one_mesh(Slab(thickness_mm=29.0), None, (29.0, 30.0)), scene_in(Slab(thickness_mm=29.0)))
     )
     inside = np.linspace(0.0, 11.0, len(own)) <= 9.9
@@ -130,7 +130,7 @@ def test_solves_are_assembled_on_their_axes():
         ramps = table.ramps(Inclusion(*place[:2], slab.modulus_kpa(0.96 - 1e-12)), slab)
         expected = place[0] ** 3 * 0.96 * field(slab, *place)
         np.testing.assert_allclose(ramps.inclusion_field.fields_per_n, expected, rtol=1e-9)
-        np.testing.assert_allclose(ramps.bare.fields_per_n, field(slab, 0.0, 0.0, 0.0), rtol=1e-9)
+        np.testing.assert_allclose(ramps.baseline.fields_per_n, field(slab, 0.0, 0.0, 0.0), rtol=1e-9)
 
 
 def test_ring_means_keep_the_force_of_what_they_smooth():

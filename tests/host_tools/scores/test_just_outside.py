@@ -32,7 +32,7 @@ def test_the_best_test_flags_as_the_normal_law_says(deviations, share):
     assert NearestInside(INSIDE, deviations).most_flagged(0.05) == pytest.approx(share, abs=1e-4)
 
 
-def test_one_of_three_doubts_has_less_than_a_third_of_the_false_flags():
+def test_one_of_three_tests_has_less_than_a_third_of_the_false_flags():
     """1.25 % of the presses inside: a test that flags half of what is 2.24 deviations apart."""
     assert 3 * FALSE_FLAGS < FALSE_AT_MOST
     assert NearestInside(INSIDE, 2.2414).most_flagged() == pytest.approx(0.5, abs=1e-4)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from linear_press import GROWTH, NOISE, START, STD, TOLD, TRUTH, noisy_row, random_slopes
+from linear_press import NOISE, RESPONSE, START, STD, TOLD, TRUTH, noisy_row, random_slopes
 from small_surrogate import COLUMNS, linear_surrogate, random_surrogate
 
 from device.measurement.parameters import EVEN_STD, PARAMETERS
@@ -23,7 +23,7 @@ def row(slopes) -> np.ndarray:
 def test_the_best_fit_of_a_linear_model_is_its_ridge_regression(row, slopes):
     best = best_fit(PressPosterior(row, linear_surrogate(slopes), NOISE), START)
     precision = slopes @ slopes.T / STD**2 + np.eye(len(PARAMETERS)) / EVEN_STD**2
-    np.testing.assert_allclose(best, np.linalg.solve(precision, slopes @ row[GROWTH] / STD**2), atol=1e-4)
+    np.testing.assert_allclose(best, np.linalg.solve(precision, slopes @ row[RESPONSE] / STD**2), atol=1e-4)
 
 
 def test_the_misfit_of_rows_of_the_model_is_as_large_as_their_columns(slopes):

@@ -20,14 +20,14 @@ from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS, ring_weights
 
 POWER = 0.8
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
+RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 
 
 @pytest.fixture
 def row() -> np.ndarray:
     """A random contrast on light that grows as the force to the power of 0.8."""
     row = np.random.default_rng(1).uniform(0.0, 0.5, COLUMNS)
-    row[GROWTH] = np.repeat(POWER * np.log(PROFILE_FORCES_N[:-1] / PROFILE_FORCES_N[-1]), RINGS)
+    row[RESPONSE] = np.repeat(POWER * np.log(PROFILE_FORCES_N[:-1] / PROFILE_FORCES_N[-1]), RINGS)
     return row
 
 
@@ -90,16 +90,16 @@ def test_a_short_field_averages_out_along_a_circle_but_not_in_the_middle():
 
 
 def test_more_light_moves_a_contrast_by_the_light_that_is_there(row):
-    """(1 + g) (1 + c) - 1 = c + g (1 + c); growth is a ratio that it leaves, an offset a part of the contrast."""
+    """(1 + g) (1 + c) - 1 = c + g (1 + c); it leaves the reference response; an offset is part of a contrast."""
     gain, _ = drift_directions(row)
     np.testing.assert_allclose(gain[:CONTRAST_COLUMNS], 1 + row[:CONTRAST_COLUMNS], rtol=1e-14)
-    np.testing.assert_array_equal(gain[GROWTH], 0.0)
-    np.testing.assert_array_equal(gain[GROWTH.stop :], row[GROWTH.stop :])
+    np.testing.assert_array_equal(gain[RESPONSE], 0.0)
+    np.testing.assert_array_equal(gain[RESPONSE.stop :], row[RESPONSE.stop :])
 
 
 def test_an_offsets_light_is_the_mean_over_the_loads_at_its_ring(row):
     contrast = row[:CONTRAST_COLUMNS].reshape(-1, RINGS)
-    np.testing.assert_allclose(light_ratio(row)[GROWTH.stop :], 1 + contrast.mean(axis=0)[1:], rtol=1e-14)
+    np.testing.assert_allclose(light_ratio(row)[RESPONSE.stop :], 1 + contrast.mean(axis=0)[1:], rtol=1e-14)
 
 
 def test_a_drift_of_the_cells_zero_looks_up_the_reference_at_another_force(row):
@@ -112,8 +112,8 @@ def test_a_drift_of_the_cells_zero_looks_up_the_reference_at_another_force(row):
 
 def test_a_drift_of_the_cells_zero_matters_most_at_the_smallest_load(row):
     row[:CONTRAST_COLUMNS] = 0.0
-    bare = np.abs(drift_directions(row)[1][:CONTRAST_COLUMNS]).reshape(-1, RINGS)
-    assert (np.diff(bare, axis=0) < 0).all()
+    baseline = np.abs(drift_directions(row)[1][:CONTRAST_COLUMNS]).reshape(-1, RINGS)
+    assert (np.diff(baseline, axis=0) < 0).all()
 
 
 def test_drifts_of_many_rows_are_those_of_each(row):
@@ -158,9 +158,9 @@ def test_in_second_harmonics_too_the_flat_field_is_common_and_the_models_error_e
     np.testing.assert_allclose(both, flat + model, rtol=1e-14)
 
 
-def test_growth_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
+def test_reference_response_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
     model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.01))
-    middle = model[GROWTH, GROWTH][::RINGS, ::RINGS]
+    middle = model[RESPONSE, RESPONSE][::RINGS, ::RINGS]
     in_the_middle = ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0]
     np.testing.assert_allclose(middle, 1e-4 * in_the_middle * (np.eye(3) + 1), rtol=1e-12)
 
@@ -170,6 +170,6 @@ def test_smooth_errors_grow_with_the_light_they_are_a_ratio_of():
     camera = np.zeros((COLUMNS, COLUMNS))
     dark, bright = (PressNoise(camera, levels).covariance(np.full(COLUMNS, c)) for c in (0.0, 0.5))
     np.testing.assert_allclose(np.diag(bright)[:CONTRAST_COLUMNS], 2.25 * np.diag(dark)[:CONTRAST_COLUMNS], rtol=1e-12)
-    np.testing.assert_allclose(np.diag(bright)[GROWTH], np.diag(dark)[GROWTH], rtol=1e-12)
-    np.testing.assert_allclose(np.diag(bright)[GROWTH.stop :], 2.25 * np.diag(dark)[GROWTH.stop :], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[RESPONSE], np.diag(dark)[RESPONSE], rtol=1e-12)
+    np.testing.assert_allclose(np.diag(bright)[RESPONSE.stop :], 2.25 * np.diag(dark)[RESPONSE.stop :], rtol=1e-12)
     assert np.diag(PressNoise(camera, EXACT).covariance(np.ones(COLUMNS))).max() == 0

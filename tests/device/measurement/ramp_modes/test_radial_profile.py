@@ -72,7 +72,7 @@ def test_a_contrast_linear_in_force_and_radius_comes_back_at_every_force_and_rin
     assert found.residual < 1e-4
 
 
-def test_growth_is_the_logarithm_of_the_inclusion_free_light_over_that_at_the_largest_force():
+def test_reference_response_is_the_logarithm_of_the_inclusion_free_light_over_that_at_the_largest_force():
     """The same at every ring, since the light's cubic is one times a factor of the place."""
     baseline = np.array([light(f)[0, 0] for f in PROFILE_FORCES_N])
     found = press_profile(recording()).reference_response
@@ -138,7 +138,7 @@ def test_the_mean_harmonic_is_to_the_bit_the_one_that_the_networks_have_learnt_f
     assert harmonic(rings, order).tobytes() == learnt.tobytes()
 
 
-def test_the_row_of_the_networks_is_contrast_growth_and_mean_offset_and_nothing_else():
+def test_the_row_of_the_networks_is_contrast_reference_response_and_mean_offset_and_nothing_else():
     found = press_profile(recording(lambda force_n: cone(force_n) + 0.01 * X / (1 + R)))
     row = np.concatenate([found.contrast.ravel(), found.reference_response.ravel(), found.offset])
     assert found.as_row().tobytes() == row.tobytes()

@@ -78,8 +78,8 @@ def test_pressure_makes_the_inclusion_visible_and_gel_hides_it(optics, press):
     inside, outside = (p > 2.0), (p < 1.0) & (np.hypot(*np.meshgrid(optics.x_mm, optics.y_mm)) < 6)
 
     def contrast(skin):
-        inclusion, bare = (optics.radiance(w, pressure, ALL, skin) for pressure in (p, np.full_like(p, 0.5)))
-        return inclusion[inside].mean() / bare[inside].mean()
+        inclusion, baseline = (optics.radiance(w, pressure, ALL, skin) for pressure in (p, np.full_like(p, 0.5)))
+        return inclusion[inside].mean() / baseline[inside].mean()
 
     assert outside.any()
     assert contrast(Skin()) > 2.0

@@ -73,9 +73,9 @@ def test_half_way_between_two_alike_the_face_is_the_same_on_both_sides(both, alo
 def test_a_second_inclusion_in_the_same_place_doubles_what_the_first_adds(both, alone):
     twice = both(Neighbour(10.0, 5.0, 80.0, x_mm=0.0)).at(FORCE_N, ProbePlacement())
     once, none = (alone(FIRST).at(FORCE_N, place) for place in (ProbePlacement(), ProbePlacement(80.0, 0.0)))
-    for found, one, bare in zip(twice, once, none, strict=True):
-        np.testing.assert_allclose(found - bare, 2 * (one - bare), atol=1e-5 * one.max())
-        assert (one - bare).max() > 0.01 * bare.max()
+    for found, one, baseline in zip(twice, once, none, strict=True):
+        np.testing.assert_allclose(found - baseline, 2 * (one - baseline), atol=1e-5 * one.max())
+        assert (one - baseline).max() > 0.01 * baseline.max()
 
 
 @pytest.mark.parametrize("place", [ProbePlacement(), ProbePlacement(6.0, 0.0), ProbePlacement(tilt_x_deg=1.5)])

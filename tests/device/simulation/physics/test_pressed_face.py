@@ -37,12 +37,12 @@ def test_beside_the_lesion_nothing_of_the_inclusion_is_left(tables, truth, force
 
 def test_centred_the_fields_are_the_tables(face, tables):
     w_mm, p_kpa = face.at(0.5, ProbePlacement())
-    bare, inclusion_field = (ramp.at(0.5) for ramp in tables.centred.ramps(INCLUSION)[1:3])
+    baseline, inclusion_field = (ramp.at(0.5) for ramp in tables.centred.ramps(INCLUSION)[1:3])
     r_mm = np.hypot(X_MM, Y_MM)
-    expected = np.interp(r_mm, tables.centred.r_mm, bare.w_mm + inclusion_field.w_mm)
+    expected = np.interp(r_mm, tables.centred.r_mm, baseline.w_mm + inclusion_field.w_mm)
     np.testing.assert_allclose(w_mm[ON_FACE], expected[ON_FACE], rtol=1e-5)
     inside = r_mm < 9
-    expected = np.interp(r_mm, tables.centred.r_mm, bare.p_kpa + inclusion_field.p_kpa)
+    expected = np.interp(r_mm, tables.centred.r_mm, baseline.p_kpa + inclusion_field.p_kpa)
     np.testing.assert_allclose(p_kpa[inside], expected[inside], rtol=0.01)  # scaled to carry the force, see below
 
 

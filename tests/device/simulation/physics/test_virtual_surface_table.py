@@ -31,7 +31,7 @@ def slab_effect(modulus_kpa, thickness_mm):
 def small_table():
     axes = points_with_ends(1.0, 15.0, 5), points_with_ends(4.0, 12.0, 5), points_with_ends(0.1, 0.96, 3)
     grid = np.meshgrid(*axes, FORCE_N, indexing="ij")
-    bare = np.stack([0.4 + R_MM / 20, 2 + R_MM])[:, None] * np.ones((3, 1))
+    baseline = np.stack([0.4 + R_MM / 20, 2 + R_MM])[:, None] * np.ones((3, 1))
     inclusion_field = np.stack([polynomial(*grid), 3 * polynomial(*grid)])
     star = slab_effect(np.array([4.0, 6.25, 5.0, 5.0]), np.array([30.0, 30.0, 28.5, 36.0]))
     return SurfaceTable(
@@ -40,9 +40,9 @@ def small_table():
         slab_thickness_mm=SLAB_MM,
         force_n=FORCE_N,
         r_mm=R_MM,
-        bare_per_n=bare,
+        bare_per_n=baseline,
         lump_per_n_mm3=inclusion_field,
-        bare_change_per_n=np.multiply.outer(star, bare),
+        bare_change_per_n=np.multiply.outer(star, baseline),
         lump_change_per_n_mm3=np.multiply.outer(star, inclusion_field[:, COARSE, COARSE]),
     )
 
@@ -65,7 +65,7 @@ def test_another_slab_adds_its_change_at_the_same_elastic_mismatch_and_scaled_fo
     changed = 1 + slab_effect(slab.youngs_modulus_kpa, slab.thickness_mm)
     expected = changed * force_n * 9.0**3 * mismatch * polynomial(9.0, 5.0, mismatch, nominal_n)
     np.testing.assert_allclose(ramps.inclusion_field.at(force_n).w_mm, expected, rtol=1e-9)
-    np.testing.assert_allclose(ramps.bare.at(force_n).w_mm, changed * force_n * (0.4 + R_MM / 20), rtol=1e-9)
+    np.testing.assert_allclose(ramps.baseline.at(force_n).w_mm, changed * force_n * (0.4 + R_MM / 20), rtol=1e-9)
 
 
 def test_the_nominal_slab_has_no_change_and_is_its_own_reference(small_table):
@@ -75,7 +75,7 @@ def test_the_nominal_slab_has_no_change_and_is_its_own_reference(small_table):
     small_table.bare_change_per_n[:] *= 1e6
     small_table.lump_change_per_n_mm3[:] *= 1e6
     after = small_table.ramps(inclusion, Slab(5.0, 30.0))
-    np.testing.assert_array_equal(after.bare.fields_per_n, before.bare.fields_per_n)
+    np.testing.assert_array_equal(after.baseline.fields_per_n, before.baseline.fields_per_n)
     np.testing.assert_array_equal(after.inclusion_field.fields_per_n, before.inclusion_field.fields_per_n)
     assert after.nominal_inclusion_field is None
 
@@ -110,7 +110,7 @@ def test_the_committed_table_holds_every_corner_of_its_range_in_every_slab(table
         for depth_mm in (4.0, 12.0):
             for modulus_kpa in (8.0, 200.0):
                 ramps = table.ramps(Inclusion(size_mm, depth_mm, modulus_kpa), slab)
-                assert np.isfinite([ramp.at(0.5) for ramp in (ramps.bare, ramps.inclusion_field)]).all()
+                assert np.isfinite([ramp.at(0.5) for ramp in (ramps.baseline, ramps.inclusion_field)]).all()
 
 
 def test_an_inclusion_outside_the_table_is_refused_in_its_slab(small_table):

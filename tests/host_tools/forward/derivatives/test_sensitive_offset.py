@@ -51,8 +51,8 @@ def test_differences_tend_to_the_derivative(found, meshed):
 def test_the_inclusion_field_moves_with_the_inclusion(found):
     """An inclusion 6 mm out that goes further lowers its field on the axis and raises it towards the rim."""
     field, rate = (
-        found.pressed.face.w_mm - found.bare.face.w_mm,
-        found.pressed.rates[OFFSET].w_mm - found.bare.rates[OFFSET].w_mm,
+        found.pressed.face.w_mm - found.baseline.face.w_mm,
+        found.pressed.rates[OFFSET].w_mm - found.baseline.rates[OFFSET].w_mm,
     )
     beyond = np.searchsorted(found.rays.r_mm[0], 9.0)
     assert field[0, beyond] > field[len(field) // 2, beyond]
@@ -60,6 +60,6 @@ def test_the_inclusion_field_moves_with_the_inclusion(found):
 
 
 def test_both_faces_carry_the_force(found):
-    for face in (found.pressed.face, found.bare.face):
+    for face in (found.pressed.face, found.baseline.face):
         assert face.force_n == pytest.approx(FORCE_N)
         assert face.contact_force_n == pytest.approx(FORCE_N, rel=2e-3)

@@ -113,10 +113,12 @@ def test_where_an_inclusion_would_be_hardly_matters_without_it(small, mesh, velo
     """On elements so coarse to 2 %: that is why both presses are solved on one mesh."""
     press = LinearPress(mesh, AXISYMMETRIC, ORDER)
     parts = {"tissue_modulus_kpa": only(baseline(SCENE), "tissue", "inclusion")}
-    bare = face_sensitivity(LinearEquilibrium(press, baseline(SCENE), parts, sampler), velocities)
+    inclusion_free = face_sensitivity(LinearEquilibrium(press, baseline(SCENE), parts, sampler), velocities)
     for name in ("size_mm", "depth_mm"):
-        by_bare, by_inclusion = (np.abs(found.rates[name].w_mm)[:, INNER].max() for found in (bare, small))
-        assert 0 < by_bare < 0.02 * by_inclusion
+        by_baseline, by_inclusion = (
+            np.abs(found.rates[name].w_mm)[:, INNER].max() for found in (inclusion_free, small)
+        )
+        assert 0 < by_baseline < 0.02 * by_inclusion
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +179,7 @@ def test_a_whole_path_anew_agrees_to_what_the_choice_of_labels_is_worth(finite, 
 def test_both_orders_of_a_ramp_agree_and_carry_the_force():
     ramps = sensitive_ramp(SCENE, (0.2, 0.4), strain="small")
     for coarse, fine in zip(ramps[3], ramps[4], strict=True):
-        assert [coarse.pressed.face.force_n, coarse.bare.face.force_n] == pytest.approx([coarse.force_n] * 2)
+        assert [coarse.pressed.face.force_n, coarse.baseline.face.force_n] == pytest.approx([coarse.force_n] * 2)
         rates = [press.pressed.rates["size_mm"].w_mm[0, INNER] for press in (coarse, fine)]
         assert rates[0] == pytest.approx(rates[1], abs=2e-3 * np.abs(rates[1]).max())
 
