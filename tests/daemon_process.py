@@ -71,6 +71,7 @@ class Daemon:
         assert self.process.stdout is not None
         greeting = self.process.stdout.readline()
         assert "http://" in greeting, (folder / "log.txt").read_text()
+        self.greeting = greeting
         self.url = greeting.split()[-1].rstrip("/")
 
     def ask(self, path: str, method: str = "GET", body: object = None) -> Answer:

@@ -17,12 +17,11 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-import host_tools
 from device import __version__
 from device.files.durable import write_durably
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table
 
-DOCS = Path(host_tools.__file__).resolve().parents[1] / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 TEMPLATES, RESULTS = DOCS / "templates", DOCS / "results"
 FIGURES = "figures"
 MOST = 10.0

@@ -8,8 +8,8 @@ import socket
 import pytest
 from daemon_process import ROOT
 
-from device import __main__ as command_line
 from device.__main__ import main
+from device.commands import serve as serving
 from device.files.recording_file import write_recording
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.settings.last_good import NAME
@@ -47,7 +47,7 @@ def models(tmp_path):
 def started(monkeypatch):
     """Statuses of the daemons that have started; each ends where it would begin to serve."""
     statuses = []
-    monkeypatch.setattr(command_line, "_run_server", lambda procedure, listening: statuses.append(snapshot(procedure)))
+    monkeypatch.setattr(serving, "_run_server", lambda procedure, listening: statuses.append(snapshot(procedure)))
     return statuses
 
 

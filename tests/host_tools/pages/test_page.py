@@ -80,7 +80,7 @@ def test_numbers_are_numbers_in_the_results_and_cells_as_they_were_on_the_page(p
     for row in ROWS:
         assert f"| {' | '.join(row)} |" in page.read_text()
     assert record["chapters"]["patch"]["benchmarks"][0]["measured"] == 1.01
-    assert record["chapters"]["basis"]["benchmarks"][0]["error"] is None
+    assert record["chapters"]["hayes"]["benchmarks"][0]["error"] is None
 
 
 def test_results_have_a_row_in_a_line():

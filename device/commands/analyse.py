@@ -1,0 +1,53 @@
+"""`python -m device analyse`: recordings to their estimates, one line of JSON each. Exit code 0."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from device.assembly.answers import Answers, answers_for
+from device.config import Config, simulated_config
+from device.files.bundle_file import read_paper_model
+from device.files.recording_file import read_recording
+from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.measurement.mode import mode_named, mode_of
+from device.records.calibrations import Calibrations
+from device.settings.layers import read_config
+
+
+def add_analyse_command(commands: Any) -> None:
+    """Add the verb to the command line's subparsers."""
+    analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
+    analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
+    analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
+
+
+def run_analyse_command(options: argparse.Namespace) -> int:
+    """Estimate recordings by the settings of a file, or those of the simulated probe that made them.
+
+    The certificate has to have held when they were recorded.
+    """
+    stated = read_config(options.config) if options.config else None
+    of_probe: dict[str, tuple[CalibrationWatch, Answers]] = {}
+    for path in options.recordings:
+        recording = read_recording(path)
+        if recording.serial not in of_probe:
+            of_probe[recording.serial] = _answers_of(recording.serial, stated)
+        calibration, answers = of_probe[recording.serial]
+        calibration.require_valid(recording.started_at)
+        mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
+        estimate = answers.estimator(recording, mode)
+        print(json.dumps({"recording": str(path), **estimate.as_record()}))
+    return 0
+
+
+def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:
+    """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
+    config = stated or simulated_config(serial)
+    bundle = read_paper_model(config.paper_model)
+    calibration = Calibrations(config.calibration).active()
+    if calibration:
+        calibration.require_for(serial, bundle)
+    return CalibrationWatch(calibration), answers_for(config, bundle, calibration)

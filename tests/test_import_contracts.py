@@ -1,0 +1,78 @@
+"""Every import contract is kept, and each breaks at an import that it forbids: in a room, at its root, of a library."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from typing import Any
+
+import grimp
+import pytest
+from daemon_process import ROOT
+from import_contracts import OnlyContract, ReservedContract
+from importlinter import Contract
+from importlinter.contracts.layers import LayersContract
+
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+CONTRACTS = {entry["name"]: entry for entry in SETTINGS["contracts"]}
+KINDS = {"only": OnlyContract, "reserved": ReservedContract, "layers": LayersContract}
+FORBIDDEN = {
+    "The device never imports the workstation toolkit": ("device.web.app", "host_tools.scenes.scene"),
+    "The workstation takes only measurement, simulation and files from the device": (
+        "host_tools.scores.dial",
+        "device.errors",
+    ),
+    "Measurement is pure: it imports nothing else of ours": ("device.measurement.mode", "device.files.text_table"),
+    "Files know what they hold, and nothing of the daemon": ("device.files.durable", "device.errors"),
+    "Simulation stands below the drivers: it knows none of them": (
+        "device.simulation.hand",
+        "device.instrument.press.states",
+    ),
+    "Drivers know neither the simulation nor what their readings are for": (
+        "device.hardware.openscale",
+        "device.simulation.faults",
+    ),
+    "The instrument leads a press on parts that are handed to it": (
+        "device.instrument.press.capture",
+        "device.hardware.camera",
+    ),
+    "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
+    "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
+    "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
+    "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
+    "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
+    "The rooms of the toolkit stand in one order, and a new one has its place": (
+        "host_tools.forward.plan",
+        "host_tools.scores.dial",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def graph() -> grimp.ImportGraph:
+    return grimp.build_graph(*SETTINGS["root_packages"], include_external_packages=True)
+
+
+def contract(entry: dict[str, Any]) -> Contract:
+    """As `lint-imports` makes it; it reads TOML's booleans as words."""
+    options = {k: str(v) if isinstance(v, bool) else v for k, v in entry.items() if k not in ("name", "type")}
+    return KINDS[entry["type"]](name=entry["name"], session_options=SETTINGS, contract_options=options)
+
+
+@pytest.mark.parametrize("name", CONTRACTS)
+def test_a_contract_is_kept_and_breaks_at_what_it_forbids(graph: grimp.ImportGraph, name: str) -> None:
+    importer, imported = FORBIDDEN[name]
+    assert importer in graph.modules
+    assert imported in graph.modules
+    assert contract(CONTRACTS[name]).check(copy.deepcopy(graph), verbose=False).kept
+    injected = copy.deepcopy(graph)
+    injected.add_import(importer=importer, imported=imported, line_number=1, line_contents=f"import {imported}")
+    assert not contract(CONTRACTS[name]).check(injected, verbose=False).kept
+
+
+@pytest.mark.parametrize("program", ["device", "host_tools"])
+def test_a_room_that_has_no_place_in_the_order_breaks_it(graph: grimp.ImportGraph, program: str) -> None:
+    entry = next(e for e in SETTINGS["contracts"] if e.get("containers") == [program])
+    injected = copy.deepcopy(graph)
+    injected.add_module(f"{program}.loft")
+    assert not contract(entry).check(injected, verbose=False).kept
