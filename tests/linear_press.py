@@ -12,7 +12,7 @@ STD = 0.05
 NOISE = white_noise(STD)
 TOLD = np.arange(len(PARAMETERS)) != MODULUS
 """The modulus' slope is 0."""
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
+RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
 START = np.zeros(len(PARAMETERS))
 
@@ -32,4 +32,4 @@ def noisy_row(slopes: np.ndarray) -> np.ndarray:
 def on_paper(row: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return mean and covariance of the posterior of what a row tells of; the ends of the ranges are far away."""
     covariance = STD**2 * np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)
-    return covariance @ slopes[TOLD] @ row[GROWTH] / STD**2, covariance
+    return covariance @ slopes[TOLD] @ row[RESPONSE] / STD**2, covariance

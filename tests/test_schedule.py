@@ -3,7 +3,7 @@
 import inspect
 
 import xdist.remote
-from schedule import MARK, REAL_TIME, OneHand
+from schedule import MARK, RAYS, REAL_TIME, TRACING, OneHand
 
 
 def test_xdist_still_names_groups_where_pytest_does_not_look(request):
@@ -14,9 +14,10 @@ def test_xdist_still_names_groups_where_pytest_does_not_look(request):
     assert request.node.nodeid == name
 
 
-def test_a_file_is_a_scope_and_all_that_is_in_real_time_is_one(tmp_path):
-    plain, marked = tmp_path / "test_plain.py", tmp_path / "test_marked.py"
+def test_a_file_is_a_scope_and_so_is_all_that_is_in_real_time_or_traces_rays(tmp_path):
+    plain, marked, tracing = (tmp_path / f"test_{name}.py" for name in ("plain", "marked", "tracing"))
     plain.write_text("def test_one(): ...")
     marked.write_text(f"pytestmark = {MARK}")
-    scopes = [OneHand._split_scope(None, f"{path}::test_one[a::b]") for path in (plain, marked)]
-    assert scopes == [str(plain), REAL_TIME]
+    tracing.write_text(f"{TRACING[0]}.tracer import trace")
+    scopes = [OneHand._split_scope(None, f"{path}::test_one[a::b]") for path in (plain, marked, tracing)]
+    assert scopes == [str(plain), REAL_TIME, RAYS]

@@ -190,6 +190,7 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     expect(page.locator("#simulated-badge")).to_be_visible()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("same_answer_in_every_mode")
 def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Served):
     """Every mode with what it costs; a slow ramp is led by its open forces, and the result says how it was taken."""
@@ -225,6 +226,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     _require_fits(page)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("no_numbers_in_any_mode")
 def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Served):
     """All three reasons at once are the longest there is: they fit above the tiles, without a figure."""
@@ -242,6 +244,7 @@ def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Serv
     expect(page.locator(".gauge")).to_be_hidden()
 
 
+@pytest.mark.long
 def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: Page, tmp_path: Path):
     """The wall clock is set forward in the middle of a press: the measurement stands, the operator is told."""
     scene = '[[faults]]\nkind = "clock_jump"\nstep_s = 3600.0\nfrom_press = 1\n' + QUICK_HAND
@@ -298,6 +301,7 @@ def test_the_operator_tares_between_presses_and_reads_what_came_of_it(page: Page
     daemon.stop()
 
 
+@pytest.mark.long
 def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page, tmp_path: Path):
     """Two swapped plugs: the page says what to do, then names both, before all that is well."""
     scene = '[[faults]]\nkind = "led_swapped"\nside = "+x"\nother_side = "-x"\n[hand]\nreaction_s = 5.0\n'

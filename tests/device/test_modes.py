@@ -223,6 +223,7 @@ def test_a_camera_that_tears_its_frames_is_at_fault_in_a_ramp(running):
     assert (job["state"], job["code"]) == ("failed", "E103")
 
 
+@pytest.mark.long
 def test_a_light_that_lost_a_tenth_is_warned_of_after_holds_and_ramps_alike(running):
     """The first press says how bright a side is at the target force, whatever its mode."""
     with running(Scenario(hand=HAND, faults=(ScriptedFault("led_dimmed", ratio=0.9, from_press=4),))) as device:

@@ -103,6 +103,7 @@ def test_train_from_a_sweep_gives_a_bundle_the_device_accepts(tmp_path):
     assert "a certificate is written once" in again.stderr
 
 
+@pytest.mark.long
 def test_calibrate_names_a_certificate_by_its_id_or_prints_all_that_speaks_against_it(tables, tmp_path):
     recordings = []
     for i, (d, h, E) in enumerate([(14, 4.5, 110), (12, 7, 60), (9, 5, 80), (11, 9, 100), (6, 6, 50), (8, 4.5, 90)]):

@@ -13,7 +13,7 @@ from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, R
 from host_tools.scores import noise_free
 from host_tools.scores.noise_free import known_nuisances_fit, noise_free_chapter
 
-GROWTH = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
+RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 ALIKE = np.ones(COLUMNS)
 TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
 SIDE = 1e-6
@@ -40,7 +40,7 @@ def test_a_row_that_does_not_fit_is_fitted_by_least_squares(slopes):
     added = np.zeros(RESPONSE_COLUMNS)
     added[:-5] = np.random.default_rng(6).normal(0, 0.05, RESPONSE_COLUMNS - 5)
     row = surrogate.rows(TRUTH[None])[0]
-    row[GROWTH] += added
+    row[RESPONSE] += added
     moved, *_ = np.linalg.lstsq(own[:2].T, added, rcond=None)
     assert np.abs(moved).min() > 0.005
     normalised = TRUTH.copy()
@@ -70,7 +70,7 @@ def test_a_fit_stays_inside_the_trained_ranges(slopes):
     """Twice as large a size coordinate as the range has: the answer is the range's end."""
     surrogate = linear_surrogate(slopes)
     row = surrogate.rows(TRUTH[None])[0]
-    row[GROWTH] += 2.0 * slopes[0]
+    row[RESPONSE] += 2.0 * slopes[0]
     found = known_nuisances_fit(surrogate, row, TRUTH, ALIKE)
     assert found[0] == pytest.approx(HIGH[0], rel=1e-3)
     assert (found >= LOW[:3] - SIDE).all()
