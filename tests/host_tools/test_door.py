@@ -76,6 +76,7 @@ def test_a_tighter_tolerance_takes_a_finer_model_and_says_so():
     assert rough.inclusion_field.max_deformation_mm == pytest.approx(tight.inclusion_field.max_deformation_mm, rel=0.1)
 
 
+@pytest.mark.long
 def test_strain_follows_the_tolerance_unless_it_is_asked_for(solution):
     assert solution.plan.strain == "small"
     assert tsis.solve(SCENE, tolerance=0.2).plan.strain == "small"

@@ -137,6 +137,7 @@ def test_the_certificate_says_from_where_it_comes_and_how_long_it_holds(real, bu
     assert all(gate.problem is None for gate in gates)
 
 
+@pytest.mark.long
 def test_the_set_of_phantoms_is_that_of_the_recordings_unless_it_is_stated(real, bundle, table):
     recorded = [changed(recording, phantom_serial="PH-4") for recording in real]
     for stated, expected in (("", "PH-4"), ("PH-3", "PH-3")):
@@ -145,6 +146,7 @@ def test_the_set_of_phantoms_is_that_of_the_recordings_unless_it_is_stated(real,
         assert certificate.phantom_serial == expected
 
 
+@pytest.mark.long
 def test_a_real_probe_is_calibrated_for_a_year_and_a_simulated_one_for_a_hundred(recordings, real, bundle, table):
     found = [
         calibrate(all_of, bundle, table, force_n=0.5, provenance=Provenance(made_at=MADE_AT)).certificate.validity

@@ -46,7 +46,7 @@ def _wait_for_rows(journal, count):
     wait_for(lambda: journal.exists() and journal.read_bytes().count(b"\n"), lambda rows: rows > count)
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("stop", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGKILL])
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterrupted, stop, jobs):
     journal, out = tmp_path / "s.nc.partial", tmp_path / "s.nc"

@@ -16,7 +16,15 @@ def finest(scene):
 
 
 @pytest.mark.parametrize(
-    "truth", [(10.0, 6.0, 80.0), (2.0, 4.0, 80.0), (15.0, 12.0, 40.0), (15.0, 4.0, 120.0), (6.0, 9.0, 60.0)]
+    "truth",
+    [
+        (10.0, 6.0, 80.0),
+        (2.0, 4.0, 80.0),
+        *(
+            pytest.param(one, marks=pytest.mark.long)
+            for one in ((15.0, 12.0, 40.0), (15.0, 4.0, 120.0), (6.0, 9.0, 60.0))
+        ),
+    ],
 )
 def test_the_default_mesh_is_accurate(truth):
     scene = Scene(Inclusion(*truth))
