@@ -139,6 +139,7 @@ def test_a_probe_that_runs_is_tared_and_presses_on(daemon):
     assert daemon.press()["state"] == "done"
 
 
+@pytest.mark.long
 def test_a_press_interrupted_by_a_stop_is_not_lost(tmp_path):
     """SIGTERM in the middle of a press: exit 0, and the job says how it ended after the next start."""
     daemon = Daemon(tmp_path)

@@ -17,6 +17,7 @@ from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.tiers import build
 from host_tools.scenes.scene import Placement, Scene
 
+pytestmark = pytest.mark.long
 SCENE, ORDER, FORCE_N = Scene(Inclusion(10, 6, 80)), 1, 0.5
 ASIDE = replace(SCENE, placement=Placement(offset_x_mm=6.0))
 
