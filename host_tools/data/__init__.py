@@ -2,5 +2,5 @@
 
 Modules in reading order: `plan`, `rows`, `executors`, `journal`, `dataset_file`, `sweep`, `dataset`.
 
-No model of the probe: a row is what the solver said.
+No model of the probe: a row is what the solver said, and `dataset` hands it to the paper's network.
 """

@@ -2,5 +2,5 @@
 
 Modules in reading order: `networks`, `protocol`, `study`, `side_by_side`, `page`.
 
-Nothing that ships: no product module imports this room.
+Nothing that ships: only `host_tools.commands.paper` imports this room.
 """

@@ -3,5 +3,5 @@
 Modules in reading order: `score_recordings`, `paper_scores`, `dial`, `coverage`, `posterior`, `noise_free`, `span`,
 `outside`, `just_outside`, `ellipsoids`, `breast_imager`.
 
-No training; what is scored has been frozen before.
+No training; what is scored has been frozen before, and `dial` adds its figures to the card.
 """

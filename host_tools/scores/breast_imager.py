@@ -13,6 +13,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.calibration import Calibration
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
 from device.measurement.parameters import NOMINAL, PARAMETERS
@@ -138,7 +139,7 @@ def _benchmarks(
     return [
         at_most(f"{mode}, size", "mean error (%)", float(error), PUBLISHED_PERCENT),
         at_most(f"{mode}, size", f"mean error over the least, {least:.1f} %", float(error / least), BOUND_RATIO[mode]),
-        at_least(f"{mode}, Young's modulus", "covered", float(np.mean(covered)) if covered else float("nan"), 0.9),
+        at_least(f"{mode}, Young's modulus", "covered", float(np.mean(covered)) if covered else float("nan"), COVERAGE),
     ]
 
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.estimate import SPOKEN
 from device.measurement.mode import Mode
 from device.measurement.quantities import UNKNOWNS
@@ -52,7 +53,7 @@ def _benchmarks(case: str, presses: int, stated: dict[str, Any]) -> list[Benchma
     pairs = zip(stated["coverage_per_octile"], stated["determined_per_octile"], strict=True)
     octiles = [covered for covered, known in pairs if known * presses / OCTILES >= FEWEST_IN_OCTILE]
     overall = _number(stated["coverage"])
-    benchmarks = [Benchmark(case, "coverage", overall, 0.9, abs(overall - middle), HIGHEST - middle)]
+    benchmarks = [Benchmark(case, "coverage", overall, COVERAGE, abs(overall - middle), HIGHEST - middle)]
     if octiles:
         benchmarks.append(at_least(case, "coverage in the worst octile", min(octiles), LOWEST_IN_OCTILE))
     return benchmarks
@@ -61,7 +62,7 @@ def _benchmarks(case: str, presses: int, stated: dict[str, Any]) -> list[Benchma
 def _recorded(case: str, presses: int, stated: dict[str, Any]) -> Benchmark:
     """Return the coverage of recordings against the lowest that chance allows."""
     counted = max(presses * stated["determined"], 1.0)
-    error = math.sqrt(0.9 * 0.1 / counted)
+    error = math.sqrt(COVERAGE * (1 - COVERAGE) / counted)
     return at_least(case, "coverage of recordings", _number(stated["coverage"]), LOWEST - 2 * error)
 
 

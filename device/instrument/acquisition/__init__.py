@@ -3,5 +3,6 @@
 Modules in reading order: `bench`, `force_recorder`, `frame_check`, `frame_level`, `light_check`, `brightness_loop`,
 `light_budget`, `load_limit`.
 
-Nothing of a press's course: what a frame is for is decided in `device.instrument.press`.
+Nothing of a press's course but the window in which its force must be steady: what a frame is for is decided in
+`device.instrument.press`.
 """

@@ -1,6 +1,6 @@
-"""Mode quick: one held frame, one row of contrast, one call of a network.
+"""Mode quick: one held frame, one row of contrast, one call of the networks.
 
-Modules in reading order: `profile`, `roundness`, `model`.
+Modules in reading order: `profile`, `model`.
 
 What it shares with the ramp modes it takes from them.
 """

@@ -1,7 +1,11 @@
 """A recording of held presses to one row: the contrast on rings of the face at one force, and that force.
 
 What mode quick reads: one frame beside the lesion and one on it are enough. Frames are binned before they are divided,
-as in `press_profile`, and the reference light follows the power law that a hold has.
+as in `radial_profile`, and the reference light follows the power law that a hold has.
+
+How far from round the bright spot is, its second harmonic tells. A round inclusion off the axis has one too, so it is
+compared with the first. Source of the share: random presses up to 2 mm off the axis; docs/modes.md counts how often
+inclusions that are not round, and pairs, are refused.
 """
 
 from __future__ import annotations
@@ -12,7 +16,6 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.quick_mode.roundness import elongation_ratio
 from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid, harmonic, lights_of
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import reference_light
@@ -23,9 +26,14 @@ QUICK_FORCES_N = 0.44, 0.56
 AGAIN = "hold 0.5 N beside the lesion and on it"
 QUICK_NAMES = (*(f"contrast_{r:.1f}_mm" for r in RING_RADII_MM), "force_n")
 
+OFFSETS_SHARE, NOISE_CONTRAST = 0.3, 0.004
+"""The second harmonic of a round inclusion off the axis is at most this share of its first, and noise is this
+contrast.
+"""
+
 
 class QuickPress(NamedTuple):
-    """Contrast on the rings and mean force [12], in the order of `QUICK_NAMES`; and `roundness.elongation_ratio`."""
+    """Contrast on the rings and mean force [12], in the order of `QUICK_NAMES`; and `elongation_ratio`."""
 
     row: Array
     elongation_ratio: float
@@ -50,3 +58,12 @@ def quick_press(recording: Recording) -> QuickPress:
     rings = RingMeans(*(np.array(part) for part in zip(*frames, strict=True)))
     row = np.append(rings.mean.mean(axis=0), np.mean(press.force_n))
     return QuickPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))
+
+
+def elongation_ratio(elongation: Array, offset: Array) -> float:
+    """Return the second harmonic [J] over the most that a round inclusion as far off the axis shows.
+
+    `offset` [J] is the first harmonic; of both the root mean square over the rings counts.
+    """
+    oblong, aside = (float(np.sqrt(np.mean(part**2))) for part in (elongation, offset))
+    return oblong / (NOISE_CONTRAST + OFFSETS_SHARE * aside)

@@ -1,6 +1,7 @@
 """How a press changes with everything that is not exactly known, from its equilibrium and not from differences.
 
-Modules in reading order: `equilibrium`, `mesh_velocity`, `sliding_parts`, `sensitivity`, `sensitive_presses`.
+Modules in reading order: `equilibrium`, `mesh_velocity`, `form_action`, `sliding_parts`, `sensitivity`,
+`sensitive_presses`.
 
-Read by `host_tools.cramer_rao` alone.
+Only `host_tools.cramer_rao` reads them.
 """

@@ -10,10 +10,10 @@ from typing import Any, Protocol
 
 from ngsolve import BilinearForm, GridFunction
 
+from host_tools.forward.derivatives.form_action import StateVector, applied, product
 from host_tools.forward.derivatives.sliding_parts import SlidingParts
 from host_tools.forward.face_state import FaceState
 from host_tools.forward.finite_strain.closed_contact import AXIAL
-from host_tools.forward.finite_strain.form_action import StateVector, applied, product
 from host_tools.forward.finite_strain.loaded_face import face_state
 from host_tools.forward.finite_strain.newton import EnergyNewton
 from host_tools.forward.finite_strain.sliding import SlidingContact

@@ -18,8 +18,8 @@ from ngsolve import H1, GridFunction, InnerProduct
 
 from device.measurement.arrays import Array
 from host_tools.forward.derivatives.equilibrium import Equilibrium
+from host_tools.forward.derivatives.form_action import StateVector, along
 from host_tools.forward.face_state import MN_PER_N, FaceState
-from host_tools.forward.finite_strain.form_action import StateVector, along
 from host_tools.forward.small_strain.contact import pressure_of_forces
 
 FORCE = "force_n"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from ngsolve import BitArray
 
-from host_tools.forward.finite_strain.form_action import StateVector, along, applied, product
+from host_tools.forward.derivatives.form_action import StateVector, along, applied, product
 from host_tools.forward.finite_strain.sliding import SLIP, SlidingContact
 from host_tools.forward.materials import Parts
 

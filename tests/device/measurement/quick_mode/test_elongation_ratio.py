@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.quick_mode.roundness import NOISE_CONTRAST, OFFSETS_SHARE, elongation_ratio
+from device.measurement.quick_mode.profile import NOISE_CONTRAST, OFFSETS_SHARE, elongation_ratio
 
 
 def test_a_spot_in_the_middle_is_compared_with_noise():
