@@ -1,5 +1,4 @@
-"""Puts the daemon together: the only room that knows drivers, simulation and instrument, and real parts from emulated
-ones.
+"""Puts the daemon together: the only room that knows drivers, simulation and instrument.
 
 Modules in reading order: `probe`, `camera`, `cell`, `answers`, `opened_parts`.
 

@@ -1,5 +1,6 @@
-"""`python -m device` without a verb: the daemon itself. It takes the port, opens the probe, and serves until it is told
-to stop; then every part is closed and dark.
+"""`python -m device` without a verb: the daemon itself.
+
+It takes the port, opens the probe, and serves until it is told to stop; then every part is closed and dark.
 """
 
 from __future__ import annotations

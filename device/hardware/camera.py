@@ -3,12 +3,6 @@
 Easy to get wrong: libcamera adjusts what it is asked for without a word, so the configuration is read back; and only
 the raw stream is photometric, main and lores pass black level, gamma and contrast of the image processor.
 Source: picamera2 0.3.38 (Raspberry Pi, "The Picamera2 Library").
-
-Rows of the sensor as picamera2 gives them to the counts of a frame: unpack, cut out the middle, average areas.
-
-A frame has 8 bits whatever the sensor has: more of them only make the mean over an area finer before it is rounded.
-Rows are bytes, padded at their end; unpacked formats of more than 8 bits have two a pixel, the low one first, and
-their bits at the low end. Source: libcamera formats R8, R10, R12, R16; picamera2 0.3.38 (`helpers.make_array`).
 """
 
 from __future__ import annotations
@@ -24,30 +18,6 @@ from device.errors import CameraError
 from device.hardware.interfaces import CameraFrame
 from device.measurement.quantities import Bound, InvalidQuantity, require
 
-
-def frame_of_rows(rows: NDArray[np.uint8], mode: RawMode) -> NDArray[np.uint8]:
-    """Return the counts [height_px, width_px] of a frame, a copy, from rows [sensor height, stride in bytes]."""
-    counts = _cropped(rows if mode.bytes_per_px == 1 else rows.view("<u2"), mode)
-    if mode.raw_format == "R8" and mode.crop_px == mode.frame_px:
-        return np.array(counts, np.uint8)
-    light = np.asarray(counts, np.float32) * np.float32(2.0 ** (8 - RAW_BITS[mode.raw_format]))
-    if mode.crop_px != mode.frame_px:
-        light = _area_mean(light, mode.frame_px)
-    return np.asarray(np.minimum(np.rint(light), 255), np.uint8)
-
-
-def _cropped(counts: NDArray[np.uint8] | NDArray[np.uint16], mode: RawMode) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    (x, y), (width, height) = mode.crop_from_px, mode.crop_px
-    return counts[y : y + height, x : x + width]
-
-
-def _area_mean(light: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np.float32]:
-    """Return an image of (width, height) pixels, each the mean of the area that it covers."""
-    import cv2  # only a camera that scales has to load it
-
-    return np.asarray(cv2.resize(light, size_px, interpolation=cv2.INTER_AREA), np.float32)
-
-
 if TYPE_CHECKING:
     from picamera2 import CompletedRequest, Picamera2
 
@@ -57,6 +27,24 @@ EXPOSURE_STEP_US = 50
 GAIN_STEP_RATIO = 0.05
 """Steps of the gain are sixteenths or finer."""
 CABLE_REMEDY = "Check the camera's ribbon cable, then restart the probe."
+
+
+def open_camera(index: int, *, mode: RawMode, exposure_us: int, gain: float, frame_rate_hz: float) -> RawMonoCamera:
+    """Open the board's camera `index` and start it; raise `CameraError` when there is no camera or no picamera2."""
+    try:
+        from picamera2 import Picamera2
+    except ImportError as error:
+        cause = "picamera2 is not installed, so no real camera can be opened."
+        raise CameraError(cause, "Install python3-picamera2 on the probe, or start with --simulate.") from error
+    try:
+        picam2 = Picamera2(index)
+    except RuntimeError as error:
+        raise CameraError(f"Camera {index} cannot be opened: {error}.", CABLE_REMEDY) from error
+    try:
+        return RawMonoCamera(picam2, mode=mode, exposure_us=exposure_us, gain=gain, frame_rate_hz=frame_rate_hz)
+    except (CameraError, InvalidQuantity):
+        picam2.close()
+        raise
 
 
 class RawMonoCamera:
@@ -177,19 +165,30 @@ class RawMonoCamera:
         self._picam2.close()
 
 
-def open_camera(index: int, *, mode: RawMode, exposure_us: int, gain: float, frame_rate_hz: float) -> RawMonoCamera:
-    """Open the board's camera `index` and start it; raise `CameraError` when there is no camera or no picamera2."""
-    try:
-        from picamera2 import Picamera2
-    except ImportError as error:
-        cause = "picamera2 is not installed, so no real camera can be opened."
-        raise CameraError(cause, "Install python3-picamera2 on the probe, or start with --simulate.") from error
-    try:
-        picam2 = Picamera2(index)
-    except RuntimeError as error:
-        raise CameraError(f"Camera {index} cannot be opened: {error}.", CABLE_REMEDY) from error
-    try:
-        return RawMonoCamera(picam2, mode=mode, exposure_us=exposure_us, gain=gain, frame_rate_hz=frame_rate_hz)
-    except (CameraError, InvalidQuantity):
-        picam2.close()
-        raise
+def frame_of_rows(rows: NDArray[np.uint8], mode: RawMode) -> NDArray[np.uint8]:
+    """Return the counts [height_px, width_px] of a frame, a copy, from rows [sensor height, stride in bytes].
+
+    The middle is cut out, and areas are averaged. A frame has 8 bits whatever the sensor has: more of them only make
+    the mean over an area finer before it is rounded. Rows are padded at their end; unpacked formats of more than 8 bits
+    have two bytes a pixel, the low one first, and their bits at the low end.
+    Source: libcamera formats R8, R10, R12, R16; picamera2 0.3.38 (`helpers.make_array`).
+    """
+    counts = _cropped(rows if mode.bytes_per_px == 1 else rows.view("<u2"), mode)
+    if mode.raw_format == "R8" and mode.crop_px == mode.frame_px:
+        return np.array(counts, np.uint8)
+    light = np.asarray(counts, np.float32) * np.float32(2.0 ** (8 - RAW_BITS[mode.raw_format]))
+    if mode.crop_px != mode.frame_px:
+        light = _area_mean(light, mode.frame_px)
+    return np.asarray(np.minimum(np.rint(light), 255), np.uint8)
+
+
+def _cropped(counts: NDArray[np.uint8] | NDArray[np.uint16], mode: RawMode) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    (x, y), (width, height) = mode.crop_from_px, mode.crop_px
+    return counts[y : y + height, x : x + width]
+
+
+def _area_mean(light: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np.float32]:
+    """Return an image of (width, height) pixels, each the mean of the area that it covers."""
+    import cv2  # only a camera that scales has to load it
+
+    return np.asarray(cv2.resize(light, size_px, interpolation=cv2.INTER_AREA), np.float32)

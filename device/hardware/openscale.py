@@ -7,12 +7,6 @@ lines a second. Nothing is ever sent: an `x` would open the menu and stop the st
 when it is back.
 Without a bridge the converter reads an end of its range, or is read where none is: always the same number.
 Source: SparkFun OpenScale firmware; HX711 datasheet (24-bit two's complement, input noise 50-90 nV = 20-40 counts).
-
-When a sender says it measured, on its own clock, to the one clock of the probe.
-
-A line is never early, only late: by the serial line, by a bus, by a busy board. So the least delay that was seen lately
-is the difference of the clocks, and what comes on top of it is lateness of that line alone.
-Source: the minimum filter of RFC 5905 (NTP), section 10; Zhang, Liu & Xia, IEEE INFOCOM 2002, on clocks that drift.
 """
 
 from __future__ import annotations
@@ -26,53 +20,15 @@ from device.errors import DetachedCellError, LoadCellError, SaturatedCellError, 
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, CellSample
 
-MOST_DRIFT_RATIO = 0.005
-"""How fast the sender's clock may lose on ours: a ceramic resonator's half per cent."""
-RESTART_S = 0.5
-"""A line this much earlier or later than the sender's clock lets expect comes from a clock that began anew."""
-
-
-class SenderClock:
-    """The difference of two clocks, from the lines that have come so far."""
-
-    def __init__(self) -> None:
-        self._ahead_s: float | None = None
-        self._sender_s = self._measured_s = 0.0
-
-    def measured_s(self, sender_s: float, arrival_s: float) -> float:
-        """Return when a line was measured (s, our clock) that says `sender_s` and came at `arrival_s`.
-
-        Never later than it came, and never before the line before it.
-        """
-        ahead_s = arrival_s - sender_s
-        if self._ahead_s is None or sender_s < self._sender_s or abs(ahead_s - self._ahead_s) > RESTART_S:
-            self._ahead_s = ahead_s
-        else:
-            self._ahead_s = min(ahead_s, self._ahead_s + MOST_DRIFT_RATIO * (sender_s - self._sender_s))
-        self._sender_s = sender_s
-        self._measured_s = min(arrival_s, max(self._measured_s, sender_s + self._ahead_s))
-        return self._measured_s
-
-
 LINE = re.compile(rb"(?P<millis>\d{1,10}),-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-?\d{1,7}),\r?")
 """One reading. A missing raw24 does not match, and neither do the words nan, inf and ovf."""
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
 MOST_ALIKE = 20
 """A converter that is there makes this many equal readings running once in 10^30: its noise is tens of counts."""
-
-
-def parse_reading(line: bytes) -> tuple[float, CellCounts]:
-    """Return time (s, of the amplifier's clock) and raw24 (counts) of one line.
-
-    Raises `ValueError` when it is no complete reading.
-    """
-    match = LINE.fullmatch(line)
-    if match is None:
-        raise ValueError(f"{line!r} is not of the form millis,reading,kg,raw24,")
-    counts = int(match["raw24"])
-    if not RAW24_LOW_COUNTS <= counts <= RAW24_HIGH_COUNTS:
-        raise ValueError(f"{line!r} holds {counts} counts, outside 24 bit")
-    return int(match["millis"]) / 1000, CellCounts(float(counts))
+MOST_DRIFT_RATIO = 0.005
+"""How fast the sender's clock may lose on ours: a ceramic resonator's half per cent."""
+RESTART_S = 0.5
+"""A line this much earlier or later than the sender's clock lets expect comes from a clock that began anew."""
 
 
 class OpenScale:
@@ -146,3 +102,44 @@ class OpenScale:
         return UnreadableCellError(
             cause, "Switch on timestamp and raw reading in its menu, and set the configured baud rate."
         )
+
+
+def parse_reading(line: bytes) -> tuple[float, CellCounts]:
+    """Return time (s, of the amplifier's clock) and raw24 (counts) of one line.
+
+    Raises `ValueError` when it is no complete reading.
+    """
+    match = LINE.fullmatch(line)
+    if match is None:
+        raise ValueError(f"{line!r} is not of the form millis,reading,kg,raw24,")
+    counts = int(match["raw24"])
+    if not RAW24_LOW_COUNTS <= counts <= RAW24_HIGH_COUNTS:
+        raise ValueError(f"{line!r} holds {counts} counts, outside 24 bit")
+    return int(match["millis"]) / 1000, CellCounts(float(counts))
+
+
+class SenderClock:
+    """When a sender says it measured, on its own clock, to the one clock of the probe.
+
+    A line is never early, only late: by the serial line, by a bus, by a busy board. So the least delay that was seen
+    lately is the difference of the clocks, and what comes on top of it is lateness of that line alone.
+    Source: the minimum filter of RFC 5905 (NTP), section 10; Zhang, Liu & Xia, IEEE INFOCOM 2002, on clocks that drift.
+    """
+
+    def __init__(self) -> None:
+        self._ahead_s: float | None = None
+        self._sender_s = self._measured_s = 0.0
+
+    def measured_s(self, sender_s: float, arrival_s: float) -> float:
+        """Return when a line was measured (s, our clock) that says `sender_s` and came at `arrival_s`.
+
+        Never later than it came, and never before the line before it.
+        """
+        ahead_s = arrival_s - sender_s
+        if self._ahead_s is None or sender_s < self._sender_s or abs(ahead_s - self._ahead_s) > RESTART_S:
+            self._ahead_s = ahead_s
+        else:
+            self._ahead_s = min(ahead_s, self._ahead_s + MOST_DRIFT_RATIO * (sender_s - self._sender_s))
+        self._sender_s = sender_s
+        self._measured_s = min(arrival_s, max(self._measured_s, sender_s + self._ahead_s))
+        return self._measured_s

@@ -4,9 +4,8 @@ The lines are fitted on phantoms with known inclusions (`host_tools calibrate`).
 one model, until a day, quotes its own residuals, and carries the held-out scenes that give every estimate its interval.
 Source: Lee & Won 2013, section III: three separate linear regressions O1':O1, O2':O2, O3':O3.
 
-From when until when a calibration holds: it counts from the phantoms' recordings, not from when it was computed.
-
-So computing it again from old recordings makes no probe younger. Simulated recordings are of 1970 by convention.
+How long it holds counts from the phantoms' recordings, not from when it was computed: computing it again from old
+recordings makes no probe younger. Simulated recordings are of 1970 by convention.
 """
 
 from __future__ import annotations
@@ -35,6 +34,17 @@ from device.measurement.recording.untouched_face import UntouchedFace
 ACTION = "calibrate the probe again"
 VALID_DAYS = Bound(1, 36_500, "days")
 """A hundred years are for simulated probes, which do not age."""
+SCHEMA = "tsis.calibration/2"
+RENEW = "calibrate the probe again"
+FORCE_TOLERANCE = 0.06
+"""Relative. Features grow with the force: a press a fifth harder leaves the intervals beside the truth."""
+SCALE_TOLERANCE = 1e-3
+EXPOSURE_TOLERANCE = 0.02
+"""Relative, of exposure times gain: dividing by the reference takes it out of the image, not out of the drift."""
+TEXTS = (
+    *("id", "made_at", "operator", "serial", "phantom_serial"),
+    *("model_sha256", "model_card_sha256", "software", "software_sha256"),
+)
 
 
 @dataclass(frozen=True)
@@ -79,22 +89,6 @@ def moment(text: str, name: str) -> datetime:
 def written(at: datetime) -> str:
     """Return a moment as RFC 3339 in UTC, to a second."""
     return at.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-
-
-SCHEMA = "tsis.calibration/2"
-RENEW = "calibrate the probe again"
-
-FORCE_TOLERANCE = 0.06
-"""Relative. Features grow with the force: a press a fifth harder leaves the intervals beside the truth."""
-SCALE_TOLERANCE = 1e-3
-EXPOSURE_TOLERANCE = 0.02
-"""Relative, of exposure times gain: dividing by the reference takes it out of the image, not out of the drift."""
-
-
-TEXTS = (
-    *("id", "made_at", "operator", "serial", "phantom_serial"),
-    *("model_sha256", "model_card_sha256", "software", "software_sha256"),
-)
 
 
 @dataclass(frozen=True)

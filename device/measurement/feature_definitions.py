@@ -36,7 +36,7 @@ QUICK_FEATURES: Mapping[str, Definition] = {
     "contrast": Definition("1", "Mean contrast on a ring of the face, at the force of the hold."),
     "force_n": Definition("N", "Mean force of the hold."),
 }
-"""What the names of a held press's row begin with (`held_profile`)."""
+"""What the names of a held press's row begin with (`quick_press`)."""
 
 
 def definition_of(name: str, group: Mapping[str, Definition]) -> Definition:

@@ -4,9 +4,8 @@ Three straight lines map image features to deformation features; their leave-one
 residuals, put on scenes of the whole box and sent through the network, give the held-out scenes behind every interval.
 Source: Lee & Won 2013, section III (regressions on nine phantoms).
 
-The sources that run, as one hash: what a certificate names beside the version, which many states of them share.
-
-Phantom recordings to what the untouched probe shows, dark and lit: what each later start is compared with.
+The certificate holds what the untouched probe shows, dark and lit, with which each later start is compared. Beside the
+version, which many states of the sources share, it names one hash of the sources that run.
 """
 
 from __future__ import annotations
@@ -56,6 +55,12 @@ from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene,
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("device", "host_tools")
+UNTOUCHED_RATIO = 0.05
+"""Reference frames at less than this part of the largest force are of the untouched probe."""
+A_YEAR_DAYS = 365.0
+HELD_OUT_SCENES = 1000
+WEAKEST_PEAK_MM = 5e-4
+"""Inclusions with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
 
 
 def source_sha256() -> str:
@@ -65,10 +70,6 @@ def source_sha256() -> str:
         digest.update(f"{path.relative_to(ROOT).as_posix()}\0".encode())
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
-
-
-UNTOUCHED_RATIO = 0.05
-"""Reference frames at less than this part of the largest force are of the untouched probe."""
 
 
 def untouched_face(recordings: Sequence[Recording]) -> UntouchedFace:
@@ -99,12 +100,6 @@ def untouched_face(recordings: Sequence[Recording]) -> UntouchedFace:
         pressed_counts=round(float(np.mean(pressed_counts)), 4),
         led_ratio=led_ratio[0] if len(set(led_ratio)) == 1 else led_ratio,
     )
-
-
-A_YEAR_DAYS = 365.0
-HELD_OUT_SCENES = 1000
-WEAKEST_PEAK_MM = 5e-4
-"""Inclusions with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 """`host_tools evaluate`: scores of recordings with truth, or of random presses of the simulated probe, in any mode.
 
-What `host_tools evaluate` prints with --noise-free and --posterior: modes standard and precise beside the best.
-
-The chapters are those of `host_tools modes`, on presses of another seed.
+With --noise-free and --posterior it prints modes standard and precise beside the best: the chapters are those of
+`host_tools modes`, on presses of another seed.
 """
 
 from __future__ import annotations

@@ -68,9 +68,7 @@ def ways() -> dict[str, PressProtocol]:
 
 
 def inclusions() -> list[Triple]:
-    """Return the inclusions of the map, those of one size and depth together: they share the solve without an
-    inclusion.
-    """
+    """Return the inclusions of the map, those of one size and depth together: they share the solve of the baseline."""
     return list(product(SIZES_MM, DEPTHS_MM, MODULI_KPA))
 
 

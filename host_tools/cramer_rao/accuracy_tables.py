@@ -1,5 +1,4 @@
-"""Bounds of one inclusion over its modulus to how often a press of it determines the modulus, the ends of the box
-included.
+"""Bounds of one inclusion over its modulus to how often a press of it determines the modulus.
 
 A Cramer-Rao bound is a straight line about one modulus and knows no ends. Here the modulus runs along a line on which
 every step of one is as visible as any other, by its bound there, and its posterior ends where the box ends; size and

@@ -99,8 +99,7 @@ def limits(scene: Scene, protocol: PressProtocol) -> Limits:
 
 
 def std_of_box(inclusion: Inclusion) -> Array:
-    """Return the standard deviations [3] of ln d, ln h, ln E at an inclusion, of inclusions spread over the probe's
-    box.
+    """Return the standard deviations [3] of ln d, ln h, ln E at an inclusion, for inclusions spread over the box.
 
     The box and how inclusions are spread over it: `RANGES` of `device/measurement/parameters.py`. In a coordinate
     that is even it has one width everywhere; in its logarithm a small size is known worse than a large one.

@@ -1,13 +1,12 @@
-"""Faces under the loads of a protocol to what is seen of them: contrast on rings, and how it changes.
+"""Faces under the loads of a protocol to what a sensor sees of them: contrast on rings, and how it changes.
 
 The contrast is light over that of the press without the inclusion, minus 1. What the elements make of a moved mesh is
 alike in both presses and drops out of it; of the press without the inclusion, nothing is kept that size or depth would
 change.
 
-A face's deformation and pressure to the light on rings of the picture: traced light, or an ideal sensor's.
-
-The physical picture is that of the virtual probe before its lens. Pressures are taken as means over 1 mm first: inside
-an element they ring, their forces do not. Lenses and fixed patterns drop out of a contrast.
+An image model takes a face's deformation and pressure to light on rings: traced light, or an ideal sensor's. Traced
+light is that of the virtual probe before its lens; lenses and fixed patterns drop out of a contrast. Pressures are
+taken as means over 1 mm first: inside an element they ring, their forces do not.
 """
 
 from __future__ import annotations
@@ -32,6 +31,8 @@ from host_tools.forward.derivatives.sensitivity import FORCE, FaceSensitivity
 from host_tools.forward.face_state import Rays
 
 TABLES = Path(__file__).resolve().parents[2] / "models" / "simulated_probe"
+WINDOW_RATIO = 0.9
+"""The central window over the face."""
 SMOOTH_MM = 1.0
 FADE_MM = 0.5
 """Length over which the deformation fades beyond the rim."""
@@ -44,6 +45,82 @@ SKIN = ("contact_pressure_kpa", "albedo", "spread_mm")
 HARMONICS = 4
 """The mean and cos(angle) to cos(3 angle); the inclusion lies at angle 0."""
 ALL_LEDS = (1.0, 1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedPress:
+    """One press as a sensor sees it, on K rings: M harmonics of the contrast, one after the other, and the light.
+
+    `contrast` [M K] and its derivatives by the logarithm of each quantity; `by_force_error` by that of the press's
+    force alone, its reference left as it is. `light` and `reference` [K]: ring means, with the inclusion and without
+    it; `reference_derivatives` [K]: of the logarithm of the reference, by what it depends on.
+    """
+
+    force_n: float
+    contrast: Array
+    derivatives: Mapping[str, Array]
+    by_force_error: Array
+    light: Array
+    reference: Array
+    reference_derivatives: Mapping[str, Array]
+
+    @property
+    def harmonics(self) -> int:
+        """How many harmonics of the angle are seen; 1 in axisymmetry."""
+        return len(self.contrast) // len(self.light)
+
+    @property
+    def ratio(self) -> Array:
+        """Light over reference [M K]: the contrast, and 1 more in the mean."""
+        ratio = self.contrast.copy()
+        ratio[: len(self.light)] += 1
+        return ratio
+
+
+def rings_of(presses: Sequence[InclusionSensitivity]) -> Rings:
+    """Return the rings that faces are seen on: those of the central window."""
+    return Rings.within(WINDOW_RATIO * float(presses[0].rays.r_mm[0, -1]))
+
+
+def observed_presses(presses: Sequence[InclusionSensitivity], observable: Observable) -> list[ObservedPress]:
+    """Return what a sensor sees of every press; the scalars are those of the image."""
+    rings = rings_of(presses)
+    return [_observed(press, _image_model(press.rays, rings, observable), len(rings.r_mm)) for press in presses]
+
+
+def _image_model(rays: Rays, rings: Rings, observable: Observable) -> ImageModel:
+    if observable in ("image", "scalars"):
+        return LightImageModel(rays, rings)
+    return IdealImageModel(rays, rings, observable)
+
+
+def _observed(press: InclusionSensitivity, image: ImageModel, rings: int) -> ObservedPress:
+    """Return the contrast (light - reference) / mean reference; the reference has harmonics by its mesh only."""
+    light, changes = _seen(press.pressed, image)
+    reference, reference_changes = _seen(press.baseline, image)
+    repeated = len(light) // rings
+
+    def of_mean(values: Array) -> Array:
+        return np.tile(values[:rings], repeated)
+
+    mean, unchanged = of_mean(reference), np.zeros_like(light)
+    contrast = (light - reference) / mean
+    derivatives = {}
+    for name, change in changes.items():
+        further = reference_changes.get(name, unchanged)
+        derivatives[name] = (change - further - contrast * of_mean(further)) / mean
+    of_mesh_alone = (*UNKNOWNS, OFFSET)
+    growing = {name: (c / mean)[:rings] for name, c in reference_changes.items() if name not in of_mesh_alone}
+    return ObservedPress(
+        press.force_n, contrast, derivatives, changes[FORCE] / mean, light[:rings], reference[:rings], growing
+    )
+
+
+def _seen(found: FaceSensitivity, image: ImageModel) -> tuple[Array, dict[str, Array]]:
+    """Return the light of a face and its derivatives by name."""
+    face = Profiles(found.face.w_mm, found.face.p_kpa)
+    changes = {name: image.change(face, Profiles(rate.w_mm, rate.p_kpa)) for name, rate in found.rates.items()}
+    return image.light(face), changes | image.changes_by_skin(face)
 
 
 class Profiles(NamedTuple):
@@ -176,83 +253,3 @@ def smooth(r_mm: Array, p_kpa: Array) -> Array:
 @lru_cache(maxsize=1)
 def _optics() -> LookupOptics:
     return LookupOptics.load(TABLES)
-
-
-WINDOW_RATIO = 0.9
-"""The central window over the face."""
-
-
-@dataclass(frozen=True, eq=False)
-class ObservedPress:
-    """One press as a sensor sees it, on K rings: M harmonics of the contrast, one after the other, and the light.
-
-    `contrast` [M K] and its derivatives by the logarithm of each quantity; `by_force_error` by that of the press's
-    force alone, its reference left as it is. `light` and `reference` [K]: ring means, with the inclusion and without
-    it; `reference_derivatives` [K]: of the logarithm of the reference, by what it depends on.
-    """
-
-    force_n: float
-    contrast: Array
-    derivatives: Mapping[str, Array]
-    by_force_error: Array
-    light: Array
-    reference: Array
-    reference_derivatives: Mapping[str, Array]
-
-    @property
-    def harmonics(self) -> int:
-        """How many harmonics of the angle are seen; 1 in axisymmetry."""
-        return len(self.contrast) // len(self.light)
-
-    @property
-    def ratio(self) -> Array:
-        """Light over reference [M K]: the contrast, and 1 more in the mean."""
-        ratio = self.contrast.copy()
-        ratio[: len(self.light)] += 1
-        return ratio
-
-
-def rings_of(presses: Sequence[InclusionSensitivity]) -> Rings:
-    """Return the rings that faces are seen on: those of the central window."""
-    return Rings.within(WINDOW_RATIO * float(presses[0].rays.r_mm[0, -1]))
-
-
-def observed_presses(presses: Sequence[InclusionSensitivity], observable: Observable) -> list[ObservedPress]:
-    """Return what a sensor sees of every press; the scalars are those of the image."""
-    rings = rings_of(presses)
-    return [_observed(press, _image_model(press.rays, rings, observable), len(rings.r_mm)) for press in presses]
-
-
-def _image_model(rays: Rays, rings: Rings, observable: Observable) -> ImageModel:
-    if observable in ("image", "scalars"):
-        return LightImageModel(rays, rings)
-    return IdealImageModel(rays, rings, observable)
-
-
-def _observed(press: InclusionSensitivity, image: ImageModel, rings: int) -> ObservedPress:
-    """Return the contrast (light - reference) / mean reference; the reference has harmonics by its mesh only."""
-    light, changes = _seen(press.pressed, image)
-    reference, reference_changes = _seen(press.baseline, image)
-    repeated = len(light) // rings
-
-    def of_mean(values: Array) -> Array:
-        return np.tile(values[:rings], repeated)
-
-    mean, unchanged = of_mean(reference), np.zeros_like(light)
-    contrast = (light - reference) / mean
-    derivatives = {}
-    for name, change in changes.items():
-        further = reference_changes.get(name, unchanged)
-        derivatives[name] = (change - further - contrast * of_mean(further)) / mean
-    of_mesh_alone = (*UNKNOWNS, OFFSET)
-    growing = {name: (c / mean)[:rings] for name, c in reference_changes.items() if name not in of_mesh_alone}
-    return ObservedPress(
-        press.force_n, contrast, derivatives, changes[FORCE] / mean, light[:rings], reference[:rings], growing
-    )
-
-
-def _seen(found: FaceSensitivity, image: ImageModel) -> tuple[Array, dict[str, Array]]:
-    """Return the light of a face and its derivatives by name."""
-    face = Profiles(found.face.w_mm, found.face.p_kpa)
-    changes = {name: image.change(face, Profiles(rate.w_mm, rate.p_kpa)) for name, rate in found.rates.items()}
-    return image.light(face), changes | image.changes_by_skin(face)

@@ -1,12 +1,9 @@
 """The least errors of size, depth and modulus: of one press of known truth, and of inclusions beside the axis.
 
-A press of known truth to the least errors of size, depth and modulus: the Cramer-Rao bound of its very mode.
-
-Forward model and noise are those that the mode's own bundle believes in, linear about the truth; what is not known of
-tissue, skin and place is estimated too. The box counts as Gaussian prior, in all coordinates, as it does in the fits
-of mode precise: an estimate that knows where the box ends may err a little less. Source: Kay (1993), as `information`.
-
-How well the modulus of an inclusion beside the probe's axis can be known: bounds by the probe's own model and noise.
+The bound is Cramer and Rao's, for the very mode of the press. Forward model and noise are those that the mode's own
+bundle believes in, linear about the truth; what is not known of tissue, skin and place is estimated too. The box counts
+as Gaussian prior, in all coordinates, as it does in the fits of mode precise: an estimate that knows where the box ends
+may err a little less. Source: Kay (1993), as `information`.
 
 Beside the axis one side of the face is brighter. That first harmonic falls off with the radius as the contrast's slope
 does, but its smooth errors are not those of the ring means: a second look, which may tell more than the unknown place
@@ -30,6 +27,7 @@ from host_tools.cramer_rao.accuracy_map import MODULI_KPA, Triple, inclusions
 from host_tools.cramer_rao.information import cramer_rao
 
 BOX_STD: Array = np.full(len(PARAMETERS), EVEN_STD)
+OFFSETS_MM = (0.5, 1.0, 1.5, 2.0)
 
 
 def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: Mapping[str, float] = NOMINAL) -> Array:
@@ -44,9 +42,6 @@ def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: 
         return np.full(COUNT, np.nan)
     row, jacobian = answers.surrogate.rows_and_jacobian(normalise(parameters))
     return cramer_rao(jacobian, answers.noise[mode].covariance(row), BOX_STD).std[:COUNT]
-
-
-OFFSETS_MM = (0.5, 1.0, 1.5, 2.0)
 
 
 def spread_of_modulus(answers: RampAnswers, inclusion: Triple, offset_mm: float) -> float:

@@ -4,10 +4,9 @@ Direct and once-reflected light is counted without a face in the way, so one run
 add, and what comes back from the skin, are measured on flat faces. Only the LED at +x is traced: the block's symmetry
 gives the others and halves the rest. It holds for dark walls: with white ones the light depends on what the skin takes.
 
-The light of one LED inside an empty block: the vector irradiance through planes at several heights.
-
-No face is in the way, so one ray serves all depths of the face. Light on its way up from the LED and light that came up
-again from the bottom are kept apart, because each arrives nearly as one beam. Source: Gershun, The Light Field, 1939.
+What is counted is the vector irradiance through planes at several heights of the empty block. Light on its way up from
+the LED and light that came up again from the bottom are kept apart, because each arrives nearly as one beam. Source:
+Gershun, The Light Field, 1939.
 """
 
 from __future__ import annotations
@@ -33,6 +32,15 @@ from host_tools.optics.tracer import trace
 MOMENTS = 5
 CLASSES = 2
 """Light of the LED itself, and of its image in the bottom."""
+CELLS = 80
+"""Cells across the block: 0.3 mm, less than skin spreads light."""
+STRAY_CELLS = 20
+"""Stray light is faint and smooth: fewer cells, less noise."""
+DEPTHS_MM = np.arange(-0.5, 2.51, 0.5)
+LED_X = (1.0, 0.0, 0.0, 0.0)
+STEPS = ("light of an LED", "stray light", "light from wet skin", "light from dry skin")
+WHITEST_WALL = 0.2
+"""Wall reflectance up to which the table is right: there the sum is 2 % too large, at 0.9 by 23 %."""
 
 
 @compiled
@@ -98,17 +106,6 @@ def _half_angle(moments: Array) -> Array:
     mean = rise / lit
     deviation = np.sqrt(np.maximum(squares / lit - mean**2, 0.0))
     return np.asarray(2 * deviation / np.maximum(1 - mean**2, 0.05))
-
-
-CELLS = 80
-"""Cells across the block: 0.3 mm, less than skin spreads light."""
-STRAY_CELLS = 20
-"""Stray light is faint and smooth: fewer cells, less noise."""
-DEPTHS_MM = np.arange(-0.5, 2.51, 0.5)
-LED_X = (1.0, 0.0, 0.0, 0.0)
-STEPS = ("light of an LED", "stray light", "light from wet skin", "light from dry skin")
-WHITEST_WALL = 0.2
-"""Wall reflectance up to which the table is right: there the sum is 2 % too large, at 0.9 by 23 %."""
 
 
 def write_light_table(

@@ -4,11 +4,10 @@ The hidden layers are logistic sigmoids (0..1, not tanh), the output is linear. 
 a floor, and the answer is the mean of many networks that differ only in their seed.
 Source: Lee & Won, IEEE JBHI 17(2), 2013, sections II (layers, box) and IV-A (100 trials, averaged).
 
-Network parameters to residuals of the training rows and their Jacobian [3 n, 99]: what Levenberg-Marquardt needs.
-
-For the mean square the residuals are the outputs' own. For the misfit they are divided by each unknown's scatter where
-the step begins: J'r is then the misfit's gradient, and since the logarithm lies below its tangents, a step that lowers
-these squares lowers the misfit too (iteratively reweighted least squares).
+Levenberg-Marquardt needs residuals of the training rows and their Jacobian [3 n, 99]. For the mean square the residuals
+are the outputs' own. For the misfit they are divided by each unknown's scatter where the step begins: J'r is then the
+misfit's gradient, and since the logarithm lies below its tangents, a step that lowers these squares lowers the misfit
+too (iteratively reweighted least squares).
 Source: Hagan & Menhaj, IEEE Trans. Neural Networks 5(6):989-993, 1994 (one back-propagation an output).
 """
 

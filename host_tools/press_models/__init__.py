@@ -1,5 +1,4 @@
-"""The models of modes quick, standard and precise: random presses to a surrogate, networks, and the belts of their
-intervals.
+"""The models of modes quick, standard and precise: random presses to a surrogate, networks and confidence belts.
 
 Modules in reading order: `seeds`, `press_samples`, `recorded_presses`, `camera_noise`, `noisy_presses`,
 `fit_surrogate`, `dense_network`, `train_ensemble`, `train_range`, `mode_outcome`, `mode_statistics`,

@@ -1,7 +1,7 @@
-"""Turns the trained modes into model bundles: model.onnx and model.json; for the ramps
-surrogate, range classifier and ellipticity test, too.
+"""Turns the trained modes into model bundles: model.onnx and model.json.
 
-The same parts give the same bytes. Source of the format: the model bundle of docs/contracts.md.
+That of the ramps holds surrogate, range classifier and ellipticity test, too. The same parts give the same bytes.
+Source of the format: the model bundle of docs/contracts.md.
 """
 
 from __future__ import annotations

@@ -46,6 +46,19 @@ BASELINE_REACH = dict.fromkeys(PARAMETERS, 0.5) | {
     "albedo": 3.0,
     "spread_mm": 4.0,
 }
+SECOND_REACH = {
+    "size_mm": 12.0,
+    "depth_mm": 11.0,
+    "youngs_modulus_kpa": 3.2,
+    "tissue_modulus_kpa": 2.1,
+    "slab_thickness_mm": 1.1,
+    "contact_pressure_kpa": 2.1,
+    "albedo": 1.1,
+    "spread_mm": 1.6,
+    "offset_mm": 3.2,
+}
+"""The same for second harmonics."""
+SECOND_HIGHEST = {"size_mm": 7, "depth_mm": 6}
 PRESSES_A_TERM = 3.0
 """Fewer presses than this a term, and the polynomials follow the noise of the tables."""
 
@@ -59,13 +72,12 @@ def fit_surrogate(samples: PressSamples) -> PressSurrogate:
 def fit_polynomials(
     samples: PressSamples, at: Array, reach: dict[str, float], highest: dict[str, int]
 ) -> tuple[LegendreSum, LegendreSum]:
-    """Return the polynomials of the inclusion, in terms of that reach, and of the inclusion-free light in coordinates
-    [n, 9].
+    """Return the polynomials of the inclusion and of the baseline, for coordinates `at` [n, 9].
 
-    Raises as `fit_surrogate`.
+    `reach` and `highest` bound the inclusion's terms. Raises as `fit_surrogate`.
     """
-    lump_degrees, baseline_degrees = degrees(reach, highest), degrees(BASELINE_REACH, {})
-    bound = Bound(PRESSES_A_TERM * len(lump_degrees), np.inf, "presses")
+    inclusion_degrees, baseline_degrees = degrees(reach, highest), degrees(BASELINE_REACH, {})
+    bound = Bound(PRESSES_A_TERM * len(inclusion_degrees), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
     require(
         "presses that are not finite",
@@ -76,13 +88,24 @@ def fit_polynomials(
     contrast, reference_response, offset = np.split(
         samples.rows, [CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS], axis=1
     )
-    factor, design = inclusion_factor(samples.parameters), terms(lump_degrees, at)
+    factor, design = inclusion_factor(samples.parameters), terms(inclusion_degrees, at)
     strength, placed = factor[:, 0], factor[:, -1]
     inclusion = [_weighted(design, strength, contrast), _weighted(design, placed, offset)]
     baseline, *_ = np.linalg.lstsq(terms(baseline_degrees, at), reference_response, rcond=None)
-    return LegendreSum(lump_degrees, np.hstack(inclusion)), LegendreSum(
+    return LegendreSum(inclusion_degrees, np.hstack(inclusion)), LegendreSum(
         baseline_degrees, np.asarray(baseline, np.float64)
     )
+
+
+def fit_second_harmonics(samples: PressSamples) -> LegendreSum:
+    """Return polynomials [9] to [Q] of `EllipticityTest`; raises `InvalidQuantity` when the presses are too few."""
+    found = degrees(SECOND_REACH, SECOND_HIGHEST)
+    bound = Bound(PRESSES_A_TERM * len(found), np.inf, "presses")
+    require("presses", len(samples.rows), bound, "simulate more presses")
+    at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
+    design = second_factor(samples.parameters)[:, None] * terms(found, at)
+    coefficients, *_ = np.linalg.lstsq(design, samples.second_harmonics, rcond=None)
+    return LegendreSum(found, np.asarray(coefficients))
 
 
 def degrees(reach: dict[str, float], highest: dict[str, int]) -> NDArray[np.uint8]:
@@ -100,11 +123,6 @@ def degrees(reach: dict[str, float], highest: dict[str, int]) -> NDArray[np.uint
     )
 
 
-def held_out_error(surrogate: PressSurrogate, samples: PressSamples) -> Array:
-    """Return the root mean square error [P] of the profile's columns on presses that were kept apart."""
-    return np.asarray(np.sqrt(np.mean((surrogate.rows(normalise(samples.parameters)) - samples.rows) ** 2, axis=0)))
-
-
 def _part(k: tuple[int, ...], names: tuple[str, ...], reach: dict[str, float]) -> float:
     return sum(degree / reach[name] for degree, name in zip(k, names, strict=True)) - 1e-9
 
@@ -115,30 +133,9 @@ def _weighted(design: Array, weight: Array, rows: Array) -> Array:
     return np.asarray(found)
 
 
-SECOND_REACH = {
-    "size_mm": 12.0,
-    "depth_mm": 11.0,
-    "youngs_modulus_kpa": 3.2,
-    "tissue_modulus_kpa": 2.1,
-    "slab_thickness_mm": 1.1,
-    "contact_pressure_kpa": 2.1,
-    "albedo": 1.1,
-    "spread_mm": 1.6,
-    "offset_mm": 3.2,
-}
-"""A term counts when its degrees over these add up to at most 1."""
-SECOND_HIGHEST = {"size_mm": 7, "depth_mm": 6}
-
-
-def fit_second_harmonics(samples: PressSamples) -> LegendreSum:
-    """Return polynomials [9] to [Q] of `EllipticityTest`; raises `InvalidQuantity` when the presses are too few."""
-    found = degrees(SECOND_REACH, SECOND_HIGHEST)
-    bound = Bound(PRESSES_A_TERM * len(found), np.inf, "presses")
-    require("presses", len(samples.rows), bound, "simulate more presses")
-    at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
-    design = second_factor(samples.parameters)[:, None] * terms(found, at)
-    coefficients, *_ = np.linalg.lstsq(design, samples.second_harmonics, rcond=None)
-    return LegendreSum(found, np.asarray(coefficients))
+def held_out_error(surrogate: PressSurrogate, samples: PressSamples) -> Array:
+    """Return the root mean square error [P] of the profile's columns on presses that were kept apart."""
+    return np.asarray(np.sqrt(np.mean((surrogate.rows(normalise(samples.parameters)) - samples.rows) ** 2, axis=0)))
 
 
 def held_out_second_harmonics(ellipticity: EllipticityTest, samples: PressSamples) -> Array:

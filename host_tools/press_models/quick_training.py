@@ -1,11 +1,8 @@
 """Everything behind mode quick: the surrogate of the ramps, read at one force, to a network of one held press.
 
-Two networks are enough: at one force the press says less than they could tell apart.
-
-Random held presses for mode quick's network: the surrogate's ramps read at one force, with noise of their own.
-
-The contrast at a force between the profile's is the cubic through them. Light and cell drift, and smooth errors add
-to it, as `press_noise` says for a ramp; the camera's part is measured on recordings of mode quick.
+Two networks are enough: at one force the press says less than they could tell apart. The contrast at a force between
+the profile's is the cubic through them. Light and cell drift, and smooth errors add to it, as `PressNoise` says for a
+ramp; the camera's part is measured on recordings of mode quick.
 """
 
 from __future__ import annotations
@@ -36,56 +33,6 @@ from host_tools.press_models.press_samples import draw_parameters, profile_rows
 from host_tools.press_models.recorded_presses import EXACT, in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
-
-
-@dataclass(frozen=True, eq=False)
-class QuickPressSet:
-    """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
-
-    normalised: Single
-    rows: Single
-    camera: Array
-    levels: ErrorLevels = field(default_factory=ErrorLevels)
-
-    def noisy(self, index: Index, rng: np.random.Generator) -> Single:
-        """Return the rows [m, 12] of an index [m], with fresh noise on the contrast and the force."""
-        rows = self.rows[index]
-        light, force_n = 1 + rows[:, :RINGS], rows[:, RINGS]
-        camera, smooth = (
-            rng.standard_normal((len(rows), RINGS)) @ np.linalg.cholesky(part).T
-            for part in (self.camera, self._smooth())
-        )
-        zero_n = self.levels.zero_n * rng.standard_normal(len(rows))
-        drift = self.levels.gain_ratio * rng.standard_normal(len(rows)) - EXPONENT * zero_n / force_n
-        contrast = rows[:, :RINGS] + light * (camera + smooth + drift[:, None])
-        return np.column_stack([contrast, force_n + zero_n]).astype(np.float32)
-
-    def typical_noise(self) -> Array:
-        """Return the covariance [12, 12] of the noise of a row without an inclusion."""
-        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(QUICK_FORCES_N))
-        covariance = np.zeros((RINGS + 1, RINGS + 1))
-        covariance[:RINGS, :RINGS] = self.camera + self._smooth() + self.levels.gain_ratio**2 + zero_ratio**2
-        covariance[RINGS, RINGS] = self.levels.zero_n**2
-        return covariance
-
-    def _smooth(self) -> Array:
-        flat, model = smooth_ring_errors(self.levels, harmonic=0)
-        return flat + model + 1e-14 * np.eye(RINGS)
-
-
-def quick_press_set(training_set: PressSet, camera: Array, seed: int) -> QuickPressSet:
-    """Return a set of ramps as held presses, each at a random force."""
-    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(training_set.rows))
-    return QuickPressSet(training_set.normalised, quick_rows(training_set.rows, force_n).astype(np.float32), camera)
-
-
-def quick_rows(rows: Single | Array, force_n: Array) -> Array:
-    """Return the rows [n, 12] of presses held at forces [n], for profile rows [n, P]."""
-    powers = np.vander(PROFILE_FORCES_N, increasing=True)
-    weights = np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers)
-    at_forces = np.asarray(rows[:, :CONTRAST_COLUMNS], np.float64).reshape(len(rows), -1, RINGS)
-    return np.column_stack([np.einsum("nk,nkj->nj", weights, at_forces), force_n])
-
 
 CRITICAL_RATIO = 0.985
 """Share of recorded presses inside the trained ranges whose elongation is below the critical value: the only
@@ -148,17 +95,17 @@ def train_quick(
     """Return the trained parts; `noise` is of mode standard, whose camera's part is replaced by that of one frame."""
     asked = budget or QuickBudget()
 
-    def held(count: int, purpose: str) -> QuickPressSet:
+    def press_set(count: int, purpose: str) -> QuickPressSet:
         drawn = derived_seed(seed, purpose)
         return quick_press_set(random_press_set(surrogate, noise, count, drawn), camera, drawn)
 
     say(f"{asked.recordings} recordings of held presses")
     camera = _camera(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)
     say(f"{asked.members} networks")
-    training_set = held(asked.trained_on, "training presses of quick")
+    training_set = press_set(asked.trained_on, "training presses of quick")
     ensemble = train_ensemble(training_set, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     say(f"{asked.evaluated} presses and {asked.test_recordings} recordings for the limits")
-    fresh = held(asked.evaluated, "judged presses of quick")
+    fresh = press_set(asked.evaluated, "judged presses of quick")
     noisy = fresh.noisy(np.arange(asked.evaluated), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
     simulated = _evaluated(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
     recording = derived_seed(seed, "judged recordings of quick")
@@ -204,3 +151,52 @@ def _outcome(ensemble: DenseEnsemble, simulated: EvaluatedPresses, recorded: Rec
 
 def _evaluated(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> EvaluatedPresses:
     return EvaluatedPresses(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))
+
+
+@dataclass(frozen=True, eq=False)
+class QuickPressSet:
+    """Coordinates [n, 9] and noise-free rows [n, 12] of held presses, and the camera's covariance [11, 11]."""
+
+    normalised: Single
+    rows: Single
+    camera: Array
+    levels: ErrorLevels = field(default_factory=ErrorLevels)
+
+    def noisy(self, index: Index, rng: np.random.Generator) -> Single:
+        """Return the rows [m, 12] of an index [m], with fresh noise on the contrast and the force."""
+        rows = self.rows[index]
+        light, force_n = 1 + rows[:, :RINGS], rows[:, RINGS]
+        camera, smooth = (
+            rng.standard_normal((len(rows), RINGS)) @ np.linalg.cholesky(part).T
+            for part in (self.camera, self._smooth())
+        )
+        zero_n = self.levels.zero_n * rng.standard_normal(len(rows))
+        drift = self.levels.gain_ratio * rng.standard_normal(len(rows)) - EXPONENT * zero_n / force_n
+        contrast = rows[:, :RINGS] + light * (camera + smooth + drift[:, None])
+        return np.column_stack([contrast, force_n + zero_n]).astype(np.float32)
+
+    def typical_noise(self) -> Array:
+        """Return the covariance [12, 12] of the noise of a row without an inclusion."""
+        zero_ratio = EXPONENT * self.levels.zero_n / float(np.mean(QUICK_FORCES_N))
+        covariance = np.zeros((RINGS + 1, RINGS + 1))
+        covariance[:RINGS, :RINGS] = self.camera + self._smooth() + self.levels.gain_ratio**2 + zero_ratio**2
+        covariance[RINGS, RINGS] = self.levels.zero_n**2
+        return covariance
+
+    def _smooth(self) -> Array:
+        flat, model = smooth_ring_errors(self.levels, harmonic=0)
+        return flat + model + 1e-14 * np.eye(RINGS)
+
+
+def quick_press_set(training_set: PressSet, camera: Array, seed: int) -> QuickPressSet:
+    """Return a set of ramps as held presses, each at a random force."""
+    force_n = np.random.default_rng([seed, 2]).uniform(*QUICK_FORCES_N, len(training_set.rows))
+    return QuickPressSet(training_set.normalised, quick_rows(training_set.rows, force_n).astype(np.float32), camera)
+
+
+def quick_rows(rows: Single | Array, force_n: Array) -> Array:
+    """Return the rows [n, 12] of presses held at forces [n], for profile rows [n, P]."""
+    powers = np.vander(PROFILE_FORCES_N, increasing=True)
+    weights = np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers)
+    at_forces = np.asarray(rows[:, :CONTRAST_COLUMNS], np.float64).reshape(len(rows), -1, RINGS)
+    return np.column_stack([np.einsum("nk,nkj->nj", weights, at_forces), force_n])

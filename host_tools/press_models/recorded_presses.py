@@ -1,12 +1,10 @@
 """Random presses as the probe records them: unknowns and nuisances to frames, and these to what a mode reads of them.
 
-Frames, hand and cell are those of `host_tools phantom`; light and cell drift as `drifted_recording` says.
-
-What drifts between a reference press and the press on the lesion, put into a recording of the simulated probe.
-
-The LEDs' brightness, the cell's zero, and two smooth errors of the light: one that all press frames share (a flat field
-that has moved), and one of the reference that changes with the force (a forward model that is not the truth). As
-`noise.ErrorLevels` says and the estimates believe in; whether they rightly do is measured on such recordings.
+Frames, hand and cell are those of `host_tools phantom`. What drifts between a reference press and the press on the
+lesion is added by `drifted`: the LEDs' brightness, the cell's zero, and two smooth errors of the light. All press
+frames share one (a flat field that has moved); the other is the reference's and changes with the force (a forward model
+that is not the truth). Their sizes are those of `ErrorLevels`, which the estimates believe in; whether they rightly do
+is measured on such recordings.
 """
 
 from __future__ import annotations
@@ -39,11 +37,94 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 from host_tools.press_models.seeds import press_seed
 
+ReadValue = TypeVar("ReadValue")
+HELD_STRAY_N = 0.0125
+"""Frames of a hold may lie within 5 % of 0.5 N (`press.band_ratio`): spread over that band, twice this each way."""
+EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
 DRIFTING = "reference", "press"
 BELOW_ONE = 0.99
 """Parts of a count are less than one also after single precision has rounded their sum."""
 GRID_MM = 0.5
 """Smooth errors are drawn on a grid this fine, far finer than they vary, and interpolated to the pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPresses:
+    """Parameters [n, 9], profile rows [n, P] and second harmonics [n, 2, K, J - 2] of recorded presses."""
+
+    parameters: Array
+    rows: Array
+    second_harmonics: Array
+
+
+def record_presses(
+    tables: ProbeTables, parameters: Array, mode: Mode, *, seed: int, levels: ErrorLevels = EXACT, jobs: int = -1
+) -> RecordedPresses:
+    """Return rows and second harmonics of presses with parameters [n, 9] in a ramp mode; the same whatever `jobs`."""
+
+    def read(number: int) -> tuple[Array, Array]:
+        recording = recorded_press(tables, parameters[number], mode, press_seed(seed, number), levels=levels)
+        profile = press_profile(recording)
+        return profile.as_row(), profile.second_harmonic
+
+    rows, second_harmonics = zip(*in_parallel(read, len(parameters), jobs), strict=True)
+    return RecordedPresses(parameters, np.array(rows), np.array(second_harmonics))
+
+
+def recorded_press(
+    tables: ProbeTables,
+    parameters: Array,
+    mode: Mode,
+    seed: int,
+    *,
+    levels: ErrorLevels = EXACT,
+    neighbour: Neighbour | None = None,
+    wet_ratio: float = 0.0,
+    ramps: PressRamps | None = None,
+) -> Recording:
+    """Return the recording of one press with parameters [9], in the frames that a mode takes.
+
+    `neighbour` is a second inclusion, `wet_ratio` the share of the face under gel; `ramps` say how the face deforms
+    where the tables do not.
+    """
+    rng = np.random.default_rng([seed, 1])
+    inclusion = Inclusion(*map(float, parameters[:3]))
+    protocol = protocol_of(mode, float(parameters[-1]), rng.uniform(0, 2 * np.pi))
+    scenario = scenario_of(parameters, neighbour, wet_ratio)
+    recording = phantom_recording(inclusion, tables, seed=seed, protocol=protocol, scenario=scenario, ramps=ramps)
+    return recording if levels == EXACT else drifted(recording, rng, levels)
+
+
+def protocol_of(mode: Mode, offset_mm: float, angle_rad: float) -> PhantomProtocol:
+    """Return the forces and the place of a press in a mode."""
+    place = ProbePlacement(offset_mm * float(np.cos(angle_rad)), offset_mm * float(np.sin(angle_rad)))
+    count = FRAMES[mode].count
+    if FRAMES[mode].is_ramp:
+        return PhantomProtocol(tuple(np.linspace(RAMP_FROM_N, RAMP_TO_N, count)), frames=1, place=place)
+    return PhantomProtocol((TARGET_N,), frames=count, place=place, stray_n=HELD_STRAY_N)
+
+
+def scenario_of(parameters: Array, neighbour: Neighbour | None = None, wet_ratio: float = 0.0) -> Scenario:
+    """Return what the probe is pressed on, but for the inclusion, for parameters [9]."""
+    at = dict(zip(PARAMETERS, map(float, parameters), strict=True))
+    skin = Skin(
+        albedo=at["albedo"],
+        spread_mm=at["spread_mm"],
+        contact_pressure_kpa=at["contact_pressure_kpa"],
+        wet_ratio=wet_ratio,
+    )
+    return Scenario(
+        skin=skin,
+        tissue_modulus_kpa=at["tissue_modulus_kpa"],
+        slab_thickness_mm=at["slab_thickness_mm"],
+        neighbour=neighbour,
+    )
+
+
+def in_parallel(work: Callable[[int], ReadValue], count: int, jobs: int) -> list[ReadValue]:
+    """Return the results of `work` on 0 to `count` - 1, one thread a process."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    return list(Parallel(n_jobs=jobs, batch_size=4)(delayed(work)(number) for number in range(count)))
 
 
 def drifted(recording: Recording, rng: np.random.Generator, levels: ErrorLevels) -> Recording:
@@ -98,90 +179,3 @@ def _cubic_weights(force_n: float) -> NDArray[np.float64]:
     powers = np.vander(PROFILE_FORCES_N, increasing=True)
     at = np.clip(force_n, PROFILE_FORCES_N[0], PROFILE_FORCES_N[-1]) ** np.arange(len(PROFILE_FORCES_N))
     return np.asarray(np.linalg.solve(powers.T, at))
-
-
-ReadValue = TypeVar("ReadValue")
-
-HELD_STRAY_N = 0.0125
-"""Frames of a hold may lie within 5 % of 0.5 N (`press.band_ratio`): spread over that band, twice this each way."""
-
-EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedPresses:
-    """Parameters [n, 9], profile rows [n, P] and second harmonics [n, 2, K, J - 2] of recorded presses."""
-
-    parameters: Array
-    rows: Array
-    second_harmonics: Array
-
-
-def scenario_of(parameters: Array, neighbour: Neighbour | None = None, wet_ratio: float = 0.0) -> Scenario:
-    """Return what the probe is pressed on, but for the inclusion, for parameters [9]."""
-    at = dict(zip(PARAMETERS, map(float, parameters), strict=True))
-    skin = Skin(
-        albedo=at["albedo"],
-        spread_mm=at["spread_mm"],
-        contact_pressure_kpa=at["contact_pressure_kpa"],
-        wet_ratio=wet_ratio,
-    )
-    return Scenario(
-        skin=skin,
-        tissue_modulus_kpa=at["tissue_modulus_kpa"],
-        slab_thickness_mm=at["slab_thickness_mm"],
-        neighbour=neighbour,
-    )
-
-
-def protocol_of(mode: Mode, offset_mm: float, angle_rad: float) -> PhantomProtocol:
-    """Return the forces and the place of a press in a mode."""
-    place = ProbePlacement(offset_mm * float(np.cos(angle_rad)), offset_mm * float(np.sin(angle_rad)))
-    count = FRAMES[mode].count
-    if FRAMES[mode].is_ramp:
-        return PhantomProtocol(tuple(np.linspace(RAMP_FROM_N, RAMP_TO_N, count)), frames=1, place=place)
-    return PhantomProtocol((TARGET_N,), frames=count, place=place, stray_n=HELD_STRAY_N)
-
-
-def recorded_press(
-    tables: ProbeTables,
-    parameters: Array,
-    mode: Mode,
-    seed: int,
-    *,
-    levels: ErrorLevels = EXACT,
-    neighbour: Neighbour | None = None,
-    wet_ratio: float = 0.0,
-    ramps: PressRamps | None = None,
-) -> Recording:
-    """Return the recording of one press with parameters [9], in the frames that a mode takes.
-
-    `neighbour` is a second inclusion, `wet_ratio` the share of the face under gel; `ramps` say how the face deforms
-    where the tables do not.
-    """
-    rng = np.random.default_rng([seed, 1])
-    inclusion = Inclusion(*map(float, parameters[:3]))
-    protocol = protocol_of(mode, float(parameters[-1]), rng.uniform(0, 2 * np.pi))
-    scenario = scenario_of(parameters, neighbour, wet_ratio)
-    recording = phantom_recording(inclusion, tables, seed=seed, protocol=protocol, scenario=scenario, ramps=ramps)
-    return recording if levels == EXACT else drifted(recording, rng, levels)
-
-
-def record_presses(
-    tables: ProbeTables, parameters: Array, mode: Mode, *, seed: int, levels: ErrorLevels = EXACT, jobs: int = -1
-) -> RecordedPresses:
-    """Return rows and second harmonics of presses with parameters [n, 9] in a ramp mode; the same whatever `jobs`."""
-
-    def read(number: int) -> tuple[Array, Array]:
-        recording = recorded_press(tables, parameters[number], mode, press_seed(seed, number), levels=levels)
-        profile = press_profile(recording)
-        return profile.as_row(), profile.second_harmonic
-
-    rows, second_harmonics = zip(*in_parallel(read, len(parameters), jobs), strict=True)
-    return RecordedPresses(parameters, np.array(rows), np.array(second_harmonics))
-
-
-def in_parallel(work: Callable[[int], ReadValue], count: int, jobs: int) -> list[ReadValue]:
-    """Return the results of `work` on 0 to `count` - 1, one thread a process."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    return list(Parallel(n_jobs=jobs, batch_size=4)(delayed(work)(number) for number in range(count)))

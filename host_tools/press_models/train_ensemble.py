@@ -3,9 +3,8 @@
 Members differ in their first weights and in the presses they see. The ensemble's variance is the mean of the members'
 variances plus the variance of their means. Source: Lakshminarayanan et al., NeurIPS 2017.
 
-Adam: stochastic gradient descent with a step of its own for every weight, under a cosine schedule.
-
-For networks of ten thousand weights on endless random presses; the paper's 99 weights learn by SCG.
+They learn by Adam, stochastic gradient descent with a step of its own for every weight, under a cosine schedule: it is
+for networks of ten thousand weights on endless random presses; the paper's 99 weights learn by SCG.
 Sources: Kingma & Ba, ICLR 2015, algorithm 1; Loshchilov & Hutter, ICLR 2017, on the schedule.
 """
 
@@ -24,6 +23,10 @@ from host_tools.press_models.dense_network import DenseLayer, InputScaling, init
 from host_tools.press_models.noisy_presses import Presses
 
 DECAY_MEAN, DECAY_SQUARE, TINY = 0.9, 0.999, np.float32(1e-8)
+BATCH, RATE = 1024, 3e-3
+SCALED_ON = 20_000
+"""Rows of which the scaling of the inputs is taken."""
+FEWEST_PRESSES = 1000
 
 
 class Adam:
@@ -46,12 +49,6 @@ class Adam:
             mean += np.float32(1 - DECAY_MEAN) * (slope - mean)
             square += np.float32(1 - DECAY_SQUARE) * (slope * slope - square)
             part -= np.float32(rate) * mean / (np.sqrt(square) + TINY)
-
-
-BATCH, RATE = 1024, 3e-3
-SCALED_ON = 20_000
-"""Rows of which the scaling of the inputs is taken."""
-FEWEST_PRESSES = 1000
 
 
 class Task(NamedTuple):

@@ -39,73 +39,11 @@ SIZES, DEPTHS = (1.5, SIZES_MM[1]), (SHALLOWEST_MM, deepest_mm(1.5))
 PLACE = slice(SIZE, DEPTH + 1)
 THICKNESS = PARAMETERS.index("slab_thickness_mm")
 ENDS: Array = np.array([SIZES, DEPTHS])
-
-
-def draw_wide_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
-    """Return parameters [count, 9] as `press_samples.draw_parameters`, size and depth even over the wide ranges."""
-    values = draw_parameters(count, rng, inclusions_a_skin=inclusions_a_skin)
-    again = np.full(count, True)
-    while again.any():
-        values[again, PLACE] = rng.uniform(ENDS[:, 0], ENDS[:, 1], (int(again.sum()), 2))
-        size_mm, depth_mm = values[:, PLACE].T
-        deepest = np.minimum([deepest_mm(size) for size in size_mm], values[:, THICKNESS] - NEAREST_MM - size_mm)
-        again = depth_mm > deepest
-    return values
-
-
-def is_outside(normalised: Array | Single) -> NDArray[np.bool_]:
-    """Return whether size or depth lies outside its trained range [n], for coordinates [n, 9] of `normalise`."""
-    return np.asarray((np.abs(normalised[:, PLACE]) > 1).any(axis=1))
-
-
-def wide_coordinates(parameters: Array) -> Array:
-    """Return the coordinates [n, 9] in which wide presses are polynomials: -1 to 1 over the wide ranges."""
-    at = polynomial_coordinates(normalise(parameters), parameters)
-    low, high = ENDS.T
-    at[:, PLACE] = 2 * (parameters[:, PLACE] - low) / (high - low) - 1
-    return at
-
-
-@dataclass(frozen=True, eq=False)
-class WideSurrogate:
-    """`PressSurrogate` over the wide ranges."""
-
-    inclusion_field: LegendreSum
-    baseline: LegendreSum
-
-    def rows(self, parameters: Array) -> Array:
-        """Return profile rows [n, P] at parameters [n, 9]."""
-        at = wide_coordinates(parameters)
-        return assemble(inclusion_factor(parameters) * self.inclusion_field.values(at), self.baseline.values(at))
-
-
-@dataclass(frozen=True, eq=False)
-class RangeNetwork:
-    """Networks that share one scaling of the inputs; their log odds are averaged."""
-
-    scaling: InputScaling
-    members: tuple[list[DenseLayer], ...]
-
-    def log_odds(self, rows: Array) -> Array:
-        """Return the log odds [n] that size or depth lies outside, for rows [n, P]."""
-        inputs = self.scaling.inputs(rows.astype(np.float32))
-        return np.asarray(np.mean([activations_of(layers, inputs)[-1][:, 0] for layers in self.members], axis=0))
-
-
-def logistic_loss_and_gradient(
-    layers: list[DenseLayer], inputs: Single, is_outside: Single
-) -> tuple[float, list[DenseLayer]]:
-    """Return the mean of -ln(probability of what is so), and its gradient; `is_outside` [n] is 0 or 1."""
-    activations = activations_of(layers, inputs)
-    log_odds = activations[-1][:, 0]
-    loss = float(np.mean(np.logaddexp(0, log_odds) - is_outside * log_odds))
-    by_output = ((expit(log_odds) - is_outside) / np.float32(len(log_odds)))[:, None]
-    return loss, backward(layers, activations, by_output.astype(np.float32))
-
-
 REACH, HIGHEST = INCLUSION_REACH | {"size_mm": 22.0, "depth_mm": 20.0}, {"size_mm": 11, "depth_mm": 11}
-"""Degrees as those of the probe's own surrogate, higher ones in size and depth, whose ranges are wider; still higher
-ones follow presses kept apart worse, where the largest and deepest inclusions are few."""
+"""Degrees as those of the probe's own surrogate, but higher in size and depth, whose ranges are wider.
+
+Still higher ones follow presses kept apart worse, where the largest and deepest inclusions are few.
+"""
 
 
 @dataclass(frozen=True)
@@ -185,3 +123,65 @@ def train_network(training_set: PressSet, seed: int, budget: RangeBudget, jobs: 
     return RangeNetwork(
         *train_members(training_set, task, seed=seed, members=budget.members, steps=budget.steps, jobs=jobs)
     )
+
+
+@dataclass(frozen=True, eq=False)
+class RangeNetwork:
+    """Networks that share one scaling of the inputs; their log odds are averaged."""
+
+    scaling: InputScaling
+    members: tuple[list[DenseLayer], ...]
+
+    def log_odds(self, rows: Array) -> Array:
+        """Return the log odds [n] that size or depth lies outside, for rows [n, P]."""
+        inputs = self.scaling.inputs(rows.astype(np.float32))
+        return np.asarray(np.mean([activations_of(layers, inputs)[-1][:, 0] for layers in self.members], axis=0))
+
+
+def logistic_loss_and_gradient(
+    layers: list[DenseLayer], inputs: Single, is_outside: Single
+) -> tuple[float, list[DenseLayer]]:
+    """Return the mean of -ln(probability of what is so), and its gradient; `is_outside` [n] is 0 or 1."""
+    activations = activations_of(layers, inputs)
+    log_odds = activations[-1][:, 0]
+    loss = float(np.mean(np.logaddexp(0, log_odds) - is_outside * log_odds))
+    by_output = ((expit(log_odds) - is_outside) / np.float32(len(log_odds)))[:, None]
+    return loss, backward(layers, activations, by_output.astype(np.float32))
+
+
+def draw_wide_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
+    """Return parameters [count, 9] as `press_samples.draw_parameters`, size and depth even over the wide ranges."""
+    values = draw_parameters(count, rng, inclusions_a_skin=inclusions_a_skin)
+    again = np.full(count, True)
+    while again.any():
+        values[again, PLACE] = rng.uniform(ENDS[:, 0], ENDS[:, 1], (int(again.sum()), 2))
+        size_mm, depth_mm = values[:, PLACE].T
+        deepest = np.minimum([deepest_mm(size) for size in size_mm], values[:, THICKNESS] - NEAREST_MM - size_mm)
+        again = depth_mm > deepest
+    return values
+
+
+def is_outside(normalised: Array | Single) -> NDArray[np.bool_]:
+    """Return whether size or depth lies outside its trained range [n], for coordinates [n, 9] of `normalise`."""
+    return np.asarray((np.abs(normalised[:, PLACE]) > 1).any(axis=1))
+
+
+def wide_coordinates(parameters: Array) -> Array:
+    """Return the coordinates [n, 9] in which wide presses are polynomials: -1 to 1 over the wide ranges."""
+    at = polynomial_coordinates(normalise(parameters), parameters)
+    low, high = ENDS.T
+    at[:, PLACE] = 2 * (parameters[:, PLACE] - low) / (high - low) - 1
+    return at
+
+
+@dataclass(frozen=True, eq=False)
+class WideSurrogate:
+    """`PressSurrogate` over the wide ranges."""
+
+    inclusion_field: LegendreSum
+    baseline: LegendreSum
+
+    def rows(self, parameters: Array) -> Array:
+        """Return profile rows [n, P] at parameters [n, 9]."""
+        at = wide_coordinates(parameters)
+        return assemble(inclusion_factor(parameters) * self.inclusion_field.values(at), self.baseline.values(at))

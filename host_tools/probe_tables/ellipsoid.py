@@ -1,16 +1,12 @@
 """An ellipsoid for the virtual probe: one inclusion solved in three dimensions, and what being longer adds to a sphere.
 
-One inclusion solved in three dimensions to a table of itself: what the virtual probe's tables of spheres do not hold.
+The virtual probe's tables hold spheres alone, so an oblong inclusion gets a table of itself. It lies under the middle
+of the probe, or is not there at all.
 
-Oblong inclusions are pressed with it. Small strain; with force and slab the field grows as that of the sphere that the
-press is told of, as for every inclusion off the axis. The inclusion lies under the middle of the probe, or is not there
-at all.
-
-An ellipsoid for the virtual probe: the probe's own sphere of its width, and what being longer adds to that.
-
-Ellipsoid and sphere are solved in three dimensions in the same way, and their difference is carried on to the probe's
-table: so an inclusion that is hardly longer is hardly another one, and what the table's own spheres are off is in both.
-Small strain; with force and slab the difference grows as the sphere does.
+Ellipsoid and sphere of its width are solved in three dimensions in the same way, and their difference is carried on to
+the probe's table: so an inclusion that is hardly longer is hardly another one, and what the table's own spheres are off
+is in both. Small strain; with force and slab the difference grows as the sphere does, as for every inclusion off the
+axis.
 """
 
 from __future__ import annotations
@@ -34,9 +30,7 @@ UNDER_THE_PROBE_MM = 5.0
 
 @dataclass(frozen=True)
 class SolvedInclusion(OffAxisTable):
-    """A table of one inclusion: `modes_per_n` [2, K, R] of deformation and pressure, whatever inclusion is asked
-    for.
-    """
+    """A table of one inclusion, whichever is asked for: `modes_per_n` [2, K, R] of deformation and pressure."""
 
     modes_per_n: Array
 

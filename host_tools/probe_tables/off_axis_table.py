@@ -4,10 +4,9 @@ Small strain, on the coarse mesh (0.6 % of the peak). Between the points (5 x 4 
 for stiff inclusions under the face, 10 % for soft ones and 15 % at its rim, as
 `tests/host_tools/probe_tables/test_off_axis_table.py` measures against fresh solves.
 
-A probe that is tilted while it touches: its back turns about y by one degree, in small strain and closed contact.
-
-Linear, so it adds to any press; where the sum of the pressures would pull, the face has lifted, and closed contact no
-longer holds. The field is a cosine of the angle, so the ray along +x says it all.
+A probe that is tilted while it touches turns its back about y, by one degree, in small strain and closed contact. That
+is linear, so it adds to any press; where the sum of the pressures would pull, the face has lifted, and closed contact
+no longer holds. The field is a cosine of the angle, so the ray along +x says it all.
 """
 
 from __future__ import annotations
@@ -41,6 +40,14 @@ from host_tools.probe_tables.surface_table import inclusion_axes, ring_means
 from host_tools.scenes.scene import Placement, Press, Scene
 
 ORDER = 3
+POINTS = (5, 4, 2, 6)
+"""Points in size, depth, mismatch and offset."""
+SMALLEST_SIZE_MM = 2.0
+OFFSETS_MM = (2.0, 16.0)
+MODES = 11
+"""Cosines kept: the twelfth of the narrowest inclusion is below a thousandth of its peak."""
+EVERY = 4
+"""Every which of the face's radii is kept: 0.2 mm apart."""
 
 
 def tilt_per_degree(
@@ -56,16 +63,6 @@ def tilt_per_degree(
     probe, _ = press.contact.bodies(u.components)
     pressure = contact_pressure_kpa(mesh, SOLID, order, press.stress_of_probe(u, materials))
     return rays.r_mm[0], sampler(probe.u[-1] + sinking_mm)[0], sampler(pressure)[0]
-
-
-POINTS = (5, 4, 2, 6)
-"""Points in size, depth, mismatch and offset."""
-SMALLEST_SIZE_MM = 2.0
-OFFSETS_MM = (2.0, 16.0)
-MODES = 11
-"""Cosines kept: the twelfth of the narrowest inclusion is below a thousandth of its peak."""
-EVERY = 4
-"""Every which of the face's radii is kept: 0.2 mm apart."""
 
 
 def off_axis_scene(inclusion: Inclusion, offset_mm: float, *, force_n: float = 1.0) -> Scene:
@@ -99,9 +96,7 @@ def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
 
 
 def face_modes(r_mm: Array, face: FaceState, inclusion_free: FaceState) -> Array:
-    """Return the cosine series [2, K, R] of what an inclusion adds to deformation and pressure, on the radii of the
-    table.
-    """
+    """Return the cosine series [2, K, R], on the table's radii, of an inclusion's deformation and pressure."""
     p_kpa = np.array([ring_means(r_mm, ray) for ray in face.p_kpa - inclusion_free.p_kpa])
     return np.stack([cosine_modes(face.w_mm - inclusion_free.w_mm), cosine_modes(p_kpa)])[..., ::EVERY]
 

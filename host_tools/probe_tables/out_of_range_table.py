@@ -1,5 +1,4 @@
-"""Faces under inclusions around the trained ranges: what the network that tells them from inclusions within learns
-from.
+"""Faces under inclusions around the trained ranges: what the range classifier learns from.
 
 Larger, shallower and deeper inclusions than the virtual probe's tables hold, in the nominal slab, as far down as the
 slab reaches. They carry the probe's own tables on: at the nearest inclusion that these hold both agree, and what
@@ -47,9 +46,7 @@ DEEPEST_MM, BEND_MM, BENT_OVER_MM = 17.9, 11.5, 1 / 0.7
 
 
 class WideAxes(NamedTuple):
-    """Ascending points in size, in the share of the way from the shallowest to the deepest inclusion, and in
-    mismatch.
-    """
+    """Ascending points in size, in the share of the way from shallowest to deepest, and in mismatch."""
 
     size_mm: Array
     depth_share: Array
@@ -69,10 +66,10 @@ class WideAxes(NamedTuple):
         return far_field_strength(size_mm, depth_mm) * mismatch * interpolated(fields, self, place)
 
     def carried_on(self, own: Array, fields: Array, inclusion: Inclusion, near: Inclusion, slab: Slab) -> Array:
-        """Return an inclusion's field per newton where that of the nearest inclusion inside is `own`, as strong as far
-        away.
+        """Return an inclusion's field per newton, where `own` is that of `near`, the nearest inclusion inside.
 
-        What the wide fields miss there is taken off: an inclusion inside has the probe's own field, and nothing jumps.
+        The ratio of both is that of their strengths far away. What the wide fields miss at `near` is taken off: an
+        inclusion inside has the probe's own field, and nothing jumps.
         """
         ratio = far_field_strength(inclusion.size_mm, inclusion.depth_mm) / far_field_strength(
             near.size_mm, near.depth_mm
@@ -102,9 +99,7 @@ class WideSurfaceTable(SurfaceTable):
 
 @dataclass(frozen=True)
 class WideOffAxisTable(OffAxisTable):
-    """The probe's own table, carried on by `wide` [2, S, D, M, K, R], which is of inclusions `ASIDE_MM` beside the
-    axis.
-    """
+    """The probe's own table, carried on by `wide` [2, S, D, M, K, R]: inclusions `ASIDE_MM` beside the axis."""
 
     wide_axes: WideAxes
     wide: Array
@@ -168,9 +163,7 @@ def made_for() -> dict[str, Any]:
 
 
 def load_wide_table(folder: Path) -> WideTable:
-    """Read a table; raise `InvalidQuantity` when it is missing, not what it says, or made for other inclusions or
-    scenes.
-    """
+    """Read a table; raise `InvalidQuantity` when it is missing, not what it says, or made for others."""
     arrays, record = load_table(folder, NAME, SCHEMA, ARRAYS, ACTION)
     for name, wanted in json.loads(json.dumps(made_for())).items():
         if record.get(name) != wanted:

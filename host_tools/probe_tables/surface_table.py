@@ -179,9 +179,7 @@ def _grids(axes: InclusionAxes) -> list[InclusionAxes]:
 
 
 def assembled(axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array]) -> SurfaceTable:
-    """Return the table of the fields [2, F, R] in the order of `SOLVED`, each inclusion's grid with the mismatch
-    fastest.
-    """
+    """Return the table of the fields [2, F, R] in the order of `SOLVED`; each grid with the mismatch fastest."""
     remaining, inclusions = iter(lump_per_n_mm3), []
     for grid in _grids(axes):
         fields_on_grid = np.array([next(remaining) for _ in product(*grid)])

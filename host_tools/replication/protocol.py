@@ -5,9 +5,8 @@ trained on the other 133 of the 134 scenes, and their mean is scored. Only the n
 regressions from image to deformation are fitted on all nine. Neither image nor force has noise.
 Source: Lee & Won, IEEE JBHI 17(2), 2013, sections III and IV-A.
 
-An inclusion to the image features that a perfect camera would see: no noise, no rounding, force held exactly.
-
-The light is the virtual probe's own, so that what differs from `phantom_recording` is the camera and the hand alone.
+`PerfectCamera` gives an inclusion's image features without noise or rounding, the force held exactly. The light is the
+virtual probe's own, so that what differs from `phantom_recording` is the camera and the hand alone.
 Source: Lee & Won, IEEE JBHI 17(2), 2013: "We assume that there is no noise in the tactile data."
 """
 
@@ -38,6 +37,10 @@ CENTRED = ProbePlacement()
 FULL_SCALE_COUNTS = 255
 INCLUSION_FREE = Inclusion(0.0, 8.0, 80.0)
 """Without size, depth and modulus only have to be in the table."""
+SETTINGS = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
+PRESSES = 5
+"""Recordings of each phantom: the error of one press is partly luck."""
+FIRST_SEED = 2000
 
 
 class PerfectCamera:
@@ -70,12 +73,6 @@ def _formation(scenario: Scenario, tables: ProbeTables) -> ImageFormation:
     if scenario.light == "linear":
         return LinearImage(scenario.optics, shape, CAMERA.scale)
     return ScatteredImage(tables.light, scenario.skin, scenario.lens, shape, CAMERA.scale)
-
-
-SETTINGS = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
-PRESSES = 5
-"""Recordings of each phantom: the error of one press is partly luck."""
-FIRST_SEED = 2000
 
 
 class ProtocolStep(Enum):

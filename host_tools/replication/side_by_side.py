@@ -75,8 +75,7 @@ class Runs:
         return sum(trial.minimum.status == "max_iterations" for trial in self.trials)
 
     def worse_than_a_constant(self) -> Array:
-        """Count, for each unknown [3], the networks that do no better than a constant guess; one that is no number
-        counts too."""
+        """Count, for each unknown [3], the networks that do no better than a constant guess, or give no number."""
         return np.asarray(np.sum(~(self.percent < self.constant_percent), axis=0))
 
     def poor(self, best: float) -> int:

@@ -3,8 +3,6 @@
 The origin is the centre of the probe's face on the undeformed tissue; z points out of the tissue. Units: mm, kPa, N.
 Source of the training box: Lee & Won, IEEE JBHI 17(2), 2013, section III.
 
-The parts of a scene: waveguide, tissue with its layers, placement of the inclusion, press. Units: mm, kPa, N.
-
 Layer 1 of the waveguide, the hardest, faces the tissue. The paper leaves face, layer moduli, slab and press open; the
 defaults here are ours. Source: Lee & Won, IEEE JBHI 17(2), 2013, sections II-III.
 """

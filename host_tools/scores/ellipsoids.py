@@ -37,6 +37,15 @@ from host_tools.scenes.scene import Placement, Scene
 from host_tools.scores.outside import FALSE_AT_MOST, REFUSED_AT_LEAST, SHARE, EstimateOf, clear_inclusions
 
 WIDTH_RATIO = (1.6, 2.4)
+ELLIPSOIDS, SKINS = 40, 3
+"""Inclusions that are solved, and presses of each: on other skins and tissue, and turned otherwise under the camera."""
+CLAIM = (
+    f"{ELLIPSOIDS} random ellipsoids 1.6-2.4 times as long as wide and high, 5-10 mm wide, 4-7 mm deep, 30-150 kPa, up "
+    f"to 2 mm off the axis; {SKINS} presses of each on other skin, tissue and slab, with every drift."
+)
+HEADER = ("mode", "width (mm)", "depth (mm)", "modulus (kPa)", "times as long", "off the axis (mm)", "long axis",
+          "deviations apart", "most that a test can flag", "refused")  # fmt: skip
+SUMMARY = ("mode", f"ellipsoids refused ({SKINS * ELLIPSOIDS})", "most that a test can flag")
 
 
 @dataclass(frozen=True)
@@ -77,8 +86,10 @@ def round_deviations(solved: ProbeTables, parameters: Array, model: RampModel, m
 
 
 def most_flagged(deviations: Array, false_flags: float) -> Array:
-    """Return the largest shares that a test can flag of presses so far from round, when it flags `false_flags` of round
-    ones and treats all directions alike."""
+    """Return the largest shares that a test can flag of presses so far from round.
+
+    Of round ones it flags `false_flags`; it treats all directions alike.
+    """
     return np.asarray(ncx2.sf(-2 * np.log(false_flags), 2, np.square(deviations)))
 
 
@@ -102,25 +113,14 @@ def nearest_round(
     return np.asarray(found.x), float(np.sqrt(2 * found.cost))
 
 
-def spoken(inclusion: Oblong) -> Sequence[str]:
+def spoken(oblong: Oblong) -> Sequence[str]:
     """Return size, depth, modulus, ratio, offset and direction as table cells."""
-    size_mm, depth_mm, modulus_kpa = inclusion.inclusion.as_tuple()
+    size_mm, depth_mm, modulus_kpa = oblong.inclusion.as_tuple()
     return (
         f"{size_mm:.1f}", f"{depth_mm:.1f}", f"{modulus_kpa:.0f}",
-        f"{inclusion.width_ratio:.2f}", f"{inclusion.offset_mm:.1f}",
-        "across" if inclusion.is_across else "along",
+        f"{oblong.width_ratio:.2f}", f"{oblong.offset_mm:.1f}",
+        "across" if oblong.is_across else "along",
     )  # fmt: skip
-
-
-ELLIPSOIDS, SKINS = 40, 3
-"""Inclusions that are solved, and presses of each: on other skins and tissue, and turned otherwise under the camera."""
-CLAIM = (
-    f"{ELLIPSOIDS} random ellipsoids 1.6-2.4 times as long as wide and high, 5-10 mm wide, 4-7 mm deep, 30-150 kPa, up "
-    f"to 2 mm off the axis; {SKINS} presses of each on other skin, tissue and slab, with every drift."
-)
-HEADER = ("mode", "width (mm)", "depth (mm)", "modulus (kPa)", "times as long", "off the axis (mm)", "long axis",
-          "deviations apart", "most that a test can flag", "refused")  # fmt: skip
-SUMMARY = ("mode", f"ellipsoids refused ({SKINS * ELLIPSOIDS})", "most that a test can flag")
 
 
 def oblong_chapter(answer: EstimateOf, model: RampModel, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
@@ -155,8 +155,8 @@ def oblong_chapter(answer: EstimateOf, model: RampModel, tables: ProbeTables, *,
 def skins(inclusions: Sequence[Oblong], rng: np.random.Generator) -> Array:
     """Return parameters [n, 9] of `SKINS` presses of each inclusion."""
     parameters = draw_parameters(SKINS * len(inclusions), rng)
-    parameters[:, :3] = np.repeat([inclusion.inclusion.as_tuple() for inclusion in inclusions], SKINS, axis=0)
-    parameters[:, -1] = np.repeat([inclusion.offset_mm for inclusion in inclusions], SKINS)
+    parameters[:, :3] = np.repeat([oblong.inclusion.as_tuple() for oblong in inclusions], SKINS, axis=0)
+    parameters[:, -1] = np.repeat([oblong.offset_mm for oblong in inclusions], SKINS)
     return parameters
 
 

@@ -5,9 +5,8 @@ that is possible is the distance of the press without noise from its nearest inc
 that one has. Source: Neyman & Pearson, Phil. Trans. R. Soc. A 231 (1933): the best test between two means d standard
 deviations apart has the power Phi(d - z).
 
-The chapter on inclusions just outside the trained ranges: refused, answered with the truth in the interval, or misled.
-
-Where the nearest inclusion inside can be told from them at all, they ought to be refused; where not, nobody can.
+Where the nearest inclusion inside can be told from them at all, they ought to be refused; where not, nobody can. The
+chapter counts those refused, answered with the truth in the interval, and misled.
 """
 
 from __future__ import annotations
@@ -45,7 +44,6 @@ FALSE_FLAGS = 1 - CRITICAL_RATIO
 """Share of presses inside that this test may flag: misfit and elongation flag as many each, all three at most 5 %."""
 STARTS = 6
 """Fits from as many places, of which the best one counts."""
-
 INCLUSIONS = (
     Inclusion(16.0, 6.0, 60.0),
     Inclusion(17.0, 6.0, 60.0),
@@ -61,6 +59,11 @@ INCLUSIONS = (
     Inclusion(14.0, 4.5, 300.0),
 )
 """Each outside in one of size, depth and modulus."""
+PRESSES = 10
+CLAIM = f"{PRESSES} recordings of each inclusion, nominal tissue and skin, with every drift."
+HEADER = ("mode", "size (mm)", "depth (mm)", "modulus (kPa)", "looks like: size", "depth", "modulus",
+          "deviations apart", "most that any test can flag", "if all false flags were its own", "refused",
+          "of the others: size holds", "depth holds", "modulus holds")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -119,17 +122,8 @@ def spoken(inclusion: Inclusion) -> Sequence[str]:
     return f"{inclusion.size_mm:.3g}", f"{inclusion.depth_mm:.3g}", f"{inclusion.youngs_modulus_kpa:.3g}"
 
 
-PRESSES = 10
-CLAIM = f"{PRESSES} recordings of each inclusion, nominal tissue and skin, with every drift."
-HEADER = ("mode", "size (mm)", "depth (mm)", "modulus (kPa)", "looks like: size", "depth", "modulus",
-          "deviations apart", "most that any test can flag", "if all false flags were its own", "refused",
-          "of the others: size holds", "depth holds", "modulus holds")  # fmt: skip
-
-
 def just_outside_chapter(model: RampModel, calibration: Calibration, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
-    """Return how alike to an inclusion inside, and how often refused, each of `INCLUSIONS` is in standard and
-    precise.
-    """
+    """Return how like one inside each of `INCLUSIONS` looks, and how often it is refused, in standard and precise."""
     ramps = in_parallel(lambda i: inclusion_ramps(tables, INCLUSIONS[i]), len(INCLUSIONS), jobs)
     seed = derived_seed(1, "just outside")
     benchmarks: list[Benchmark] = []

@@ -38,9 +38,11 @@ CLEAR_SIZE_MM, CLEAR_DEPTH_MM, CLEAR_KPA = (5.0, 10.0), (4.0, 7.0), (30.0, 150.0
 """Inclusions that show well, so that it is their company or shape that must be noticed."""
 GAP_MM, WET_RATIO = (0.5, 4.0), (0.1, 0.6)
 LARGE_MM, SHALLOW_MM = (17.5, 20.0), (2.5, 3.2)
-
 RecordPress = Callable[[Mode, int], Recording]
 Ends = tuple[float, float]
+SHARE = "share refused"
+REFUSED_AT_LEAST, FALSE_AT_MOST = 0.95, 0.05
+EstimateOf = Callable[[Recording, Mode], Estimate]
 
 
 @dataclass(frozen=True)
@@ -121,12 +123,6 @@ def _solved(
             tables, parameters[i], mode, press_seed(seed, i), levels=ErrorLevels(), ramps=ramps[i // SKINS_A_SOLUTION]
         ),
     )
-
-
-SHARE = "share refused"
-REFUSED_AT_LEAST, FALSE_AT_MOST = 0.95, 0.05
-
-EstimateOf = Callable[[Recording, Mode], Estimate]
 
 
 def outside_chapter(answer: EstimateOf, kinds: Sequence[Kind], *, jobs: int = -1) -> Chapter:

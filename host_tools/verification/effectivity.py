@@ -89,8 +89,9 @@ def _finite(rng: np.random.Generator) -> _Case:
 
 
 def _solid(rng: np.random.Generator) -> _Case:
-    """An inclusion off the axis, half symmetry; truth is one level finer (0.1 % on the force, 0.01 % on the
-    inclusion).
+    """An inclusion off the axis, half symmetry; truth is one level finer.
+
+    That is 0.1 % on the force, 0.01 % on the inclusion field.
     """
     inclusion = Inclusion(*(float(value) for value in rng.uniform((4.0, 4.0, 40.0), (12.0, 9.0, 120.0))))
     scene = Scene(inclusion, _press(rng), placement=Placement(offset_x_mm=float(rng.uniform(1.0, 9.0))))

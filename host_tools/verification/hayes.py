@@ -1,11 +1,10 @@
 """Hayes' punch: the force of the forward model's flat face, made rigid, on a bonded layer, against the exact one.
 
-Hayes' punch solved without finite elements: one Fredholm integral equation gives the force to ten digits.
-
-A rigid flat punch of radius a on a layer of thickness h bonded to a rigid base: with the layer's surface compliance
-1 - M(xi h) over that of a half-space, phi(t) - 2/pi int_0^a phi(s) int_0^oo M(xi h) cos(xi s) cos(xi t) dxi ds = 1 and
-kappa = int phi / a. Source: Lebedev & Ufliand, J. Appl. Math. Mech. 22:442 (1958); Hayes et al., J. Biomech. 5:541
-(1972).
+The exact one takes no finite elements: one Fredholm integral equation gives the force to ten digits. For a rigid flat
+punch of radius a on a layer of thickness h bonded to a rigid base, with the layer's surface compliance 1 - M(xi h) over
+that of a half-space, phi(t) - 2/pi int_0^a phi(s) int_0^oo M(xi h) cos(xi s) cos(xi t) dxi ds = 1 and
+kappa = int phi / a.
+Source: Lebedev & Ufliand, J. Appl. Math. Mech. 22:442 (1958); Hayes et al., J. Biomech. 5:541 (1972).
 """
 
 from __future__ import annotations

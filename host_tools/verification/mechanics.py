@@ -35,9 +35,7 @@ SMALL_BOUND, FORCE_BOUND, INCLUSION_BOUND = 0.01, 0.01, 0.03
 
 
 class ProgramRamp(NamedTuple):
-    """One program's answer: force in N [indentation], w and inclusion field in mm [indentation, radius], wall time in
-    s.
-    """
+    """One program's answer: force (N) [indentation], w and inclusion field (mm) [indentation, radius], time (s)."""
 
     force_n: Array
     w_mm: Array
@@ -108,9 +106,7 @@ ProgramsFound = dict[str, ProgramRamp]
 
 
 def benchmarks(found: ProgramsFound) -> tuple[Benchmark, ...]:
-    """Return ours against CalculiX: force, w and inclusion field in small strain and in finite strain with true
-    sliding.
-    """
+    """Return ours against CalculiX: force, w and inclusion field, in small and in finite strain with true sliding."""
     small, theirs = found[SMALL], found[CALCULIX_SMALL]
     case = f"small strain, {INDENTATIONS_MM[0]:g} mm"
     rows = [

@@ -190,9 +190,7 @@ def test_a_hold_that_is_too_hard_is_rejected_with_both_numbers(running):
 
 @pytest.mark.parametrize("mode", ["paper", "standard"])
 def test_a_press_far_beside_the_inclusion_is_rejected_and_says_where_to_go(running, mode):
-    """The probe stands 5 mm to the right of the inclusion: the inclusion shines on the left, -x, and there it has to
-    go.
-    """
+    """The probe stands 5 mm to the right of the inclusion, which shines on the left, -x: there the probe has to go."""
     with running(Scenario(hand=replace(HAND, miss_x_mm=5.0))) as device:
         job = device.press(mode)
     assert job["state"] == "rejected"

@@ -23,6 +23,50 @@ TOUCH_RATIO = 0.7
 """A frame on the way to the hold, at less than this part of its force, shows what the force does to the image."""
 FEWEST_COMPARED = 2
 """Whether a frame is torn shows only beside another one."""
+REFERENCE_BEYOND_N = 0.02
+"""So much further the reference ramp reaches at both ends: no press frame's flat field is extrapolated."""
+
+
+class WantedFrames(Protocol):
+    """Frames of one press: those that are kept so far, and the forces at which more are wanted."""
+
+    is_ramp: bool
+
+    @property
+    def frames(self) -> list[Frame]:
+        """The frames so far, at most as many as the mode needs."""
+
+    @property
+    def window_n(self) -> tuple[float, float]:
+        """Forces (N) between which frames are wanted."""
+
+    @property
+    def wanted_n(self) -> tuple[float, ...]:
+        """Forces (N) at which a frame is still wanted."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all frames are there."""
+
+    def see(self, frame: Frame, state: PressState) -> Guidance:
+        """Keep a frame of the touching probe if it counts; return what to do next."""
+
+    def drop_outlier(self, dark_counts: float) -> Outlier | None:
+        """Drop the frame that is most unlike the others and return it, or None when they are alike."""
+
+    def begin_again(self) -> None:
+        """Forget all frames: the probe was lifted."""
+
+    def light_and_hard(self) -> tuple[Frame, list[Frame]] | None:
+        """Return a frame at a small force and those at the largest, or None when no small one was seen."""
+
+
+def wanted_frames(mode: Mode, role: Role, press: PressSection, tears: TearWatch) -> WantedFrames:
+    """Return what a press of a mode and role wants."""
+    count = FRAMES[mode].count
+    if FRAMES[mode].is_ramp:
+        return RampFrames(ramp_targets_n(count, role), tears)
+    return HoldFrames(count, press, tears)
 
 
 class HoldFrames:
@@ -79,16 +123,6 @@ class HoldFrames:
         if self._touch is None or self._touch.force_n >= TOUCH_RATIO * self._press.target_n:
             return None
         return self._touch, self.frames
-
-
-REFERENCE_BEYOND_N = 0.02
-"""So much further the reference ramp reaches at both ends: no press frame's flat field is extrapolated."""
-
-
-def ramp_targets_n(count: int, role: Role) -> tuple[float, ...]:
-    """Return the `count` forces (N), evenly spaced and growing, at which a press of a role is to be seen."""
-    beyond_n = REFERENCE_BEYOND_N if role == "reference" else 0.0
-    return tuple(float(force) for force in np.linspace(RAMP_FROM_N - beyond_n, RAMP_TO_N + beyond_n, count))
 
 
 class RampFrames:
@@ -176,43 +210,7 @@ class RampFrames:
         return Guidance.PRESS_SLOWLY if self._is_rising else Guidance.PRESS_LIGHTER
 
 
-class WantedFrames(Protocol):
-    """Frames of one press: those that are kept so far, and the forces at which more are wanted."""
-
-    is_ramp: bool
-
-    @property
-    def frames(self) -> list[Frame]:
-        """The frames so far, at most as many as the mode needs."""
-
-    @property
-    def window_n(self) -> tuple[float, float]:
-        """Forces (N) between which frames are wanted."""
-
-    @property
-    def wanted_n(self) -> tuple[float, ...]:
-        """Forces (N) at which a frame is still wanted."""
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether all frames are there."""
-
-    def see(self, frame: Frame, state: PressState) -> Guidance:
-        """Keep a frame of the touching probe if it counts; return what to do next."""
-
-    def drop_outlier(self, dark_counts: float) -> Outlier | None:
-        """Drop the frame that is most unlike the others and return it, or None when they are alike."""
-
-    def begin_again(self) -> None:
-        """Forget all frames: the probe was lifted."""
-
-    def light_and_hard(self) -> tuple[Frame, list[Frame]] | None:
-        """Return a frame at a small force and those at the largest, or None when no small one was seen."""
-
-
-def wanted_frames(mode: Mode, role: Role, press: PressSection, tears: TearWatch) -> WantedFrames:
-    """Return what a press of a mode and role wants."""
-    count = FRAMES[mode].count
-    if FRAMES[mode].is_ramp:
-        return RampFrames(ramp_targets_n(count, role), tears)
-    return HoldFrames(count, press, tears)
+def ramp_targets_n(count: int, role: Role) -> tuple[float, ...]:
+    """Return the `count` forces (N), evenly spaced and growing, at which a press of a role is to be seen."""
+    beyond_n = REFERENCE_BEYOND_N if role == "reference" else 0.0
+    return tuple(float(force) for force in np.linspace(RAMP_FROM_N - beyond_n, RAMP_TO_N + beyond_n, count))

@@ -1,4 +1,4 @@
-"""Frames that are unlike the others of their press: a flash, a bubble, a slip. To the worst of a hold or of a ramp.
+"""Frames of a hold or of a ramp to the one that is most unlike the others: a flash, a bubble, a slip.
 
 Of a hold, the light above dark in blocks of the face is compared, brought to one force by the power that contact
 follows; so both the mean level and the profile count. Source: median and median absolute deviation, Rousseeuw & Croux,
@@ -30,6 +30,9 @@ BLOCKS = 6, 8
 """Rows and columns of blocks."""
 FEWEST_FRAMES = 5
 """Of fewer nobody can say which one is unlike the others."""
+FEWEST_RAMP_FRAMES = 8
+"""Fewer leave too little beside the four coefficients to tell a frame from the course of the others."""
+DEGREE = 3
 ROBUST_SIGMAS = 6.0
 DEVIATION_RATIO = 0.05
 """A deviation below this part of the light is no outlier however alike the others are; the band is as wide."""
@@ -59,13 +62,6 @@ def worst_outlier(frames: Sequence[Frame], dark_counts: float) -> Outlier | None
     return Outlier(frames[worst], float(deviations[worst]))
 
 
-def light_at_one_force(frame: Frame, dark_counts: float) -> NDArray[np.float64]:
-    """Return the light above dark in blocks [6, 8] of a frame, over the power of its force that contact follows."""
-    rows, columns = BLOCKS
-    blocks = cv2.resize(frame.counts.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
-    return np.asarray((blocks - dark_counts) / max(frame.force_n, 1e-6) ** EXPONENT, dtype=np.float64)
-
-
 def _deviations(lights: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the root mean square deviation of each frame's blocks from the median frame, over its mean light."""
     light = np.array(lights)
@@ -74,11 +70,6 @@ def _deviations(lights: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     if level <= 0.0:
         return np.zeros(len(lights))
     return np.asarray(np.sqrt(np.mean((light - usual) ** 2, axis=(1, 2))) / level)
-
-
-DEGREE = 3
-FEWEST_RAMP_FRAMES = 8
-"""Fewer leave too little beside the four coefficients to tell a frame from the course of the others."""
 
 
 def ramp_outlier(frames: Sequence[Frame], dark_counts: float) -> Outlier | None:
@@ -112,10 +103,6 @@ class _Stray(NamedTuple):
         return self.deviation_ratio > max(ROBUST_SIGMAS * self.sigma_ratio, DEVIATION_RATIO)
 
 
-def _powers(values: Array) -> Array:
-    return np.vander(values - values.mean(), DEGREE + 1)
-
-
 def _stray(light: Array, course: Array) -> _Stray:
     """Return the furthest of light [n, blocks] from the best sum of a course's columns [n, 4]."""
     basis, _ = np.linalg.qr(course)
@@ -125,3 +112,14 @@ def _stray(light: Array, course: Array) -> _Stray:
     left = max(float(np.sum(squares) - squares[worst] / free[worst]), 0.0)
     sigma = np.sqrt(left / (len(light) - DEGREE - 2))
     return _Stray(worst, float(np.sqrt(squares[worst]) / free[worst]), float(sigma))
+
+
+def _powers(values: Array) -> Array:
+    return np.vander(values - values.mean(), DEGREE + 1)
+
+
+def light_at_one_force(frame: Frame, dark_counts: float) -> NDArray[np.float64]:
+    """Return the light above dark in blocks [6, 8] of a frame, over the power of its force that contact follows."""
+    rows, columns = BLOCKS
+    blocks = cv2.resize(frame.counts.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
+    return np.asarray((blocks - dark_counts) / max(frame.force_n, 1e-6) ** EXPONENT, dtype=np.float64)

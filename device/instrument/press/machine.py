@@ -185,10 +185,9 @@ class PressUnderWay:
         )
 
     def hold(self, spot_mm: tuple[float, float] | None, rules: PressRules) -> PressUnderWay:
-        """Return the press once every frame is there; `spot_mm` is where the inclusion lies from the middle of the
-        face.
+        """Return the press once every frame is there.
 
-        None without an inclusion that stands out, and beside the lesion.
+        `spot_mm` is where the inclusion lies from the middle of the face; None beside it, or when nothing stands out.
         """
         self._require(TOUCHING, "have its frames")
         if spot_mm is not None and hypot(*spot_mm) > rules.max_offset_mm:

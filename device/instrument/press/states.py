@@ -67,25 +67,6 @@ class IllegalTransition(RuntimeError):  # noqa: N818 - reads as what it says
         super().__init__(f"A press that is {state.code} cannot {step}; see device/instrument/press/states.py.")
 
 
-def too_hard(force_n: float, overload_n: float) -> str:
-    """Return why a force is too much."""
-    return f"The force rose to {force_n:.2f} N, above {overload_n:.2f} N: lift and press more gently."
-
-
-def off_centre(spot_mm: tuple[float, float], max_offset_mm: float) -> str:
-    """Return how far off the middle a lesion is, and where the probe has to go: +x is right, +y down in the image."""
-    x_mm, y_mm = spot_mm
-    towards = [
-        f"{'+' if part > 0 else '-'}{axis}"
-        for axis, part in (("x", x_mm), ("y", y_mm))
-        if abs(part) >= max(abs(x_mm), abs(y_mm)) / 2
-    ]
-    return (
-        f"The lesion lies {hypot(x_mm, y_mm):.1f} mm off the middle, above {max_offset_mm:g} mm: "
-        f"move the probe towards {' and '.join(towards)}."
-    )
-
-
 class Guidance(Enum):
     """The whole vocabulary of the screen's instruction."""
 
@@ -128,3 +109,22 @@ HELD_GUIDANCE = {
     PressState.CAPTURING: Guidance.HOLD_STILL,
 }
 """What to do in each state of a hold; a ramp's guidance depends on the forces that are still wanted, too."""
+
+
+def too_hard(force_n: float, overload_n: float) -> str:
+    """Return why a force is too much."""
+    return f"The force rose to {force_n:.2f} N, above {overload_n:.2f} N: lift and press more gently."
+
+
+def off_centre(spot_mm: tuple[float, float], max_offset_mm: float) -> str:
+    """Return how far off the middle a lesion is, and where the probe has to go: +x is right, +y down in the image."""
+    x_mm, y_mm = spot_mm
+    towards = [
+        f"{'+' if part > 0 else '-'}{axis}"
+        for axis, part in (("x", x_mm), ("y", y_mm))
+        if abs(part) >= max(abs(x_mm), abs(y_mm)) / 2
+    ]
+    return (
+        f"The lesion lies {hypot(x_mm, y_mm):.1f} mm off the middle, above {max_offset_mm:g} mm: "
+        f"move the probe towards {' and '.join(towards)}."
+    )

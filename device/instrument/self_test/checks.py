@@ -1,15 +1,15 @@
 """The checks of the self-test: each measures one part, and says within which bound it must be and what to do if not.
 
-Camera: a noise below half a count is hidden by the rounding to whole counts and is given as half a count. Source: EMVA
+Camera: noise below half a count is hidden by the rounding to whole counts and is given as half a count. Source: EMVA
 Standard 1288, temporal noise from the difference of two images of equal exposure, no reliable estimate below 0.24
 counts^2.
 
-Sides, each lit alone on a face that is held on the reference block: the half of the image that is nearer to an LED is
-brighter than the opposite one, at the target force by a third; at a tenth of it the far half is brighter, so the test
-needs the force. Where the block touches does not matter: each side's light is compared with that of all sides
+Light: each side is lit alone on a face that is held on the reference block. The half of the image that is nearer to an
+LED is brighter than the opposite one, at the target force by a third; at a tenth of it the far half is brighter, so the
+test needs the force. Where the block touches does not matter: each side's light is compared with that of all sides
 together. An untouched face is dark by total reflection and tells nothing.
 
-Models: the network in use was proved at the start; this proves that the next start will find it as it was.
+Model: the network in use was proved at the start; this proves that the next start will find it as it was.
 """
 
 from __future__ import annotations

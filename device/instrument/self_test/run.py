@@ -38,6 +38,14 @@ from device.records.store import Store
 
 POLL_S = 0.02
 SETTLED_S = 0.5
+DARK_FRAMES = 8
+REST_S = 0.5
+FREE_TIMEOUT_S = 10.0
+OPERATOR_TIMEOUT_S = 30.0
+HELD_RATIO = 0.7
+"""Below this part of the target force a side lights the opposite half about as much as its own."""
+ZERO_FIRST = "The load cell's zero comes first: without it nobody knows how hard the probe is pressed."
+CheckOf = Callable[[SelfTestJob], list[CheckResult]]
 
 
 class Operator:
@@ -77,17 +85,6 @@ class Operator:
         """Keep the idle parts going for the watchdog; what is wrong with one is for its own check to say."""
         with suppress(DeviceError):
             self._progress.beat()
-
-
-DARK_FRAMES = 8
-REST_S = 0.5
-FREE_TIMEOUT_S = 10.0
-OPERATOR_TIMEOUT_S = 30.0
-HELD_RATIO = 0.7
-"""Below this part of the target force a side lights the opposite half about as much as its own."""
-ZERO_FIRST = "The load cell's zero comes first: without it nobody knows how hard the probe is pressed."
-
-CheckOf = Callable[[SelfTestJob], list[CheckResult]]
 
 
 class SelfTestRun:

@@ -4,10 +4,8 @@ A part that stops is first a fault on the screen and a note on the disk; then no
 daemon, darkens the LEDs and starts it again. Its own thread does no more than look at the other loops' progress.
 Source: sd_notify(3), WATCHDOG=1; systemd.service(5), WatchdogSec=.
 
-What a service tells systemd: datagrams of assignments to the socket that the environment names.
-
-Without that socket, as on a laptop, nothing is sent and nothing is missing.
-Source: sd_notify(3), sd_watchdog_enabled(3).
+What it tells systemd are datagrams of assignments to the socket that the environment names. Without that socket, as on
+a laptop, nothing is sent and nothing is missing. Source: sd_notify(3), sd_watchdog_enabled(3).
 """
 
 from __future__ import annotations
@@ -21,6 +19,14 @@ from device.errors import StalledError
 from device.instrument.status import StatusBoard
 from device.instrument.watch.progress import Part, ProgressBoard, Stall
 from device.instrument.watch.restart_note import RestartNote
+
+log = logging.getLogger(__name__)
+WITHOUT_SYSTEMD_S = 15.0
+"""What systemd/tsis.service asks for; without systemd a part that stops is shown, and nothing restarts."""
+LOOKS = 4
+"""Looks in the watchdog's time: at least two are fed, and a fault is on the screen for half of it."""
+MOST_RESTARTS = 3
+"""So many in a row have not helped: a part that still comes back with its fault stays on the screen instead."""
 
 
 def notify(*assignments: str) -> bool:
@@ -44,16 +50,6 @@ def watchdog_s() -> float | None:
     if not asked_us or (asked_pid and int(asked_pid) != os.getpid()):
         return None
     return int(asked_us) * 1e-6
-
-
-log = logging.getLogger(__name__)
-
-WITHOUT_SYSTEMD_S = 15.0
-"""What systemd/tsis.service asks for; without systemd a part that stops is shown, and nothing restarts."""
-LOOKS = 4
-"""Looks in the watchdog's time: at least two are fed, and a fault is on the screen for half of it."""
-MOST_RESTARTS = 3
-"""So many in a row have not helped: a part that still comes back with its fault stays on the screen instead."""
 
 
 class Watchdog:

@@ -1,5 +1,4 @@
-"""Whether a bright spot is as round as an inclusion that is: its second harmonic, against that of the best fit's round
-inclusion.
+"""Whether a bright spot is round: its second harmonic, against that of the best fit's round inclusion.
 
 A round inclusion beside the axis shows a second harmonic, too; polynomials tell it, as the surrogate's tell the
 profile. What is left is searched for a spot that is stretched in some direction: the contrast f(r) becomes f(r) + e r
@@ -70,9 +69,7 @@ class EllipticityTest:
         return float(np.linalg.norm(self.left(second_harmonic, best) @ weights) / np.sqrt(weights @ pattern))
 
     def left(self, second_harmonic: Array, best: Array) -> Array:
-        """Return what a round inclusion leaves [2, Q] of second harmonics [2, K, J - 2]: along and across the
-        offset.
-        """
+        """Return what a round inclusion leaves [2, Q], along and across its offset, of harmonics [2, K, J - 2]."""
         left = second_harmonic.reshape(2, SECOND_COLUMNS).copy()
         left[0] -= self.second_harmonics(best[None])[0]
         return left

@@ -1,5 +1,4 @@
-"""How far a profile row may lie from what the forward model says: camera and hand, drift of light and cell, and error
-of the model itself.
+"""How far a profile row may lie from what the forward model says: camera, hand, drift, and the model's own error.
 
 Camera, cell and hand are measured on simulated recordings. Light that drifts between the two presses moves every
 pixel's contrast by the same ratio of 1 + contrast; a cell whose zero drifts moves the loads most at the small ones. A

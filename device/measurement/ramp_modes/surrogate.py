@@ -44,9 +44,7 @@ ELASTIC_MISMATCH_RANGE = (
 
 @dataclass(frozen=True, eq=False)
 class PressSurrogate:
-    """`inclusion`: contrast and offset over the strength; `baseline`: reference force response, of the light beside
-    it.
-    """
+    """`inclusion_field`: contrast and offset over the strength. `baseline`: reference force response."""
 
     inclusion_field: LegendreSum
     baseline: LegendreSum

@@ -3,9 +3,8 @@
 The stream never waits for its reader: when too much is unread, lines are lost, as in an amplifier's own small buffer.
 A cell that is plugged in again is another terminal under the same path, as udev's link makes it.
 
-A load cell whose line hangs: the call that reads it does not return while the scenario says so.
-
-The kernel's own drivers can do this, for instance while a USB port is being reset; no time limit of the reader helps.
+Its line may hang: the call that reads it does not return while the scenario says so. The kernel's own drivers can do
+this, for instance while a USB port is being reset; no time limit of the reader helps.
 """
 
 from __future__ import annotations

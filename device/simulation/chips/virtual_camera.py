@@ -1,12 +1,8 @@
 """A rendered scene seen through the interface of picamera2: frame clock, buffers, flush, silent adjustment.
 
 Frame k is exposed from start + k * frame duration whether or not anyone asks for it; only a frame that is asked for
-is rendered, with the light as it was when its exposure began.
+is rendered, with the light as it was when its exposure began. A torn frame holds the exposure before from some row on.
 Source: picamera2 0.3.38 (`Picamera2.capture_request`, `wait_for_timestamp_`, `CompletedRequest.release`, `Controls`).
-
-One delivered frame of the virtual camera: rendered when it is asked for, with what the camera says about it.
-
-A torn frame holds the exposure before from some row on. Source: picamera2 0.3.38 (`CompletedRequest`).
 """
 
 from __future__ import annotations

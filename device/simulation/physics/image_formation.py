@@ -3,10 +3,9 @@
 Both take w (mm) and p (kPa) on a grid of their own and give intensity [height, width]; at intensity 1 a pixel collects
 `sensitivity_e_per_us`.
 
-Deformed surface to light: the paper's linear optics, intensity = light field * (a w + b).
-
-It is the paper's own assumption (three straight lines from image to deformation), not a picture of how skin in contact
-scatters light. The light field is uneven, brighter towards each LED, and dark beyond the face.
+The paper's linear optics are intensity = light field * (a w + b): its own assumption (three straight lines from image
+to deformation), not a picture of how skin in contact scatters light. The light field is uneven, brighter towards each
+LED, and dark beyond the face.
 Source: Lee & Won 2013, section III.
 """
 

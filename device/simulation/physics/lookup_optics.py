@@ -6,14 +6,12 @@ so contact, not deformation, makes the image. Left out: shadows of one part of t
 leaves the face by its slope and finds it again. Source: Gershun, The Light Field, J. Math. Phys. 18 (1939); frustrated
 total reflection, Han, UIST 2005.
 
-One LED's light to that of all four: the block looks the same after a quarter turn.
+How much light passes the face is Fresnel's law, averaged over the width of its source. Total reflection at a dry face
+begins at one exact angle, but an LED is seen under a range of angles; without that average the light that leaks out at
+slopes would have false, sharp edges. Source: Hecht, Optics, section 4.6.
 
-Maps are [..., y, x] with ascending coordinates; the first LED is the one at +x, then +y, -x, -y.
-
-How much light passes the face, by the angle it arrives at: Fresnel, averaged over the width of its source.
-
-Total reflection at a dry face begins at one exact angle, but an LED is seen under a range of angles; without that
-average the light that leaks out at slopes would have false, sharp edges. Source: Hecht, Optics, section 4.6.
+The light of one LED is kept for all four, since the block looks the same after a quarter turn. Maps are [..., y, x]
+with ascending coordinates; the first LED is the one at +x, then +y, -x, -y.
 """
 
 from __future__ import annotations
@@ -33,91 +31,15 @@ from device.simulation.physics.light_table import LightTable, load_light_table
 from device.simulation.physics.skin import Skin
 
 LEDS = 4
-
-
-def quarter_turn(field: NDArray[Any]) -> NDArray[Any]:
-    """Return a map of numbers [..., n, n] of one LED as that of the next one, a quarter turn from x to y."""
-    return np.swapaxes(field[..., ::-1, :], -1, -2)
-
-
-def turn_vectors(field: NDArray[Any]) -> NDArray[Any]:
-    """Return a map of vectors [..., 3, m, n, n] of one LED as that of the next one."""
-    x, y, z = np.moveaxis(quarter_turn(field), -4, 0)
-    return np.stack([-y, x, z], axis=-4)
-
-
-def four_leds(field: NDArray[np.floating]) -> Single:
-    """Return a map of numbers [...] of the LED at +x for all LEDs [4, ...] as float32."""
-    maps: list[NDArray[Any]] = [field]
-    for _ in range(LEDS - 1):
-        maps.append(quarter_turn(maps[-1]))
-    return np.stack(maps).astype(np.float32)
-
-
-def four_led_vectors(field: NDArray[np.floating]) -> Single:
-    """Return a map of vectors [..., 3, m, n, n] of the LED at +x for all LEDs [4, ...] as float32."""
-    maps: list[NDArray[Any]] = [field]
-    for _ in range(LEDS - 1):
-        maps.append(turn_vectors(maps[-1]))
-    return np.stack(maps).astype(np.float32)
-
-
+FINER = 2
+"""Render cells along one light cell: light is smooth, contact is not."""
+DARK = np.float32(1e-12)
+"""Irradiance (1/mm2) that keeps a direction defined where no light arrives."""
 LOWEST_COSINE = -0.2
 COSINES, WIDTHS = 1200, 32
 WIDEST = 0.16
 """Half-width of the range of cosines under which a source is seen; wider ones count as this."""
 _ACROSS = 41
-
-
-def transmission(cosine: NDArray[np.float64], n_from: float, n_to: float) -> NDArray[np.float64]:
-    """Return the share of unpolarised light that passes an interface; 0 at total reflection and from behind."""
-    c = np.clip(cosine, 0.0, 1.0)
-    squared = 1 - (n_from / n_to) ** 2 * (1 - c**2)
-    refracted = np.sqrt(np.maximum(squared, 0.0))
-    with np.errstate(invalid="ignore"):
-        perpendicular = (n_from * c - n_to * refracted) / (n_from * c + n_to * refracted)
-        parallel = (n_to * c - n_from * refracted) / (n_to * c + n_from * refracted)
-    passed = 1 - (perpendicular**2 + parallel**2) / 2
-    return np.where((squared > 0) & (c > 0), passed, 0.0)
-
-
-def diffuse_reflectance(n_from: float, n_to: float) -> float:
-    """Return the reflected share of Lambertian light that arrives at an interface: the mean of R over cos^2."""
-    squares = (np.arange(2000) + 0.5) / 2000
-    return float(1 - transmission(np.sqrt(squares), n_from, n_to).mean())
-
-
-@lru_cache(maxsize=4)
-def passing(n_from: float, n_to: float) -> Single:
-    """Return [COSINES * WIDTHS] the mean of cosine * transmission over a round source seen from a place.
-
-    Row: cosine between the light's mean direction and the face's normal, from LOWEST_COSINE to 1. Column: half-width
-    of the range of cosines, 0..WIDEST. A disc seen from its side is a semicircle's distribution. Kept, not made again,
-    for an index that was asked for before.
-    """
-    cosine = np.linspace(LOWEST_COSINE, 1.0, COSINES)[:, None, None]
-    width = np.linspace(0.0, WIDEST, WIDTHS)[None, :, None]
-    angle = (np.arange(_ACROSS) + 0.5) * math.pi / _ACROSS
-    weight = np.sin(angle) ** 2
-    seen = np.clip(cosine + width * np.cos(angle), -1.0, 1.0)
-    mean = (np.maximum(seen, 0.0) * transmission(seen, n_from, n_to) * weight).sum(axis=2) / weight.sum()
-    table = np.asarray(mean.ravel(), dtype=np.float32)
-    table.setflags(write=False)
-    return table
-
-
-def passing_index(cosine: Single, width: Single) -> NDArray[np.intp]:
-    """Return where in the table of `passing` a cosine and a half-width of cosines are, to the nearest entry."""
-    row = (cosine - np.float32(LOWEST_COSINE)) * np.float32((COSINES - 1) / (1 - LOWEST_COSINE)) + np.float32(0.5)
-    column = width * np.float32((WIDTHS - 1) / WIDEST) + np.float32(0.5)
-    row, column = np.clip(row, 0, COSINES - 1), np.minimum(column, WIDTHS - 1)
-    return np.asarray(row.astype(np.intp) * WIDTHS + column.astype(np.intp))
-
-
-FINER = 2
-"""Render cells along one light cell: light is smooth, contact is not."""
-DARK = np.float32(1e-12)
-"""Irradiance (1/mm2) that keeps a direction defined where no light arrives."""
 
 
 class LookupOptics:
@@ -297,3 +219,75 @@ def _slopes(w: Single, step_mm: float) -> tuple[Single, Single]:
     """Return (dw/dy, dw/dx) by central differences, one-sided at the edges."""
     slope_y, slope_x = np.gradient(w, np.float32(step_mm))
     return np.asarray(slope_y), np.asarray(slope_x)
+
+
+def quarter_turn(field: NDArray[Any]) -> NDArray[Any]:
+    """Return a map of numbers [..., n, n] of one LED as that of the next one, a quarter turn from x to y."""
+    return np.swapaxes(field[..., ::-1, :], -1, -2)
+
+
+def turn_vectors(field: NDArray[Any]) -> NDArray[Any]:
+    """Return a map of vectors [..., 3, m, n, n] of one LED as that of the next one."""
+    x, y, z = np.moveaxis(quarter_turn(field), -4, 0)
+    return np.stack([-y, x, z], axis=-4)
+
+
+def four_leds(field: NDArray[np.floating]) -> Single:
+    """Return a map of numbers [...] of the LED at +x for all LEDs [4, ...] as float32."""
+    maps: list[NDArray[Any]] = [field]
+    for _ in range(LEDS - 1):
+        maps.append(quarter_turn(maps[-1]))
+    return np.stack(maps).astype(np.float32)
+
+
+def four_led_vectors(field: NDArray[np.floating]) -> Single:
+    """Return a map of vectors [..., 3, m, n, n] of the LED at +x for all LEDs [4, ...] as float32."""
+    maps: list[NDArray[Any]] = [field]
+    for _ in range(LEDS - 1):
+        maps.append(turn_vectors(maps[-1]))
+    return np.stack(maps).astype(np.float32)
+
+
+def transmission(cosine: NDArray[np.float64], n_from: float, n_to: float) -> NDArray[np.float64]:
+    """Return the share of unpolarised light that passes an interface; 0 at total reflection and from behind."""
+    c = np.clip(cosine, 0.0, 1.0)
+    squared = 1 - (n_from / n_to) ** 2 * (1 - c**2)
+    refracted = np.sqrt(np.maximum(squared, 0.0))
+    with np.errstate(invalid="ignore"):
+        perpendicular = (n_from * c - n_to * refracted) / (n_from * c + n_to * refracted)
+        parallel = (n_to * c - n_from * refracted) / (n_to * c + n_from * refracted)
+    passed = 1 - (perpendicular**2 + parallel**2) / 2
+    return np.where((squared > 0) & (c > 0), passed, 0.0)
+
+
+def diffuse_reflectance(n_from: float, n_to: float) -> float:
+    """Return the reflected share of Lambertian light that arrives at an interface: the mean of R over cos^2."""
+    squares = (np.arange(2000) + 0.5) / 2000
+    return float(1 - transmission(np.sqrt(squares), n_from, n_to).mean())
+
+
+@lru_cache(maxsize=4)
+def passing(n_from: float, n_to: float) -> Single:
+    """Return [COSINES * WIDTHS] the mean of cosine * transmission over a round source seen from a place.
+
+    Row: cosine between the light's mean direction and the face's normal, from LOWEST_COSINE to 1. Column: half-width
+    of the range of cosines, 0..WIDEST. A disc seen from its side is a semicircle's distribution. Kept, not made again,
+    for an index that was asked for before.
+    """
+    cosine = np.linspace(LOWEST_COSINE, 1.0, COSINES)[:, None, None]
+    width = np.linspace(0.0, WIDEST, WIDTHS)[None, :, None]
+    angle = (np.arange(_ACROSS) + 0.5) * math.pi / _ACROSS
+    weight = np.sin(angle) ** 2
+    seen = np.clip(cosine + width * np.cos(angle), -1.0, 1.0)
+    mean = (np.maximum(seen, 0.0) * transmission(seen, n_from, n_to) * weight).sum(axis=2) / weight.sum()
+    table = np.asarray(mean.ravel(), dtype=np.float32)
+    table.setflags(write=False)
+    return table
+
+
+def passing_index(cosine: Single, width: Single) -> NDArray[np.intp]:
+    """Return where in the table of `passing` a cosine and a half-width of cosines are, to the nearest entry."""
+    row = (cosine - np.float32(LOWEST_COSINE)) * np.float32((COSINES - 1) / (1 - LOWEST_COSINE)) + np.float32(0.5)
+    column = width * np.float32((WIDTHS - 1) / WIDEST) + np.float32(0.5)
+    row, column = np.clip(row, 0, COSINES - 1), np.minimum(column, WIDTHS - 1)
+    return np.asarray(row.astype(np.intp) * WIDTHS + column.astype(np.intp))

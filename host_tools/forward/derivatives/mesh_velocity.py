@@ -24,8 +24,7 @@ HELD = {"dirichlet": "face|skin|base", "dirichletx": "axis|side|plane_x", "diric
 
 
 def mesh_velocities(scene: Scene, mesh: Any) -> dict[str, Any]:
-    """Return the velocity (mm, grid function) per unit of ln d, ln h and ln T, and in 3-D per mm of the inclusion's
-    offset.
+    """Return the velocity (mm, grid function) per unit of ln d, ln h and ln T, and in 3-D per mm of the offset.
 
     The mesh is that of the scene, as it stands deformed. Raise `InvalidQuantity` for a scene without an inclusion or
     with layers in its tissue: their planes would be dragged along.
@@ -48,9 +47,7 @@ def mesh_velocities(scene: Scene, mesh: Any) -> dict[str, Any]:
 
 
 def inclusion_of(scene: Scene) -> Inclusion:
-    """Return the scene's inclusion; raise `InvalidQuantity` if there is none, or one that nothing tells from the
-    tissue.
-    """
+    """Return the scene's inclusion; raise `InvalidQuantity` if there is none, or if it is as the tissue."""
     if scene.inclusion is None or not scene.has_inclusion:
         raise InvalidQuantity("inclusion", "none", "one whose size may vary", "give the scene an inclusion")
     return scene.inclusion

@@ -1,14 +1,12 @@
 """A press to its face and how that changes with the scene: a ramp on the axis, or one force beside the inclusion.
 
-A scene and a list of forces to the face at each, with and without the inclusion, and how both change with the scene.
+Faces with and without the inclusion are solved on one mesh: what the mesh alone makes of a change of size or depth is
+then the same in both, and drops out of their difference. Finite strain follows one load path with true sliding; small
+strain scales one solve.
 
-Both are solved on one mesh: what the mesh alone makes of a change of size or depth is then the same in both, and drops
-out of their difference. Finite strain follows one load path with true sliding; small strain scales one solve.
-
-A press beside the inclusion to its face and how that changes with the scene, in three dimensions and small strain.
-
-In proportion to the force, so one solve serves any; finite strain has no three-dimensional model here. The meshes are
-coarse: both orders show by how much that matters.
+A press beside the inclusion is solved in three dimensions and small strain. It goes in proportion to the force, so one
+solve serves any; finite strain has no three-dimensional model here. The meshes are coarse: both orders show by how much
+that matters.
 """
 
 from __future__ import annotations
@@ -161,8 +159,7 @@ GRADING = "coarse"
 
 
 def sensitive_offset(scene: Scene, offset_mm: float, force_n: float) -> dict[int, InclusionSensitivity]:
-    """Return, by the order of the elements, both faces and their derivatives when pressed beside the inclusion's
-    centre.
+    """Return, by the order of the elements, both faces and their derivatives when pressed beside the centre.
 
     The inclusion is at angle 0; its place there is one of the quantities, `offset_x_mm`, and counts per mm. Raise
     `InvalidQuantity` as `sensitive_ramp` does.

@@ -1,9 +1,8 @@
 """A mesh, its materials and a list of indentations or forces to the loaded face at each of them, in finite strain.
 
 The steps between the loads are chosen by `equilibrium_path.py`; a load that cannot be reached is an exception that
-says how far the press got, never a number.
-
-Finite strain as a `PressModel`: one load path through all presses, with true sliding.
+says how far the press got, never a number. As a `PressModel`, one load path runs through all presses, with true
+sliding.
 """
 
 from __future__ import annotations

@@ -10,10 +10,9 @@ the mesh is refined, and a contact of faces has no such force. So by default the
 which is what a contact search on faces finds (docs/verification.md); `edge_force` gives the other reading.
 Source: Donea et al., Arbitrary Lagrangian-Eulerian methods, Encyclopedia of Computational Mechanics (2004), sec. 3.
 
-The shift of the tissue's labels on the face to one in the whole tissue: harmonic, so smooth and without overshoot.
-
-It vanishes on the axis, base, side and in the inclusion, and is free on the skin. Only radii are relabelled, so
-planes between tissue layers stay where they are.
+The shift of the labels on the face is carried into the whole tissue harmonically, so smoothly and without overshoot. It
+vanishes on the axis, base, side and in the inclusion, and is free on the skin. Only radii are relabelled, so planes
+between tissue layers stay where they are.
 """
 
 from __future__ import annotations

@@ -4,9 +4,8 @@ An optional check of the forward model, started as a separate process; nothing e
 tissue truly slides: contact points are paired anew on the deformed bodies until they no longer move. Finite strain
 costs minutes. Source: Dhondt, CalculiX CrunchiX user's manual 2.20; mesh as in Lee & Won, IEEE JBHI 17(2), 2013.
 
-The text of a CalculiX .dat file to displacements and total forces, one of each for every printed state.
-
-Reads what `calculix_deck` asks for and nothing else. Node numbers count from one, as in the deck.
+Of the .dat file, what `calculix_deck` asks for is read and nothing else: displacements and total forces of every
+printed state. Node numbers count from one, as in the deck.
 """
 
 from __future__ import annotations
@@ -32,6 +31,9 @@ from host_tools.verification.cross_check.revolved_mesh import Sector, revolve
 from host_tools.verification.cross_check.section import Sizes, half_section
 
 HEADING = re.compile(r"^ *(displacements|total force) \([^)]*\) for set (\w+) and time +(\S+) *$", re.MULTILINE)
+PROGRAM = "ccx"
+NEWTONS_PER_MN = 1e-3
+"""kPa times mm2 is mN."""
 
 
 class UnreadableOutput(ValueError):  # noqa: N818 - reads as what it says
@@ -76,11 +78,6 @@ def _vector(words: list[str]) -> tuple[float, float, float]:
         raise UnreadableOutput(f"a row of the .dat file holds {len(words)} components, but must hold 3: {words}")
     x, y, z = (float(word) for word in words)
     return x, y, z
-
-
-PROGRAM = "ccx"
-NEWTONS_PER_MN = 1e-3
-"""kPa times mm2 is mN."""
 
 
 class CalculixFailed(RuntimeError):  # noqa: N818 - reads as what it says

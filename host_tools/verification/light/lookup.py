@@ -1,12 +1,8 @@
 """How far the fast lookup model is from the traced light, on scenes that no part of it was fitted to.
 
 Two families: smooth dimples of random depth, width, place, contact and light, and faces as finite elements give them
-for a round probe, with and without an inclusion. The tracer's own noise stands beside every error: it is part of it.
-
-The virtual probe's fast image model against the tracer, on scenes that no part of its table was made from.
-
-The tracer's own noise is part of every difference; it is taken off in quadrature before the bound is asked.
-Source: `host_tools/verification/light/lookup.py`.
+for a round probe, with and without an inclusion. The tracer's own noise is part of every error and stands beside it; it
+is taken off in quadrature before the bound is asked.
 """
 
 from __future__ import annotations
@@ -33,8 +29,13 @@ from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_most
 from host_tools.verification.light.pictures import LINES
 
+TABLES = Path(__file__).resolve().parents[3] / "models" / "simulated_probe"
 CELL_MM = 0.5
 PRESS_N = 0.5
+TITLE = "The virtual probe's fast model"
+CLAIM = "The simulated probe looks its light up in a table instead of tracing it."
+SOURCE = "The ray tracer; no scene was used to make the table."
+MEAN_BOUND, WORST_BOUND, SUM_BOUND = 0.03, 0.05, 0.05
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,7 @@ def dimple_scenes(lookup: LookupOptics, count: int = 7, seed: int = 20) -> Itera
 
 
 def pressed_scenes(lookup: LookupOptics, table: SurfaceTable, seed: int = 21) -> Iterator[HeldOutScene]:
-    """Yield faces of a round probe pressed with 0.5 N: without an inclusion, and over inclusions of several sizes and
-    depths.
+    """Yield faces of a round probe pressed with 0.5 N: without an inclusion, and over several.
 
     Deformation and pressure are the finite-element table's; what an inclusion adds is moved off the middle.
     """
@@ -142,13 +142,6 @@ def _compare(lookup: LookupOptics, block: LightBlock, scene: HeldOutScene, rays:
         peak_error_ratio=model_peak / true_peak - 1,
         noise_ratio=traced.noise_ratio,
     )
-
-
-TABLES = Path(__file__).resolve().parents[3] / "models" / "simulated_probe"
-TITLE = "The virtual probe's fast model"
-CLAIM = "The simulated probe looks its light up in a table instead of tracing it."
-SOURCE = "The ray tracer; no scene was used to make the table."
-MEAN_BOUND, WORST_BOUND, SUM_BOUND = 0.03, 0.05, 0.05
 
 
 def model_error(row: HeldOutRow) -> float:

@@ -39,9 +39,7 @@ def test_the_default_mesh_is_accurate(truth):
 
 
 def test_the_same_mesh_baseline_keeps_a_tiny_inclusion():
-    """An inclusion of half an element of the face, contrast a millionth of the press: separate meshes would lose it
-    whole.
-    """
+    """An inclusion of half an element, its field a millionth of the press: separate meshes would lose it whole."""
     scene = Scene(Inclusion(0.5, 8.0, 80.0))
     default, fine = solve(scene), finest(scene)
     assert default.inclusion_field.max_deformation_mm == pytest.approx(

@@ -1,6 +1,4 @@
-"""Second harmonics of round inclusions are recovered from their own values, as polynomials times what multiplies
-them.
-"""
+"""Second harmonics of round inclusions, polynomials times a factor, are recovered from their own values."""
 
 from dataclasses import replace
 

@@ -1,6 +1,4 @@
-"""One inclusion solved for itself: a sphere is the table's, an oblong one is longer one way, and beside it there is
-none.
-"""
+"""One inclusion solved for itself: a sphere is the table's, an oblong one is longer one way, beside it is none."""
 
 from __future__ import annotations
 

@@ -41,9 +41,7 @@ def worst_over_peak(found, fresh, inside):
 
 @pytest.mark.parametrize("truth", TRUTHS)
 def test_the_table_is_within_half_a_percent_of_the_inclusions_deformation_and_one_of_its_pressure(table, truth):
-    """What the inclusion adds, over its own peak in the central window: deformation 0.5 %, ring means of pressure 1
-    %.
-    """
+    """What the inclusion adds, over its own peak in the window: deformation 0.5 %, ring means of pressure 1 %."""
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
     for force_n, solution in zip(FORCES_SEEN_N, ramp(scene_in(NOMINAL, inclusion), FORCES_SEEN_N), strict=True):
         fresh, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
@@ -54,9 +52,7 @@ def test_the_table_is_within_half_a_percent_of_the_inclusions_deformation_and_on
 @pytest.mark.parametrize(("truth", "slab"), IN_SLABS)
 @pytest.mark.long
 def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, truth, slab):
-    """What the slab changes in the inclusion's deformation and pressure, over the inclusion's peaks, from solves on one
-    mesh.
-    """
+    """What the slab changes in the inclusion's deformation and pressure, over their peaks, from solves on one mesh."""
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
     thicknesses_mm = sorted([slab.thickness_mm, 30.0])
     solved, known = [], []

@@ -27,9 +27,7 @@ def test_without_an_inclusion_it_sees_nothing_at_all(tables: ProbeTables) -> Non
 
 
 def test_the_linear_light_is_a_straight_line_in_the_deformation(tables: ProbeTables) -> None:
-    """Contrast is slope x inclusion / (slope x bare press + intercept), and the bare press of both inclusions is the
-    same.
-    """
+    """Contrast is slope x inclusion / (slope x baseline + intercept), and both inclusions have one baseline."""
     camera = PerfectCamera(Scenario(light="linear"), tables)
     ratios = []
     for inclusion in (Inclusion(12.0, 5.0, 100.0), Inclusion(12.0, 9.0, 100.0)):

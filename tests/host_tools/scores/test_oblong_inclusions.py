@@ -45,14 +45,14 @@ def test_the_long_axis_lies_along_the_offset_or_across_it():
 
 def test_inclusions_are_drawn_inside_the_trained_ranges():
     inclusions = draw_oblong(200, np.random.default_rng(1))
-    values = np.array([inclusion.inclusion.as_tuple() for inclusion in inclusions])
+    values = np.array([oblong.inclusion.as_tuple() for oblong in inclusions])
     assert ((LOW[:3] <= values) & (values <= HIGH[:3])).all()
     ratios, offsets_mm = (np.array([getattr(one, name) for one in inclusions]) for name in ("width_ratio", "offset_mm"))
     assert (WIDTH_RATIO[0] <= ratios).all()
     assert (ratios <= WIDTH_RATIO[1]).all()
     assert offsets_mm.max() <= HIGH[OFFSET]
     assert np.mean(offsets_mm < HIGH[OFFSET] / 2) == pytest.approx(0.25, abs=0.08)  # even over the disk
-    assert 60 < sum(inclusion.is_across for inclusion in inclusions) < 140
+    assert 60 < sum(oblong.is_across for oblong in inclusions) < 140
 
 
 def test_tables_of_an_ellipsoid_hold_it_off_the_axis_and_are_the_probes_own_otherwise(tables, monkeypatch):

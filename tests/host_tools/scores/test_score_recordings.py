@@ -148,7 +148,7 @@ def test_what_is_left_out_is_counted_in_the_headline():
 
 def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(recording: Recording):
     heard: list[str] = []
-    baseline = replace(recording, truth=None)
+    nameless = replace(recording, truth=None)
     short = replace(recording, frames=())
 
     def damaged() -> Recording:
@@ -162,7 +162,7 @@ def test_recordings_without_truth_or_that_cannot_be_read_are_named_and_left_out(
 
     samples = [
         Sample("first", lambda: recording),
-        Sample("nameless", lambda: baseline),
+        Sample("nameless", lambda: nameless),
         Sample("damaged", damaged),
         Sample("short", lambda: short),
         Sample("last", lambda: recording),

@@ -74,7 +74,7 @@ def test_a_probe_that_the_model_is_not_for_is_refused(held, quick_model, calibra
 
 
 def test_a_bundle_without_bands_is_refused(quick_model):
-    bundle = type("Bundle", (), {"card": {"modes": {}}, "folder": Path("baseline")})()
+    bundle = type("Bundle", (), {"card": {"modes": {}}, "folder": Path("bundle")})()
     with pytest.raises(BundleRefused, match=r"modes\.quick is incomplete"):
         QuickModel(bundle)
 

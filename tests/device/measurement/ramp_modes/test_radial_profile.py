@@ -29,9 +29,7 @@ R = np.hypot(X, Y)
 
 
 def light(force_n):
-    """The inclusion-free light above dark (counts of 16 bits): a cubic of the force that differs from place to
-    place.
-    """
+    """The inclusion-free light above dark (counts of 16 bits): a cubic of the force, another one at each place."""
     return (60_000 * force_n - 30_000 * force_n**2 - 4_000 * force_n**3) * (1 - 0.02 * R)
 
 

@@ -1,6 +1,4 @@
-"""Two inclusions on one face: each adds what it adds alone, at its own place, and the tissue's own field counts
-once.
-"""
+"""Two inclusions on one face: each adds what it adds alone, at its own place; the tissue's own field counts once."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,4 @@
-"""A press beside the inclusion: its derivative by the inclusion's place is the limit of differences, and moves the
-inclusion field.
-"""
+"""A press beside the inclusion: its derivative by the place is the limit of differences, and moves the field."""
 
 from dataclasses import replace
 

@@ -169,9 +169,7 @@ def test_a_symmetry_that_the_scene_has_not_is_refused(scene, symmetry):
 
 
 def test_an_element_turned_inside_out_is_refused(monkeypatch):
-    """An inclusion a tenth of an element from the slab's edge: the sphere's curved side pierces the elements
-    between.
-    """
+    """An inclusion a tenth of an element from the slab's edge: its curved side pierces the elements between."""
     monkeypatch.setattr("host_tools.forward.meshes.solid_mesh.ATTEMPTS", 1)
     scene = Scene(INCLUSION, tissue=Tissue(edge_mm=15.0), placement=Placement(offset_x_mm=9.99))
     with pytest.raises(InvalidQuantity, match="inside out"):
