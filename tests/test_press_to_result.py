@@ -131,6 +131,7 @@ def test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancel
     assert daemon.ended(first.headers["location"])["state"] == "cancelled"
 
 
+@pytest.mark.long
 def test_a_probe_that_runs_is_tared_and_presses_on(daemon):
     """Twenty readings of 40 counts' noise, twice: 0.1 mN."""
     tare = daemon.ask("/api/v1/tare", "POST")
@@ -189,6 +190,7 @@ def test_a_force_that_the_calibration_does_not_hold_for_is_refused_at_the_start(
         open_simulated_probe(config, Scenario())
 
 
+@pytest.mark.long
 def test_the_screen_keeps_saying_done_until_the_next_press(daemon):
     daemon.press()
     assert daemon.ask("/api/v1/status").json["guidance"]["code"] == "done"

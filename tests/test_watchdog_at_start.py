@@ -15,6 +15,7 @@ HELD = "[hand]\nheld_n = 0.5\nreaction_s = 5.0\nrate_n_per_s = 3.0\n"
 DARK = (0.0, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.long
 def test_a_daemon_whose_probe_is_held_is_fed_says_so_and_is_ready_once_it_is_lifted(tmp_path):
     supervisor = Supervisor(tmp_path, HELD, WATCHDOG_S)
     try:

@@ -262,6 +262,7 @@ def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: P
     daemon.stop()
 
 
+@pytest.mark.long
 def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_path: Path):
     daemon = Daemon(tmp_path, QUICK_HAND)
     page.goto(daemon.url)

@@ -133,6 +133,7 @@ def test_the_mode_stands_in_the_job_the_measurement_and_its_estimate(running):
     assert job["mode"] == measurement["mode"] == measurement["estimate"]["mode"] == "quick"
 
 
+@pytest.mark.long
 def test_a_hand_that_is_too_fast_is_slowed_and_gets_its_ramp(running):
     """1.1 N/s against 0.6 N/s: what it missed it fetches on the way down."""
     hand = replace(HAND, ramp_rate_n_per_s=1.1)
@@ -143,6 +144,7 @@ def test_a_hand_that_is_too_fast_is_slowed_and_gets_its_ramp(running):
     assert len(pressed_n(device.witness.recordings[0], "press")) == 10
 
 
+@pytest.mark.long
 def test_a_hand_that_lifts_midway_begins_again(running, monkeypatch):
     """On the lesion it lifts half a second after it was told to press slowly harder."""
     lifted_s: list[float] = []

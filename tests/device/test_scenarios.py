@@ -158,6 +158,7 @@ def test_the_fault_of_a_scenario_is_raised_by_its_code_and_the_device_recovers(p
 
 
 @pytest.mark.parametrize("path", OF_A_PROCESS, ids=lambda path: path.stem)
+@pytest.mark.long
 def test_a_camera_whose_process_hangs_or_dies_is_at_fault_until_it_does_so_no_more(path, tmp_path, monkeypatch):
     """The fault's own clock stands until its code is shown; then the fault is over."""
     fault_s, timeline = [0.0], partial(FaultTimeline, clock=lambda: fault_s[0])

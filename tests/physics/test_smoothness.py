@@ -1,6 +1,7 @@
 """On the mesh of fixed topology features are smooth in size and depth; meshed anew, they are not."""
 
 import numpy as np
+import pytest
 
 from host_tools.verification import smoothness
 
@@ -17,6 +18,7 @@ def test_the_map_folds_nowhere_in_the_box():
     assert smoothness.least_jacobian() > 0.05
 
 
+@pytest.mark.long
 def test_features_jump_by_less_than_a_thousandth_where_remeshing_takes_over():
     force, O1 = np.abs(smoothness.jump(smoothness.corners()[0]))[[3, 0]]
     assert max(force, O1) < 1e-3

@@ -2,6 +2,7 @@
 
 import re
 
+import pytest
 from mypy import api
 
 from device.hardware.interfaces import ForceScale
@@ -24,7 +25,8 @@ def test_newtons_are_the_counts_above_the_tare_over_the_sensitivity():
     assert [scale.newtons(counts) for counts in (500.0, 2500.0, -500.0)] == [0.0, 2.0, -1.0]
 
 
-def test_the_type_check_refuses_counts_and_baseline_numbers_for_newtons_and_newtons_for_counts(tmp_path):
+@pytest.mark.long
+def test_the_type_check_refuses_counts_and_plain_numbers_for_newtons_and_newtons_for_counts(tmp_path):
     """Line 7 of the text is right, lines 8 to 10 are not."""
     code = tmp_path / "mixed.py"
     code.write_text(MIXED)

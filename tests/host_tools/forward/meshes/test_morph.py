@@ -30,7 +30,14 @@ def test_the_inclusion_is_the_sphere_that_was_asked_for():
     assert Integrate(2 * pi * x * dx("tissue0|inclusion0"), mesh) == pytest.approx(np.pi * 60**2 * 30, rel=1e-8)
 
 
-@pytest.mark.parametrize(("truth", "varied"), [((10.0, 6.0), 0), ((3.0, 9.0), 0), ((14.8, 4.2), 1)])
+@pytest.mark.parametrize(
+    ("truth", "varied"),
+    [
+        ((10.0, 6.0), 0),
+        pytest.param((3.0, 9.0), 0, marks=pytest.mark.long),
+        pytest.param((14.8, 4.2), 1, marks=pytest.mark.long),
+    ],
+)
 def test_features_are_smooth_in_size_and_depth_to_a_millionth(truth, varied):
     """Over a fine scan the features leave a polynomial of degree 5 by less than 1e-6; remeshing leaves 1e-5."""
     scan = np.linspace(-0.1, 0.1, 11)
