@@ -37,6 +37,10 @@ FORBIDDEN = {
         "device.hardware.camera",
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
+    "Care saves and restores what lies on the disk, whether a daemon runs or not": (
+        "device.care.backup",
+        "device.instrument.status",
+    ),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),

@@ -24,6 +24,8 @@ from device.records.disk import Disk, LocalDisk, read_uncached
 
 StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
+SCHEMA_VERSION = 1
+"""What the database says it is, `PRAGMA user_version`; it was 0 until version 0.2.0, with the same tables."""
 TABLES = """
 CREATE TABLE IF NOT EXISTS measurement
   (seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, record TEXT NOT NULL);
@@ -52,7 +54,9 @@ class Store:
             opened.enter_context(closing(db))
             db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = FULL")
+            _require_known(db)
             db.executescript(TABLES)
+            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
             raise StorageError(f"The store {self.folder} cannot be opened: {error}.", remedy) from error
@@ -193,6 +197,13 @@ class Store:
         """Close the database and let go of the folder."""
         with self._lock:
             self._opened.close()
+
+
+def _require_known(db: sqlite3.Connection) -> None:
+    """Raise `sqlite3.DatabaseError` for a database that only newer software can read."""
+    [schema] = db.execute("PRAGMA user_version").fetchone()
+    if schema > SCHEMA_VERSION:
+        raise sqlite3.DatabaseError(f"its schema is {schema}, and this software knows {SCHEMA_VERSION} at most")
 
 
 def _is_full(error: Exception) -> bool:
