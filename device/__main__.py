@@ -26,6 +26,7 @@ from device.commands.record import add_record_command, run_record_command
 from device.commands.restore import add_restore_command, run_restore_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
 from device.commands.serve import serve
+from device.commands.support import add_support_command, run_support_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.press.phantom_press import PhantomPress
@@ -58,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    verbs = "analyse | record | config | calibration | faults | self-test | backup | restore | led-off"
+    verbs = "analyse | record | config | calibration | faults | self-test | backup | restore | support | led-off"
     commands = parser.add_subparsers(dest="command", metavar=verbs)
     add_analyse_command(commands)
     add_record_command(commands)
@@ -68,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     add_self_test_command(commands)
     add_backup_command(commands)
     add_restore_command(commands)
+    add_support_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -99,6 +101,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run_backup_command(options, _start_settings(options, _scenario(options)).config)
         if options.command == "restore":
             return run_restore_command(options, _stated(options))
+        if options.command == "support":
+            return run_support_command(options)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0

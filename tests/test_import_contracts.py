@@ -38,7 +38,7 @@ FORBIDDEN = {
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
     "Care saves and restores what lies on the disk, whether a daemon runs or not": (
-        "device.care.backup",
+        "device.care.support",
         "device.instrument.status",
     ),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
