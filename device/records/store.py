@@ -200,10 +200,11 @@ class Store:
 
 
 def _require_known(db: sqlite3.Connection) -> None:
-    """Raise `sqlite3.DatabaseError` for a database that only newer software can read."""
+    """Raise `StorageError` for a database that only newer software can read."""
     [schema] = db.execute("PRAGMA user_version").fetchone()
     if schema > SCHEMA_VERSION:
-        raise sqlite3.DatabaseError(f"its schema is {schema}, and this software knows {SCHEMA_VERSION} at most")
+        cause = f"The database is of schema {schema}, and this software knows {SCHEMA_VERSION} at most."
+        raise StorageError(cause, "Install the release that wrote it, or a newer one.")
 
 
 def _is_full(error: Exception) -> bool:

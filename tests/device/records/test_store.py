@@ -258,7 +258,7 @@ def test_a_database_of_newer_software_is_refused_and_left_as_it_is(tmp_path):
     db = sqlite3.connect(tmp_path / "tsis.sqlite")
     db.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
     db.close()
-    with pytest.raises(StorageError, match="its schema is 2, and this software knows 1 at most"):
+    with pytest.raises(StorageError, match="of schema 2, and this software knows 1 at most. Install the release"):
         Store(tmp_path)
     db = sqlite3.connect(tmp_path / "tsis.sqlite")
     assert db.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION + 1,)
