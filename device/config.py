@@ -14,6 +14,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Literal
 
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 from typing_extensions import Doc
 
@@ -329,9 +330,11 @@ class ClockSection(Section):
 class ServerSection(Section):
     """Where the screen and the REST API are served; loopback unless told otherwise."""
 
-    host: Annotated[str, Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network.")] = (
-        "127.0.0.1"
-    )
+    host: Annotated[
+        str,
+        Field(min_length=1),
+        Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network."),
+    ] = "127.0.0.1"
     port: Annotated[int, Bound(0, 65535, ""), Doc("Port of screen and REST API; 0 takes any free one.")] = 8000
 
 
