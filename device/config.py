@@ -336,6 +336,10 @@ class ServerSection(Section):
         Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network."),
     ] = "127.0.0.1"
     port: Annotated[int, Bound(0, 65535, ""), Doc("Port of screen and REST API; 0 takes any free one.")] = 8000
+    hosts: Annotated[
+        tuple[str, ...],
+        Doc("More names by which the probe is asked, as a proxy's; its addresses and its host name are known."),
+    ] = ()
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -404,6 +404,38 @@ class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller 
     status = 422
 
 
+class UnknownHost(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The request was addressed to a name that is none of this probe's."""
+
+    code = "E806"
+    title = "Unknown host"
+    status = 421
+
+
+class ForeignRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A page of another origin asked, or another machine for what is done at the probe's own screen only."""
+
+    code = "E807"
+    title = "Asked from elsewhere"
+    status = 403
+
+
+class WrongContentType(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A request that changes something must say that its body is JSON, or what else its path takes."""
+
+    code = "E808"
+    title = "Wrong content type"
+    status = 415
+
+
+class BodyTooLarge(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The body of the request is larger than its path takes; it was not read."""
+
+    code = "E809"
+    title = "Body too large"
+    status = 413
+
+
 class StalledError(DeviceError):
     """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
 

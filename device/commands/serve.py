@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import uvicorn
 
+from device.access.known_hosts import ANYWHERE, KnownHosts
 from device.config import Config
 from device.errors import DeviceError
 from device.instrument.procedure import Procedure
@@ -69,8 +70,10 @@ def _listen(config: Config) -> socket.socket:
 def _run_server(procedure: Procedure, listening: socket.socket) -> None:
     host, port = listening.getsockname()
     kind = "simulated probe" if procedure.is_simulated else "probe"
-    print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{host}:{port}/", flush=True)
-    app = create_app(procedure, procedure.store)
+    reached_at = socket.gethostname() if host in ANYWHERE else host
+    print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{reached_at}:{port}/", flush=True)
+    stated = procedure.config.server
+    app = create_app(procedure, procedure.store, KnownHosts.of_machine(stated.host, *stated.hosts))
     # Open event streams never end by themselves; without the limit a stop would wait for them.
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server = uvicorn.Server(settings)

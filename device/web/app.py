@@ -14,6 +14,7 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
+from device.access.known_hosts import KnownHosts
 from device.instrument.press.cost import press_cost
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
@@ -21,6 +22,7 @@ from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.web.events import snapshot, status_events
+from device.web.guard import RequestGuard
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
 from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
@@ -46,8 +48,11 @@ class SelfTestRequest(BaseModel):
     weight_n: float | None = None
 
 
-def create_app(procedure: Procedure, store: Store) -> FastAPI:
-    """Return the web application of a running procedure."""
+def create_app(procedure: Procedure, store: Store, hosts: KnownHosts | None = None) -> FastAPI:
+    """Return the web application of a running procedure, asked under the names `hosts`, the machine's own unless given.
+
+    Every request goes through the rules of device/access/request_rules.py first.
+    """
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -57,6 +62,7 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
         responses=PROBLEM,
     )
     install_problems(app)
+    app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
     _add_state(app, procedure, store)
     _add_presses(app, procedure, store)
     _add_measurements(app, store)
