@@ -8,6 +8,7 @@ from __future__ import annotations
 import signal
 import socket
 from collections.abc import Callable
+from types import FrameType
 
 import uvicorn
 
@@ -70,6 +71,19 @@ def _run_server(procedure: Procedure, listening: socket.socket) -> None:
     app = create_app(procedure, procedure.store)
     # Open event streams never end by themselves; without the limit a stop would wait for them.
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
-    server = uvicorn.Server(settings)
-    signal.signal(signal.SIGTERM, lambda *_: setattr(server, "should_exit", True))
+    server = DarkeningServer(settings, procedure)
+    signal.signal(signal.SIGTERM, server.handle_exit)  # until the server has its own
     server.run(sockets=[listening])
+
+
+class DarkeningServer(uvicorn.Server):
+    """The server whose first act at a signal to stop is to darken the probe: its clients are waited for after that."""
+
+    def __init__(self, settings: uvicorn.Config, procedure: Procedure) -> None:
+        super().__init__(settings)
+        self._procedure = procedure
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Take a signal to stop."""
+        self._procedure.stop()
+        super().handle_exit(sig, frame)
