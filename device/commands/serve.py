@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from types import FrameType
 
 import uvicorn
@@ -34,18 +35,27 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
         warnings = tuple(warning for warning in (settings.warning, note.warning()) if warning)
         procedure.board.update(warnings=warnings)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
-        procedure.start()
-        watchdog.start()
-        try:
+        with _noted(note), ExitStack() as ending:
+            procedure.start()
+            ending.callback(procedure.close)
+            watchdog.start()
+            ending.callback(watchdog.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
             _run_server(procedure, listening)
-        finally:
-            try:
-                watchdog.close()
-            finally:
-                procedure.close()
     return 0
+
+
+@contextmanager
+def _noted(note: RestartNote) -> Iterator[None]:
+    """Note that the daemon runs, until it has ended by a signal to stop: any other end is told by the next one."""
+    note.begin()
+    try:
+        yield
+    except KeyboardInterrupt:
+        note.remove()
+        raise
+    note.remove()
 
 
 def _listen(config: Config) -> socket.socket:

@@ -1,7 +1,8 @@
 """The press procedure: reference press beside the lesion, press on the lesion, estimate, keep.
 
-One thread runs it and owns light and camera; a second only darkens when the daemon is to stop. A press begins by a request or by itself, when the force passes the
-contact threshold. Everything that ends a press has a reason that the operator reads.
+One thread runs it and owns light and camera; a second only darkens when the daemon is to stop. A press begins by a
+request or by itself, when the force passes the contact threshold. Everything that ends a press has a reason that the
+operator reads.
 """
 
 from __future__ import annotations

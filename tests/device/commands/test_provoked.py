@@ -23,6 +23,7 @@ PROVOKED_BY = {
     "E803": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E804": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E805": "device/web/test_app.py::test_a_mode_without_a_model_is_refused_with_its_own_code",
+    "E903": "test_unclean_end.py::test_a_kill_is_a_warning_after_the_next_start_and_only_after_that",
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
 """What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""
