@@ -450,3 +450,11 @@ class RestartedError(DeviceError):
     code = "E902"
     title = "Restarted by itself"
     severity = "warning"
+
+
+class UncleanEndError(DeviceError):
+    """The daemon before did not end by a stop: a power cut, a freeze or a kill; shown until a press has told of it."""
+
+    code = "E903"
+    title = "Ended without a stop"
+    severity = "warning"

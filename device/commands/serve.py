@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from types import FrameType
 
 import uvicorn
 
@@ -34,18 +36,27 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
         warnings = tuple(warning for warning in (settings.warning, note.warning()) if warning)
         procedure.board.update(warnings=warnings)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
-        procedure.start()
-        watchdog.start()
-        try:
+        with _noted(note), ExitStack() as ending:
+            procedure.start()
+            ending.callback(procedure.close)
+            watchdog.start()
+            ending.callback(watchdog.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
             _run_server(procedure, listening)
-        finally:
-            try:
-                watchdog.close()
-            finally:
-                procedure.close()
     return 0
+
+
+@contextmanager
+def _noted(note: RestartNote) -> Iterator[None]:
+    """Note that the daemon runs, until it has ended by a signal to stop: any other end is told by the next one."""
+    note.begin()
+    try:
+        yield
+    except KeyboardInterrupt:
+        note.remove()
+        raise
+    note.remove()
 
 
 def _listen(config: Config) -> socket.socket:
@@ -76,6 +87,19 @@ def _run_server(procedure: Procedure, listening: socket.socket) -> None:
     app = create_app(procedure, procedure.store, KnownHosts.of_machine(stated.host, *stated.hosts))
     # Open event streams never end by themselves; without the limit a stop would wait for them.
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
-    server = uvicorn.Server(settings)
-    signal.signal(signal.SIGTERM, lambda *_: setattr(server, "should_exit", True))
+    server = DarkeningServer(settings, procedure)
+    signal.signal(signal.SIGTERM, server.handle_exit)  # until the server has its own
     server.run(sockets=[listening])
+
+
+class DarkeningServer(uvicorn.Server):
+    """The server whose first act at a signal to stop is to darken the probe: its clients are waited for after that."""
+
+    def __init__(self, settings: uvicorn.Config, procedure: Procedure) -> None:
+        super().__init__(settings)
+        self._procedure = procedure
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Take a signal to stop."""
+        self._procedure.stop()
+        super().handle_exit(sig, frame)

@@ -1,7 +1,8 @@
 """The press procedure: reference press beside the lesion, press on the lesion, estimate, keep.
 
-One thread runs it and owns light and camera. A press begins by a request or by itself, when the force passes the
-contact threshold. Everything that ends a press has a reason that the operator reads.
+One thread runs it and owns light and camera; a second only darkens when the daemon is to stop. A press begins by a
+request or by itself, when the force passes the contact threshold. Everything that ends a press has a reason that the
+operator reads.
 """
 
 from __future__ import annotations
@@ -85,6 +86,7 @@ class Procedure:
         test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
+        self._darkening = threading.Thread(target=self._darken_at_stop, name="darkening", daemon=True)
 
     @property
     def is_simulated(self) -> bool:
@@ -99,12 +101,18 @@ class Procedure:
 
     def start(self) -> None:
         """Begin to wait for presses."""
+        self._darkening.start()
         self._thread.start()
+
+    def stop(self) -> None:
+        """Darken the probe at once and end the press under way; waits for nothing, so a signal may ask for it."""
+        self._capture.stopping.set()
 
     def close(self) -> None:
         """End the press under way, switch the light off and release every part that was opened."""
-        self._capture.stopping.set()
+        self.stop()
         self._thread.join(timeout=5.0)
+        self._darkening.join(timeout=1.0)
         self._opened.close()
 
     def request(self, mode: Mode | None = None) -> PressJob:
@@ -147,6 +155,14 @@ class Procedure:
     def self_test(self) -> SelfTestJob:
         """The self-test under way or the last one; raises `UnknownResource` when there was none."""
         return self._self_tests.last
+
+    def _darken_at_stop(self) -> None:
+        """Darken as soon as the daemon is to stop: the procedure's own thread may be waiting for a camera."""
+        self._capture.stopping.wait()
+        try:
+            self.bench.darken_for_good()
+        except LightError as error:
+            log.error("%s %s", error.code, error)
 
     def _run(self) -> None:
         self._run_presses()
