@@ -19,13 +19,11 @@ from pydantic.dataclasses import dataclass
 from typing_extensions import Doc
 
 from device.config_chips import CHIP_ADDRESSES, INTERNAL_HZ, LightChip, PwmClock, RawFormat, RawMode
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.files.toml_record import STRICT, InvalidRecord
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.recording.pixel_scale import PixelScale
-
-MODELS = Path(__file__).resolve().parents[1] / "models"
-SIMULATED_PROBE = MODELS / "simulated_probe"
 
 SideRatio = Annotated[float, Bound(0.0, 1.0, "", low_included=False)]
 SideCounts = Annotated[float, Bound(1.0, 255.0, "counts")]

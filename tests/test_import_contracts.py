@@ -43,6 +43,10 @@ FORBIDDEN = {
         "device.web.problems",
     ),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
+    "A release is built from files alone: its builder knows nothing of the toolkit": (
+        "host_tools.release.own_wheel",
+        "host_tools.forward.plan",
+    ),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
     "The rooms of the toolkit stand in one order, and a new one has its place": (

@@ -18,10 +18,11 @@ from device.assembly.answers import Answers, active_calibration, answers_for
 from device.assembly.camera import emulated_camera, real_camera
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.opened_parts import OpenedParts
-from device.config import SIMULATED_PROBE, Config
+from device.config import Config
 from device.config_chips import RAW_BITS
 from device.errors import ConfigError
 from device.files.bundle_file import read_paper_model
+from device.files.shipped import SIMULATED_PROBE
 from device.hardware.interfaces import Camera, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.instrument.acquisition.bench import Bench
