@@ -16,6 +16,7 @@ from device.errors import DeviceError
 from device.instrument.procedure import Procedure
 from device.instrument.watch.restart_note import RestartNote
 from device.instrument.watch.watchdog import Watchdog
+from device.records.updates import Updates
 from device.settings.last_good import StartSettings
 from device.web.app import create_app
 
@@ -30,7 +31,8 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
     with listening:
         procedure = opened()
         note = RestartNote(config.data)
-        warnings = tuple(warning for warning in (settings.warning, note.warning()) if warning)
+        updates = Updates()
+        warnings = tuple(one for one in (settings.warning, note.warning(), updates.warning()) if one)
         procedure.board.update(warnings=warnings)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
         procedure.start()
@@ -38,7 +40,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
         try:
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, listening)
+            _run_server(procedure, updates, listening)
         finally:
             try:
                 watchdog.close()
@@ -63,11 +65,11 @@ def _listen(config: Config) -> socket.socket:
     return listening
 
 
-def _run_server(procedure: Procedure, listening: socket.socket) -> None:
+def _run_server(procedure: Procedure, updates: Updates, listening: socket.socket) -> None:
     host, port = listening.getsockname()
     kind = "simulated probe" if procedure.is_simulated else "probe"
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{host}:{port}/", flush=True)
-    app = create_app(procedure, procedure.store)
+    app = create_app(procedure, procedure.store, updates)
     # Open event streams never end by themselves; without the limit a stop would wait for them.
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server = uvicorn.Server(settings)

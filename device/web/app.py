@@ -20,10 +20,12 @@ from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
+from device.records.updates import Updates
 from device.web.events import snapshot, status_events
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
 from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
+from device.web.updates import add_updates
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -46,8 +48,8 @@ class SelfTestRequest(BaseModel):
     weight_n: float | None = None
 
 
-def create_app(procedure: Procedure, store: Store) -> FastAPI:
-    """Return the web application of a running procedure."""
+def create_app(procedure: Procedure, store: Store, updates: Updates | None = None) -> FastAPI:
+    """Return the web application of a running procedure, on a probe with its updater's folder."""
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -62,6 +64,7 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
     _add_measurements(app, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_updates(app, API, procedure, updates or Updates())
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)
