@@ -97,6 +97,15 @@ class LastGoodConfigError(ConfigError):
     is_lasting = True
 
 
+class UpdateTakenBack(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release did not work on this probe and the one before is back; shown until another one is installed."""
+
+    code = "E013"
+    title = "An update was taken back"
+    severity = "warning"
+    is_lasting = True
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 

@@ -8,10 +8,11 @@ operator reads.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from device.config import Config
@@ -31,16 +32,19 @@ from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.progress import ProgressBoard
+from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
 from device.measurement.mode import Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
-from device.records.store import Store
+from device.records.store import ENDED, Store
 
 log = logging.getLogger(__name__)
 
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
+WRITE_EVERY_S = 20.0
+"""So often a write that nobody needs proves the store: seldom enough not to wear the card out."""
 
 
 class Procedure:
@@ -82,7 +86,8 @@ class Procedure:
             called_away=self._capture.called_away,
         )
         self._book = PressBook(self.board, store, bench.budget)
-        self.progress.exercise("storage", self._look_at_disk)
+        self._written_s = -math.inf
+        self.progress.exercise("storage", self._prove_store)
         test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
@@ -98,6 +103,10 @@ class Procedure:
         if self.board.now.hindrance:
             raise self.board.now.hindrance
         _ = self.bench.force.latest_n
+
+    def parts(self) -> dict[HealthPart, PartHealth]:
+        """Return which parts were seen working just now; waits for none of them."""
+        return parts_health(self.board.now, self.progress, self.bench.force.fault)
 
     def start(self) -> None:
         """Begin to wait for presses."""
@@ -126,6 +135,10 @@ class Procedure:
     def cancel(self, press_id: str) -> None:
         """Cancel the press under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
+
+    def idle(self) -> AbstractContextManager[None]:
+        """While it is held no press begins; raises `BusyError` while a press or a self-test is under way."""
+        return self._requests.idle()
 
     def tare(self) -> Newtons:
         """Take the load cell's tare anew while nothing touches the probe; return by how much (N) the zero has moved.
@@ -269,6 +282,17 @@ class Procedure:
     def _look_at_disk(self) -> None:
         with self.progress.inside("storage"):
             self.store.require_space(self.config.store.min_free_mb)
+
+    def _prove_store(self) -> None:
+        """See that the store can be read, and now and then between presses that it can be written."""
+        self._look_at_disk()
+        press = self.board.now.press
+        is_idle = press is None or press.state in ENDED
+        is_due = time.monotonic() - self._written_s >= WRITE_EVERY_S
+        with self.progress.inside("storage"):
+            self.store.prove(writing=is_idle and is_due)
+        if is_idle and is_due:
+            self._written_s = time.monotonic()
 
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:

@@ -21,11 +21,13 @@ from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
+from device.records.updates import Updates
 from device.web.events import snapshot, status_events
 from device.web.guard import RequestGuard
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
 from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
+from device.web.updates import add_updates
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -48,10 +50,13 @@ class SelfTestRequest(BaseModel):
     weight_n: float | None = None
 
 
-def create_app(procedure: Procedure, store: Store, hosts: KnownHosts | None = None) -> FastAPI:
-    """Return the web application of a running procedure, asked under the names `hosts`, the machine's own unless given.
+def create_app(
+    procedure: Procedure, store: Store, *, hosts: KnownHosts | None = None, updates: Updates | None = None
+) -> FastAPI:
+    """Return the web application of a running procedure, with what says how its updates went.
 
-    Every request goes through the rules of device/access/request_rules.py first.
+    It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
+    device/access/request_rules.py first.
     """
     app = FastAPI(
         title="TSIS probe",
@@ -68,6 +73,7 @@ def create_app(procedure: Procedure, store: Store, hosts: KnownHosts | None = No
     _add_measurements(app, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_updates(app, API, procedure, updates or Updates())
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)

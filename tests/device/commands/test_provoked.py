@@ -17,6 +17,8 @@ PROVOKED_BY = {
     "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
+    "E013": "device/records/test_updates.py::"
+    "test_an_update_taken_back_is_a_lasting_warning_until_the_next_one_is_installed",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
