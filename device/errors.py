@@ -106,6 +106,24 @@ class UpdateTakenBack(DeviceError):  # noqa: N818 - the name is what the operato
     is_lasting = True
 
 
+class SupplyLowError(DeviceError):
+    """The computer's supply voltage is too low, or was for a moment; LEDs and camera may not do what they are told."""
+
+    code = "E015"
+    title = "Supply voltage too low"
+    status = 503
+    severity = "warning"
+
+
+class ComputerHotError(DeviceError):
+    """The probe's computer is so hot that it slows itself down."""
+
+    code = "E016"
+    title = "Computer too hot"
+    status = 503
+    severity = "warning"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 

@@ -31,6 +31,7 @@ from device.instrument.self_test.run import SelfTestRun
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
 from device.measurement.mode import Mode
@@ -61,6 +62,7 @@ class Procedure:
         calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
+        computer: ComputerWatch | None = None,
         progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
         folder_of: Callable[[Path], Path] = Path,
@@ -75,6 +77,7 @@ class Procedure:
         self._answers = PressAnswers(config, calibration, estimator, store, self.progress, simulated_truth)
         self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
+        self._computer = computer
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
@@ -111,6 +114,8 @@ class Procedure:
     def start(self) -> None:
         """Begin to wait for presses."""
         self._darkening.start()
+        if self._computer:
+            self._computer.start()
         self._thread.start()
 
     def stop(self) -> None:
@@ -122,6 +127,8 @@ class Procedure:
         self.stop()
         self._thread.join(timeout=5.0)
         self._darkening.join(timeout=1.0)
+        if self._computer:
+            self._computer.close()
         self._opened.close()
 
     def request(self, mode: Mode | None = None) -> PressJob:
@@ -203,6 +210,7 @@ class Procedure:
         self._look_at_disk()
         self._book.save_light_hours(at_least_s=SAVE_LIGHT_EVERY_S)
         self._book.warn(self._clock.warning())
+        self._warn_of_computer()
         self.calibration.require_valid(self._clock.now())
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
@@ -228,6 +236,7 @@ class Procedure:
             if job := self._requests.begin(is_touched=is_touched):
                 return job
             self.progress.beat()
+            self._warn_of_computer()
             time.sleep(POLL_S)
         return None
 
@@ -259,6 +268,7 @@ class Procedure:
         self._book.note(job, state="capturing", progress=0.1)
         self.board.update(step="reference", measurement_id=None)
         reference = self._capture.loaded("reference", job.mode)
+        self._warn_of_computer()
         levels = self._capture.side_levels(reference)
         self._book.warn(self._dimming.warning(levels))
         self._book.warn(self._brightness.saw(levels))
@@ -272,7 +282,15 @@ class Procedure:
         self._darken()
         self.board.update(step="computing", guidance=Guidance.LIFT)
         self._book.warn(self._clock.warning())
+        self._warn_of_computer()
         return [*reference, *press]
+
+    def _warn_of_computer(self) -> None:
+        """Show what the computer's watch has seen since the last time; what is shown already is not logged again."""
+        shown = [one.as_record() for one in self.board.now.warnings]
+        for warning in self._computer.taken() if self._computer else ():
+            if warning.as_record() not in shown:
+                self._book.warn(warning)
 
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self._capture.end(reason)
