@@ -62,7 +62,7 @@ def ask(probe):
     def asking(method, path, client="127.0.0.1", **content):
         async def answer():
             transport = httpx.ASGITransport(app, client=(client, 4321))
-            async with httpx.AsyncClient(transport=transport, base_url="http://probe") as http:
+            async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as http:
                 return await http.request(method, path, **content)
 
         return asyncio.run(answer())
