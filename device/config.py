@@ -193,8 +193,13 @@ class LightSection(Section):
     max_on_s: Annotated[
         float,
         Bound(1.0, 3600.0, "s"),
-        Doc("Time with light in one press, both of its parts together, after which the light goes off."),
+        Doc("Time with light, over all presses of one and a half times as long, after which the light goes off."),
     ] = 300.0
+    untouched_s: Annotated[
+        float,
+        Bound(0.5, 60.0, "s"),
+        Doc("Time with light in presses that nobody touches, one after the other, after which they wait in the dark."),
+    ] = 5.0
 
     @property
     def chip_address(self) -> int:

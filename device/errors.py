@@ -192,7 +192,7 @@ class HotLedDriverError(LightError):
 
 
 class LightBudgetError(LightError):
-    """The light was on for too long in one press; it goes off, and the next press may begin."""
+    """The light was on for too long over the last presses; it goes off, and the press ends."""
 
     code = "E209"
     title = "Light on for too long"
@@ -204,6 +204,13 @@ class LightLimitError(LightError):
     code = "E210"
     title = "Light at its limit"
     severity = "warning"
+
+
+class LightRestError(LightError):
+    """The light was on for so long over the last presses that none may begin; it passes by itself."""
+
+    code = "E211"
+    title = "Light must rest"
 
 
 class LoadCellError(DeviceError):

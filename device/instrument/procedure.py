@@ -191,6 +191,7 @@ class Procedure:
         self._book.save_light_hours(at_least_s=SAVE_LIGHT_EVERY_S)
         self._book.warn(self._clock.warning())
         self.calibration.require_valid(self._clock.now())
+        self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
         self._require_no_drift(unloaded)
