@@ -213,6 +213,20 @@ class LightRestError(LightError):
     title = "Light must rest"
 
 
+class LightCutError(LightError):
+    """The enable line took the light away in a press: loop, bus or camera came to a stop, or the line's keeper did."""
+
+    code = "E212"
+    title = "Light was cut"
+
+
+class LightLineError(LightError):
+    """The line that enables the LEDs cannot be driven, or the LED chip does not obey it."""
+
+    code = "E213"
+    title = "Enable line does not work"
+
+
 class LoadCellError(DeviceError):
     """The load cell is silent."""
 

@@ -55,6 +55,9 @@ class SimulatedTimeProbe:
         self.now_s += 0.001
         return self.now_s
 
+    def go_on(self) -> None:
+        pass
+
     def check_outputs(self) -> None:
         self.now_s += 0.01
 
