@@ -219,7 +219,7 @@ class HotLedDriverError(LightError):
 
 
 class LightBudgetError(LightError):
-    """The light was on for too long in one press; it goes off, and the next press may begin."""
+    """The light was on for too long over the last presses; it goes off, and the press ends."""
 
     code = "E209"
     title = "Light on for too long"
@@ -231,6 +231,27 @@ class LightLimitError(LightError):
     code = "E210"
     title = "Light at its limit"
     severity = "warning"
+
+
+class LightRestError(LightError):
+    """The light was on for so long over the last presses that none may begin; it passes by itself."""
+
+    code = "E211"
+    title = "Light must rest"
+
+
+class LightCutError(LightError):
+    """The enable line took the light away in a press: loop, bus or camera came to a stop, or the line's keeper did."""
+
+    code = "E212"
+    title = "Light was cut"
+
+
+class LightLineError(LightError):
+    """The line that enables the LEDs cannot be driven, or the LED chip does not obey it."""
+
+    code = "E213"
+    title = "Enable line does not work"
 
 
 class LoadCellError(DeviceError):
