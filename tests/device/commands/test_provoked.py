@@ -17,6 +17,11 @@ PROVOKED_BY = {
     "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
+    "E010": "device/update/test_refusals.py::test_a_flipped_byte_is_refused_wherever_it_is",
+    "E011": "device/update/test_refusals.py::test_what_is_not_for_this_probe_is_refused",
+    "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
+    "E013": "device/update/test_install.py::test_a_release_that_is_not_healthy_is_left_and_the_one_before_is_back",
+    "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
