@@ -70,15 +70,14 @@ def small_files(version: str, behaviour: Mapping[str, Any] | None = None, filler
     }
 
 
-def manifest(files: Mapping[str, bytes], version: str, counter: int, **changes: Any) -> bytes:
-    """Return the manifest of some files; `changes` replace its entries."""
+def manifest(content: Mapping[str, bytes], version: str, counter: int, **changes: Any) -> bytes:
+    """Return the manifest of these files; `changes` replace its entries."""
     record = {
         "schema": "tsis.release/1", "product": "tsis", "version": version, "counter": counter, "commit": "0" * 40,
         "machine": platform.machine(), "python": f"{sys.version_info.major}.{sys.version_info.minor}",
         "hardware": ["tsis-probe-1"], "data_schemas": {"store": {"writes": 1, "reads": [1]}}, "signers": "",
         "files": [
-            {"path": path, "size": len(content), "sha256": hashlib.sha256(content).hexdigest()}
-            for path, content in files.items()
+            {"path": path, "size": len(own), "sha256": hashlib.sha256(own).hexdigest()} for path, own in content.items()
         ],
     }  # fmt: skip
     return json.dumps(record | changes).encode()
@@ -102,9 +101,9 @@ def plain(member: tuple[str, bytes]) -> tuple[tarfile.TarInfo, bytes]:
 
 def release_file(
     key: Path, version: str, counter: int, behaviour: Mapping[str, Any] | None = None,
-    files: Mapping[str, bytes] | None = None, filler: int = 1, **changes: Any,
+    content: Mapping[str, bytes] | None = None, filler: int = 1, **changes: Any,
 ) -> bytes:  # fmt: skip
     """Return a release file that `key` signed; `changes` are of its manifest."""
-    files = small_files(version, behaviour, filler) if files is None else files
+    files = small_files(str(version), behaviour, filler) if content is None else content
     signed = manifest(files, version, counter, **changes)
     return tar({"manifest.json": signed, "manifest.json.sig": signature(signed, key), **files})

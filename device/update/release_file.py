@@ -104,9 +104,10 @@ def opened(path: Path) -> Iterator[ReleaseFile]:
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
         raise UntrustedRelease(f"The release file {path} cannot be opened: {error}.", REMEDY) from None
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise UntrustedRelease(f"{path} is not a file.", REMEDY)
     with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise UntrustedRelease(f"{path} is not a file.", REMEDY)
         yield ReleaseFile(file)
 
 
