@@ -97,7 +97,30 @@ class LastGoodConfigError(ConfigError):
     is_lasting = True
 
 
-class UpdateTakenBack(DeviceError):  # noqa: N818 - the name is what the operator reads
+class UntrustedRelease(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release file is damaged, was cut off while it was copied, or is not signed by a key that this probe trusts."""
+
+    code = "E010"
+    title = "Release damaged or not signed"
+    status = 422
+
+
+class UnfitRelease(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release is not for this probe: another product, machine or data, older than what ran here, or known as bad."""
+
+    code = "E011"
+    title = "Release does not fit"
+    status = 422
+
+
+class UpdateFailed(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A step of an update failed; the release that ran before still does."""
+
+    code = "E012"
+    title = "Update failed"
+
+
+class RolledBack(DeviceError):  # noqa: N818 - the name is what the operator reads
     """A release did not work on this probe and the one before is back; shown until another one is installed."""
 
     code = "E013"
@@ -404,6 +427,13 @@ class DiskFullError(StorageError):
     title = "Disk full"
 
 
+class NewerDataError(StorageError):
+    """The data folder was written by a newer release than this one, which cannot read it."""
+
+    code = "E014"
+    title = "Data of a newer release"
+
+
 class ClockJumpError(DeviceError):
     """The wall clock was set; what is measured runs on the monotonic clock, but `taken_at` may be wrong."""
 
@@ -413,7 +443,7 @@ class ClockJumpError(DeviceError):
 
 
 class BusyError(DeviceError):
-    """A press or a self-test is already under way."""
+    """A press, a self-test or an update is already under way."""
 
     code = "E801"
     title = "Busy"
