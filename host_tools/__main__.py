@@ -17,6 +17,7 @@ from host_tools.commands.optics import optics
 from host_tools.commands.output import note
 from host_tools.commands.pages import pages
 from host_tools.commands.paper import paper
+from host_tools.commands.release import release
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
 from host_tools.commands.train import train
@@ -42,6 +43,7 @@ app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(pap
 app.command(epilog="Example: host_tools pages --check")(pages)
 app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)
 app.add_typer(optics, name="optics")
+app.add_typer(release, name="release")
 
 
 def main() -> None:

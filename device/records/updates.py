@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from device import __version__
-from device.errors import BusyError, DiskFullError, InvalidRequest, StorageError, RolledBack
+from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
 from device.files.durable import sync_directory
 
 log = logging.getLogger(__name__)
