@@ -101,7 +101,7 @@ class UpdateTakenBack(DeviceError):  # noqa: N818 - the name is what the operato
     """A release did not work on this probe and the one before is back; shown until another one is installed."""
 
     code = "E013"
-    title = "An update was taken back"
+    title = "Update taken back"
     severity = "warning"
     is_lasting = True
 

@@ -128,7 +128,7 @@ class Updates:
         last = _last_end(record)
         if not last or last.state != "rolled_back":
             return None
-        return UpdateTakenBack(_taken_back(last, record), "Measure as before, and send this to whoever made it.")
+        return UpdateTakenBack(_failure(last), f"{_way_back(record)} Measure as before.")
 
     def require_free(self) -> None:
         """Raise `BusyError` while an update is under way, `InvalidRequest` where there is no updater."""
@@ -297,12 +297,15 @@ def _outcome(record: UpdateRecord) -> str:
         return ""
     if end.state == "committed":
         return f"Version {_version(end.release)} is installed and works."
-    return _taken_back(end, record)
+    return f"{_failure(end)} {_way_back(record)}"
 
 
-def _taken_back(end: UpdateEnd, record: UpdateRecord) -> str:
-    went_back = f"This probe went back to {_version(record.running)}."
-    return f"Version {_version(end.release)} did not work: {_unstopped(end.reason)}. {went_back}"
+def _failure(end: UpdateEnd) -> str:
+    return f"Version {_version(end.release)} did not work: {_unstopped(end.reason)}."
+
+
+def _way_back(record: UpdateRecord) -> str:
+    return f"This probe went back to {_version(record.running)}."
 
 
 def _version(release: str | None) -> str:

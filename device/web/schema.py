@@ -148,6 +148,7 @@ class Status(_Body):
     simulated: bool
     serial: str
     software: str
+    release: str
     step: Step
     press_state: PressStateCode
     guidance: GuidanceLine

@@ -63,7 +63,8 @@ def test_an_update_taken_back_is_a_lasting_warning_until_the_next_one_is_install
     updates = told(folder)
     warning = updates.warning()
     assert (warning.code, warning.severity, warning.is_lasting) == ("E013", "warning", True)
-    assert "camera gave no image" in warning.cause
+    assert warning.cause == "Version 0.2.0 did not work: camera gave no image."
+    assert warning.remedy == "This probe went back to 0.1.0. Measure as before."
     (folder / "progress.json").unlink()
     assert updates.warning().code == "E013"
     refused = told(folder, state="refused", release="0.1.0+399", reason="It is older.").now()
