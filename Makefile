@@ -45,11 +45,12 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
 
-check: .venv/all.stamp ## lint, format, types, import arrows, dead links, pages that are their results in their templates
+check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports
+	$(PY) -m pytest -rs --durations 0 --durations-min 9 tests/test_systemd_units.py tests/test_shell_scripts.py
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
 

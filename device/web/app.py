@@ -14,6 +14,7 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
+from device.access.known_hosts import KnownHosts
 from device.instrument.press.cost import press_cost
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
@@ -22,6 +23,7 @@ from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.records.updates import Updates
 from device.web.events import snapshot, status_events
+from device.web.guard import RequestGuard
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
 from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
@@ -48,8 +50,14 @@ class SelfTestRequest(BaseModel):
     weight_n: float | None = None
 
 
-def create_app(procedure: Procedure, store: Store, updates: Updates | None = None) -> FastAPI:
-    """Return the web application of a running procedure, on a probe with its updater's folder."""
+def create_app(
+    procedure: Procedure, store: Store, *, hosts: KnownHosts | None = None, updates: Updates | None = None
+) -> FastAPI:
+    """Return the web application of a running procedure, with what says how its updates went.
+
+    It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
+    device/access/request_rules.py first.
+    """
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -59,6 +67,7 @@ def create_app(procedure: Procedure, store: Store, updates: Updates | None = Non
         responses=PROBLEM,
     )
     install_problems(app)
+    app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
     _add_state(app, procedure, store)
     _add_presses(app, procedure, store)
     _add_measurements(app, store)

@@ -69,6 +69,9 @@ class ObedientBench:
     def light(self, ratio):
         self.ratio = ratio
 
+    def darken_for_good(self):
+        self.ratio = (0.0, 0.0, 0.0, 0.0)
+
     def check_lights(self):
         self.ratio = (0.0, 0.0, 0.0, 0.0)
 

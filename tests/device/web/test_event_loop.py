@@ -72,7 +72,7 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
     app = create_app(witness, witness)
 
     async def ask():
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://probe") as client:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
             return threading.get_ident(), await client.get(f"/api/v1/{path}")
 
     loop_thread, answer = asyncio.run(ask())

@@ -57,12 +57,12 @@ def probe(tmp_path):
 
 @pytest.fixture
 def ask(probe):
-    app = create_app(probe.procedure, types.SimpleNamespace(), Updates(probe.folder, "0.1.0+400"))
+    app = create_app(probe.procedure, types.SimpleNamespace(), updates=Updates(probe.folder, "0.1.0+400"))
 
     def asking(method, path, client="127.0.0.1", **content):
         async def answer():
             transport = httpx.ASGITransport(app, client=(client, 4321))
-            async with httpx.AsyncClient(transport=transport, base_url="http://probe") as http:
+            async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as http:
                 return await http.request(method, path, **content)
 
         return asyncio.run(answer())
