@@ -97,8 +97,8 @@ class LastGoodConfigError(ConfigError):
     is_lasting = True
 
 
-class UpdateTakenBack(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """A release did not work on this probe and the one before is back; shown until another one is installed."""
+class RolledBack(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A new release was not healthy within its time; the previous one is back."""
 
     code = "E013"
     title = "Update taken back"

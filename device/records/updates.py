@@ -7,6 +7,7 @@ file appears in its folder `incoming` by a rename, whole or not at all. Files th
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import logging
 import math
@@ -20,7 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from device import __version__
-from device.errors import BusyError, DiskFullError, InvalidRequest, StorageError, UpdateTakenBack
+from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
 from device.files.durable import sync_directory
 
 log = logging.getLogger(__name__)
@@ -53,7 +54,8 @@ RUNNING = release_of(Path(sys.prefix).resolve())
 class UpdateRecord:
     """What the updater says: releases by name, how far an update is (0..1), how the last one ended, and before that.
 
-    `outcome` is the last end in one sentence for the operator.
+    `pending` is a release on trial, `leaving` why it is just being left; `outcome` is the last end in words for the
+    operator.
     """
 
     running: str
@@ -62,6 +64,7 @@ class UpdateRecord:
     previous: str | None = None
     committed: str | None = None
     pending: str | None = None
+    leaving: str = ""
     floor: int | None = None
     progress: float | None = None
     step: str = ""
@@ -86,9 +89,9 @@ class UpdateRecord:
 
 @dataclass(frozen=True)
 class UpdateEnd:
-    """How an update ended that was tried: `state` is one of `ENDS`."""
+    """How an update ended that was tried: `event` is one of `ENDS`."""
 
-    state: str
+    event: str
     release: str | None
     reason: str
 
@@ -114,6 +117,7 @@ class Updates:
             previous=_name(state.get("previous")),
             committed=_name(state.get("committed")),
             pending=_name(state.get("pending")),
+            leaving=_as(str, (_as(dict, state.get("pending")) or {}).get("leaving")) or "",
             floor=_as(int, state.get("floor")),
             progress=_ratio(progress.get("progress")),
             step=_as(str, progress.get("step")) or "",
@@ -122,13 +126,13 @@ class Updates:
         )
         return replace(record, outcome=_outcome(record))
 
-    def warning(self) -> UpdateTakenBack | None:
+    def warning(self) -> RolledBack | None:
         """Return what the screen shows until the next release is committed, if the last one was taken back."""
         record = self.now()
         last = _last_end(record)
-        if not last or last.state != "rolled_back":
+        if not last or last.event != "rolled_back":
             return None
-        return UpdateTakenBack(_failure(last), f"{_way_back(record)} Measure as before.")
+        return RolledBack(_failure(last), f"{_way_back(record)} Measure as before.")
 
     def require_free(self) -> None:
         """Raise `BusyError` while an update is under way, `InvalidRequest` where there is no updater."""
@@ -152,9 +156,8 @@ class Updates:
         self.require_free()
         if self._taking and self._taking.is_open:
             raise BusyError("Another file is being taken.", "Wait until it has arrived.")
-        for leftover in self._incoming.glob(".upload-*"):
-            with suppress(OSError):
-                leftover.unlink()
+        for path in self._incoming.glob(".upload-*"):
+            _remove_unless_held(path)
         require_size(announced_bytes or 0)
         space = os.statvfs(self._incoming)
         left_bytes = space.f_bavail * space.f_frsize - SPARE_BYTES
@@ -176,9 +179,10 @@ class IncomingRelease:
     """A file that is being taken: not there for the updater until it is handed over."""
 
     def __init__(self, path: Path) -> None:
-        """Create it, for this user and the updater."""
+        """Create it, for this user and the updater; what nobody holds was left by somebody who is gone."""
         self._path, self.bytes_taken, self._unsynced_bytes = path, 0, 0
         self._file: BinaryIO = path.open("xb")
+        fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         os.chmod(self._file.fileno(), 0o640)
 
     @property
@@ -205,10 +209,14 @@ class IncomingRelease:
         _on_disk(lambda: os.fsync(self._file.fileno()))
 
     def hand_over(self, name: str = HANDED_OVER) -> None:
-        """Bring it to the disk and give it the name that the updater waits for."""
+        """Bring it to the disk and give it the name that the updater waits for; raise `BusyError` when one is there."""
         self.synchronise()
-        self._file.close()
-        _on_disk(lambda: self._path.rename(self._path.with_name(name)))
+        try:
+            _on_disk(lambda: os.link(self._path, self._path.with_name(name)))  # unlike a rename it replaces nothing
+        except FileExistsError:
+            raise BusyError("An update is under way: another file waits for it.", "Wait until it has ended.") from None
+        finally:
+            self.discard()
         _on_disk(lambda: sync_directory(self._path.parent))
 
     def discard(self) -> None:
@@ -236,10 +244,19 @@ def _on_disk(action: Callable[[], Result]) -> Result:
     """Return what an action returns; raise `StorageError`, or `DiskFullError`, when the disk refuses it."""
     try:
         return action()
+    except FileExistsError:
+        raise
     except OSError as error:
         kind = DiskFullError if error.errno in (errno.ENOSPC, errno.EDQUOT) else StorageError
         remedy = "Free space on the disk, or update from its command line: python -m device update install FILE."
         raise kind(f"The release could not be written: {error}.", remedy) from error
+
+
+def _remove_unless_held(path: Path) -> None:
+    """Remove what an upload left that nobody goes on with; another door of the probe may be taking its own."""
+    with suppress(OSError), path.open("rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        path.unlink()
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -279,11 +296,16 @@ def _ratio(value: object) -> float | None:
 
 
 def _last_end(record: UpdateRecord) -> UpdateEnd | None:
-    """Return how the last update ended that was tried on this probe; a file that was refused was not tried."""
-    told = {"state": record.state, "release": record.release, "reason": record.reason}
-    for entry in (told, *reversed(record.history)):
-        if entry.get("state") in ENDS:
-            return UpdateEnd(entry["state"], _name(entry.get("release")), _as(str, entry.get("reason")) or "")
+    """Return how the last update ended that was tried on this probe; a file that was refused was not tried.
+
+    The updater starts the daemon of before first and adds to its history then.
+    """
+    if record.leaving:
+        return UpdateEnd("rolled_back", record.pending, record.leaving)
+    told = {"event": record.state, "release": record.release, "reason": record.reason}
+    for entry in (*reversed(record.history), told):
+        if entry.get("event") in ENDS:
+            return UpdateEnd(entry["event"], _name(entry.get("release")), _as(str, entry.get("reason")) or "")
     return None
 
 
@@ -295,7 +317,7 @@ def _outcome(record: UpdateRecord) -> str:
     end = _last_end(record)
     if end is None:
         return ""
-    if end.state == "committed":
+    if end.event == "committed":
         return f"Version {_version(end.release)} is installed and works."
     return f"{_failure(end)} {_way_back(record)}"
 

@@ -126,6 +126,7 @@ class UpdateResource(_Body):
     previous: str | None
     committed: str | None
     pending: str | None
+    leaving: str
     floor: int | None
     progress: float | None
     step: str
