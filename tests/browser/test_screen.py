@@ -123,7 +123,7 @@ def probe(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     procedure.start()
     (tmp_path / "updates" / "incoming").mkdir(parents=True)
     (tmp_path / "updates" / "state.json").write_text(json.dumps({"committed": "0.1.0+400", "previous": "0.0.9+390"}))
-    app = create_app(procedure, procedure.store, Updates(tmp_path / "updates", "0.1.0+400"))
+    app = create_app(procedure, procedure.store, updates=Updates(tmp_path / "updates", "0.1.0+400"))
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server, listening = uvicorn.Server(settings), socket.create_server(("127.0.0.1", 0))
     serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
