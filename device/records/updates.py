@@ -30,7 +30,9 @@ Result = TypeVar("Result")
 FOLDER = Path("/var/lib/tsis-update")
 RELEASES = Path("/opt/tsis/releases")
 HANDED_OVER, WAY_BACK = "update.release", "roll_back"
-UNDER_WAY = ("verifying", "unpacking", "switching", "checking")
+WAITING = "waiting"
+"""State while a file is handed over and the updater has not said anything of it."""
+UNDER_WAY = (WAITING, "verifying", "unpacking", "switching", "checking")
 ENDS = ("committed", "rolled_back")
 NOT_A_RELEASE = "not_installed"
 """State of a workstation, where nothing updates this software."""
@@ -112,7 +114,7 @@ class Updates:
         history = tuple(one for one in _as(list, state.get("history")) or () if isinstance(one, dict))
         record = UpdateRecord(
             running=self.running,
-            state=_as(str, progress.get("state")) or "idle",
+            state=WAITING if self._is_waiting() else _as(str, progress.get("state")) or "idle",
             release=_name(progress.get("release")),
             previous=_name(state.get("previous")),
             committed=_name(state.get("committed")),
@@ -139,7 +141,7 @@ class Updates:
         record = self.now()
         if not self._incoming.is_dir():
             raise _refused("This software is not installed as a release.", "Update it as it was installed.", 409)
-        if record.is_under_way or self._is_waiting():
+        if record.is_under_way:
             raise BusyError(f"An update is under way: {record.step or record.state}.", "Wait until it has ended.")
 
     def _is_waiting(self) -> bool:

@@ -361,6 +361,7 @@ def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_fr
     handed = probe.updates / "incoming" / "update.release"
     wait_for(handed.exists, bool)
     assert handed.read_bytes() == release.read_bytes()
+    expect(page.locator("#releases-line")).to_have_text("A release is being installed.")
     handed.unlink()
     probe.updater_says(state="unpacking", release="0.2.0+412", progress=0.42, step="unpacking numpy")
     expect(page.locator("#releases-line")).to_have_text("Version 0.2.0 is being installed.")

@@ -4,7 +4,7 @@
 import { byId, setText } from "./dom.js";
 import { fetchUpdates, goBack, sendRelease } from "./probe.js";
 
-const UNDER_WAY = { verifying: "checking its signature", unpacking: "unpacking", switching: "starting it", checking: "testing it" };
+const UNDER_WAY = { waiting: "beginning", verifying: "checking its signature", unpacking: "unpacking", switching: "starting it", checking: "testing it" };
 const LOOK_MS = 1000;
 const GLANCE_MS = 5000; // while nobody looks at this page
 const BEGINNING = "manifest.json"; // of every release file
@@ -18,21 +18,22 @@ let problem = "";
 let lookedAt = -Infinity;
 let asking = false;
 
+const installing = (release) => (release ? `Version ${version(release)} is being installed.` : "A release is being installed.");
 const version = (release) => (release ?? "").split("+")[0];
 const isUnderWay = () => updates !== null && updates.state in UNDER_WAY;
 
 /** What the main view says of an update under way, or null. */
 export function updateLine() {
   if (!isUnderWay()) return null;
-  const percent = updates.progress === null ? "" : `, ${Math.round(100 * updates.progress)} %`;
-  return { word: `Version ${version(updates.release)} is being installed.`, reason: `Now: ${UNDER_WAY[updates.state]}${percent}.`, tone: "caution" };
+  const percent = updates.progress === null || updates.state === "waiting" ? "" : `, ${Math.round(100 * updates.progress)} %`;
+  return { word: installing(updates.state === "waiting" ? null : updates.release), reason: `Now: ${UNDER_WAY[updates.state]}${percent}.`, tone: "caution" };
 }
 
 /** What to say while the daemon is away: title and sentence, null unless that is an update's doing. */
 export function absenceWords() {
   if (!isUnderWay()) return null;
   const title = "The probe is being updated";
-  return [title, `It comes back by itself within three minutes, with version ${version(updates.release)} or with the one before.`];
+  return [title, "It comes back by itself within three minutes, with the new release or with the one before."];
 }
 
 function lineWords() {

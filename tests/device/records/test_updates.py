@@ -124,8 +124,11 @@ def test_a_file_is_there_for_the_updater_only_when_it_is_whole(folder):
     incoming.discard()
     assert (folder / "incoming" / "update.release").read_bytes() == b"onetwo"
     assert [path.name for path in (folder / "incoming").iterdir()] == ["update.release"]
+    assert updates.now().state == "waiting"
     with pytest.raises(BusyError, match="An update is under way"):
         updates.require_free()
+    os.utime(folder / "progress.json", (2e9, 2e9))  # the updater has told of it
+    assert updates.now().state == "idle"
 
 
 def test_one_that_is_given_up_leaves_nothing_and_a_leftover_is_removed(folder):
