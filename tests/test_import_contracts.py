@@ -38,6 +38,7 @@ FORBIDDEN = {
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
+    "Provisioning runs where nothing of the probe is installed yet": ("device.provisioning.plan", "device.errors"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
