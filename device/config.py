@@ -14,17 +14,16 @@ from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Literal
 
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 from typing_extensions import Doc
 
 from device.config_chips import CHIP_ADDRESSES, INTERNAL_HZ, LightChip, PwmClock, RawFormat, RawMode
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.files.toml_record import STRICT, InvalidRecord
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N, Mode
 from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.recording.pixel_scale import PixelScale
-
-MODELS = Path(__file__).resolve().parents[1] / "models"
-SIMULATED_PROBE = MODELS / "simulated_probe"
 
 SideRatio = Annotated[float, Bound(0.0, 1.0, "", low_included=False)]
 SideCounts = Annotated[float, Bound(1.0, 255.0, "counts")]
@@ -329,10 +328,16 @@ class ClockSection(Section):
 class ServerSection(Section):
     """Where the screen and the REST API are served; loopback unless told otherwise."""
 
-    host: Annotated[str, Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network.")] = (
-        "127.0.0.1"
-    )
+    host: Annotated[
+        str,
+        Field(min_length=1),
+        Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network."),
+    ] = "127.0.0.1"
     port: Annotated[int, Bound(0, 65535, ""), Doc("Port of screen and REST API; 0 takes any free one.")] = 8000
+    hosts: Annotated[
+        tuple[str, ...],
+        Doc("More names by which the probe is asked, as a proxy's; its addresses and its host name are known."),
+    ] = ()
 
 
 @dataclass(frozen=True, config=STRICT)

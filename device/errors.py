@@ -97,6 +97,33 @@ class LastGoodConfigError(ConfigError):
     is_lasting = True
 
 
+class UpdateTakenBack(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release did not work on this probe and the one before is back; shown until another one is installed."""
+
+    code = "E013"
+    title = "An update was taken back"
+    severity = "warning"
+    is_lasting = True
+
+
+class SupplyLowError(DeviceError):
+    """The computer's supply voltage is too low, or was for a moment; LEDs and camera may not do what they are told."""
+
+    code = "E015"
+    title = "Supply voltage too low"
+    status = 503
+    severity = "warning"
+
+
+class ComputerHotError(DeviceError):
+    """The probe's computer is so hot that it slows itself down."""
+
+    code = "E016"
+    title = "Computer too hot"
+    status = 503
+    severity = "warning"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 
@@ -404,6 +431,38 @@ class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller 
     status = 422
 
 
+class UnknownHost(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The request was addressed to a name that is none of this probe's."""
+
+    code = "E806"
+    title = "Unknown host"
+    status = 421
+
+
+class ForeignRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A page of another origin asked, or another machine for what is done at the probe's own screen only."""
+
+    code = "E807"
+    title = "Asked from elsewhere"
+    status = 403
+
+
+class WrongContentType(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A request that changes something must say that its body is JSON, or what else its path takes."""
+
+    code = "E808"
+    title = "Wrong content type"
+    status = 415
+
+
+class BodyTooLarge(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The body of the request is larger than its path takes; it was not read."""
+
+    code = "E809"
+    title = "Body too large"
+    status = 413
+
+
 class StalledError(DeviceError):
     """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
 
@@ -417,4 +476,12 @@ class RestartedError(DeviceError):
 
     code = "E902"
     title = "Restarted by itself"
+    severity = "warning"
+
+
+class UncleanEndError(DeviceError):
+    """The daemon before did not end by a stop: a power cut, a freeze or a kill; shown until a press has told of it."""
+
+    code = "E903"
+    title = "Ended without a stop"
     severity = "warning"

@@ -39,7 +39,15 @@ FORBIDDEN = {
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
     "Provisioning runs where nothing of the probe is installed yet": ("device.provisioning.plan", "device.errors"),
+    "Access judges a request, and knows nothing that could answer it": (
+        "device.access.request_rules",
+        "device.web.problems",
+    ),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
+    "A release is built from files alone: its builder knows nothing of the toolkit": (
+        "host_tools.release.own_wheel",
+        "host_tools.forward.plan",
+    ),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
     "The rooms of the toolkit stand in one order, and a new one has its place": (

@@ -18,11 +18,13 @@ from device.assembly.answers import Answers, active_calibration, answers_for
 from device.assembly.camera import emulated_camera, real_camera
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.opened_parts import OpenedParts
-from device.config import SIMULATED_PROBE, Config
+from device.config import Config
 from device.config_chips import RAW_BITS
 from device.errors import ConfigError
 from device.files.bundle_file import read_paper_model
-from device.hardware.interfaces import Camera, Lights, LoadCell
+from device.files.shipped import SIMULATED_PROBE
+from device.hardware.computer import SysfsComputer
+from device.hardware.interfaces import Camera, Computer, Lights, LoadCell
 from device.hardware.led_driver import led_driver, open_led_driver
 from device.instrument.acquisition.bench import Bench
 from device.instrument.acquisition.force_recorder import ForceRecorder
@@ -34,6 +36,7 @@ from device.instrument.procedure import Procedure
 from device.instrument.status import StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
@@ -43,6 +46,7 @@ from device.records.disk import Disk
 from device.records.store import Store
 from device.simulation.chips.camera_server import CameraServer
 from device.simulation.chips.emulated_amplifier import FreezingCell
+from device.simulation.chips.emulated_computer import EmulatedComputer
 from device.simulation.chips.emulated_storage import EmulatedBundles, EmulatedDisk
 from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.chips.pca9685_chip import Pca9685Chip
@@ -110,6 +114,7 @@ class OpenedProbe:
     camera: Camera | None
     cell: LoadCell | None
     clock: ClockWatch
+    computer: Computer
     disk: Disk | None = None
     scenario: Scenario | None = None
     faults: FaultTimeline = NO_FAULTS
@@ -165,13 +170,16 @@ def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> Som
     lights = parts.open(lambda: open_led_driver(config.light))
     camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
-    return on_top(OpenedProbe(config, parts, lights, camera, cell, ClockWatch(config.clock.max_jump_s)))
+    clock = ClockWatch(config.clock.max_jump_s)
+    return on_top(OpenedProbe(config, parts, lights, camera, cell, clock, SysfsComputer()))
 
 
 def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
     """Return the same of a virtual probe: emulated registers, serial bytes and frames, everything else real."""
     parts, faults = OpenedParts(), FaultTimeline(scenario.faults)
-    bundles = EmulatedBundles(faults, Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-"))))
+    scratch = Path(parts.opened.enter_context(TemporaryDirectory(prefix="tsis-")))
+    bundles = EmulatedBundles(faults, scratch / "models")
+    computer = SysfsComputer(EmulatedComputer(faults, scratch / "computer").root)
     config = replace(commissioned(config), paper_model=bundles.folder(config.paper_model))
     parts.open(lambda: _require_own_serial(config, scenario))
     width_px, height_px = config.camera.raw_mode.sensor_px
@@ -199,7 +207,8 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
     disk = EmulatedDisk(faults)
-    guide = on_top(OpenedProbe(config, parts, lights, camera, cell, clock, disk, scenario, faults, bundles.folder))
+    opened = OpenedProbe(config, parts, lights, camera, cell, clock, computer, disk, scenario, faults, bundles.folder)
+    guide = on_top(opened)
     guide.on_request(lambda mode: faults.begin_press())
     lead_by_hand(guide, probe)
     return guide
@@ -256,6 +265,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         calibration=watch,
         opened=parts.opened,
         clock=probe.clock,
+        computer=ComputerWatch(probe.computer),
         progress=progress,
         simulated_truth=probe.simulated_truth,
         folder_of=probe.folder_of,

@@ -54,6 +54,24 @@ class ForceScale:
         return Newtons((counts - self.tare_counts) / self.sensitivity_counts_per_n)
 
 
+@dataclass(frozen=True)
+class ComputerState:
+    """What the probe's computer says of itself; None for what it cannot say.
+
+    `is_supply_low`: whether its supply voltage was too low at some time in the last two seconds.
+    """
+
+    is_supply_low: bool | None = None
+    temperature_c: float | None = None
+
+
+class Computer(Protocol):
+    """The computer that the daemon runs on."""
+
+    def read(self) -> ComputerState:
+        """Return what it says now; whatever cannot be read is None."""
+
+
 class Lights(Protocol):
     """The LEDs on the four sides."""
 

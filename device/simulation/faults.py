@@ -50,6 +50,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "disk_read_only": (),
     "disk_frozen": (),
     "bundle_tampered": (),
+    "undervoltage": (),
+    "computer_hot": (),
 }
 """Every kind of fault, and what it takes besides its times."""
 

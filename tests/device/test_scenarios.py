@@ -243,6 +243,19 @@ def test_a_probe_that_was_never_calibrated_runs_and_takes_no_press(running):
             device.procedure.request()
 
 
+def test_a_supply_that_was_low_for_half_a_second_of_a_press_is_told_by_that_press_and_its_measurement_alone(running):
+    dip = Scenario(faults=(ScriptedFault("undervoltage", from_press=1, from_s=1.0, until_s=2.5),))
+    with running(dip) as device:
+        told = []
+        for _ in range(2):
+            device.press("quick")
+            press = device.board.now.press
+            assert press.state == "done"
+            measurement = device.procedure.store.measurement(press.measurement_id)
+            told.append([[one["code"] for one in record["warnings"]] for record in (vars(press), measurement)])
+    assert told == [[["E015"], ["E015"]], [[], []]]
+
+
 def test_every_kind_of_fault_has_a_scenario():
     assert {fault.kind for path in (ROOT / "scenarios").glob("*.toml") for fault in read_scenario(path).faults} == set(
         PARAMETERS

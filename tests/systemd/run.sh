@@ -10,14 +10,12 @@ project=$here/../..
 # The daemon, as docs/contracts.md says under "On a probe".
 rm -rf "$root/src" "$root/etc/tsis" "$root/var/lib/tsis" "$root"/etc/systemd/system/tsis*
 mkdir "$root/src" "$root/etc/tsis"
-tar -C "$project" --exclude=__pycache__ -cf - device host_tools models tests pyproject.toml README.md LICENSE |
+tar -C "$project" --exclude=__pycache__ -cf - \
+  device host_tools models protocols systemd docs/templates tests pyproject.toml setup.py README.md LICENSE |
   tar -C "$root/src" --no-same-owner -xf -
 inside() { chroot "$root" /usr/bin/env -C / "$@"; }
 inside /opt/tsis/current/bin/python -m pip install -qq --root-user-action=ignore --no-deps --no-build-isolation \
   --no-index --force-reinstall /src
-packages=$(inside /opt/tsis/current/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-rm -rf "$root$packages/models"
-cp -r "$root/src/models" "$root$packages/models"
 install -D -m 644 "$project/systemd/tsis.service" "$root/usr/lib/systemd/system/tsis.service"
 install -D -m 644 "$project/systemd/tsis.sysusers.conf" "$root/usr/lib/sysusers.d/tsis.conf"
 install -D -m 644 "$project/systemd/tsis-force.rules" "$root/usr/lib/udev/rules.d/60-tsis-force.rules"

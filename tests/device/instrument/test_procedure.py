@@ -28,8 +28,10 @@ from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import CheckResult
+from device.instrument.watch import progress as progress_module
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
+from device.instrument.watch.readiness import PartHealth
 from device.measurement.calibration import Validity
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
@@ -48,6 +50,8 @@ ANSWER = Estimate(
 class ObedientBench:
     """A bench whose operator does at once what the screen says. `breaks` are raised by a press frame each."""
 
+    fault = None  # of the force, which this bench is itself
+
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work, self.is_closed, self.zero_n = False, False, 0.0
@@ -64,6 +68,9 @@ class ObedientBench:
 
     def light(self, ratio):
         self.ratio = ratio
+
+    def darken_for_good(self):
+        self.ratio = (0.0, 0.0, 0.0, 0.0)
 
     def check_lights(self):
         self.ratio = (0.0, 0.0, 0.0, 0.0)
@@ -660,3 +667,32 @@ def test_warnings_of_the_certificate_are_told_with_every_press_until_they_are_ov
     rig.procedure.calibration.warned = lambda others: ()
     rig.press()
     assert rig.press()["warnings"] == []
+
+
+def test_the_store_is_written_as_a_proof_between_presses_and_never_in_one(rig, monkeypatch):
+    """Each second it is read; a write while frames are taken might hold them up."""
+    monkeypatch.setattr(progress_module, "BEAT_S", 0.0)
+    monkeypatch.setattr(procedure_module, "WRITE_EVERY_S", 0.0)
+    seen = []
+
+    def prove(*, writing):
+        seen.append((rig.board.now.press is None or rig.board.now.press.state in ENDED, writing))
+
+    monkeypatch.setattr(rig.store, "prove", prove)
+    rig.until(lambda: len(seen) > 2)
+    rig.press()
+    assert {(True, True), (False, False)} <= set(seen)
+    assert all(is_idle == writing for is_idle, writing in seen)
+
+
+def test_a_store_that_cannot_be_written_is_a_fault_and_not_ready(rig, monkeypatch):
+    def refuse(*, writing):
+        raise StorageError("The disk is read-only.", "Check it.")
+
+    monkeypatch.setattr(progress_module, "BEAT_S", 0.0)
+    rig.until(lambda: rig.procedure.parts()["store"].ready)
+    with monkeypatch.context() as failing:
+        failing.setattr(rig.store, "prove", refuse)
+        rig.until(lambda: rig.board.now.fault is not None)
+        assert rig.procedure.parts()["store"] == PartHealth(False, "E601")
+    rig.until(lambda: rig.procedure.parts()["store"].ready)

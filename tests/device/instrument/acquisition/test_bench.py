@@ -1,6 +1,7 @@
 """Light, camera and force together: a frame knows under which light and force it was taken."""
 
 import itertools
+import threading
 
 import numpy as np
 import pytest
@@ -219,3 +220,29 @@ def test_an_exposure_needs_no_force(bench, hardware):
     bench.force.at = None
     bench.light(DARK)
     assert [bench.expose().exposure_start_s for _ in range(2)] == pytest.approx([10.0, 10.1])
+
+
+def test_what_was_made_dark_for_good_is_never_lit_again(bench, hardware):
+    bench.light(LIT)
+    bench.darken_for_good()
+    bench.light(LIT)
+    bench.check_lights()
+    assert hardware.log == [LIT, DARK]
+
+
+def test_a_frame_that_the_darkening_spoilt_is_no_fault_of_the_camera(bench, hardware):
+    bench.levels = type("Levels", (), {"saw": lambda self, frame: pytest.fail("it was looked at")})()
+    bench.darken_for_good()
+    assert bench.take("press").led_ratio == DARK
+
+
+def test_a_thread_that_lights_while_another_darkens_for_good_is_the_one_that_waits(bench, hardware):
+    """The procedure's light and the end's darkness, whichever comes first: the last word is dark."""
+    lighting = threading.Thread(target=bench.light, args=(LIT,))
+    with bench._lock:
+        bench._is_over = True
+        lighting.start()
+    lighting.join()
+    bench.darken_for_good()
+    assert hardware.log[-1] == DARK
+    assert LIT not in hardware.log
