@@ -20,7 +20,9 @@ def deploy(
     host: Host,
     ssh: Ssh = "",
     signers: Signers = SIGNERS,
-    check_here: Annotated[bool, typer.Option(help="Verify the file before it is sent; the probe does in any case.")] = True,
+    check_here: Annotated[
+        bool, typer.Option(help="Verify the file before it is sent; the probe does in any case.")
+    ] = True,
 ) -> None:
     """Send a release to a probe and follow it: exit code 0 when the probe has committed it, else the reason and 1."""
     from host_tools.release.remote_machine import NotReachable, RemoteMachine
@@ -44,7 +46,9 @@ def provision(
     ssh: Ssh = "",
     signers: Signers = SIGNERS,
     time_zone: Annotated[str, typer.Option(help="As Europe/Berlin; as it is unless given.")] = "",
-    check: Annotated[bool, typer.Option("--check", help="Only tell what differs, exit code 1 when something does.")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Only tell what differs, exit code 1 when something does.")
+    ] = False,
     stand_in: Annotated[bool, typer.Option("--stand-in", help="The machine is no Pi, for tests.")] = False,
 ) -> None:
     """Make a machine with a fresh Raspberry Pi OS a probe; what is in place stays."""

@@ -61,7 +61,9 @@ class RemoteMachine:
 
     def answer(self, *words: str) -> str:
         """Return what a command prints; raise `NotReachable` when it or ssh fails."""
-        done = subprocess.run(self._command(words), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            self._command(words), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+        )
         if done.returncode:
             raise NotReachable(f"{self} does not answer: {done.stderr.strip()}")
         return done.stdout.strip()

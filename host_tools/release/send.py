@@ -28,7 +28,9 @@ def send_release(
     """
     if is_checked_here:
         manifest = checked_manifest(file, signers)
-        told(f"{file.name}: release {manifest['version']}+{manifest['counter']}, {manifest['machine']}, signed and whole")
+        told(
+            f"{file.name}: release {manifest['version']}+{manifest['counter']}, {manifest['machine']}, signed and whole"
+        )
     told(f"sending {file.stat().st_size / 1e6:.1f} MB to {machine}")
     try:
         code = machine.run(stdin=file, told=told)
