@@ -8,7 +8,7 @@ from __future__ import annotations
 import shlex
 import tarfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
@@ -101,17 +101,13 @@ def _folder_on(machine: RemoteMachine) -> Iterator[str]:
     try:
         yield folder
     finally:
-        try:
+        with suppress(NotReachable):  # whatever has happened is told, and the folder hurts nobody
             machine.answer(f"rm -r {shlex.quote(folder)}")
-        except NotReachable:
-            pass  # whatever has happened is told, and the folder hurts nobody
 
 
 def _reboot(machine: RemoteMachine, told: Callable[[str], None]) -> None:
     before = machine.answer("cat", BOOT_ID)
     told("rebooting")
-    try:
+    with suppress(NotReachable):  # it may hang up before it says good-bye
         machine.run("systemctl reboot" if machine.user == "root" else "sudo systemctl reboot", told=told)
-    except NotReachable:
-        pass  # it may hang up before it says good-bye
     machine.wait_for_reboot(before, BACK_WITHIN_S)

@@ -1,6 +1,6 @@
 """`make deploy`: a release file, verified here, goes to a probe, which installs it and says what became of it.
 
-The account on the probe can do nothing else, whatever it is asked for; all that protects a probe is checked there again.
+The account on the probe can do nothing else, whatever it is asked for; and the probe verifies all of it again.
 """
 
 from __future__ import annotations
