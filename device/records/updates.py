@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from device import __version__
-from device.errors import BusyError, DiskFullError, InvalidRequest, StorageError, UpdateTakenBack
+from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
 from device.files.durable import sync_directory
 
 log = logging.getLogger(__name__)
@@ -122,13 +122,13 @@ class Updates:
         )
         return replace(record, outcome=_outcome(record))
 
-    def warning(self) -> UpdateTakenBack | None:
+    def warning(self) -> RolledBack | None:
         """Return what the screen shows until the next release is committed, if the last one was taken back."""
         record = self.now()
         last = _last_end(record)
         if not last or last.state != "rolled_back":
             return None
-        return UpdateTakenBack(_taken_back(last, record), "Measure as before, and send this to whoever made it.")
+        return RolledBack(_taken_back(last, record), "Measure as before, and send this to whoever made it.")
 
     def require_free(self) -> None:
         """Raise `BusyError` while an update is under way, `InvalidRequest` where there is no updater."""
