@@ -47,6 +47,7 @@ FORBIDDEN = {
         "device.instrument.status",
     ),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
+    "Provisioning runs where nothing of the probe is installed yet": ("device.provisioning.plan", "device.errors"),
     "Access judges a request, and knows nothing that could answer it": (
         "device.access.request_rules",
         "device.web.problems",
