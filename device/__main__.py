@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse or record presses, see settings, certificates and faults, test, save.
+"""`python -m device`: start the daemon, analyse or record presses, see settings and faults, test, update, save, darken.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -27,6 +27,7 @@ from device.commands.restore import add_restore_command, run_restore_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
 from device.commands.serve import serve
 from device.commands.support import add_support_command, run_support_command
+from device.commands.update import add_update_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.press.phantom_press import PhantomPress
@@ -36,6 +37,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, overridden, read_layers
 from device.simulation.scenario import Scenario, read_scenario
+from device.update.__main__ import run_update
 
 EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
@@ -59,14 +61,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    verbs = "analyse | record | config | calibration | faults | self-test | backup | restore | support | led-off"
-    commands = parser.add_subparsers(dest="command", metavar=verbs)
+    commands = parser.add_subparsers(dest="command", metavar="VERB", title="verbs")
     add_analyse_command(commands)
     add_record_command(commands)
     add_config_command(commands)
     add_calibration_command(commands)
     add_faults_command(commands)
     add_self_test_command(commands)
+    add_update_command(commands)
     add_backup_command(commands)
     add_restore_command(commands)
     add_support_command(commands)
@@ -97,6 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run_faults_command(options)
         if options.command == "self-test":
             return _self_test(options)
+        if options.command == "update":
+            return run_update(options)
         if options.command == "backup":
             return run_backup_command(options, _start_settings(options, _scenario(options)).config)
         if options.command == "restore":

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from device.config import MODELS, Config
+from device.config import Config
+from device.files.shipped import MODELS
 from device.settings.layers import DROP_INS, LOCAL
 
 DATABASE = "tsis.sqlite"

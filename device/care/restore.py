@@ -26,7 +26,7 @@ from device.care.snapshot import StoreFacts, facts_of
 from device.errors import BusyError, DiskFullError, StorageError
 from device.files.durable import sync_directory
 from device.measurement.quantities import InvalidQuantity
-from device.records.store import SCHEMA_VERSION
+from device.records.schema import STORE_READS
 from device.settings.catalogue import SETTINGS
 from device.settings.layers import LOCAL
 
@@ -130,8 +130,8 @@ class _Targets:
 def _require_fitting(archive: Archive, own: Mapping[str, Any], *, records_only: bool) -> None:
     manifest = archive.manifest
     schema, serial = manifest.get("store_schema"), manifest.get("serial")
-    if not isinstance(schema, int) or schema > SCHEMA_VERSION:
-        bound = f"at most {SCHEMA_VERSION}, which this software knows"
+    if schema not in STORE_READS:
+        bound = f"{', '.join(map(str, STORE_READS))}, which this software reads"
         raise InvalidQuantity("backup.store_schema", schema, bound, "install the release that wrote it, or a newer one")
     if f"data/{DATABASE}" not in archive.entries:
         raise InvalidQuantity("backup", archive.path, "one with a database", "take another backup")

@@ -19,7 +19,8 @@ from device.care.restore import RestoreReport, restore_backup
 from device.errors import BusyError, DiskFullError, StorageError
 from device.files.recording_file import read_recording
 from device.measurement.quantities import InvalidQuantity
-from device.records.store import SCHEMA_VERSION, Store
+from device.records.schema import STORE_WRITES
+from device.records.store import Store
 from device.settings.layers import layer_files, read_layers
 
 
@@ -142,10 +143,10 @@ def test_records_alone_go_to_this_probes_own_data_folder(backup: Path, fresh: Pa
 
 def test_a_store_of_newer_software_is_refused(card: Path, fresh: Path, tmp_path: Path) -> None:
     db = sqlite3.connect(data_of(card) / "tsis.sqlite")
-    db.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
+    db.execute(f"PRAGMA user_version = {STORE_WRITES + 1}")
     db.close()
     write_backup(read_layers(layer_files(card)).config(), tmp_path / "new.backup", card)
-    with pytest.raises(InvalidQuantity, match="at most 1, which this software knows"):
+    with pytest.raises(InvalidQuantity, match="but must be 1, which this software reads"):
         restored(tmp_path / "new.backup", fresh)
     assert not data_of(fresh).exists()
 

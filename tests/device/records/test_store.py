@@ -3,6 +3,7 @@
 import errno
 import os
 import sqlite3
+import types
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from device.errors import DiskFullError, StorageError, UnknownResource
 from device.files.recording_file import read_recording
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
-from device.records.store import SCHEMA_VERSION, Store
+from device.records.store import Store
 
 CAMERA = CameraSettings(
     width_px=32, height_px=24, bits=8, mm_per_px_x=0.03, mm_per_px_y=0.04, exposure_us=4000.0, gain=1.0
@@ -241,25 +242,19 @@ def test_the_hours_of_light_add_up_over_restarts(tmp_path):
         store.close()
 
 
-def test_the_database_says_its_schema_also_one_of_before_there_was_one(tmp_path):
-    for user_version in (None, 0):
-        if user_version is not None:
-            db = sqlite3.connect(tmp_path / "tsis.sqlite")
-            db.execute(f"PRAGMA user_version = {user_version}")
-            db.close()
-        Store(tmp_path).close()
-        db = sqlite3.connect(tmp_path / "tsis.sqlite")
-        assert db.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION,)
-        db.close()
+def test_a_store_proves_itself_by_reading_and_when_asked_by_a_durable_write(store):
+    journal = store.folder / "tsis.sqlite-wal"
+    store.prove(writing=False)
+    before_bytes = journal.stat().st_size
+    store.prove(writing=False)
+    assert journal.stat().st_size == before_bytes
+    store.prove(writing=True)
+    assert journal.stat().st_size > before_bytes
 
 
-def test_a_database_of_newer_software_is_refused_and_left_as_it_is(tmp_path):
-    Store(tmp_path).close()
-    db = sqlite3.connect(tmp_path / "tsis.sqlite")
-    db.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
-    db.close()
-    with pytest.raises(StorageError, match="of schema 2, and this software knows 1 at most. Install the release"):
-        Store(tmp_path)
-    db = sqlite3.connect(tmp_path / "tsis.sqlite")
-    assert db.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION + 1,)
-    db.close()
+def test_a_disk_that_became_read_only_is_told_without_a_write(store, monkeypatch):
+    """As the kernel remounts a failing card."""
+    read_only = types.SimpleNamespace(f_flag=os.ST_RDONLY)
+    monkeypatch.setattr(os, "statvfs", lambda _: read_only)
+    with pytest.raises(StorageError, match="can only be read"):
+        store.prove(writing=False)
