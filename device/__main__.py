@@ -22,9 +22,10 @@ from device.commands.faults import add_faults_command, run_faults_command
 from device.commands.led_off import led_off
 from device.commands.record import add_record_command, run_record_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
-from device.commands.serve import serve
+from device.commands.serve import refusal_noted, serve
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.fallback.start_note import clear_note
 from device.instrument.press.phantom_press import PhantomPress
 from device.instrument.procedure import Procedure
 from device.measurement.bundle import BundleRefused
@@ -93,12 +94,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0
-        scenario = _scenario(options)
-        settings = _start_settings(options, scenario)
-        return serve(settings, lambda: _opened(settings.config, scenario))
+        return _serve(options)
     except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
         print(error, file=sys.stderr)
         return 1
+
+
+def _serve(options: argparse.Namespace) -> int:
+    with refusal_noted(options.root):
+        scenario = _scenario(options)
+        settings = _start_settings(options, scenario)
+        return serve(settings, lambda: _opened(settings.config, scenario), lambda: clear_note(options.root))
 
 
 def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> StartSettings:

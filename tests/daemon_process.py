@@ -47,7 +47,8 @@ class Daemon:
     """`python -m device --simulate` as its own process on a free port unless told otherwise.
 
     To its scene comes that no frame is late, unless that has settings of the camera: on a busy machine many are.
-    `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests.
+    `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests,
+    `arguments` behind its own.
     """
 
     def __init__(
@@ -58,15 +59,16 @@ class Daemon:
         *,
         program: Sequence[str] = ("-m", "device"),
         environment: Mapping[str, str] | None = None,
+        arguments: Sequence[str] = (),
     ) -> None:
-        arguments = [sys.executable, *program, "--simulate", "--port", str(port)]
+        command = [sys.executable, *program, "--simulate", "--port", str(port), *arguments]
         (folder / "scene.toml").write_text(scene if "[settings.camera]" in scene else scene + PATIENT)
-        arguments += ["--scene", "scene.toml"]
+        command += ["--scene", "scene.toml"]
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         whole = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", **(environment or {})}
         self.log = (folder / "log.txt").open("a")
         self.process = subprocess.Popen(
-            arguments, cwd=folder, env=whole, stdout=subprocess.PIPE, stderr=self.log, text=True
+            command, cwd=folder, env=whole, stdout=subprocess.PIPE, stderr=self.log, text=True
         )
         assert self.process.stdout is not None
         greeting = self.process.stdout.readline()

@@ -42,6 +42,7 @@ FORBIDDEN = {
         "device.access.request_rules",
         "device.web.problems",
     ),
+    "The fallback runs when nothing else does": ("device.fallback.situation", "device.files.durable"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),

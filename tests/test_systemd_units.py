@@ -15,10 +15,13 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
+from device.fallback.server import GIVEN_UP_S
+from device.fallback.start_note import NOTE
 from device.instrument.watch.watchdog import WITHOUT_SYSTEMD_S
 from device.settings.catalogue import SETTINGS
 
 UNIT = ROOT / "systemd" / "tsis.service"
+FALLBACK = ROOT / "systemd" / "tsis-fallback.service"
 RULES = ROOT / "systemd" / "tsis-force.rules"
 PYTHON = "/opt/tsis/current/bin/python"
 needs_systemd = pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
@@ -62,6 +65,28 @@ def test_the_unit_shuts_the_daemon_in(tmp_path):
     assert verified.returncode == 0, verified.stdout
 
 
+@needs_systemd
+def test_the_fallback_is_taken_without_a_complaint_and_shut_in_further():
+    assert complaints(FALLBACK) == ""
+    command = ["systemd-analyze", "security", "--offline=true", "--threshold=15", "--no-pager", str(FALLBACK)]
+    verified = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stdout
+
+
+def test_the_fallback_runs_from_the_last_good_release_by_the_systems_python_alone():
+    service = service_of(FALLBACK)
+    assert service["ExecStart"].split() == ["/usr/bin/python3", "-S", "-P", "-m", "device.fallback"]
+    assert "PYTHONPATH=/opt/tsis/updater/" in service["Environment"]
+    assert int(service["WatchdogSec"]) > 2 * GIVEN_UP_S
+
+
+def test_the_daemon_notes_where_the_fallback_reads_and_what_it_noted_stays():
+    service = service_of(UNIT)
+    assert f"run/{service['RuntimeDirectory']}" == str(Path(NOTE).parent)
+    assert service["RuntimeDirectoryPreserve"] == "yes"
+    assert service["User"] == service_of(FALLBACK)["User"]
+
+
 def section_of(path: Path, name: str) -> configparser.SectionProxy:
     unit = configparser.RawConfigParser(strict=False)
     unit.optionxform = str
@@ -89,12 +114,12 @@ def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_en
     assert service["Restart"] == "on-failure"
 
 
-def test_the_daemon_can_write_its_state_and_nothing_else():
+def test_the_daemon_can_write_its_state_and_its_note_in_memory_and_nothing_else():
     """systemd 252 gives a ConfigurationDirectory= to the unit's user, who could then write the settings."""
     service = service_of(UNIT)
     assert service["ProtectSystem"] == "strict"
     assert service["StateDirectory"] == "tsis"
-    others = ("Configuration", "Cache", "Logs", "Runtime")
+    others = ("Configuration", "Cache", "Logs")
     assert not {*(f"{kind}Directory" for kind in others), "ReadWritePaths", "BindPaths"} & set(service)
 
 
