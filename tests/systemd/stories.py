@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
 
+from claim import Claim
+from fallback_stories import fallback_stories
 from service import NAME, NotReached, Service, run, until
 
 PYTHON = "/opt/tsis/current/bin/python"
@@ -22,19 +23,6 @@ WATCHDOG_S = 15.0
 TRIES = 3
 """A machine that is busy besides may spoil a press, as a trembling hand does; a sandbox spoils all."""
 SHUT_IN = Path("/var/lib/tsis/shut_in.json")
-
-
-@dataclass(frozen=True)
-class Claim:
-    """What has to hold, whether it does, and what was seen."""
-
-    words: str
-    holds: bool
-    seen: object = ""
-
-    def __str__(self) -> str:
-        seen = f": {self.seen}" if self.seen != "" else ""
-        return f"{'pass' if self.holds else 'FAIL'}  {self.words}{seen}"
 
 
 def analysed() -> Iterator[Claim]:
@@ -163,6 +151,7 @@ def main() -> int:
     stories += [partial(story, service) for story in (started, pressed, killed)]
     stories += [partial(frozen, service, kind) for kind in FROZEN]
     stories.append(partial(stopped, service))
+    stories += fallback_stories(service)
     held = []
     with service.on_its_board():
         for claim in told(stories):
