@@ -16,7 +16,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from device.access.known_hosts import is_loopback
+from device.access.known_hosts import ANYWHERE, is_loopback
 from device.access.request_rules import AskedRequest, joined, require_allowed, require_local
 from device.access.safe_headers import SAFE_HEADERS
 from device.errors import DeviceError, UnknownPath
@@ -37,6 +37,7 @@ LOOK_S = 0.5
 """How often it is looked whether the port is free."""
 GIVEN_UP_S = 5.0
 """So long the port is left to a daemon that has asked for it."""
+TAKEN_LOOK_S = 0.1
 KNOWN_S = 1.0
 """So long what is known is not asked for again: systemd is asked by a command."""
 
@@ -212,7 +213,7 @@ def serve_until(stop: threading.Event, root: Path = Path("/")) -> None:
             continue
         log.info("the probe's software has not its port %d: the fallback serves it", address.port)
         _serve(FallbackServer(listening, address, root), stop)
-        stop.wait(GIVEN_UP_S)
+        _leave(address, stop)
 
 
 def _serve(server: FallbackServer, stop: threading.Event) -> None:
@@ -220,6 +221,19 @@ def _serve(server: FallbackServer, stop: threading.Event) -> None:
         while not (stop.is_set() or server.is_asked_for):
             server.handle_request()
             notify("WATCHDOG=1")
+
+
+def _leave(address: ServedAddress, stop: threading.Event) -> None:
+    """Return when the daemon that has asked for the port has it, or does not take it."""
+    until_s = time.monotonic() + GIVEN_UP_S
+    while time.monotonic() < until_s and not stop.wait(TAKEN_LOOK_S):
+        try:
+            socket.create_connection(
+                (HOST if address.host in ANYWHERE else address.host, address.port), REQUEST_S
+            ).close()
+        except OSError:
+            continue
+        return
 
 
 def notify(text: str) -> None:
