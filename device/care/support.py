@@ -23,7 +23,7 @@ SUMMARY = "summary.json"
 PRIVATE = 0o600
 WITHIN_S = 30.0
 """A disk that does not answer costs this, not the file; who shows the file waits for a minute."""
-Section = tuple[dict[str, Any] | None, str]
+Answered = tuple[dict[str, Any] | None, str]
 """Its content, and "ok"; or None and why."""
 
 
@@ -54,10 +54,10 @@ def write_support(file: Path, context: SupportContext) -> dict[str, str]:
     return told
 
 
-def _collected(context: SupportContext) -> dict[str, Section]:
+def _collected(context: SupportContext) -> dict[str, Answered]:
     """Return each section by its name; one that does not return in time is left behind."""
     learn_words()
-    ended: dict[str, Section] = {}
+    ended: dict[str, Answered] = {}
 
     def collect(name: str) -> None:
         try:

@@ -17,7 +17,7 @@ from device.provisioning.target import ProvisioningFailed, TargetMachine, system
 CURRENT, UPDATER = "/opt/tsis/current", "/opt/tsis/updater"
 UNITS = "/etc/systemd/system"
 UNIT_KINDS = (".service", ".path", ".socket", ".timer")
-OF_UPDATER = ("tsis-boot.", "tsis-update.")
+OF_UPDATER = ("tsis-boot.", "tsis-update.", "tsis-fallback.")
 AT_BOOT = "WantedBy=multi-user.target"
 OTHER_FOLDERS = {
     ".rules": "/etc/udev/rules.d/60-",
