@@ -63,14 +63,14 @@ def _try_again(layout: UpdateLayout, state: UpdateState, pending: PendingRelease
 def _repair(updater: Updater, state: UpdateState) -> None:
     """Nothing is on trial: the committed release is current, what a commit leaves to do is done, the rest removed."""
     layout = updater.layout
+    if state.committed and not is_on_disk(layout, state):  # it was found by the links
+        write_state(layout, state)
     if return_link(layout, state):
         _reload()
     if state.is_finishing:
         finish_commit(layout)
     remove_others(layout, state)
     clear_incoming(layout)
-    if state.committed and not is_on_disk(layout, state):
-        write_state(layout, state)
     tell_interrupted(updater)
 
 
