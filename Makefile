@@ -6,7 +6,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -44,6 +44,9 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
+
+test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, ten minutes)
+	$(PY) tests/deploy/power_cuts.py
 
 check: .venv/all.stamp ## lint, format, types, import arrows, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .

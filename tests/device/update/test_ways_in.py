@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from threading import Event, Thread
 
@@ -56,7 +55,10 @@ def test_a_release_on_a_stream_is_installed_and_its_progress_told(probe):
 
 @pytest.mark.parametrize(
     ("behaviour", "cut", "said"),
-    [({"dies_after": 1}, None, b"E013 1.1+11 was left: It was ready, and then"), ({}, 9000, b"E010 The release file ends")],
+    [
+        ({"dies_after": 1}, None, b"E013 1.1+11 was left: It was ready, and then"),
+        ({}, 9000, b"E010 The release file ends"),
+    ],
 )
 def test_what_is_refused_or_left_ends_the_stream_with_its_reason(probe, behaviour, cut, said):
     probe.install("1.0", 10)
