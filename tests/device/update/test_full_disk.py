@@ -7,6 +7,11 @@ import pytest
 from daemon_process import ROOT
 from updated_probe import QUICK
 
+from device.errors import UpdateFailed
+from device.update.install import install
+from device.update.progress import ProgressReport
+from device.update.trial import Updater
+
 KILLED = str(ROOT / "tests" / "killed_updater.py")
 SAMPLED = 9
 
@@ -37,7 +42,8 @@ def test_a_disk_that_becomes_full_at_a_step_leaves_what_ran_and_no_leftovers(pro
         assert whole == ("1.1+11" if done.returncode else "1.2+12"), (at, done.stderr)
         assert done.returncode == 0 or done.stderr.startswith(("E012 ", "E013 1.2+12 was left: A step failed: ")), at
         assert probe.state.bad == {}, at
-        if how == "full":
+        if how == "full" and done.returncode:
+            assert probe.progress.state in ("refused", "rolled_back"), at
             assert not [name for name in probe.releases() if name not in probe.state.keeps()], at
         probe.start_machine()
         assert probe.run("watch-incoming").returncode == 0, at
@@ -50,11 +56,6 @@ def test_a_disk_that_becomes_full_at_a_step_leaves_what_ran_and_no_leftovers(pro
 
 
 def test_a_disk_without_space_is_told_before_anything_is_written(probe, monkeypatch):
-    from device.errors import UpdateFailed
-    from device.update.install import install
-    from device.update.progress import ProgressReport
-    from device.update.trial import Updater
-
     monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=64 * 2**20 + 20_000))
     path, before = probe.write("1.0", 10), probe.snapshot()
     with pytest.raises(UpdateFailed, match=r"has 67 MB free, and the release needs 67\.|MB free") as refusal:
