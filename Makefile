@@ -2,11 +2,16 @@
 PORT ?= 8000
 SCENE ?=
 FILE ?=
+MACHINE ?= aarch64
+KEY ?= $(HOME)/.config/tsis/release_key
+OUT ?= dist
+COUNTER ?=
+SIGNERS ?=
 PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm bundle check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -48,11 +53,19 @@ test-systemd: ## run the unit under a real systemd, in a Debian container under 
 test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, ten minutes)
 	$(PY) tests/deploy/power_cuts.py
 
-check: .venv/all.stamp ## lint, format, types, import arrows, dead links, pages that are their results in their templates
+test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)
+	tests/deploy/arm64.sh build/arm64
+
+bundle: .venv/all.stamp ## build and sign the file that a probe installs: make bundle [MACHINE=aarch64] [KEY=FILE] [OUT=dist] [COUNTER=N] [SIGNERS=FILE]
+	@$(HOST_TOOLS) release build --machine $(MACHINE) --key $(KEY) --out $(OUT) \
+	  $(if $(COUNTER),--counter $(COUNTER)) $(if $(SIGNERS),--signers $(SIGNERS))
+
+check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports
+	$(PY) -m pytest -rs --durations 0 --durations-min 9 tests/test_systemd_units.py tests/test_shell_scripts.py
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
 

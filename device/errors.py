@@ -121,10 +121,30 @@ class UpdateFailed(DeviceError):  # noqa: N818 - the name is what the operator r
 
 
 class RolledBack(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """A new release was not healthy within its time; the previous one is back."""
+    """A release did not work on this probe and the one before is back; shown until another one is installed."""
 
     code = "E013"
-    title = "Previous release is back"
+    title = "Update taken back"
+    severity = "warning"
+    is_lasting = True
+
+
+class SupplyLowError(DeviceError):
+    """The computer's supply voltage is too low, or was for a moment; LEDs and camera may not do what they are told."""
+
+    code = "E015"
+    title = "Supply voltage too low"
+    status = 503
+    severity = "warning"
+
+
+class ComputerHotError(DeviceError):
+    """The probe's computer is so hot that it slows itself down."""
+
+    code = "E016"
+    title = "Computer too hot"
+    status = 503
+    severity = "warning"
 
 
 class CameraError(DeviceError):
@@ -222,7 +242,7 @@ class HotLedDriverError(LightError):
 
 
 class LightBudgetError(LightError):
-    """The light was on for too long in one press; it goes off, and the next press may begin."""
+    """The light was on for too long over the last presses; it goes off, and the press ends."""
 
     code = "E209"
     title = "Light on for too long"
@@ -234,6 +254,27 @@ class LightLimitError(LightError):
     code = "E210"
     title = "Light at its limit"
     severity = "warning"
+
+
+class LightRestError(LightError):
+    """The light was on for so long over the last presses that none may begin; it passes by itself."""
+
+    code = "E211"
+    title = "Light must rest"
+
+
+class LightCutError(LightError):
+    """The enable line took the light away in a press: loop, bus or camera came to a stop, or the line's keeper did."""
+
+    code = "E212"
+    title = "Light was cut"
+
+
+class LightLineError(LightError):
+    """The line that enables the LEDs cannot be driven, or the LED chip does not obey it."""
+
+    code = "E213"
+    title = "Enable line does not work"
 
 
 class LoadCellError(DeviceError):
@@ -441,6 +482,38 @@ class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller 
     status = 422
 
 
+class UnknownHost(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The request was addressed to a name that is none of this probe's."""
+
+    code = "E806"
+    title = "Unknown host"
+    status = 421
+
+
+class ForeignRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A page of another origin asked, or another machine for what is done at the probe's own screen only."""
+
+    code = "E807"
+    title = "Asked from elsewhere"
+    status = 403
+
+
+class WrongContentType(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A request that changes something must say that its body is JSON, or what else its path takes."""
+
+    code = "E808"
+    title = "Wrong content type"
+    status = 415
+
+
+class BodyTooLarge(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The body of the request is larger than its path takes; it was not read."""
+
+    code = "E809"
+    title = "Body too large"
+    status = 413
+
+
 class StalledError(DeviceError):
     """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
 
@@ -454,4 +527,12 @@ class RestartedError(DeviceError):
 
     code = "E902"
     title = "Restarted by itself"
+    severity = "warning"
+
+
+class UncleanEndError(DeviceError):
+    """The daemon before did not end by a stop: a power cut, a freeze or a kill; shown until a press has told of it."""
+
+    code = "E903"
+    title = "Ended without a stop"
     severity = "warning"

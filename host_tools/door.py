@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from device import __version__
+from device.files.shipped import MODELS, PROTOCOLS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.scenes.scene import Press, Scene
 
@@ -29,10 +30,7 @@ if TYPE_CHECKING:
     from host_tools.forward.solution import Solution
     from host_tools.paper_network.train import Trained
 
-ROOT = Path(__file__).resolve().parents[1]
-MODELS = ROOT / "models"
-SIMULATED_PROBE = MODELS / "simulated_probe"
-STANDARD_PROTOCOL = ROOT / "protocols" / "standard.toml"
+STANDARD_PROTOCOL = PROTOCOLS / "standard.toml"
 TOLERANCE = 0.01
 StrainChoice = Literal["small", "finite", "auto"]
 

@@ -42,13 +42,26 @@ FORBIDDEN = {
         "device.hardware.camera",
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
+    "Care saves and restores what lies on the disk, whether a daemon runs or not": (
+        "device.care.support",
+        "device.instrument.status",
+    ),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
+    "Provisioning runs where nothing of the probe is installed yet": ("device.provisioning.plan", "device.errors"),
+    "Access judges a request, and knows nothing that could answer it": (
+        "device.access.request_rules",
+        "device.web.problems",
+    ),
     "An update knows errors, durable files and the number of the store's schema": (
         "device.update.fits",
         "device.records.store",
     ),
     "An update runs on a machine that has Python alone": ("device.files.durable", "numpy"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
+    "A release is built from files alone: its builder knows nothing of the toolkit": (
+        "host_tools.release.own_wheel",
+        "host_tools.forward.plan",
+    ),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
     "The rooms of the toolkit stand in one order, and a new one has its place": (

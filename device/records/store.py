@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import json
+import os
 import shutil
 import sqlite3
 import threading
@@ -140,6 +141,21 @@ class Store:
         finally:
             with suppress(OSError):  # a read-only disk refuses that too, and its fault is already under way
                 path.unlink(missing_ok=True)
+
+    def prove(self, *, writing: bool) -> None:
+        """Read the database, and write and commit when asked to; raise `StorageError` when the disk refuses either.
+
+        A disk with errors is made read-only by the kernel: that is told without a write, which wears a card.
+        """
+        if os.statvfs(self.folder).f_flag & os.ST_RDONLY:
+            raise StorageError(f"The disk of {self.folder} can only be read.", "Restart the probe; check its card.")
+        with self._transaction() as db:
+            db.execute("SELECT count(*) FROM counter").fetchone()
+            if writing:
+                db.execute(
+                    "INSERT OR REPLACE INTO counter VALUES ('proofs', 1 + coalesce("
+                    "(SELECT value FROM counter WHERE name = 'proofs'), 0))"
+                )
 
     def save_press(self, job: StoredRecord) -> None:
         """Keep the state of a press job."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from device.config import MODELS
+from device.files.shipped import MODELS
 from device.settings.catalogue import SETTINGS, Known
 
 PAGE = """# Settings

@@ -11,19 +11,18 @@ import typer
 from device.files.bundle_file import read_paper_model
 from device.files.durable import write_once
 from device.files.recording_file import read_recording
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.paper_mode.features import FEATURE_NAMES
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.surface_table import load_surface_table
 from host_tools.calibration.gates import CalibrationRejected, Gate
-from host_tools.commands.model import MODELS
 from host_tools.commands.output import note
 
 if TYPE_CHECKING:
     from host_tools.calibration.calibrate import Calibrated
 
 MODEL = MODELS / "paper"
-TABLE = MODELS / "simulated_probe"
 
 
 def calibrate(
@@ -38,7 +37,7 @@ def calibrate(
         typer.Option(help="Days from the first recording, 1-36500; 365, or of a simulated probe all of them."),
     ] = None,
     model: Annotated[Path, typer.Option(help="Bundle the certificate is for.")] = MODEL,
-    table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = TABLE,
+    table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = SIMULATED_PROBE,
     force_n: Annotated[float, typer.Option(help="Force the probe is pressed with.")] = 0.5,
     as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
 ) -> None:

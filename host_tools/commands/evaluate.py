@@ -18,6 +18,7 @@ from rich.console import Console
 from device.files.bundle_file import read_models, read_paper_model, read_ramp_model
 from device.files.certificate_file import read_calibration
 from device.files.recording_file import read_recording
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
@@ -29,7 +30,7 @@ from device.measurement.recording.recording import Recording
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table
-from host_tools.commands.model import MODELS, phantoms_of
+from host_tools.commands.model import phantoms_of
 from host_tools.commands.output import note
 
 if TYPE_CHECKING:
@@ -79,7 +80,6 @@ if TYPE_CHECKING:
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 SCENES = 100
-PROBE = MODELS / "simulated_probe"
 
 
 def evaluate(
@@ -90,7 +90,7 @@ def evaluate(
     model: Annotated[Path, typer.Option(help="Bundle of mode paper.")] = MODELS / "paper",
     quick_model: Annotated[Path, typer.Option(help="Bundle of mode quick.")] = MODELS / "quick",
     standard_model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
-    table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = PROBE,
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = SIMULATED_PROBE,
     light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
     scenes: Annotated[
         int | None, typer.Option(help="Random presses; 100, 160 without noise, 50 beside the posterior by default.")

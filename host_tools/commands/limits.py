@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from device.files.bundle_file import read_ramp_model
+from device.files.shipped import MODELS, PROTOCOLS
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
-from host_tools.commands.measured_chapters import ROOT, shown
+from host_tools.commands.measured_chapters import shown
 from host_tools.commands.output import note, progress, require_writable
 
 if TYPE_CHECKING:
     from host_tools.cramer_rao.bounds import Limits
     from host_tools.scenes.scene import Scene
 
-STANDARD = ROOT / "protocols" / "standard.toml"
+STANDARD = PROTOCOLS / "standard.toml"
 LETTERS = ("ln d", "ln h", "ln E")
 
 
@@ -126,7 +127,7 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     from host_tools.cramer_rao.press_bound import beside_over_axis
     from host_tools.pages.page import FIGURES, Results, write_page
 
-    beside = beside_over_axis(read_ramp_model(ROOT / "models" / "standard").answers)
+    beside = beside_over_axis(read_ramp_model(MODELS / "standard").answers)
     chosen, mapped = inclusions(), []
     with progress("scenes") as bar:
         task = bar.add_task("", total=len(chosen))

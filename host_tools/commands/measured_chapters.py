@@ -11,13 +11,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from device.files.shipped import SOURCE_TREE
 from host_tools.commands.output import progress
 
 if TYPE_CHECKING:
     from host_tools.pages import benchmark
     from host_tools.pages.page import Timed
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) -> dict[str, Timed]:
@@ -61,4 +60,5 @@ def print_table(table: benchmark.Table) -> None:
 def shown(path: Path) -> str:
     """Return a path as it would be typed at the root of the repository."""
     whole = path.resolve()
-    return str(whole.relative_to(ROOT)) if whole.is_relative_to(ROOT) else path.name
+    inside = SOURCE_TREE and whole.is_relative_to(SOURCE_TREE)
+    return str(whole.relative_to(SOURCE_TREE)) if SOURCE_TREE and inside else path.name

@@ -10,17 +10,18 @@ import typer
 
 from device.files.bundle_file import read_paper_model
 from device.files.recording_file import write_recording
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.bundle import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.output import note, progress
+from host_tools.commands.output import note, own_models, progress
 
 if TYPE_CHECKING:
     from host_tools.calibration.phantom_sets import Phantom
 
-MODELS, WIDE = Path(__file__).resolve().parents[2] / "models", Path("build/wide_table")
+WIDE = Path("build/wide_table")
 
 
 def table(
@@ -42,7 +43,7 @@ def table(
 
     if part not in ("centred", "off-axis", "all", "wide"):
         raise InvalidQuantity("part", part, "centred, off-axis, all or wide", "name one of them")
-    out = out or (WIDE if part == "wide" else MODELS / "simulated_probe")
+    out = out or (WIDE if part == "wide" else own_models("simulated_probe"))
     with progress("solves") as bar:
         task = bar.add_task("")
 
@@ -65,7 +66,7 @@ def phantom(
     force_n: Annotated[list[float] | None, typer.Option(help="Force of the press; repeat for a ramp.")] = None,
     offset_mm: Annotated[float, typer.Option(help="How far beside the lesion's middle it is pressed.")] = 0.0,
     model: Annotated[Path, typer.Option(help="Bundle whose phantom scenes to record.")] = MODELS / "paper",
-    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
     seed: Annotated[int, typer.Option(help="Seed of scenes, camera, force and hand.")] = 100,
 ) -> None:
     """Record the simulated probe on phantoms: the model's nine, eight published ones, or random ones.

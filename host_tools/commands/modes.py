@@ -10,14 +10,13 @@ import typer
 
 from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
 from device.files.certificate_file import read_calibration
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.model import RAMP_MODES
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
 from host_tools.commands.output import note, require_writable
-
-MODELS = ROOT / "models"
 
 
 def modes(
@@ -25,7 +24,7 @@ def modes(
         Path | None, typer.Option(help="Markdown file to write, results beside it; printed only when not given.")
     ] = None,
     model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
-    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = MODELS / "simulated_probe",
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
     only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
 ) -> None:
     """Measure error, time, coverage and refusals of the modes against bounds; about an hour on two cores.

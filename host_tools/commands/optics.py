@@ -8,28 +8,30 @@ from typing import Annotated
 import typer
 
 from device.measurement.quantities import Bound, require
-from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
-from host_tools.commands.output import note, progress, require_writable
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
+from host_tools.commands.output import note, own_models, progress, require_writable
 
-MODELS = ROOT / "models"
 DEFAULT_RAYS = 2_000_000
 optics = typer.Typer(no_args_is_help=True, help="The light in the block: its table, and its verification.")
 
 
 @optics.command(epilog="Example: host_tools optics build --out models/simulated_probe")
 def build(
-    out: Annotated[Path, typer.Option(help="Folder of the table.")] = MODELS / "simulated_probe",
+    out: Annotated[Path | None, typer.Option(help="Folder of the table; models/simulated_probe unless given.")] = None,
     rays: Annotated[int, typer.Option(help="Rays for the light of one LED; minutes for the default.")] = 100_000_000,
     seed: Annotated[int, typer.Option(help="Seed of the rays; the same seed gives the same table.")] = 1,
 ) -> None:
     """Trace the light of the block and write the table that the virtual probe's images come from."""
     from host_tools.optics.build_lookup import STEPS, write_light_table
 
+    folder = out or own_models("simulated_probe")
     with progress("parts") as bar:
         task = bar.add_task("", total=len(STEPS))
-        write_light_table(out, rays=rays, seed=seed, on_step=lambda step: bar.update(task, completed=STEPS.index(step)))
+        write_light_table(
+            folder, rays=rays, seed=seed, on_step=lambda step: bar.update(task, completed=STEPS.index(step))
+        )
         bar.update(task, completed=len(STEPS))
-    print(f"{out}: light of {rays} rays.")
+    print(f"{folder}: light of {rays} rays.")
 
 
 @optics.command(epilog="Example: host_tools optics verify --mitsuba --out docs/optics.md")

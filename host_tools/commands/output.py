@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from device.files.shipped import MODELS, SOURCE_TREE
 from device.measurement.quantities import InvalidQuantity
 
 note = Console(stderr=True, highlight=False)
@@ -22,6 +23,20 @@ def note_left_out(scenes: int, data: Path) -> None:
     """Say how many scenes of a data set cannot be used; nothing when all can."""
     if scenes:
         note.print(f"{scenes} scenes of {data}, failed or without a number, are left out.", soft_wrap=True)
+
+
+def source_tree(purpose: str) -> Path:
+    """Return the root of the source tree; raise `InvalidQuantity` in an installed package, whose files stay as made."""
+    if SOURCE_TREE is None:
+        bound = "in its source tree"
+        raise InvalidQuantity("host_tools", "an installed package", bound, f"clone the repository to {purpose}")
+    return SOURCE_TREE
+
+
+def own_models(name: str) -> Path:
+    """Return the folder in models/ that a verb writes unless told another; raise as `source_tree`."""
+    source_tree("write its own models, or name another folder with --out")
+    return MODELS / name
 
 
 def require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from device.files.durable import write_durably
-from host_tools.commands.output import note
+from host_tools.commands.output import note, source_tree
 
 
 def pages(
@@ -18,6 +18,7 @@ def pages(
     """Write each page of docs/results from its template in docs/templates."""
     from host_tools.pages.page import DOCS, RESULTS, render
 
+    source_tree("write its pages")
     stale = []
     for record in sorted(RESULTS.glob("*.json")):
         page, text = DOCS / f"{record.stem}.md", render(record)

@@ -7,19 +7,19 @@ from typing import Annotated
 
 import typer
 
+from device.files.shipped import SIMULATED_PROBE, SOURCE_TREE
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.measured_chapters import ROOT, print_table, shown
+from host_tools.commands.measured_chapters import print_table, shown
 from host_tools.commands.output import note, note_left_out, progress, require_writable
 
-DEFAULT_DATA = ROOT / "build" / "sweep.nc"
-DEFAULT_TABLE = ROOT / "models" / "simulated_probe"
+DEFAULT_DATA = (SOURCE_TREE or Path()) / "build" / "sweep.nc"
 DEFAULT_SEEDS = 100
 
 
 def paper(
     out: Annotated[Path | None, typer.Option(help="Markdown file to write; results go beside it.")] = None,
     data: Annotated[Path, typer.Option(help="Data set of `host_tools sweep`.")] = DEFAULT_DATA,
-    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = DEFAULT_TABLE,
+    table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
     seeds: Annotated[int, typer.Option(help="Trials of each network; the page is meant for 100.")] = DEFAULT_SEEDS,
 ) -> None:
     """Repeat the paper's protocol, take its assumptions away, and set two algorithms side by side.
@@ -53,6 +53,6 @@ def paper(
 
 def _command(out: Path, data: Path, table: Path, seeds: int) -> str:
     flags = [f"--data {shown(data)}"] if data != DEFAULT_DATA else []
-    flags += [f"--table {shown(table)}"] if table != DEFAULT_TABLE else []
+    flags += [f"--table {shown(table)}"] if table != SIMULATED_PROBE else []
     flags += [f"--seeds {seeds}"] if seeds != DEFAULT_SEEDS else []
     return " ".join(["host_tools paper", *flags, f"--out {shown(out)}"])

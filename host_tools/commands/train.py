@@ -11,12 +11,11 @@ import typer
 
 from device import __version__
 from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.bundle import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from host_tools.commands.output import note, note_left_out, progress
+from host_tools.commands.output import note, note_left_out, own_models, progress
 
-MODELS = Path(__file__).resolve().parents[2] / "models"
-TABLE = MODELS / "simulated_probe"
 CERTIFICATE = "calibration.json"
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
@@ -50,13 +49,13 @@ def train(
         if value is not None and option not in OWN_OPTIONS[mode]:
             raise InvalidQuantity("option", option, f"one of mode {mode}", "leave it out")
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
-    folder = out or MODELS / mode
+    folder = out or own_models(mode)
     if mode == "paper":
         _paper(data or _swept(), folder, TRIALS if trials is None else trials, seed, command)
     elif mode == "standard":
-        _standard(table or TABLE, wide, folder, seed, dry_run, command)
+        _standard(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
     else:
-        _quick(table or TABLE, folder, seed, command)
+        _quick(table or SIMULATED_PROBE, folder, seed, command)
 
 
 def _command(options: Mapping[str, object]) -> str:

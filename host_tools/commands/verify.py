@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.measured_chapters import ROOT, measure_chapters, print_chapter, shown
-from host_tools.commands.output import note, require_writable
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
+from host_tools.commands.output import note, require_writable, source_tree
 
 if TYPE_CHECKING:
     from host_tools.pages.benchmark import Chapter
-
-TABLES = ROOT / "host_tools" / "forward" / "accuracy_table.json"
 
 
 def verify(
@@ -63,5 +61,6 @@ def _chapters(only: list[str], extra: list[str], *, short: bool) -> dict[str, Ca
 def _measure_tables() -> None:
     from host_tools.verification.level_tables import measure_tables
 
-    measure_tables(TABLES, on_step=lambda what: note.print(f"measuring {what}"))
-    note.print(f"{TABLES} written.")
+    tables = source_tree("measure the tables of plans") / "host_tools" / "forward" / "accuracy_table.json"
+    measure_tables(tables, on_step=lambda what: note.print(f"measuring {what}"))
+    note.print(f"{tables} written.")

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
+from device.files.shipped import PROTOCOLS
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from host_tools.cramer_rao.bounds import Limits, limit_of_observed, std_of_box
@@ -22,7 +22,6 @@ from host_tools.forward.derivatives.sensitive_presses import Ramps, sensitive_ra
 from host_tools.scenes.scene import Scene
 
 SIZES_MM, DEPTHS_MM, MODULI_KPA = (3.0, 6.0, 10.0, 15.0), (4.0, 6.0, 8.0, 12.0), (15.0, 40.0, 80.0, 120.0)
-PROTOCOLS = Path(__file__).resolve().parents[2] / "protocols"
 STANDARD, PRECISE, NOT_SMOOTH = "standard", "precise", "standard, no smooth error"
 UNKNOWN_RATIO = 10.0
 OBSERVABLES: tuple[Observable, ...] = ("image", "pressure", "displacement")

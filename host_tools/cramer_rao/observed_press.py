@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
 from device.simulation.physics.lookup_optics import LookupOptics
@@ -30,7 +30,6 @@ from host_tools.forward.derivatives.sensitive_presses import InclusionSensitivit
 from host_tools.forward.derivatives.sensitivity import FORCE, FaceSensitivity
 from host_tools.forward.face_state import Rays
 
-TABLES = Path(__file__).resolve().parents[2] / "models" / "simulated_probe"
 WINDOW_RATIO = 0.9
 """The central window over the face."""
 SMOOTH_MM = 1.0
@@ -252,4 +251,4 @@ def smooth(r_mm: Array, p_kpa: Array) -> Array:
 
 @lru_cache(maxsize=1)
 def _optics() -> LookupOptics:
-    return LookupOptics.load(TABLES)
+    return LookupOptics.load(SIMULATED_PROBE)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.recording.tactile_image import Counts
 from device.simulation.physics.image_formation import ScatteredImage
 from device.simulation.physics.lens import Lens
@@ -16,8 +15,6 @@ from host_tools.calibration.phantom import CAMERA, LIT
 from host_tools.forward.face_points import FacePoints
 from host_tools.forward.solution import Solution
 
-TABLES = Path(__file__).resolve().parents[2] / "models" / "simulated_probe"
-
 
 def simulated_frame(solution: Solution, *, exposure_us: float, seed: int) -> Counts:
     """Return the 768 x 492 frame (8 bit) of the pressed face under four equal LEDs, default skin, lens and sensor.
@@ -25,7 +22,7 @@ def simulated_frame(solution: Solution, *, exposure_us: float, seed: int) -> Cou
     Of the whole face, so an inclusion beside the axis is seen beside it: +x is to the right, +y down.
     """
     shape = CAMERA.height_px, CAMERA.width_px
-    image = ScatteredImage(LookupOptics.load(TABLES), Skin(), Lens(), shape, CAMERA.scale)
+    image = ScatteredImage(LookupOptics.load(SIMULATED_PROBE), Skin(), Lens(), shape, CAMERA.scale)
     at_pixels = FacePoints(solution.rays, image.x_mm, image.y_mm)
     w_mm = at_pixels(solution.pressed.w_mm).astype(np.float32)
     p_kpa = (at_pixels(np.maximum(solution.pressed.p_kpa, 0)) * at_pixels.is_inside).astype(np.float32)

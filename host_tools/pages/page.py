@@ -19,10 +19,11 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from device import __version__
 from device.files.durable import write_durably
+from device.files.shipped import SOURCE_TREE, TEMPLATES
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-TEMPLATES, RESULTS = DOCS / "templates", DOCS / "results"
+DOCS = (SOURCE_TREE or Path()) / "docs"
+RESULTS = DOCS / "results"
 FIGURES = "figures"
 MOST = 10.0
 """Ratios beyond 1000 % are not written out."""

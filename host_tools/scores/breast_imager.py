@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from device.files.shipped import PROTOCOLS
 from device.measurement.arrays import Array
 from device.measurement.calibration import Calibration
 from device.measurement.confidence_belt import COVERAGE
@@ -24,7 +25,6 @@ from device.measurement.ramp_modes.surrogate import MODULUS, SIZE
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom_sets import BREAST_IMAGER_SLAB_MM, Phantom, breast_imager
-from host_tools.cramer_rao.accuracy_map import PROTOCOLS
 from host_tools.cramer_rao.bounds import limits
 from host_tools.cramer_rao.protocol import read_protocol
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.light_table import load_light_table
@@ -29,7 +30,6 @@ from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_most
 from host_tools.verification.light.pictures import LINES
 
-TABLES = Path(__file__).resolve().parents[3] / "models" / "simulated_probe"
 CELL_MM = 0.5
 PRESS_N = 0.5
 TITLE = "The virtual probe's fast model"
@@ -190,7 +190,7 @@ def _contact(scene: HeldOutScene) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.asarray(scene.skin.contact_ratio(scene.p_kpa), dtype=np.float64)
 
 
-def chapter(rays: int, folder: Path = TABLES) -> Chapter:
+def chapter(rays: int, folder: Path = SIMULATED_PROBE) -> Chapter:
     """Return the chapter; skipped where there is no table. Raises `InvalidQuantity` for a broken one."""
     if not (folder / "light_table.json").exists():
         missing = "there is no light table in models/simulated_probe; `host_tools optics build` makes it"

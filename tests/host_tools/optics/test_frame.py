@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.image_formation import ScatteredImage
 from device.simulation.physics.lens import Lens
@@ -15,7 +16,7 @@ from device.simulation.physics.skin import Skin
 from host_tools.calibration.phantom import CAMERA, LIT
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solve import solve
-from host_tools.optics.frame import TABLES, simulated_frame
+from host_tools.optics.frame import simulated_frame
 from host_tools.scenes.scene import Placement, Press, Scene
 
 INCLUSION, PRESS = Inclusion(10.0, 6.0, 80.0), Press(force_n=0.4)
@@ -58,7 +59,9 @@ def test_the_picture_is_lopsided_along_the_offset_and_even_across_it():
 def test_the_picture_of_an_inclusion_below_the_middle_is_that_of_its_radial_profile():
     """One ray says all: the same counts as when every pixel takes the profile at its own radius."""
     solution = solve(Scene(INCLUSION, PRESS))
-    image = ScatteredImage(LookupOptics.load(TABLES), Skin(), Lens(), (CAMERA.height_px, CAMERA.width_px), CAMERA.scale)
+    image = ScatteredImage(
+        LookupOptics.load(SIMULATED_PROBE), Skin(), Lens(), (CAMERA.height_px, CAMERA.width_px), CAMERA.scale
+    )
     r_mm = np.hypot(image.x_mm, image.y_mm)
     w_mm = np.interp(r_mm, solution.r_mm, solution.w_mm).astype(np.float32)
     p_kpa = np.interp(r_mm, solution.r_mm, np.maximum(solution.p_kpa, 0), right=0.0).astype(np.float32)
