@@ -50,7 +50,7 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
 
-test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, ten minutes)
+test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
 	$(PY) tests/deploy/power_cuts.py
 
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)

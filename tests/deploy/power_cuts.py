@@ -6,7 +6,9 @@ NOLOGFLUSH): what was not synchronised is lost, as it is when the power goes. Th
 checked, every file is compared with its hash, and the next release is installed on what was found. After the cuts the
 last release is installed without one, and has to run.
 
-The same with `os.fsync` and `os.sync` patched out has to find a broken release: so this test can tell.
+Meanwhile somebody else stores and synchronises, as the daemon does with its measurements: that brings names to the
+disk whose content is not there yet. The same with `os.fsync` and `os.sync` patched out of the updater has to find a
+broken release: so this test can tell.
 """
 
 from __future__ import annotations
@@ -22,12 +24,14 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from threading import Thread
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 from small_release import new_key, release_file  # noqa: E402
 from updated_probe import UpdatedProbe  # noqa: E402
 
+from device.files.durable import write_and_sync  # noqa: E402
 from device.update.contents import damage  # noqa: E402
 
 SHUTDOWN, WITHOUT_LOG = 0x8004587D, 2
@@ -106,9 +110,11 @@ class Cuts:
     def cut(self) -> tuple[str, list[str]]:
         """Install, cut the power at a random moment, start again; return what was found, and what is broken of it."""
         after_s = self.random.uniform(0.05, 1.1 * self.duration_s)
-        installation = self.installation()
+        installation, others = self.installation(), Thread(target=self.store_measurements)
+        others.start()
         time.sleep(after_s)
         self.disk.cut()
+        others.join()
         installation.send_signal(signal.SIGKILL)
         installation.communicate()
         self.probe.stop()
@@ -120,6 +126,15 @@ class Cuts:
         problems += self.broken()
         self.probe.run("watch-incoming")
         return f"{found}; {self.probe.current} runs", problems + self.broken()
+
+    def store_measurements(self) -> None:
+        """Write and synchronise beside the updater until the disk is gone."""
+        try:
+            while True:
+                write_and_sync(self.disk.mount / "measurement", b"1")
+                time.sleep(0.05)
+        except OSError:
+            return
 
     def found(self, after_s: float) -> str:
         """Return what the disk says before anything is mended."""
