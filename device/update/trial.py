@@ -23,6 +23,7 @@ from device.update.unpack import remove_release
 
 log = logging.getLogger(__name__)
 INTERRUPTED = "The power went, or the updater was killed, before the release was whole."
+GONE = "Its folder is not there."
 REMEDY = "The release that ran before does again; the maker of the failed one needs to know the reason."
 
 
@@ -58,9 +59,11 @@ def carry_through(updater: Updater) -> None:
         finish_commit(updater.layout)
         tell_interrupted(updater)
         return
-    updater.report.release = pending.release
+    _go_on_telling(updater, pending.release)
     if pending.leaving:
         leave(updater, pending.leaving, is_bad=pending.is_bad)
+    if not updater.layout.is_installed(pending.release):
+        leave(updater, GONE, is_bad=False)
     try:
         _switch(updater, pending.release)
         _watch(updater, pending)
@@ -172,6 +175,14 @@ def tell_interrupted(updater: Updater) -> None:
     else:
         report.end("refused", UpdateFailed(INTERRUPTED, "Send it again; the release before runs unchanged."))
     report.release, report.file = "", ""
+
+
+def _go_on_telling(updater: Updater, release: str) -> None:
+    """Tell the progress under the name of the file with which this trial began, by which its sender follows it."""
+    report, last = updater.report, read_progress(updater.layout)
+    if last.release == release and not report.file:
+        report.file = last.file
+    report.release = release
 
 
 def _switch(updater: Updater, release: str) -> None:

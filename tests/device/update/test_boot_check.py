@@ -75,6 +75,25 @@ def test_a_trial_whose_release_is_not_there_ends_and_is_not_its_fault(on_trial):
     assert (probe.require_whole(), probe.state.bad, probe.releases()) == ("1.0+10", {}, ["1.0+10"])
 
 
+def test_a_trial_without_its_release_ends_also_while_the_machine_runs(on_trial):
+    """As when a full disk let neither the state be written nor the folder stay."""
+    probe = on_trial()
+    point(probe.layout.current, probe.layout.release("1.0+10"))
+    probe.layout.release("1.1+11").rename(probe.layout.releases / ".removed-1.1+11")
+    done = probe.run("resume")
+    assert done.stderr.startswith("E013 1.1+11 was left: Its folder is not there.")
+    assert (probe.require_whole(), probe.state.pending, probe.state.bad) == ("1.0+10", None, {})
+
+
+def test_who_follows_a_release_hears_the_end_though_the_updater_was_killed_meanwhile(on_trial):
+    probe = on_trial()
+    report = ProgressReport(probe.layout)
+    report.release, report.file = "1.1+11", "7.7"
+    report.tell("checking", 0.7, "health")
+    probe.run("watch-incoming")
+    assert (probe.progress.state, probe.progress.release, probe.progress.file) == ("committed", "1.1+11", "7.7")
+
+
 def test_what_an_interrupted_installation_left_is_gone_and_the_progress_says_why(probe):
     probe.install("1.0", 10)
     for name in (".incoming-1.1+11", ".removed-0.9+9", "0.8+8"):
