@@ -11,7 +11,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-arm bundle check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm bundle check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -49,6 +49,9 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
+
+test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
+	$(PY) tests/deploy/power_cuts.py
 
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)
 	tests/deploy/arm64.sh build/arm64

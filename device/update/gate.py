@@ -42,7 +42,7 @@ class NotHealthy(Exception):  # noqa: N818 - it is an answer, not an error of th
 
 
 class DaemonGone(NotHealthy):
-    """No daemon has the port: nobody listens there, or the page that stands in for one (device/fallback/)."""
+    """Nobody listens on the port, or somebody else does: the page that stands in for a daemon (device/fallback/)."""
 
 
 def ask_parts(port: int) -> PartsHealth:
@@ -59,7 +59,7 @@ def ask_parts(port: int) -> PartsHealth:
         kind = DaemonGone if isinstance(error, ConnectionError) else NotHealthy
         raise kind(f"the daemon does not answer on port {port} ({error or type(error).__name__})") from None
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise NotHealthy(f"the daemon's answer on port {port} is not that of a probe") from None
+        raise DaemonGone(f"what answers on port {port} is no daemon of a probe") from None
     finally:
         line.close()
 
@@ -103,7 +103,7 @@ def wait_until_healthy(
 
 def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | None) -> None:
     if health.release != release:
-        raise NotHealthy(f"the daemon that answers is {health.release or 'of no release'}")
+        raise DaemonGone(f"the daemon that answers is {health.release or 'of no release'}")
     for part in PARTS:
         if part not in health.faults:
             raise NotHealthy(f"the daemon says nothing of its {part}")
