@@ -17,7 +17,7 @@ from device.provisioning.target import ProvisioningFailed, TargetMachine, system
 CURRENT, UPDATER = "/opt/tsis/current", "/opt/tsis/updater"
 UNITS = "/etc/systemd/system"
 UNIT_KINDS = (".service", ".path", ".socket", ".timer")
-OF_UPDATER = ("tsis-boot.", "tsis-update.")
+OF_UPDATER = ("tsis-boot.", "tsis-update.", "tsis-fallback.")
 AT_BOOT = "WantedBy=multi-user.target"
 FOLDERS_OF = {".sysusers.conf": "/etc/sysusers.d/", ".tmpfiles.conf": "/etc/tmpfiles.d/"}
 """Where files go that are no units, by how their names end."""
