@@ -57,11 +57,12 @@ bundle: .venv/all.stamp ## build and sign the file that a probe installs: make b
 	@$(HOST_TOOLS) release build --machine $(MACHINE) --key $(KEY) --out $(OUT) \
 	  $(if $(COUNTER),--counter $(COUNTER)) $(if $(SIGNERS),--signers $(SIGNERS))
 
-check: .venv/all.stamp ## lint, format, types, import arrows, dead links, pages that are their results in their templates
+check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports
+	$(PY) -m pytest -rs --durations 0 --durations-min 9 tests/test_systemd_units.py tests/test_shell_scripts.py
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
 

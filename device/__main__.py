@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse or record presses, see settings, certificates and faults, test, darken.
+"""`python -m device`: start the daemon, analyse or record presses, see settings and faults, test, update, darken.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -23,6 +23,7 @@ from device.commands.led_off import led_off
 from device.commands.record import add_record_command, run_record_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
 from device.commands.serve import serve
+from device.commands.update import add_update_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.press.phantom_press import PhantomPress
@@ -32,6 +33,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, overridden, read_layers
 from device.simulation.scenario import Scenario, read_scenario
+from device.update.__main__ import run_update
 
 EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
@@ -55,7 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    verbs = "analyse | record | config | calibration | faults | self-test | led-off"
+    verbs = "analyse | record | config | calibration | faults | self-test | update | led-off"
     commands = parser.add_subparsers(dest="command", metavar=verbs)
     add_analyse_command(commands)
     add_record_command(commands)
@@ -63,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     add_calibration_command(commands)
     add_faults_command(commands)
     add_self_test_command(commands)
+    add_update_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -90,6 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run_faults_command(options)
         if options.command == "self-test":
             return _self_test(options)
+        if options.command == "update":
+            return run_update(options)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0

@@ -97,6 +97,56 @@ class LastGoodConfigError(ConfigError):
     is_lasting = True
 
 
+class UntrustedRelease(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release file is damaged, was cut off while it was copied, or is not signed by a key that this probe trusts."""
+
+    code = "E010"
+    title = "Release damaged or not signed"
+    status = 422
+
+
+class UnfitRelease(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release is not for this probe: another product, machine or data, older than what ran here, or known as bad."""
+
+    code = "E011"
+    title = "Release does not fit"
+    status = 422
+
+
+class UpdateFailed(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A step of an update failed; the release that ran before still does."""
+
+    code = "E012"
+    title = "Update failed"
+
+
+class RolledBack(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release did not work on this probe and the one before is back; shown until another one is installed."""
+
+    code = "E013"
+    title = "An update was taken back"
+    severity = "warning"
+    is_lasting = True
+
+
+class SupplyLowError(DeviceError):
+    """The computer's supply voltage is too low, or was for a moment; LEDs and camera may not do what they are told."""
+
+    code = "E015"
+    title = "Supply voltage too low"
+    status = 503
+    severity = "warning"
+
+
+class ComputerHotError(DeviceError):
+    """The probe's computer is so hot that it slows itself down."""
+
+    code = "E016"
+    title = "Computer too hot"
+    status = 503
+    severity = "warning"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 
@@ -192,7 +242,7 @@ class HotLedDriverError(LightError):
 
 
 class LightBudgetError(LightError):
-    """The light was on for too long in one press; it goes off, and the next press may begin."""
+    """The light was on for too long over the last presses; it goes off, and the press ends."""
 
     code = "E209"
     title = "Light on for too long"
@@ -204,6 +254,27 @@ class LightLimitError(LightError):
     code = "E210"
     title = "Light at its limit"
     severity = "warning"
+
+
+class LightRestError(LightError):
+    """The light was on for so long over the last presses that none may begin; it passes by itself."""
+
+    code = "E211"
+    title = "Light must rest"
+
+
+class LightCutError(LightError):
+    """The enable line took the light away in a press: loop, bus or camera came to a stop, or the line's keeper did."""
+
+    code = "E212"
+    title = "Light was cut"
+
+
+class LightLineError(LightError):
+    """The line that enables the LEDs cannot be driven, or the LED chip does not obey it."""
+
+    code = "E213"
+    title = "Enable line does not work"
 
 
 class LoadCellError(DeviceError):
@@ -356,6 +427,13 @@ class DiskFullError(StorageError):
     title = "Disk full"
 
 
+class NewerDataError(StorageError):
+    """The data folder was written by a newer release than this one, which cannot read it."""
+
+    code = "E014"
+    title = "Data of a newer release"
+
+
 class ClockJumpError(DeviceError):
     """The wall clock was set; what is measured runs on the monotonic clock, but `taken_at` may be wrong."""
 
@@ -365,7 +443,7 @@ class ClockJumpError(DeviceError):
 
 
 class BusyError(DeviceError):
-    """A press or a self-test is already under way."""
+    """A press, a self-test or an update is already under way."""
 
     code = "E801"
     title = "Busy"
@@ -404,6 +482,38 @@ class ModeUnavailable(DeviceError):  # noqa: N818 - the name is what the caller 
     status = 422
 
 
+class UnknownHost(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The request was addressed to a name that is none of this probe's."""
+
+    code = "E806"
+    title = "Unknown host"
+    status = 421
+
+
+class ForeignRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A page of another origin asked, or another machine for what is done at the probe's own screen only."""
+
+    code = "E807"
+    title = "Asked from elsewhere"
+    status = 403
+
+
+class WrongContentType(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A request that changes something must say that its body is JSON, or what else its path takes."""
+
+    code = "E808"
+    title = "Wrong content type"
+    status = 415
+
+
+class BodyTooLarge(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The body of the request is larger than its path takes; it was not read."""
+
+    code = "E809"
+    title = "Body too large"
+    status = 413
+
+
 class StalledError(DeviceError):
     """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
 
@@ -417,4 +527,12 @@ class RestartedError(DeviceError):
 
     code = "E902"
     title = "Restarted by itself"
+    severity = "warning"
+
+
+class UncleanEndError(DeviceError):
+    """The daemon before did not end by a stop: a power cut, a freeze or a kill; shown until a press has told of it."""
+
+    code = "E903"
+    title = "Ended without a stop"
     severity = "warning"

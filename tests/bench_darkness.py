@@ -1,7 +1,8 @@
-"""Kills a daemon whose light is on, and takes the time until the LED chip is dark; fails above a second.
+"""Ends a daemon whose light is on, and takes the time until the LED chip is dark; fails above a second.
 
 The daemon presses on emulated hardware under a stand-in for systemd, which then runs the unit's `ExecStopPost=`. Times
 are the wall's, by one clock, from the signal to the chip's last light: they hold for a machine that does nothing else.
+A daemon that is told to stop has a screen connected, as it mostly has.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import os
 import signal
 import sys
 import time
+import urllib.request
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -30,16 +32,17 @@ def darkness_s(folder: Path, ending: signal.Signals) -> float:
     try:
         daemon = supervisor.start()
         supervisor.is_fed_until(lambda daemon: daemon.ask("/api/v1/health/ready").status == 200)
-        daemon.ask("/api/v1/presses", "POST", {})
-        while min(supervisor.chip.led_ratio()) < 0.5:
-            time.sleep(STEP_S)
-        killed_s = time.monotonic()
-        daemon.process.send_signal(ending)
-        daemon.ended_code()
-        is_lit_still = any(supervisor.chip.led_ratio())
+        with urllib.request.urlopen(daemon.url + "/api/v1/events") as screen:
+            screen.readline()
+            daemon.ask("/api/v1/presses", "POST", {})
+            while min(supervisor.chip.led_ratio()) < 0.5:
+                time.sleep(STEP_S)
+            killed_s = time.monotonic()
+            daemon.process.send_signal(ending)
+            daemon.ended_code()
         supervisor.stop_post()
-        if any(supervisor.chip.led_ratio()) or not is_lit_still:
-            raise SystemExit(f"After {ending.name} the light was not on, or it is not off.")
+        if any(supervisor.chip.led_ratio()):
+            raise SystemExit(f"After {ending.name} the light is not off.")
         return _last_light_s(supervisor, killed_s, time.monotonic()) - killed_s
     finally:
         supervisor.close()
@@ -56,7 +59,7 @@ def _last_light_s(supervisor: Supervisor, since_s: float, until_s: float) -> flo
 def main() -> int:
     """Print the longest time of each kind of end; return 1 when one is above the limit."""
     longest_s = 0.0
-    for ending in (signal.SIGKILL, signal.SIGABRT):
+    for ending in (signal.SIGTERM, signal.SIGKILL, signal.SIGABRT):
         times_s = []
         for _ in range(REPEATS):
             with TemporaryDirectory(prefix="tsis-") as folder:

@@ -32,6 +32,7 @@ class Supervisor:
 
     def __init__(self, folder: Path, scene: str, watchdog_s: float) -> None:
         self._folder, self._scene, self._watchdog_s = folder, scene, watchdog_s
+        (folder / "probe.toml").write_text('data = "var"\n')
         self.chip = Tlc59116Chip()
         self._serving = served(EmulatedI2cBus({0x60: self.chip}), folder / "i2c")
         self._serving.__enter__()
@@ -47,7 +48,8 @@ class Supervisor:
         }  # fmt: skip
         program = str(ROOT / "tests" / "mirrored_daemon.py"), str(self._folder / "i2c")
         self.daemon = Daemon(self._folder, self._scene, program=program, environment=environment)
-        assert "READY=1" in self._next_message(START_S)
+        while "READY=1" not in (message := self._next_message(START_S)):
+            assert message == ["STOPPING=1"], message  # of the daemon before
         self._fed_s = time.monotonic()
         return self.daemon
 
@@ -67,11 +69,15 @@ class Supervisor:
         self.daemon.process.send_signal(signal.SIGABRT)
         return self.daemon.ended_code()
 
-    def stop_post(self) -> tuple[int, float]:
-        """Run what darkens the LEDs after the daemon's end, however that came; return exit code and CPU time (s)."""
+    def stop_post(self, **told: str) -> tuple[int, float]:
+        """Run what darkens the LEDs after the daemon's end, however that came; return exit code and CPU time (s).
+
+        `told` are systemd's variables of that end.
+        """
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         program = [str(ROOT / "tests" / "i2c_over_socket.py"), str(self._folder / "i2c"), "device.commands.led_off"]
-        environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+        program += ["--config", "probe.toml"]
+        environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", **told}
         process = subprocess.Popen([sys.executable, *program], cwd=self._folder, env=environment)
         cpu_s = ended_cpu_s(process)
         return process.returncode, cpu_s

@@ -8,6 +8,7 @@ Exit codes: 0 dark, 1 not known to be dark, 2 usage.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from pathlib import Path
 from device.config import LightSection
 from device.errors import DeviceError, LightError
 from device.hardware.led_driver import open_led_driver
+from device.instrument.watch.restart_note import note_end
 from device.settings.last_good import start_settings
 from device.settings.layers import layer_files, read_layers
 
@@ -46,7 +48,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, metavar="FILE", help="the daemon's settings (TOML)")
     options = parser.parse_args(arguments)
     try:
-        led_off(start_settings(read_layers(layer_files(stated=options.config))).config.light)
+        config = start_settings(read_layers(layer_files(stated=options.config))).config
+        try:
+            led_off(config.light)
+        finally:
+            note_end(config.data, os.environ)
     except DeviceError as error:
         print(error, file=sys.stderr)
         return 1

@@ -138,7 +138,7 @@ def _problem(kind: Any, error: ErrorDetails) -> InvalidQuantity:
         return InvalidQuantity(name, "missing", "given", "add it")
     if reason == "dataclass_type":
         return InvalidQuantity(name, value, "a table", f"write it as [{name}]")
-    wanted = re.sub("^Input should be |^Tuple should have | after validation.*", "", error["msg"])
+    wanted = re.sub("^Input should be |^(Tuple|String) should have | after validation.*", "", error["msg"])
     return InvalidQuantity(name, value, wanted, "correct it")
 
 

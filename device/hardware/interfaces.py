@@ -54,6 +54,24 @@ class ForceScale:
         return Newtons((counts - self.tare_counts) / self.sensitivity_counts_per_n)
 
 
+@dataclass(frozen=True)
+class ComputerState:
+    """What the probe's computer says of itself; None for what it cannot say.
+
+    `is_supply_low`: whether its supply voltage was too low at some time in the last two seconds.
+    """
+
+    is_supply_low: bool | None = None
+    temperature_c: float | None = None
+
+
+class Computer(Protocol):
+    """The computer that the daemon runs on."""
+
+    def read(self) -> ComputerState:
+        """Return what it says now; whatever cannot be read is None."""
+
+
 class Lights(Protocol):
     """The LEDs on the four sides."""
 
@@ -62,6 +80,12 @@ class Lights(Protocol):
 
     def check_outputs(self) -> None:
         """Raise `OpenLedError` or `HotLedDriverError` when the chip can tell that current does not flow; end dark."""
+
+    def check_line(self) -> bool:
+        """Return whether the chip has shown that it obeys its enable line; raise `LightLineError` when it does not."""
+
+    def go_on(self) -> None:
+        """Say that whoever has the light on goes on; raise `LightCutError` when an enable line took it away."""
 
     def close(self) -> None:
         """Switch all sides off and release the bus."""

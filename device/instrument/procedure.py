@@ -1,16 +1,18 @@
 """The press procedure: reference press beside the lesion, press on the lesion, estimate, keep.
 
-One thread runs it and owns light and camera. A press begins by a request or by itself, when the force passes the
-contact threshold. Everything that ends a press has a reason that the operator reads.
+One thread runs it and owns light and camera; a second only darkens when the daemon is to stop. A press begins by a
+request or by itself, when the force passes the contact threshold. Everything that ends a press has a reason that the
+operator reads.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from device.config import Config
@@ -29,17 +31,21 @@ from device.instrument.self_test.run import SelfTestRun
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
+from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
 from device.measurement.mode import Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
-from device.records.store import Store
+from device.records.store import ENDED, Store
 
 log = logging.getLogger(__name__)
 
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
+WRITE_EVERY_S = 20.0
+"""So often a write that nobody needs proves the store: seldom enough not to wear the card out."""
 
 
 class Procedure:
@@ -56,6 +62,7 @@ class Procedure:
         calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
+        computer: ComputerWatch | None = None,
         progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
         folder_of: Callable[[Path], Path] = Path,
@@ -70,6 +77,7 @@ class Procedure:
         self._answers = PressAnswers(config, calibration, estimator, store, self.progress, simulated_truth)
         self._capture = Capture(bench, config, self.board, self.progress)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
+        self._computer = computer
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
@@ -81,10 +89,12 @@ class Procedure:
             called_away=self._capture.called_away,
         )
         self._book = PressBook(self.board, store, bench.budget)
-        self.progress.exercise("storage", self._look_at_disk)
+        self._written_s = -math.inf
+        self.progress.exercise("storage", self._prove_store)
         test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
+        self._darkening = threading.Thread(target=self._darken_at_stop, name="darkening", daemon=True)
 
     @property
     def is_simulated(self) -> bool:
@@ -97,14 +107,28 @@ class Procedure:
             raise self.board.now.hindrance
         _ = self.bench.force.latest_n
 
+    def parts(self) -> dict[HealthPart, PartHealth]:
+        """Return which parts were seen working just now; waits for none of them."""
+        return parts_health(self.board.now, self.progress, self.bench.force.fault)
+
     def start(self) -> None:
         """Begin to wait for presses."""
+        self._darkening.start()
+        if self._computer:
+            self._computer.start()
         self._thread.start()
+
+    def stop(self) -> None:
+        """Darken the probe at once and end the press under way; waits for nothing, so a signal may ask for it."""
+        self._capture.stopping.set()
 
     def close(self) -> None:
         """End the press under way, switch the light off and release every part that was opened."""
-        self._capture.stopping.set()
+        self.stop()
         self._thread.join(timeout=5.0)
+        self._darkening.join(timeout=1.0)
+        if self._computer:
+            self._computer.close()
         self._opened.close()
 
     def request(self, mode: Mode | None = None) -> PressJob:
@@ -118,6 +142,10 @@ class Procedure:
     def cancel(self, press_id: str) -> None:
         """Cancel the press under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
+
+    def idle(self) -> AbstractContextManager[None]:
+        """While it is held no press begins; raises `BusyError` while a press or a self-test is under way."""
+        return self._requests.idle()
 
     def tare(self) -> Newtons:
         """Take the load cell's tare anew while nothing touches the probe; return by how much (N) the zero has moved.
@@ -148,6 +176,14 @@ class Procedure:
         """The self-test under way or the last one; raises `UnknownResource` when there was none."""
         return self._self_tests.last
 
+    def _darken_at_stop(self) -> None:
+        """Darken as soon as the daemon is to stop: the procedure's own thread may be waiting for a camera."""
+        self._capture.stopping.wait()
+        try:
+            self.bench.darken_for_good()
+        except LightError as error:
+            log.error("%s %s", error.code, error)
+
     def _run(self) -> None:
         self._run_presses()
         try:
@@ -174,7 +210,9 @@ class Procedure:
         self._look_at_disk()
         self._book.save_light_hours(at_least_s=SAVE_LIGHT_EVERY_S)
         self._book.warn(self._clock.warning())
+        self._warn_of_computer()
         self.calibration.require_valid(self._clock.now())
+        self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
         self._require_no_drift(unloaded)
@@ -199,6 +237,7 @@ class Procedure:
             if job := self._requests.begin(is_touched=is_touched):
                 return job
             self.progress.beat()
+            self._warn_of_computer()
             time.sleep(POLL_S)
         return None
 
@@ -230,6 +269,7 @@ class Procedure:
         self._book.note(job, state="capturing", progress=0.1)
         self.board.update(step="reference", measurement_id=None)
         reference = self._capture.loaded("reference", job.mode)
+        self._warn_of_computer()
         levels = self._capture.side_levels(reference)
         self._book.warn(self._dimming.warning(levels))
         self._book.warn(self._brightness.saw(levels))
@@ -243,7 +283,15 @@ class Procedure:
         self._darken()
         self.board.update(step="computing", guidance=Guidance.LIFT)
         self._book.warn(self._clock.warning())
+        self._warn_of_computer()
         return [*reference, *press]
+
+    def _warn_of_computer(self) -> None:
+        """Show what the computer's watch has seen since the last time; what is shown already is not logged again."""
+        shown = [one.as_record() for one in self.board.now.warnings]
+        for warning in self._computer.taken() if self._computer else ():
+            if warning.as_record() not in shown:
+                self._book.warn(warning)
 
     def _reject(self, job: PressJob, state: str, reason: str, code: str | None = None) -> None:
         self._capture.end(reason)
@@ -253,6 +301,17 @@ class Procedure:
     def _look_at_disk(self) -> None:
         with self.progress.inside("storage"):
             self.store.require_space(self.config.store.min_free_mb)
+
+    def _prove_store(self) -> None:
+        """See that the store can be read, and now and then between presses that it can be written."""
+        self._look_at_disk()
+        press = self.board.now.press
+        is_idle = press is None or press.state in ENDED
+        is_due = time.monotonic() - self._written_s >= WRITE_EVERY_S
+        with self.progress.inside("storage"):
+            self.store.prove(writing=is_idle and is_due)
+        if is_idle and is_due:
+            self._written_s = time.monotonic()
 
     def _at_fault(self, error: DeviceError) -> None:
         if self.board.now.fault is None:

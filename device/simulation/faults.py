@@ -27,6 +27,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "i2c_nack": (),
     "i2c_stuck": (),
     "i2c_frozen": (),
+    "enable_busy": (),
+    "enable_unwired": (),
     "led_dead": ("side",),
     "led_stuck_on": ("side",),
     "led_dimmed": ("side", "ratio"),
@@ -50,6 +52,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "disk_read_only": (),
     "disk_frozen": (),
     "bundle_tampered": (),
+    "undervoltage": (),
+    "computer_hot": (),
 }
 """Every kind of fault, and what it takes besides its times."""
 

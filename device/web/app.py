@@ -14,16 +14,20 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
+from device.access.known_hosts import KnownHosts
 from device.instrument.press.cost import press_cost
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
+from device.records.updates import Updates
 from device.web.events import snapshot, status_events
+from device.web.guard import RequestGuard
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
 from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
+from device.web.updates import add_updates
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -46,8 +50,14 @@ class SelfTestRequest(BaseModel):
     weight_n: float | None = None
 
 
-def create_app(procedure: Procedure, store: Store) -> FastAPI:
-    """Return the web application of a running procedure."""
+def create_app(
+    procedure: Procedure, store: Store, *, hosts: KnownHosts | None = None, updates: Updates | None = None
+) -> FastAPI:
+    """Return the web application of a running procedure, with what says how its updates went.
+
+    It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
+    device/access/request_rules.py first.
+    """
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -57,11 +67,13 @@ def create_app(procedure: Procedure, store: Store) -> FastAPI:
         responses=PROBLEM,
     )
     install_problems(app)
+    app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
     _add_state(app, procedure, store)
     _add_presses(app, procedure, store)
     _add_measurements(app, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_updates(app, API, procedure, updates or Updates())
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)

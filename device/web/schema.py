@@ -14,6 +14,7 @@ from device.fault_table import FaultCode
 from device.instrument.press.states import PressState
 from device.instrument.self_test.report import SelfTestState, Verdict
 from device.instrument.status import JobState, Step
+from device.instrument.watch.readiness import HealthPart
 from device.measurement.mode import Mode
 
 PressStateCode = StrEnum("PressStateCode", [(state.name, state.code) for state in PressState])  # type: ignore[misc]
@@ -100,6 +101,38 @@ class Tare(_Body):
 
     moved_n: float
     zero_shift_n: float
+
+
+class HealthOfPart(_Body):
+    """Whether a part was seen working within the last seconds, and the code of what it tells."""
+
+    ready: bool
+    code: FaultCode | None
+
+
+class Health(_Body):
+    """The parts of the probe under a release."""
+
+    release: str
+    parts: dict[HealthPart, HealthOfPart]
+
+
+class UpdateResource(_Body):
+    """What runs, and what the updater says: `outcome` is how the last update ended, in words for the operator."""
+
+    running: str
+    state: str
+    release: str | None
+    previous: str | None
+    committed: str | None
+    pending: str | None
+    floor: int | None
+    progress: float | None
+    step: str
+    reason: str
+    outcome: str
+    can_roll_back: bool
+    history: list[dict[str, Any]]
 
 
 class GuidanceLine(_Body):

@@ -189,6 +189,7 @@ def test_a_tlc59116_takes_any_exposure(read):
         ("[press]\ntarget_n = nan\n", r"press\.target_n is nan"),
         ("[press]\noverload_n = 0.71\n", r"press\.overload_n is 0\.71, but must be at least 0\.72"),
         ("[server]\nport = 65536\n", r"server\.port is 65536"),
+        ('[server]\nhost = ""\n', r"server\.host is '', but must be at least 1 character"),
         ("serial = 7\n", "serial is 7"),
         ("camera = 3\n", r"write it as \[camera\]"),
         ("[camera\n", "valid TOML"),

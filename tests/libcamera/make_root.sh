@@ -19,10 +19,10 @@ debootstrap --variant=minbase trixie "$root" "$mirror"
 } > "$root/etc/apt/sources.list"
 install -D -m 644 /etc/resolv.conf "$root/etc/resolv.conf"
 inside() { chroot "$root" /usr/bin/env DEBIAN_FRONTEND=noninteractive "$@"; }
-install="apt-get install -y -qq --no-install-recommends"
+install=(apt-get install -y -qq --no-install-recommends)
 inside apt-get update -qq
-inside $install python3-venv python3-dev build-essential libcap-dev ca-certificates
-inside $install -t trixie-backports libcamera-tools libcamera-ipa python3-libcamera # 0.4 of trixie has broken metadata
+inside "${install[@]}" python3-venv python3-dev build-essential libcap-dev ca-certificates
+inside "${install[@]}" -t trixie-backports libcamera-tools libcamera-ipa python3-libcamera # 0.4 of trixie has broken metadata
 # pip's index and certificates are those of the host.
 for file in /etc/pip.conf /etc/ssl/certs/ca-certificates.crt; do
   [[ ! -e $file ]] || install -D -m 644 "$file" "$root$file"

@@ -35,17 +35,18 @@ results=$root/results.txt console=$root/console.txt
 # The container's own systemd-nspawn, with its own libraries: the host needs neither. Where systemd is not PID 1 nobody
 # can be asked for a scope, and the mounts have to be private. DevicePolicy= takes bpf and the unified control groups.
 libraries=$root/usr/lib/x86_64-linux-gnu
-scope=$([[ -d /run/systemd/system ]] || echo --keep-unit)
+scope=()
+[[ -d /run/systemd/system ]] || scope=(--keep-unit)
 export SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1
 unshare --mount --propagation private \
   "$root/lib64/ld-linux-x86-64.so.2" --library-path "$libraries:$libraries/systemd" \
-  "$root/usr/bin/systemd-nspawn" --quiet --register=no $scope --directory="$root" --machine=tsis-stories \
+  "$root/usr/bin/systemd-nspawn" --quiet --register=no "${scope[@]}" --directory="$root" --machine=tsis-stories \
   --system-call-filter=bpf --private-network --resolv-conf=off --timezone=off --link-journal=no --boot --console=pipe \
   < /dev/null > "$console" 2>&1 &
 container=$!
 ended() {
-  kill "$container" 2> /dev/null && wait "$container" || true
-  [[ -z $scope ]] || rmdir /sys/fs/cgroup/*/{payload/init.scope,payload,supervisor} 2> /dev/null || true
+  if kill "$container" 2> /dev/null; then wait "$container" || true; fi
+  [[ ${#scope[@]} == 0 ]] || rmdir /sys/fs/cgroup/*/{payload/init.scope,payload,supervisor} 2> /dev/null || true
 }
 trap ended EXIT
 tail --pid="$container" --follow --lines=+1 "$results"

@@ -85,7 +85,8 @@ def killed(service: Service) -> Iterator[Claim]:
     again_s = dark_s + until("active again", lambda: service.shown("ActiveState") == "active", 60)
     until("ready again", service.is_ready, 60)
     yield Claim("it is started again", service.shown("NRestarts") == "1", f"active after {again_s:.1f} s")
-    yield Claim("a killed daemon is no fault on the screen", not service.faults(), list(service.faults()))
+    warning = service.faults().get("E903", {})
+    yield Claim("E903 on the screen says by what", "signal" in warning.get("cause", ""), warning.get("cause"))
 
 
 def pressed(service: Service) -> Iterator[Claim]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass, field
 
@@ -23,7 +24,10 @@ LATE_S = 0.1
 
 @dataclass
 class Bench:
-    """The opened hardware. Owned by the procedure's thread alone, except `force`, which anyone may read."""
+    """The opened hardware. Owned by the procedure's thread alone, except `force`, which anyone may read.
+
+    Any thread may make it dark for good.
+    """
 
     lights: Lights
     camera: Camera
@@ -35,6 +39,8 @@ class Bench:
     _light: LedRatio = DARK
     _is_known: bool = False
     _not_before_s: float = 0.0
+    _is_over: bool = False
+    _lock: threading.Lock = field(default_factory=lambda: threading.Lock())
 
     def __post_init__(self) -> None:
         self.progress.exercise("camera", self._look)
@@ -44,7 +50,21 @@ class Bench:
         """Set the four sides; frames begun before the chip acknowledged it are not taken.
 
         After a `LightError` nobody knows what the light is: it is set again at the next call, whatever it asks for.
+        Once it was made dark for good it stays so.
         """
+        with self._lock:
+            self._set(DARK if self._is_over else ratio)
+
+    def darken_for_good(self) -> None:
+        """Switch the light off now, whatever the procedure is in, and never on again; raises `LightError`."""
+        self._is_over = True  # before the lock: whoever holds it is the last that may have lit
+        with self._lock:
+            self._is_known = False
+            self.lights.set_ratio(DARK)  # not `inside` a part: the loop whose progress that is may be in another
+            self._light, self._is_known = DARK, True
+            self.budget.note_dark()
+
+    def _set(self, ratio: LedRatio) -> None:
         if ratio != self._light or not self._is_known:
             self._is_known = False
             if any(ratio):
@@ -56,10 +76,12 @@ class Bench:
 
     def check_lights(self) -> None:
         """Raise `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not flow; ends dark."""
-        self._is_known = False
-        with self.progress.inside("light"):
-            self.lights.check_outputs()
-        self.budget.note_dark()
+        with self._lock:
+            self._is_known = False
+            if not self._is_over:
+                with self.progress.inside("light"):
+                    self.lights.check_outputs()
+                self.budget.note_dark()
 
     def take(self, role: Role) -> Frame:
         """Return the next frame under the present light, with the force in the middle of its exposure.
@@ -70,7 +92,8 @@ class Bench:
         taken = self.expose()
         middle_s = taken.exposure_start_s + taken.exposure_us * 0.5e-6
         frame = Frame(taken.counts, role, middle_s, self.force.at(middle_s), self._light)
-        self.levels.saw(frame)
+        if not self._is_over:
+            self.levels.saw(frame)
         return frame
 
     def expose(self) -> CameraFrame:
@@ -84,7 +107,23 @@ class Bench:
         with self.progress.inside("camera"):
             taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
         self._not_before_s = taken.exposure_start_s + 1e-6
+        self._go_on()
         return taken
+
+    def _go_on(self) -> None:
+        """Hold the light that the frame was taken under, since all before has come back; it may have gone off."""
+        with self._lock:
+            if self._is_over or not (self._is_known and any(self._light)):
+                return
+            self._is_known = False
+            self.lights.go_on()
+            self._is_known = True
+
+    def check_line(self) -> bool:
+        """Return whether the LED chip has shown that it obeys its enable line; raise `LightLineError`. Ends dark."""
+        self.light(DARK)
+        with self._lock, self.progress.inside("light"):
+            return self.lights.check_line()
 
     def _look(self) -> None:
         """Take a frame that nobody needs."""
@@ -99,12 +138,13 @@ class Bench:
 
         A light that nobody knows is switched off.
         """
-        if not self._is_known:
-            self.light(DARK)
-            return
-        self._is_known = False
-        self._acknowledged_s(self._light)
-        self._is_known = True
+        with self._lock:
+            if not self._is_known or self._is_over:
+                self._set(DARK)
+                return
+            self._is_known = False
+            self._acknowledged_s(self._light)
+            self._is_known = True
 
     def range_n(self, t_s: float, *, around_line: bool) -> float:
         """Return by how much the force varied just before a time, or on a ramp around it: a ramp is no hold."""

@@ -1,6 +1,7 @@
-"""Whether all goes on: each part's progress, systemd's watchdog, the wall clock, and the certificate.
+"""Whether all goes on: each part's progress, systemd's watchdog, the wall clock, the computer, and the certificate.
 
-Modules in reading order: `progress`, `watchdog`, `restart_note`, `clock_watch`, `calibration_watch`.
+Modules in reading order: `progress`, `readiness`, `watchdog`, `restart_note`, `clock_watch`, `computer_watch`,
+`calibration_watch`.
 
 No repair and no measurement: it judges and tells.
 """

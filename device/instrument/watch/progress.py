@@ -7,6 +7,7 @@ it counts as going on; only for a camera whose process lives and gives no frames
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -58,12 +59,27 @@ class Stall:
         return f"{', '.join(others)}{' and ' if others else ''}{last} made no progress for {self.silent_s:.1f} s"
 
 
+@dataclass(frozen=True)
+class LastSeen:
+    """When a part last did what it was asked for, and the error of the last time, if that was in vain.
+
+    `ago_s`: so long ago, infinite if never; `idle_s`: the same without the time its loop has spent in other parts.
+    """
+
+    ago_s: float
+    idle_s: float
+    error: DeviceError | None
+
+
 class ProgressBoard:
     """When each part last made progress (s, monotonic). May be asked from any thread."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock, self._lock = clock, threading.Lock()
         self._progress_s = dict.fromkeys(PARTS, clock())
+        self._worked_s = dict.fromkeys(PARTS, -math.inf)
+        self._awaited_s = dict(self._worked_s)
+        self._errors: dict[Part, DeviceError | None] = dict.fromkeys(PARTS)
         self._returned_s = dict(self._progress_s)
         self._entered: dict[str, tuple[Part, float]] = {}
         self._exercises: dict[Part, Callable[[], None]] = {}
@@ -71,28 +87,31 @@ class ProgressBoard:
     @contextmanager
     def inside(self, part: Part) -> Iterator[None]:
         """Be in a part: frozen unless it is left in time. A loop is in one part at a time."""
-        begun_s, is_progress = self._clock(), False
+        begun_s, error = self._clock(), None
         with self._lock:
             self._entered[PARTS[part].loop] = part, begun_s
         try:
             yield
-            is_progress = True
-        except PARTS[part].may_fail:
-            is_progress = True
+        except BaseException as failure:
+            error = failure
             raise
         finally:
-            self._leave(part, begun_s, is_progress)
+            self._leave(part, begun_s, error)
 
-    def _leave(self, part: Part, begun_s: float, is_progress: bool) -> None:
+    def _leave(self, part: Part, begun_s: float, error: BaseException | None) -> None:
         with self._lock:
             now_s = self._clock()
             for other, kind in PARTS.items():
                 if other != part and kind.loop == PARTS[part].loop:
                     self._progress_s[other] += now_s - begun_s
+                    self._awaited_s[other] += now_s - begun_s
             del self._entered[PARTS[part].loop]
             self._returned_s[part] = now_s
-            if is_progress:
+            if error is None or isinstance(error, PARTS[part].may_fail):
                 self._progress_s[part] = now_s
+            if error is None:
+                self._worked_s[part] = self._awaited_s[part] = now_s
+            self._errors[part] = error if isinstance(error, DeviceError) else None
 
     def exercise(self, part: Part, action: Callable[[], None]) -> None:
         """Use a part by `action` at each beat that finds it idle."""
@@ -109,6 +128,13 @@ class ProgressBoard:
                     faults.append(error)
         if faults:
             raise faults[0]
+
+    def last_seen(self, part: Part) -> LastSeen:
+        """Return when a part last worked, in its own loop's time and in everybody's."""
+        with self._lock:
+            now_s = self._clock()
+            idle_s = self._until_s(part, now_s) - self._awaited_s[part]
+            return LastSeen(now_s - self._worked_s[part], idle_s, self._errors[part])
 
     def stall(self, watchdog_s: float) -> Stall | None:
         """Return what has made no progress for longer than its part of the watchdog's time, or None."""

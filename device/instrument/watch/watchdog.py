@@ -73,7 +73,7 @@ class Watchdog:
         """Look no more: the daemon ends by itself."""
         self._stopping.set()
         self._thread.join()
-        self._note.remove()
+        self._note.take_back()
         _tell("STOPPING=1")
 
     def _run(self) -> None:
@@ -100,7 +100,7 @@ class Watchdog:
         if stall and will_restart:
             self._note.write(str(stall))
         else:
-            self._note.remove()
+            self._note.take_back()
 
 
 def _error(stall: Stall, will_restart: bool) -> StalledError:

@@ -17,12 +17,23 @@ PROVOKED_BY = {
     "E001": "device/test_device_command_line.py::test_the_settings_of_another_probe_are_refused_for_the_simulated_one",
     "E002": "device/settings/test_last_good.py::"
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
+    "E013": "device/records/test_updates.py::"
+    "test_an_update_taken_back_is_a_lasting_warning_until_the_next_one_is_installed",
+    "E010": "device/update/test_refusals.py::test_a_flipped_byte_is_refused_wherever_it_is",
+    "E011": "device/update/test_refusals.py::test_what_is_not_for_this_probe_is_refused",
+    "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
+    "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E803": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E804": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
     "E805": "device/web/test_app.py::test_a_mode_without_a_model_is_refused_with_its_own_code",
+    "E806": "device/access/test_request_rules.py::test_a_name_that_is_none_of_this_machines_is_refused_for_any_method",
+    "E807": "device/access/test_request_rules.py::test_a_page_of_another_origin_cannot_change_anything",
+    "E808": "device/access/test_request_rules.py::test_what_a_page_may_send_anywhere_without_leave_is_refused",
+    "E809": "device/web/test_guard.py::test_a_body_that_says_it_is_too_large_is_refused_without_being_read",
+    "E903": "test_unclean_end.py::test_a_kill_is_a_warning_after_the_next_start_and_only_after_that",
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
 """What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""

@@ -17,6 +17,7 @@ from device.errors import (
     ExpiredCalibration,
     LastGoodConfigError,
     LightError,
+    LightRestError,
     ModeUnavailable,
     StorageError,
     UnknownResource,
@@ -28,8 +29,10 @@ from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import CheckResult
+from device.instrument.watch import progress as progress_module
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
+from device.instrument.watch.readiness import PartHealth
 from device.measurement.calibration import Validity
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
@@ -48,6 +51,8 @@ ANSWER = Estimate(
 class ObedientBench:
     """A bench whose operator does at once what the screen says. `breaks` are raised by a press frame each."""
 
+    fault = None  # of the force, which this bench is itself
+
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work, self.is_closed, self.zero_n = False, False, 0.0
@@ -64,6 +69,9 @@ class ObedientBench:
 
     def light(self, ratio):
         self.ratio = ratio
+
+    def darken_for_good(self):
+        self.ratio = (0.0, 0.0, 0.0, 0.0)
 
     def check_lights(self):
         self.ratio = (0.0, 0.0, 0.0, 0.0)
@@ -241,12 +249,43 @@ def test_what_the_counter_was_not_told_yet_is_kept_at_the_end(rig):
 
 
 def test_a_press_that_ran_out_of_light_fails_with_its_code_and_seconds(rig):
-    rig.bench.budget._max_on_s = 1.0
-    rig.board.on_guidance(
-        lambda guidance: guidance is Guidance.PRESS_LESION and setattr(rig.bench.budget, "_before_s", 2.0)
-    )
+    light_two_seconds(rig, max_on_s=1.0)
     job = rig.press()
     assert (job["state"], job["code"], job["light_on_s"]) == ("failed", "E209", 2.0)
+
+
+def light_two_seconds(rig, max_on_s):
+    """Let the light of the press on the lesion be on for 2 s; return the clock of that light."""
+    now_s = [0.0]
+    budget = rig.bench.budget = LightBudget(max_on_s, clock=lambda: now_s[0])
+    rig.procedure._book._budget = budget
+
+    def light(guidance):
+        if guidance is Guidance.PRESS_LESION:
+            budget.note_lit()
+            now_s[0] += 2.0
+            budget.note_dark()
+
+    rig.board.on_guidance(light)
+    return now_s
+
+
+def test_no_press_begins_until_the_light_has_rested_by_request_or_by_touch(rig, monkeypatch):
+    """2 s of at most 2.1 s are used; the window, 3.15 s, ends after another 1.15 s and more."""
+    monkeypatch.setattr(procedure_module, "AFTER_FAULT_S", 0.01)
+    now_s = light_two_seconds(rig, max_on_s=2.1)
+    assert rig.press()["state"] == "done"
+    rig.until(lambda: rig.board.now.fault is not None)
+    with pytest.raises(LightRestError, match=r"on for 2 s in the last 3 s, of at most 2.1 s. Wait 2 s"):
+        rig.procedure.request()
+    rig.bench.is_at_work = True
+    assert rig.bench.ratio == (0.0, 0.0, 0.0, 0.0)
+    last = rig.board.now.press
+    rig.bench.is_at_work = False
+    now_s[0] += 2.0
+    rig.until(lambda: rig.board.now.fault is None)
+    assert rig.board.now.press == last, "a touch has begun one"
+    assert rig.press()["state"] == "done"
 
 
 def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig):
@@ -660,3 +699,32 @@ def test_warnings_of_the_certificate_are_told_with_every_press_until_they_are_ov
     rig.procedure.calibration.warned = lambda others: ()
     rig.press()
     assert rig.press()["warnings"] == []
+
+
+def test_the_store_is_written_as_a_proof_between_presses_and_never_in_one(rig, monkeypatch):
+    """Each second it is read; a write while frames are taken might hold them up."""
+    monkeypatch.setattr(progress_module, "BEAT_S", 0.0)
+    monkeypatch.setattr(procedure_module, "WRITE_EVERY_S", 0.0)
+    seen = []
+
+    def prove(*, writing):
+        seen.append((rig.board.now.press is None or rig.board.now.press.state in ENDED, writing))
+
+    monkeypatch.setattr(rig.store, "prove", prove)
+    rig.until(lambda: len(seen) > 2)
+    rig.press()
+    assert {(True, True), (False, False)} <= set(seen)
+    assert all(is_idle == writing for is_idle, writing in seen)
+
+
+def test_a_store_that_cannot_be_written_is_a_fault_and_not_ready(rig, monkeypatch):
+    def refuse(*, writing):
+        raise StorageError("The disk is read-only.", "Check it.")
+
+    monkeypatch.setattr(progress_module, "BEAT_S", 0.0)
+    rig.until(lambda: rig.procedure.parts()["store"].ready)
+    with monkeypatch.context() as failing:
+        failing.setattr(rig.store, "prove", refuse)
+        rig.until(lambda: rig.board.now.fault is not None)
+        assert rig.procedure.parts()["store"] == PartHealth(False, "E601")
+    rig.until(lambda: rig.procedure.parts()["store"].ready)

@@ -3,6 +3,7 @@
 import errno
 import os
 import sqlite3
+import types
 from dataclasses import replace
 
 import numpy as np
@@ -239,3 +240,21 @@ def test_the_hours_of_light_add_up_over_restarts(tmp_path):
         store.add_light_on_s(1.0)
         store.add_light_on_s(1.5)
         store.close()
+
+
+def test_a_store_proves_itself_by_reading_and_when_asked_by_a_durable_write(store):
+    journal = store.folder / "tsis.sqlite-wal"
+    store.prove(writing=False)
+    before_bytes = journal.stat().st_size
+    store.prove(writing=False)
+    assert journal.stat().st_size == before_bytes
+    store.prove(writing=True)
+    assert journal.stat().st_size > before_bytes
+
+
+def test_a_disk_that_became_read_only_is_told_without_a_write(store, monkeypatch):
+    """As the kernel remounts a failing card."""
+    read_only = types.SimpleNamespace(f_flag=os.ST_RDONLY)
+    monkeypatch.setattr(os, "statvfs", lambda _: read_only)
+    with pytest.raises(StorageError, match="can only be read"):
+        store.prove(writing=False)

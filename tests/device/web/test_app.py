@@ -60,8 +60,9 @@ def ask(procedure):
 
     def asking(method, path, **content):
         async def answer():
-            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://probe") as client:
-                return await client.request(method, path, **content)
+            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+                headers = {"content-type": "application/json"}
+                return await client.request(method, path, headers=headers, **content)
 
         return asyncio.run(answer())
 

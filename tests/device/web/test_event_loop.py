@@ -72,7 +72,7 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
     app = create_app(witness, witness)
 
     async def ask():
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://probe") as client:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
             return threading.get_ident(), await client.get(f"/api/v1/{path}")
 
     loop_thread, answer = asyncio.run(ask())
@@ -80,10 +80,10 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
     assert witness.threads[HEAVY[path]] != loop_thread
 
 
-def test_only_the_event_stream_runs_on_the_event_loop(witness):
+def test_only_the_event_stream_and_the_parts_of_an_upload_run_on_the_event_loop(witness):
     routes = [route for route in create_app(witness, witness).routes if isinstance(route, APIRoute)]
     on_the_loop = [route.path for route in routes if inspect.iscoroutinefunction(route.endpoint)]
-    assert on_the_loop == ["/api/v1/events"]
+    assert on_the_loop == ["/api/v1/events", "/api/v1/updates"]
 
 
 def test_an_event_is_small_and_touches_neither_disk_nor_store(witness):

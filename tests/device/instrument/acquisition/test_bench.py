@@ -1,6 +1,7 @@
 """Light, camera and force together: a frame knows under which light and force it was taken."""
 
 import itertools
+import threading
 
 import numpy as np
 import pytest
@@ -25,6 +26,9 @@ class FakeHardware:
     def set_ratio(self, ratio):
         self.log.append(ratio)
         return 10.0
+
+    def go_on(self):
+        pass
 
     def check_outputs(self):
         self.log.append("check")
@@ -219,3 +223,49 @@ def test_an_exposure_needs_no_force(bench, hardware):
     bench.force.at = None
     bench.light(DARK)
     assert [bench.expose().exposure_start_s for _ in range(2)] == pytest.approx([10.0, 10.1])
+
+
+def test_what_was_made_dark_for_good_is_never_lit_again(bench, hardware):
+    bench.light(LIT)
+    bench.darken_for_good()
+    bench.light(LIT)
+    bench.check_lights()
+    assert hardware.log == [LIT, DARK]
+
+
+def test_a_frame_that_the_darkening_spoilt_is_no_fault_of_the_camera(bench, hardware):
+    bench.levels = type("Levels", (), {"saw": lambda self, frame: pytest.fail("it was looked at")})()
+    bench.darken_for_good()
+    assert bench.take("press").led_ratio == DARK
+
+
+def test_a_thread_that_lights_while_another_darkens_for_good_is_the_one_that_waits(bench, hardware):
+    """The procedure's light and the end's darkness, whichever comes first: the last word is dark."""
+    lighting = threading.Thread(target=bench.light, args=(LIT,))
+    with bench._lock:
+        bench._is_over = True
+        lighting.start()
+    lighting.join()
+    bench.darken_for_good()
+    assert hardware.log[-1] == DARK
+    assert LIT not in hardware.log
+
+
+def test_light_is_held_after_each_frame_that_has_come_and_darkness_never(bench, hardware, monkeypatch):
+    monkeypatch.setattr(hardware, "go_on", lambda: hardware.log.append("held"))
+    bench.light(DARK)
+    bench.expose()
+    bench.light(LIT)
+    bench.expose()
+    bench.take("press")
+    assert [entry for entry in hardware.log if entry == "held" or entry == LIT] == [LIT, "held", "held"]
+
+
+def test_light_that_went_off_by_itself_is_set_again_whatever_is_asked_for(bench, hardware, monkeypatch):
+    bench.light(LIT)
+    with monkeypatch.context() as cut:
+        cut.setattr(hardware, "go_on", lambda: (_ for _ in ()).throw(LightError("It went off.", "Press again.")))
+        with pytest.raises(LightError):
+            bench.take("press")
+    bench.light(LIT)
+    assert hardware.log.count(LIT) == 2

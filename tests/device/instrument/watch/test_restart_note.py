@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from device.instrument.watch.restart_note import IN_A_ROW_S, NAME, RestartNote
+from device.instrument.watch.restart_note import IN_A_ROW_S, NAME, RestartNote, note_end
 
 CAUSE = "the camera made no progress for 7.6 s"
 
@@ -20,8 +20,8 @@ def test_the_next_daemon_says_why_it_was_restarted_and_the_one_after_does_not(tm
 def test_a_note_that_is_taken_back_tells_nothing(tmp_path):
     note = RestartNote(tmp_path)
     note.write(CAUSE)
-    note.remove()
-    note.remove()
+    note.take_back()
+    note.take_back()
     assert RestartNote(tmp_path).warning() is None
 
 
@@ -56,3 +56,66 @@ def test_a_disk_that_does_not_take_it_is_logged(tmp_path, caplog):
     (tmp_path / "file").touch()
     RestartNote(tmp_path / "file" / "folder").write(CAUSE)
     assert "cannot be kept" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("boot", "cause"),
+    [("A", "The daemon was killed while it ran."), ("B", "The probe lost its power, or its board was restarted")],
+)
+def test_an_end_that_was_no_stop_is_told_once_and_says_whether_the_board_went_off_too(tmp_path, boot, cause):
+    RestartNote(tmp_path, boot=lambda: "A").begin()
+    after = RestartNote(tmp_path, boot=lambda: boot)
+    warning = after.warning()
+    assert (warning.code, warning.severity) == ("E903", "warning")
+    assert warning.cause.startswith(cause)
+    assert after.times == 0
+    assert RestartNote(tmp_path).warning() is None
+
+
+def test_a_daemon_that_was_stopped_leaves_nothing_to_tell(tmp_path):
+    note = RestartNote(tmp_path)
+    note.begin()
+    note.remove()
+    assert not (tmp_path / NAME).exists()
+
+
+def test_the_watchdogs_cause_is_told_in_place_of_the_end_that_it_brought(tmp_path):
+    note = RestartNote(tmp_path)
+    note.begin()
+    note.write(CAUSE)
+    note_end(tmp_path, {"SERVICE_RESULT": "watchdog"})
+    assert RestartNote(tmp_path).warning().code == "E902"
+
+
+def test_a_cause_that_was_taken_back_leaves_the_daemon_running(tmp_path):
+    note = RestartNote(tmp_path)
+    note.begin()
+    note.write(CAUSE)
+    note.take_back()
+    assert RestartNote(tmp_path).warning().code == "E903"
+
+
+@pytest.mark.parametrize(
+    ("result", "status", "cause"),
+    [
+        ("watchdog", "ABRT", "The daemon froze as a whole, and its watchdog ended it."),
+        ("oom-kill", "KILL", "The board's memory ran out, and the daemon was killed."),
+        ("signal", "KILL", "The daemon was killed by the signal KILL."),
+        ("core-dump", "SEGV", "The daemon crashed with the signal SEGV."),
+        ("exit-code", "1", "The daemon failed with exit code 1."),
+        ("", "", "The daemon was killed while it ran."),
+    ],
+)
+def test_what_systemd_knows_of_the_end_is_in_the_warning(tmp_path, result, status, cause):
+    RestartNote(tmp_path).begin()
+    note_end(tmp_path, {"SERVICE_RESULT": result, "EXIT_STATUS": status})
+    assert RestartNote(tmp_path).warning().cause == cause
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", "{}"])
+def test_without_a_note_there_is_nothing_to_complete(tmp_path, content):
+    if content is not None:
+        (tmp_path / NAME).write_text(content)
+    note_end(tmp_path, {"SERVICE_RESULT": "signal", "EXIT_STATUS": "KILL"})
+    assert (tmp_path / NAME).exists() is (content is not None)
+    assert RestartNote(tmp_path).warning() is None

@@ -1,0 +1,104 @@
+"""Stands before every route: refuses what no own page and no program sends, and bodies that are too large.
+
+What is refused, and why: device/access/request_rules.py. It is pure ASGI, so that a stream stays one and a body that
+is refused is never read.
+"""
+
+from __future__ import annotations
+
+import logging
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from device.access.known_hosts import KnownHosts
+from device.access.request_rules import AskedRequest, BodyRule, joined, require_allowed, too_large
+from device.access.safe_headers import SAFE_HEADERS
+from device.errors import DeviceError
+from device.web.problems import problem
+
+log = logging.getLogger(__name__)
+HEADERS = [(name.encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
+
+
+class RequestGuard:
+    """The application behind its rules."""
+
+    def __init__(self, app: ASGIApp, hosts: KnownHosts) -> None:
+        """Take what answers when the rules hold, and under which names this machine may be asked."""
+        self._app, self._hosts = app, hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer with a problem document, or let the application answer; either way with the safe headers."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        request = asked(scope)
+        try:
+            require_allowed(request, self._hosts)
+            bounded = await _bounded(request, receive)
+        except DeviceError as error:
+            log.warning("%s %s", error.code, error)
+            await problem(error)(scope, receive, _with_safe_headers(send))
+        else:
+            await self._app(scope, bounded, _with_safe_headers(send))
+
+
+def asked(scope: Scope) -> AskedRequest:
+    """Return what an ASGI request says of itself."""
+    headers = joined((name.decode("latin-1"), value.decode("latin-1")) for name, value in scope["headers"])
+    ends = ((scope.get(end) or (None,))[0] for end in ("server", "client"))
+    return AskedRequest(scope["method"], scope["path"], headers, *ends)
+
+
+async def _bounded(request: AskedRequest, receive: Receive) -> Receive:
+    """Return what hands out the body; raises `BodyTooLarge` when it is larger than it said, or never said.
+
+    A streamed one raises while it is read, by its route. Any other that does not say its size is read here, up to
+    what is allowed: a route's own reader would make another error of it.
+    """
+    if request.rule.streamed:
+        return _counted(request.rule, receive)
+    if "transfer-encoding" not in request.headers:
+        return receive  # the server itself holds a body to the size that it states
+    body = bytearray()
+    counted, is_more = _counted(request.rule, receive), True
+    while is_more:
+        message = await counted()
+        if message["type"] != "http.request":
+            return _replayed(message, receive)
+        body += message.get("body", b"")
+        is_more = message.get("more_body", False)
+    return _replayed({"type": "http.request", "body": bytes(body), "more_body": False}, receive)
+
+
+def _counted(rule: BodyRule, receive: Receive) -> Receive:
+    read = 0
+
+    async def counting() -> Message:
+        nonlocal read
+        message = await receive()
+        read += len(message.get("body", b""))
+        if read > rule.max_bytes:
+            raise too_large(rule)
+        return message
+
+    return counting
+
+
+def _replayed(message: Message, receive: Receive) -> Receive:
+    """Return what gives a message that was read already, then what comes."""
+    read = [message]
+
+    async def replaying() -> Message:
+        return read.pop() if read else await receive()
+
+    return replaying
+
+
+def _with_safe_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", []), *HEADERS]}
+        await send(message)
+
+    return sending

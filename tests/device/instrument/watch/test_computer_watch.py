@@ -1,0 +1,86 @@
+"""What the computer says is told once, however short it was; one that says nothing, or hangs, disturbs nobody."""
+
+from __future__ import annotations
+
+import threading
+
+from device.hardware.interfaces import ComputerState
+from device.instrument.watch.computer_watch import ComputerWatch
+
+FINE = ComputerState(is_supply_low=False, temperature_c=79.9)
+
+
+class TalkingComputer:
+    """Says one state after the other, then is fine; `asked` is set once all are said."""
+
+    def __init__(self, *states: ComputerState) -> None:
+        self._states, self.asked = list(states), threading.Event()
+
+    def read(self) -> ComputerState:
+        if not self._states:
+            self.asked.set()
+            return FINE
+        return self._states.pop(0)
+
+
+def codes(watch: ComputerWatch) -> list[str]:
+    return [warning.code for warning in watch.taken()]
+
+
+def test_a_low_voltage_between_two_looks_of_the_procedure_is_told_once() -> None:
+    watch = ComputerWatch(TalkingComputer(FINE, ComputerState(True, 50.0), FINE))
+    for _ in range(3):
+        watch.look()
+    assert codes(watch) == ["E015"]
+    assert codes(watch) == []
+
+
+def test_a_voltage_that_stays_low_is_told_again() -> None:
+    watch = ComputerWatch(TalkingComputer(*[ComputerState(True, 50.0)] * 2))
+    watch.look()
+    [first] = watch.taken()
+    watch.look()
+    [second] = watch.taken()
+    assert first.as_record() == second.as_record()  # so that a press that has told of it need not again
+
+
+def test_a_computer_is_hot_from_80_degrees_on_and_says_how_hot() -> None:
+    watch = ComputerWatch(TalkingComputer(ComputerState(False, 80.0), ComputerState(False, 86.2)))
+    watch.look()
+    [warning] = watch.taken()
+    assert (warning.code, "at 80 degrees or more" in warning.cause) == ("E016", True)
+    watch.look()
+    assert "at 85 degrees or more" in watch.taken()[0].cause
+
+
+def test_a_cool_computer_and_one_that_says_nothing_are_not_warned_of() -> None:
+    watch = ComputerWatch(TalkingComputer(FINE, ComputerState()))
+    watch.look()
+    watch.look()
+    assert watch.taken() == ()
+
+
+def test_it_looks_by_itself_until_it_is_closed() -> None:
+    computer = TalkingComputer(ComputerState(True, 90.0))
+    watch = ComputerWatch(computer)
+    watch.start()
+    assert computer.asked.wait(10.0)  # so it has looked twice
+    watch.close()
+    assert sorted(codes(watch)) == ["E015", "E016"]
+
+
+def test_a_look_that_hangs_keeps_nobody_waiting() -> None:
+    reading, let_go = threading.Event(), threading.Event()
+
+    class HangingComputer:
+        def read(self) -> ComputerState:
+            reading.set()
+            let_go.wait()
+            return FINE
+
+    watch = ComputerWatch(HangingComputer())
+    watch.start()
+    assert reading.wait(10.0)
+    assert watch.taken() == ()
+    watch.close()
+    let_go.set()
