@@ -11,7 +11,7 @@ export PYTHONPATH=$project:$project/tests OPENBLAS_NUM_THREADS=1
 # Without it QEMU emulates every extension there is: 20 times slower, and no Raspberry Pi has them.
 export QEMU_CPU=${QEMU_CPU:-cortex-a72}
 "$here/make_arm64_root.sh" "$folder"
-root=$folder/root work=$folder/work
+root=$folder/root work=$folder/work keys=$(mktemp -d)
 claim() { printf '%s: %s (%d s)\n' "$1" "$2" $((SECONDS - began)); began=$SECONDS; }
 began=$SECONDS
 
@@ -22,9 +22,9 @@ mountpoint -q "$formats" || mount -t binfmt_misc binfmt_misc "$formats"
 magic='\x7fELF\x02\x01\x01\x00\x00\x00\x00\x00\x00\x00\x00\x00\x02\x00\xb7\x00'
 mask='\xff\xff\xff\xff\xff\xff\xff\x00\xff\xff\xff\xff\xff\xff\xff\xff\xfe\xff\xff\xff'
 echo ":$name:M::$magic:$mask:$folder/qemu-aarch64:OPF" > "$formats/register"
-daemon=
 ended() {
-  [[ -z $daemon ]] || { kill "$daemon" && wait "$daemon"; } 2> /dev/null || true
+  [[ ! -x $root/usr/bin/systemctl ]] || inside / /usr/bin/systemctl stop tsis.service
+  rm -r "$keys"
   [[ ! -e $formats/$name ]] || echo -1 > "$formats/$name"
   for mounted in dev/shm dev proc; do mountpoint -q "$root/$mounted" && umount "$root/$mounted"; done || true
 }
@@ -32,23 +32,33 @@ trap ended EXIT
 mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
 mountpoint -q "$root/dev" || mount --bind /dev "$root/dev"
 mountpoint -q "$root/dev/shm" || mount -t tmpfs tmpfs "$root/dev/shm"
-inside() { chroot "$root" /usr/bin/env -i -C "$1" PATH=/usr/bin:/bin HOME=/root OPENBLAS_NUM_THREADS=1 "${@:2}"; }
+port=18764
+inside() { chroot "$root" /usr/bin/env -i -C "$1" PATH=/usr/bin:/bin HOME=/root QEMU_CPU="$QEMU_CPU" OPENBLAS_NUM_THREADS=1 "${@:2}"; }
 claim "emulated" "$(inside / /usr/bin/python3 -c 'import platform as p; print(p.machine(), p.python_version(), *p.libc_ver())')"
 
-rm -rf "$work" "$root/srv/tsis" "$root/opt/tsis"
+rm -rf "$work" "$root/srv/tsis" "$root/opt/tsis" "$root/run/tsis-daemon.pid"
 mkdir -p "$work" "$root/srv/tsis"
-(cd "$project" && "$python" -m host_tools release key "$work/key" --no-passphrase > "$root/srv/tsis/release_signers" 2> /dev/null
-  "$python" -m host_tools release build --allow-dirty --key "$work/key" --out "$work" > "$work/built.txt" 2> "$work/build.log") ||
+(cd "$project" && "$python" -m host_tools release key "$keys/key" --no-passphrase > "$root/srv/tsis/release_signers" 2> /dev/null
+  "$python" -m host_tools release build --allow-dirty --key "$keys/key" --out "$work" > "$work/built.txt" 2> "$work/build.log") ||
   { cat "$work/build.log"; exit 1; }
 cat "$work/built.txt"
 release=$(echo "$work"/*.release)
 claim "built" "$(stat -c %s "$release") bytes"
 
-# The seam to the probe's own installer: it takes a release file and leaves /opt/tsis/current.
+# The probe's own installer, run from the wheel in the release file: nothing of ours is in the root before. It starts the
+# daemon, simulated, by a stand-in for systemctl, and commits it once its parts are ready.
+tar -C "$root/srv/tsis" --strip-components=1 --wildcards -xf "$release" 'wheels/tsis-*.whl'
+wheel=$(basename "$root"/srv/tsis/tsis-*.whl)
 cp "$release" "$root/srv/tsis/update.release"
-cp "$here/unpack_release.py" "$here/golden_answers.py" "$root/srv/tsis/"
-inside /srv/tsis /usr/bin/python3 unpack_release.py update.release release_signers /opt/tsis
-claim "installed" "$(du -sm "$root/opt/tsis" | cut -f1) MB in /opt/tsis, $(readlink "$root/opt/tsis/current")"
+cp "$here/golden_answers.py" "$here/slow_scene.toml" "$root/srv/tsis/"
+install -m 755 "$here/systemctl_stand_in.sh" "$root/usr/bin/systemctl"
+install -D -m 644 "$root/srv/tsis/release_signers" "$root/etc/tsis/release_signers"
+printf '[server]\nport = %d\n' "$port" > "$root/etc/tsis/config.toml"
+echo "$port" > "$root/srv/tsis/port"
+rm -rf "$root/var/lib/tsis-update"
+inside /srv/tsis PYTHONPATH="/srv/tsis/$wheel" /usr/bin/python3 -m device.update --health-within 1200 --look-every 10 \
+  install /srv/tsis/update.release > "$work/install.log" 2>&1 || { tail -20 "$work/install.log" "$root/srv/tsis/daemon.log"; exit 1; }
+claim "installed and healthy" "$(readlink "$root/opt/tsis/current"), $(du -sm "$root/opt/tsis/" | cut -f1) MB"
 device=/opt/tsis/current/bin/python
 
 inside /srv/tsis "$device" golden_answers.py > "$work/golden.aarch64.json"
@@ -63,3 +73,7 @@ for mode in paper quick standard precise; do
   claim "a recording in mode $mode" \
     "$("$python" "$here/compare_answers.py" "$work/$mode.here.json" "$work/$mode.aarch64.json" 1e-3)"
 done
+
+# A press of the simulated probe by the daemon that was installed. Its hand and camera are slowed down, as the emulated
+# processor is (slow_scene.toml).
+claim "a press" "$("$python" "$here/press.py" "http://127.0.0.1:$port" quick)"
