@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+import urllib.error
 import urllib.request
 from typing import Any
 
@@ -31,9 +32,13 @@ def main(url: str, mode: str) -> int:
     if job["state"] != "done":
         return 1
     measured = ask(f"{url}/api/v1/measurements/{job['measurement_id']}")
-    print(json.dumps(measured.get("estimate", measured))[:600])
+    print(json.dumps(measured)[:600])
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], sys.argv[2]))
+    try:
+        sys.exit(main(sys.argv[1], sys.argv[2]))
+    except urllib.error.HTTPError as refused:
+        print("refused:", json.load(refused).get("detail"))
+        sys.exit(1)

@@ -1,5 +1,7 @@
 #!/bin/sh
 # What an emulated Debian has for systemctl: the daemon of /opt/tsis/current, simulated, started and stopped by hand.
+# Of the caller nothing is passed on, as by systemd.
+unset PYTHONPATH
 running=/run/tsis-daemon.pid
 case "$*" in
   *stop*)
