@@ -378,6 +378,9 @@ class Config(Section):
         Path, Doc("Folder of this probe's certificates, of which one is active; or one certificate, NAME.json.")
     ] = Path("/var/lib/tsis/calibrations")
     data: Annotated[Path, Doc("Folder of measurements and recordings.")] = Path("/var/lib/tsis")
+    updates: Annotated[Path, Doc("Folder in which the updater tells of releases and takes files.")] = Path(
+        "/var/lib/tsis-update"
+    )
     camera: CameraSection = field(default_factory=CameraSection)
     light: LightSection = field(default_factory=LightSection)
     cell: CellSection = field(default_factory=CellSection)

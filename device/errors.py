@@ -124,7 +124,7 @@ class RolledBack(DeviceError):  # noqa: N818 - the name is what the operator rea
     """A release did not work on this probe and the one before is back; shown until another one is installed."""
 
     code = "E013"
-    title = "An update was taken back"
+    title = "Update taken back"
     severity = "warning"
     is_lasting = True
 

@@ -47,7 +47,8 @@ class Daemon:
     """`python -m device --simulate` as its own process on a free port unless told otherwise.
 
     To its scene comes that no frame is late, unless that has settings of the camera: on a busy machine many are.
-    `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests.
+    `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests. With
+    `arguments` it is not simulated: they are its whole command line.
     """
 
     def __init__(
@@ -58,15 +59,22 @@ class Daemon:
         *,
         program: Sequence[str] = ("-m", "device"),
         environment: Mapping[str, str] | None = None,
+        arguments: Sequence[str] = (),
     ) -> None:
-        arguments = [sys.executable, *program, "--simulate", "--port", str(port)]
-        (folder / "scene.toml").write_text(scene if "[settings.camera]" in scene else scene + PATIENT)
-        arguments += ["--scene", "scene.toml"]
+        if not arguments:
+            (folder / "scene.toml").write_text(scene if "[settings.camera]" in scene else scene + PATIENT)
+            arguments = ("--simulate", "--port", str(port), "--scene", "scene.toml")
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         whole = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", **(environment or {})}
-        self.log = (folder / "log.txt").open("a")
+        self._log_path = folder / "log.txt"
+        self.log = self._log_path.open("a")
         self.process = subprocess.Popen(
-            arguments, cwd=folder, env=whole, stdout=subprocess.PIPE, stderr=self.log, text=True
+            [sys.executable, *program, *arguments],
+            cwd=folder,
+            env=whole,
+            stdout=subprocess.PIPE,
+            stderr=self.log,
+            text=True,
         )
         assert self.process.stdout is not None
         greeting = self.process.stdout.readline()
@@ -98,6 +106,10 @@ class Daemon:
             return self.ask(location).json
 
         return wait_for(job, lambda job: job["state"] in ("done", "rejected", "cancelled", "failed"))
+
+    def log_text(self) -> str:
+        """Return what it has logged."""
+        return self._log_path.read_text()
 
     def stop(self) -> int:
         self.process.terminate()

@@ -42,7 +42,12 @@ FORBIDDEN = {
         "device.hardware.camera",
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
+    "Care saves and restores what lies on the disk, whether a daemon runs or not": (
+        "device.care.support",
+        "device.instrument.status",
+    ),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
+    "Provisioning runs where nothing of the probe is installed yet": ("device.provisioning.plan", "device.errors"),
     "Access judges a request, and knows nothing that could answer it": (
         "device.access.request_rules",
         "device.web.problems",

@@ -38,8 +38,9 @@ class BodyRule:
 JSON_BODY = BodyRule()
 BODY_RULES: Mapping[str, BodyRule] = {
     "/api/v1/updates": BodyRule("application/octet-stream", 300 * 1024 * 1024, streamed=True, local_only=True),
+    "/api/v1/updates/roll-back": BodyRule(local_only=True),
 }
-"""The paths that take something else than a little JSON, and what. A release file comes from the local screen only."""
+"""The paths with a rule of their own: a release file, or the wish for another release, comes from the local screen."""
 
 
 @dataclass(frozen=True)

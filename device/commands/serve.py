@@ -34,7 +34,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
     with listening:
         procedure = opened()
         note = RestartNote(config.data)
-        updates = Updates()
+        updates = Updates(config.updates)
         warnings = tuple(one for one in (settings.warning, note.warning(), updates.warning()) if one)
         procedure.board.update(warnings=warnings)
         watchdog = Watchdog(procedure.progress, procedure.board, note)

@@ -7,6 +7,7 @@ file appears in its folder `incoming` by a rename, whole or not at all. Files th
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import logging
 import math
@@ -29,7 +30,9 @@ Result = TypeVar("Result")
 FOLDER = Path("/var/lib/tsis-update")
 RELEASES = Path("/opt/tsis/releases")
 HANDED_OVER, WAY_BACK = "update.release", "roll_back"
-UNDER_WAY = ("verifying", "unpacking", "switching", "checking")
+WAITING = "waiting"
+"""State while a file is handed over and the updater has not said anything of it."""
+UNDER_WAY = (WAITING, "verifying", "unpacking", "switching", "checking")
 ENDS = ("committed", "rolled_back")
 NOT_A_RELEASE = "not_installed"
 """State of a workstation, where nothing updates this software."""
@@ -53,7 +56,8 @@ RUNNING = release_of(Path(sys.prefix).resolve())
 class UpdateRecord:
     """What the updater says: releases by name, how far an update is (0..1), how the last one ended, and before that.
 
-    `outcome` is the last end in one sentence for the operator.
+    `pending` is a release on trial, `leaving` why it is just being left; `outcome` is the last end in words for the
+    operator.
     """
 
     running: str
@@ -62,6 +66,7 @@ class UpdateRecord:
     previous: str | None = None
     committed: str | None = None
     pending: str | None = None
+    leaving: str = ""
     floor: int | None = None
     progress: float | None = None
     step: str = ""
@@ -86,9 +91,9 @@ class UpdateRecord:
 
 @dataclass(frozen=True)
 class UpdateEnd:
-    """How an update ended that was tried: `state` is one of `ENDS`."""
+    """How an update ended that was tried: `event` is one of `ENDS`."""
 
-    state: str
+    event: str
     release: str | None
     reason: str
 
@@ -109,11 +114,12 @@ class Updates:
         history = tuple(one for one in _as(list, state.get("history")) or () if isinstance(one, dict))
         record = UpdateRecord(
             running=self.running,
-            state=_as(str, progress.get("state")) or "idle",
+            state=WAITING if self._is_waiting() else _as(str, progress.get("state")) or "idle",
             release=_name(progress.get("release")),
             previous=_name(state.get("previous")),
             committed=_name(state.get("committed")),
             pending=_name(state.get("pending")),
+            leaving=_as(str, (_as(dict, state.get("pending")) or {}).get("leaving")) or "",
             floor=_as(int, state.get("floor")),
             progress=_ratio(progress.get("progress")),
             step=_as(str, progress.get("step")) or "",
@@ -126,16 +132,16 @@ class Updates:
         """Return what the screen shows until the next release is committed, if the last one was taken back."""
         record = self.now()
         last = _last_end(record)
-        if not last or last.state != "rolled_back":
+        if not last or last.event != "rolled_back":
             return None
-        return RolledBack(_taken_back(last, record), "Measure as before, and send this to whoever made it.")
+        return RolledBack(_failure(last), f"{_way_back(record)} Measure as before.")
 
     def require_free(self) -> None:
         """Raise `BusyError` while an update is under way, `InvalidRequest` where there is no updater."""
         record = self.now()
         if not self._incoming.is_dir():
             raise _refused("This software is not installed as a release.", "Update it as it was installed.", 409)
-        if record.is_under_way or self._is_waiting():
+        if record.is_under_way:
             raise BusyError(f"An update is under way: {record.step or record.state}.", "Wait until it has ended.")
 
     def _is_waiting(self) -> bool:
@@ -152,9 +158,8 @@ class Updates:
         self.require_free()
         if self._taking and self._taking.is_open:
             raise BusyError("Another file is being taken.", "Wait until it has arrived.")
-        for leftover in self._incoming.glob(".upload-*"):
-            with suppress(OSError):
-                leftover.unlink()
+        for path in self._incoming.glob(".upload-*"):
+            _remove_unless_held(path)
         require_size(announced_bytes or 0)
         space = os.statvfs(self._incoming)
         left_bytes = space.f_bavail * space.f_frsize - SPARE_BYTES
@@ -176,9 +181,10 @@ class IncomingRelease:
     """A file that is being taken: not there for the updater until it is handed over."""
 
     def __init__(self, path: Path) -> None:
-        """Create it, for this user and the updater."""
+        """Create it, for this user and the updater; what nobody holds was left by somebody who is gone."""
         self._path, self.bytes_taken, self._unsynced_bytes = path, 0, 0
         self._file: BinaryIO = path.open("xb")
+        fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         os.chmod(self._file.fileno(), 0o640)
 
     @property
@@ -205,10 +211,14 @@ class IncomingRelease:
         _on_disk(lambda: os.fsync(self._file.fileno()))
 
     def hand_over(self, name: str = HANDED_OVER) -> None:
-        """Bring it to the disk and give it the name that the updater waits for."""
+        """Bring it to the disk and give it the name that the updater waits for; raise `BusyError` when one is there."""
         self.synchronise()
-        self._file.close()
-        _on_disk(lambda: self._path.rename(self._path.with_name(name)))
+        try:
+            _on_disk(lambda: os.link(self._path, self._path.with_name(name)))  # unlike a rename it replaces nothing
+        except FileExistsError:
+            raise BusyError("An update is under way: another file waits for it.", "Wait until it has ended.") from None
+        finally:
+            self.discard()
         _on_disk(lambda: sync_directory(self._path.parent))
 
     def discard(self) -> None:
@@ -236,10 +246,19 @@ def _on_disk(action: Callable[[], Result]) -> Result:
     """Return what an action returns; raise `StorageError`, or `DiskFullError`, when the disk refuses it."""
     try:
         return action()
+    except FileExistsError:
+        raise
     except OSError as error:
         kind = DiskFullError if error.errno in (errno.ENOSPC, errno.EDQUOT) else StorageError
         remedy = "Free space on the disk, or update from its command line: python -m device update install FILE."
         raise kind(f"The release could not be written: {error}.", remedy) from error
+
+
+def _remove_unless_held(path: Path) -> None:
+    """Remove what an upload left that nobody goes on with; another door of the probe may be taking its own."""
+    with suppress(OSError), path.open("rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        path.unlink()
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -279,11 +298,16 @@ def _ratio(value: object) -> float | None:
 
 
 def _last_end(record: UpdateRecord) -> UpdateEnd | None:
-    """Return how the last update ended that was tried on this probe; a file that was refused was not tried."""
-    told = {"state": record.state, "release": record.release, "reason": record.reason}
-    for entry in (told, *reversed(record.history)):
-        if entry.get("state") in ENDS:
-            return UpdateEnd(entry["state"], _name(entry.get("release")), _as(str, entry.get("reason")) or "")
+    """Return how the last update ended that was tried on this probe; a file that was refused was not tried.
+
+    The updater starts the daemon of before first and adds to its history then.
+    """
+    if record.leaving:
+        return UpdateEnd("rolled_back", record.pending, record.leaving)
+    told = {"event": record.state, "release": record.release, "reason": record.reason}
+    for entry in (*reversed(record.history), told):
+        if entry.get("event") in ENDS:
+            return UpdateEnd(entry["event"], _name(entry.get("release")), _as(str, entry.get("reason")) or "")
     return None
 
 
@@ -295,14 +319,17 @@ def _outcome(record: UpdateRecord) -> str:
     end = _last_end(record)
     if end is None:
         return ""
-    if end.state == "committed":
+    if end.event == "committed":
         return f"Version {_version(end.release)} is installed and works."
-    return _taken_back(end, record)
+    return f"{_failure(end)} {_way_back(record)}"
 
 
-def _taken_back(end: UpdateEnd, record: UpdateRecord) -> str:
-    went_back = f"This probe went back to {_version(record.running)}."
-    return f"Version {_version(end.release)} did not work: {_unstopped(end.reason)}. {went_back}"
+def _failure(end: UpdateEnd) -> str:
+    return f"Version {_version(end.release)} did not work: {_unstopped(end.reason)}."
+
+
+def _way_back(record: UpdateRecord) -> str:
+    return f"This probe went back to {_version(record.running)}."
 
 
 def _version(release: str | None) -> str:

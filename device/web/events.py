@@ -15,6 +15,7 @@ from device.instrument.procedure import Procedure
 from device.instrument.status import ProcedureStatus
 from device.measurement.mode import FRAMES, RAMP_TO_N, Mode
 from device.records.store import ENDED
+from device.records.updates import RUNNING
 
 EVENT_INTERVAL_S = 0.06
 
@@ -37,6 +38,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "simulated": procedure.is_simulated,
         "serial": procedure.config.serial,
         "software": __version__,
+        "release": RUNNING,
         "step": step,
         "press_state": status.state.code,
         "guidance": {"code": guidance.code, "text": guidance.text},

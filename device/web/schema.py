@@ -126,6 +126,7 @@ class UpdateResource(_Body):
     previous: str | None
     committed: str | None
     pending: str | None
+    leaving: str
     floor: int | None
     progress: float | None
     step: str
@@ -148,6 +149,7 @@ class Status(_Body):
     simulated: bool
     serial: str
     software: str
+    release: str
     step: Step
     press_state: PressStateCode
     guidance: GuidanceLine

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import json
 import math
 import re
 import socket
+import tarfile
 import threading
 import time
 from collections.abc import Iterator
@@ -14,7 +17,7 @@ from pathlib import Path
 import pytest
 import uvicorn
 from chromium import chromium_page
-from daemon_process import QUICK_HAND, ROOT, Daemon
+from daemon_process import PATIENT, QUICK_HAND, ROOT, Daemon, wait_for
 from playwright.sync_api import Page, expect
 
 from device.assembly import probe as assembly
@@ -26,6 +29,7 @@ from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, 
 from device.measurement.mode import MODES, Mode
 from device.measurement.ramp_modes.estimate import REASONS
 from device.measurement.recording.recording import Recording
+from device.records.updates import Updates
 from device.simulation import virtual_probe
 from device.simulation.hand import HandSettings, VirtualHand
 from device.simulation.physics.pressed_face import ProbePlacement
@@ -80,6 +84,11 @@ class Served:
     url: str
     procedure: Procedure
     hand: WaitingHand
+    updates: Path
+
+    def updater_says(self, **progress: object) -> None:
+        """Write what the updater tells of how far it is."""
+        (self.updates / "progress.json").write_text(json.dumps(progress))
 
 
 @pytest.fixture
@@ -95,13 +104,14 @@ def probe(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     config = replace(simulated_config(), data=tmp_path, camera=CameraSection(late_frames=100.0))
     procedure = open_simulated_probe(config, Scenario())
     procedure.start()
-    settings = uvicorn.Config(
-        create_app(procedure, procedure.store), log_level="warning", timeout_graceful_shutdown=1, lifespan="off"
-    )
+    (tmp_path / "updates" / "incoming").mkdir(parents=True)
+    (tmp_path / "updates" / "state.json").write_text(json.dumps({"committed": "0.1.0+400", "previous": "0.0.9+390"}))
+    app = create_app(procedure, procedure.store, updates=Updates(tmp_path / "updates", "0.1.0+400"))
+    settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server, listening = uvicorn.Server(settings), socket.create_server(("127.0.0.1", 0))
     serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     serving.start()
-    yield Served(f"http://127.0.0.1:{listening.getsockname()[1]}", procedure, hands[0])
+    yield Served(f"http://127.0.0.1:{listening.getsockname()[1]}", procedure, hands[0], tmp_path / "updates")
     page.goto("about:blank")  # an open event stream would hold the server
     server.should_exit = True
     serving.join()
@@ -312,3 +322,73 @@ def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page,
     page.locator("#self-test-close").click()
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
     daemon.stop()
+
+
+def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_from_a_stick(
+    page: Page, probe: Served, tmp_path: Path
+):
+    """Another file is refused in words; the release is handed over whole; how far it is, is on both views."""
+    page.goto(probe.url)
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    page.locator("#releases-open").click()
+    expect(page.locator("#release-running")).to_have_text("0.1.0+400")
+    expect(page.locator("#release-previous")).to_have_text("0.0.9+390")
+    holiday, release = tmp_path / "holiday.jpg", tmp_path / "tsis-0.2.0-x86_64.release"
+    holiday.write_bytes(b"\xff\xd8" * 1000)
+    release.write_bytes(_release())
+    page.locator("#release-file").set_input_files(holiday)
+    expect(page.locator("#releases-line")).to_contain_text("holiday.jpg is no release file")
+    _shoot(page, "software")
+    _require_fits(page)
+    page.locator("#release-file").set_input_files(release)
+    handed = probe.updates / "incoming" / "update.release"
+    wait_for(handed.exists, bool)
+    assert handed.read_bytes() == release.read_bytes()
+    expect(page.locator("#releases-line")).to_have_text("A release is being installed.")
+    handed.unlink()
+    probe.updater_says(state="unpacking", release="0.2.0+412", progress=0.42, step="unpacking numpy")
+    expect(page.locator("#releases-line")).to_have_text("Version 0.2.0 is being installed.")
+    expect(page.locator("#release-progress")).to_have_js_property("value", 0.42)
+    expect(page.locator("#release-file")).to_be_disabled()
+    _shoot(page, "software-update")
+    _require_fits(page)
+    page.locator("#releases-close").click()
+    expect(page.locator("#status-line")).to_have_text("Version 0.2.0 is being installed. Now: unpacking, 42 %.")
+    probe.updater_says(state="rolled_back", release="0.2.0+412", progress=1.0, reason="camera gave no image")
+    expect(page.locator("#status-line")).not_to_contain_text("being installed")
+    page.locator("#releases-open").click()
+    words = "Version 0.2.0 did not work: camera gave no image. This probe went back to 0.1.0."
+    expect(page.locator("#releases-line")).to_have_text(words)
+    page.locator("#release-back").click()
+    wait_for((probe.updates / "incoming" / "roll_back").exists, bool)
+
+
+def _release() -> bytes:
+    content, file = b'{"product": "tsis"}', io.BytesIO()
+    member = tarfile.TarInfo("manifest.json")
+    member.size = len(content)
+    with tarfile.open(fileobj=file, mode="w") as archive:
+        archive.addfile(member, io.BytesIO(content))
+    return file.getvalue()
+
+
+def test_an_update_that_was_taken_back_is_a_lasting_warning_that_leaves_the_view_readable(page: Page, tmp_path: Path):
+    folder = tmp_path / "updates"
+    (folder / "incoming").mkdir(parents=True)
+    told = {"state": "rolled_back", "release": "0.2.0+412", "reason": "camera gave no image"}
+    (folder / "progress.json").write_text(json.dumps(told))
+    daemon = Daemon(tmp_path, f'[settings]\nupdates = "{folder}"\n' + PATIENT)
+    page.goto(daemon.url)
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    warning = page.locator('.fault[data-severity="warning"]')
+    expect(warning.locator(".fault-code")).to_have_text("E013")
+    expect(warning.locator(".fault-cause")).to_have_text("Version 0.2.0 did not work: camera gave no image.")
+    _shoot(page, "update-taken-back")
+    _require_fits(page)
+    assert daemon.ask("/api/v1/updates").json["outcome"].startswith("Version 0.2.0 did not work")
+    (folder / "progress.json").write_text(json.dumps(told | {"state": "switching", "release": "0.3.0+420"}))
+    expect(page.locator("#status-line")).to_contain_text("Version 0.3.0 is being installed")
+    daemon.stop()
+    expect(page.locator("#connection-lost")).to_be_visible()
+    expect(page.locator("#lost-title")).to_have_text("The probe is being updated")
+    _shoot(page, "being-updated")

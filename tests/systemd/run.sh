@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs systemd/tsis.service under a real systemd, in a container without hardware: run.sh FOLDER.
-# Prints one line a claim; exits 1 when one does not hold.
+# Prints one line a claim; exits 1 when one does not hold. With a second word, `simulated` or `real`, only those stories.
 set -euo pipefail
 root=$(realpath -m "$1")
 here=$(dirname "$(realpath "$0")")
@@ -27,6 +27,11 @@ install -D -m 644 "$here/simulated.conf" "$etc/tsis.service.d/simulated.conf"
 install -D -m 644 "$project/systemd/tsis.service" "$etc/tsis-shut-in.service"
 install -D -m 644 "$here/shut_in.conf" "$etc/tsis-shut-in.service.d/shut_in.conf"
 install -D -m 644 "$here/tsis-stories.service" "$etc/tsis-stories.service"
+sed -i "s/-m stories$/-m stories ${2:-}/" "$etc/tsis-stories.service"
+# The same C library is in the container, so the host's compiler will do.
+command -v gcc > /dev/null || { echo "gcc is missing: apt-get install gcc libc6-dev."; exit 1; }
+mkdir -p "$root/opt/tsis-rig"
+gcc -O2 -shared -fPIC -o "$root/opt/tsis-rig/i2c_shim.so" "$project/tests/rig/i2c_shim.c" -ldl
 mkdir -p "$etc/multi-user.target.wants" "$root/home/someone"
 ln -sf ../tsis-stories.service "$etc/multi-user.target.wants/"
 

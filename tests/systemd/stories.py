@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
 
+from claim import Claim
+from real_stories import RealService, real_stories
 from service import NAME, NotReached, Service, run, until
 
 PYTHON = "/opt/tsis/current/bin/python"
@@ -22,19 +23,6 @@ WATCHDOG_S = 15.0
 TRIES = 3
 """A machine that is busy besides may spoil a press, as a trembling hand does; a sandbox spoils all."""
 SHUT_IN = Path("/var/lib/tsis/shut_in.json")
-
-
-@dataclass(frozen=True)
-class Claim:
-    """What has to hold, whether it does, and what was seen."""
-
-    words: str
-    holds: bool
-    seen: object = ""
-
-    def __str__(self) -> str:
-        seen = f": {self.seen}" if self.seen != "" else ""
-        return f"{'pass' if self.holds else 'FAIL'}  {self.words}{seen}"
 
 
 def analysed() -> Iterator[Claim]:
@@ -157,21 +145,26 @@ def told(stories: list[Callable[[], Iterator[Claim]]]) -> Iterator[Claim]:
             yield Claim("the story goes on", False, error)
 
 
-def main() -> int:
-    """Tell all stories; return the exit code."""
-    service = Service()
+def simulated_stories(service: Service) -> list[Callable[[], Iterator[Claim]]]:
+    """Return all stories of a simulated probe's service."""
     stories: list[Callable[[], Iterator[Claim]]] = [analysed, shut_in]
     stories += [partial(story, service) for story in (started, pressed, killed)]
     stories += [partial(frozen, service, kind) for kind in FROZEN]
-    stories.append(partial(stopped, service))
+    return [*stories, partial(stopped, service)]
+
+
+def main(only: str = "") -> int:
+    """Tell all stories, or those of the `simulated` or the `real` probe only; return the exit code."""
     held = []
-    with service.on_its_board():
-        for claim in told(stories):
-            print(claim)
-            held.append(claim.holds)
+    chapters = {"simulated": (Service(), simulated_stories), "real": (RealService(), real_stories)}
+    for service, stories in [chapters[only]] if only else chapters.values():
+        with service.on_its_board():
+            for claim in told(stories(service)):
+                print(claim)
+                held.append(claim.holds)
     print(f"{sum(held)} passed, {len(held) - sum(held)} failed")
     return 0 if all(held) else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))

@@ -5,6 +5,7 @@ const SILENCE_MS = 2000; // a status arrives every 50 to 100 ms: after this long
 const REOPEN_MS = 3000;
 const WATCH_MS = 250;
 const ANSWER_MS = 5000;
+const RELEASE_MS = 600000; // a slow stick
 
 /** Call onStatus with each status, and onSilence again and again while none arrives. */
 export function followStatus(onStatus, onSilence) {
@@ -42,9 +43,8 @@ async function problemSentence(response) {
   return [problem.code, cause, problem.remedy].filter(Boolean).join(" ");
 }
 
-async function ask(method, path, body) {
-  const headers = { "Content-Type": "application/json" };
-  const options = { method, body, headers, signal: AbortSignal.timeout(ANSWER_MS) };
+async function ask(method, path, body, { type = "application/json", withinMs = ANSWER_MS } = {}) {
+  const options = { method, body, headers: { "Content-Type": type }, signal: AbortSignal.timeout(withinMs) };
   const response = await fetch(API + path, options).catch(() => {
     throw new Error("The probe did not answer. Try again.");
   });
@@ -72,4 +72,17 @@ export async function fetchDevice() {
 
 export async function fetchMeasurement(id) {
   return (await ask("GET", `/measurements/${encodeURIComponent(id)}`)).json();
+}
+
+export async function fetchUpdates() {
+  return (await ask("GET", "/updates")).json();
+}
+
+/** Send a release file; it goes from the stick to the probe part by part, never whole through the memory. */
+export async function sendRelease(file) {
+  return (await ask("POST", "/updates", file, { type: "application/octet-stream", withinMs: RELEASE_MS })).json();
+}
+
+export async function goBack() {
+  return (await ask("POST", "/updates/roll-back", "{}")).json();
 }

@@ -7,6 +7,7 @@ import { chosenMode, offerModes, showModes } from "./modes.js";
 import { cancelPress, fetchDevice, fetchMeasurement, followStatus, startPress, takeTare } from "./probe.js";
 import { describeEstimate, showMeasurement } from "./result.js";
 import { showSelfTest } from "./self_test.js";
+import { absenceWords, updateLine } from "./software.js";
 
 const UNDER_WAY = new Set(["waiting", "capturing", "computing"]);
 const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
@@ -38,6 +39,7 @@ const TOLD_MS = 5000;
 const panel = byId("panel");
 const button = byId("press-button");
 const tareButton = byId("tare");
+const LOST_WORDS = [byId("lost-title").textContent, byId("lost-words").textContent];
 let status = null;
 let measurement = null;
 let offersAreKnown = false;
@@ -83,6 +85,7 @@ function describeStatus() {
   const hint = (status.kind === "ramp" && RAMP_HINTS[status.step]) || (STEP_HINTS[status.step] ?? "");
   const pressWord = PRESS_WORDS[status.press?.state];
   if (problem) return { word: "Not done.", reason: problem, tone: "caution" };
+  if (updateLine()) return updateLine();
   if (tared) return { word: "Tared.", reason: tared, tone: "good" };
   if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
   if (resultShown()) return describeEstimate(measurement.estimate);
@@ -182,15 +185,20 @@ function loadWhatIsMissing() {
 }
 
 function showConnection(lost) {
+  const [title, words] = absenceWords() ?? LOST_WORDS;
+  setText(byId("lost-title"), title);
+  setText(byId("lost-words"), words);
+  setAttribute(byId("lost-icon"), "href", absenceWords() ? "#icon-wait" : "#icon-fault");
+  byId("connection-lost").dataset.tone = absenceWords() ? "caution" : "bad";
   byId("connection-lost").hidden = !lost;
   byId("main").inert = lost;
-  if (lost) byId("self-test").close(); // it lies above everything
+  if (lost) for (const id of ["self-test", "releases"]) byId(id).close(); // they lie above everything
   if (lost) offersAreKnown = false; // whoever comes back may be another probe
 }
 
 function receive(next) {
   // After an update of the probe, the page that is already open must not stay the old one.
-  if (status && status.software !== next.software) location.reload();
+  if (status && status.release !== next.release) location.reload();
   if (status && status.step !== next.step) problem = tared = "";
   status = next;
   showConnection(false);

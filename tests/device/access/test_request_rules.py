@@ -132,6 +132,10 @@ class TestAPathWithARuleOfItsOwn:
         assert code(path=self.path, client=client, content_type="application/octet-stream") == "E807"
         assert code(path=self.path, client=client, method="GET") is None
 
+    def test_the_way_back_is_asked_for_at_this_machine_too(self):
+        assert code(path=self.path + "/roll-back") is None
+        assert code(path=self.path + "/roll-back", client="192.168.1.7") == "E807"
+
     def test_a_path_below_it_has_the_common_rule(self):
         assert code(path=self.path + "/x", content_type="application/octet-stream") == "E808"
 

@@ -9,7 +9,7 @@ import pytest
 
 from device.errors import BusyError, DiskFullError, InvalidRequest, StorageError
 from device.records import updates as module
-from device.records.updates import RELEASES, Updates, release_of
+from device.records.updates import RELEASES, IncomingRelease, Updates, release_of
 
 STATE = {
     "committed": "0.1.0+400",
@@ -18,8 +18,8 @@ STATE = {
     "floor": 400,
     "bad": {"0.2.0+412": "camera gave no image"},
     "history": [
-        {"release": "0.1.0+400", "state": "committed", "reason": ""},
-        {"release": "0.2.0+412", "state": "rolled_back", "reason": "camera gave no image."},
+        {"release": "0.1.0+400", "event": "committed", "reason": ""},
+        {"release": "0.2.0+412", "event": "rolled_back", "reason": "camera gave no image."},
     ],
 }
 IDLE = {"schema": "tsis.update/1", "state": "idle", "release": None, "progress": 0.0, "reason": "", "step": ""}
@@ -63,16 +63,27 @@ def test_an_update_taken_back_is_a_lasting_warning_until_the_next_one_is_install
     updates = told(folder)
     warning = updates.warning()
     assert (warning.code, warning.severity, warning.is_lasting) == ("E013", "warning", True)
-    assert "camera gave no image" in warning.cause
+    assert warning.cause == "Version 0.2.0 did not work: camera gave no image."
+    assert warning.remedy == "This probe went back to 0.1.0. Measure as before."
     (folder / "progress.json").unlink()
     assert updates.warning().code == "E013"
     refused = told(folder, state="refused", release="0.1.0+399", reason="It is older.").now()
     assert refused.outcome == "Version 0.1.0 was refused: It is older. Nothing was changed."
     assert told(folder, state="refused").warning().code == "E013"
-    assert told(folder, state="committed", release="0.3.0+420").warning() is None
-    newer = STATE | {"history": [*STATE["history"], {"release": "0.3.0+420", "state": "committed", "reason": ""}]}
+    first = STATE | {"history": []}
+    assert told(folder, first, state="rolled_back", release="0.2.0+412", reason="x").warning().code == "E013"
+    assert told(folder, first, state="committed", release="0.3.0+420").warning() is None
+    newer = STATE | {"history": [*STATE["history"], {"release": "0.3.0+420", "event": "committed", "reason": ""}]}
     assert told(folder, newer).warning() is None
     assert told(folder, newer).now().outcome == "Version 0.3.0 is installed and works."
+
+
+def test_the_warning_is_there_at_the_start_of_the_daemon_that_comes_back(folder):
+    """The updater starts that one before it adds to its history, so that a full disk keeps nobody dark."""
+    pending = {"release": "0.3.0+420", "tries": 1, "leaving": "light is not ready (E201)"}
+    updates = told(folder, STATE | {"history": [], "pending": pending}, state="checking", release="0.3.0+420")
+    assert updates.warning().cause == "Version 0.3.0 did not work: light is not ready (E201)."
+    assert updates.now().as_record()["leaving"] == "light is not ready (E201)"
 
 
 def test_an_update_under_way_says_how_far_it_is(folder):
@@ -113,20 +124,34 @@ def test_a_file_is_there_for_the_updater_only_when_it_is_whole(folder):
     incoming.discard()
     assert (folder / "incoming" / "update.release").read_bytes() == b"onetwo"
     assert [path.name for path in (folder / "incoming").iterdir()] == ["update.release"]
+    assert updates.now().state == "waiting"
     with pytest.raises(BusyError, match="An update is under way"):
         updates.require_free()
+    os.utime(folder / "progress.json", (2e9, 2e9))  # the updater has told of it
+    assert updates.now().state == "idle"
 
 
 def test_one_that_is_given_up_leaves_nothing_and_a_leftover_is_removed(folder):
     updates = told(folder)
     (folder / "incoming" / ".upload-old").write_bytes(b"of a daemon that was killed")
+    of_ssh = IncomingRelease(folder / "incoming" / ".upload-ssh")
     incoming = updates.receive(None)
     incoming.write(b"one")
     with pytest.raises(BusyError, match="Another file"):
         updates.receive(None)
     incoming.discard()
-    assert list((folder / "incoming").iterdir()) == []
+    assert [path.name for path in (folder / "incoming").iterdir()] == [".upload-ssh"]  # is still being taken
+    of_ssh.discard()
     updates.receive(None).discard()
+
+
+def test_a_file_that_waits_for_the_updater_is_not_replaced(folder):
+    incoming = told(folder).receive(None)
+    incoming.write(b"mine")
+    (folder / "incoming" / "update.release").write_bytes(b"another")
+    with pytest.raises(BusyError, match="another file waits"):
+        incoming.hand_over()
+    assert [path.read_bytes() for path in (folder / "incoming").iterdir()] == [b"another"]
 
 
 @pytest.mark.parametrize("state", ["verifying", "unpacking", "switching", "checking"])

@@ -1,0 +1,169 @@
+"""The daemon of a real probe, without `--simulate`, on a machine without one: it meets a world process on its wires.
+
+`Rig` plays systemd for it as tests/supervisor.py does: a socket for its notifications, the kill when its watchdog is
+not fed, and the command that darkens the LEDs after its end.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from daemon_process import ROOT, Daemon, wait_for
+
+from device.config import MODELS
+
+HERE = Path(__file__).parent
+SETTINGS = f"""
+serial = "SIM-0001"
+calibration = "{MODELS / "simulated_probe" / "calibration.json"}"
+data = "var"
+[camera]
+late_frames = 100.0
+[cell]
+"""
+START_S = 60.0
+
+
+def build_shim(folder: Path) -> Path:
+    """Compile the shim with the machine's gcc; return where it lies."""
+    shim = folder / "i2c_shim.so"
+    command = ["gcc", "-O2", "-Wall", "-Werror", "-shared", "-fPIC", "-o", str(shim), str(HERE / "i2c_shim.c"), "-ldl"]
+    subprocess.run(command, check=True)
+    return shim
+
+
+class WorldProcess:
+    """The world, and a line to it."""
+
+    def __init__(self, folder: Path, scene: str = "") -> None:
+        folder.mkdir()
+        self.folder = folder
+        (folder / "scene.toml").write_text(scene)
+        path = os.pathsep.join(map(str, (ROOT, ROOT / "tests")))
+        command = [sys.executable, str(HERE / "world.py"), str(folder), str(folder / "scene.toml")]
+        self.process = subprocess.Popen(
+            command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline() == "ready\n"
+        self._line = socket.socket(socket.AF_UNIX)
+        self._line.connect(str(folder / "control"))
+        self._answers = self._line.makefile()
+
+    def wish(self, **wish: Any) -> dict[str, Any]:
+        """Tell the world something; return what can be seen of the probe."""
+        self._line.sendall(json.dumps(wish).encode() + b"\n")
+        seen: dict[str, Any] = json.loads(self._answers.readline())
+        return seen
+
+    def is_lit(self) -> bool:
+        """Whether all sides shine."""
+        return min(self.wish()["light"]) > 0.5
+
+    def is_dark(self) -> bool:
+        """Whether no side does."""
+        return max(self.wish()["light"]) == 0.0
+
+    def close(self) -> None:
+        """End the world."""
+        self._answers.close()
+        self._line.close()
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+
+class Rig:
+    """A world and, when it is started, the daemon in it."""
+
+    def __init__(self, folder: Path, shim: Path, scene: str = "", watchdog_s: float | None = None) -> None:
+        self._folder, self._watchdog_s = folder, watchdog_s
+        self.world = WorldProcess(folder / "world", scene)
+        (folder / "config.toml").write_text(SETTINGS + f'device = "{folder / "world" / "force"}"\n')
+        self.environment = {
+            "LD_PRELOAD": str(shim),
+            "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT))),
+            "TSIS_RIG_I2C": str(folder / "world" / "i2c"),
+            "TSIS_RIG_CAMERA": str(folder / "world" / "camera"),
+            "NOTIFY_SOCKET": str(folder / "notify"),
+            "WATCHDOG_USEC": str(round(1e6 * watchdog_s)) if watchdog_s else "",
+        }
+        self._notified = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._notified.bind(str(folder / "notify"))
+        self.daemon: Daemon | None = None
+
+    def start(self) -> Daemon:
+        """Start the daemon as its unit does; return it when it can be pressed and the hand reads its screen."""
+        self.daemon = daemon = Daemon(
+            self._folder, arguments=("--config", "config.toml", "--port", "0"), environment=self.environment
+        )
+        assert self._is_told("READY=1", START_S)
+        self.world.wish(url=daemon.url)
+        wait_for(lambda: daemon.ask("/api/v1/health/ready").status, lambda status: status == 200)
+        return daemon
+
+    def press_until_lit(self) -> str:
+        """Ask for a press and wait for its light; return where its job is."""
+        assert self.daemon
+        location = self.daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
+        wait_for(self.world.is_lit, bool)
+        return location
+
+    def is_fed_until(self, condition: Callable[[], bool]) -> bool:
+        """Watch the daemon until a condition holds; return False when it was not fed in time before."""
+        assert self._watchdog_s
+        fed_s = time.monotonic()
+        while not condition():
+            if self._is_told("WATCHDOG=1", 0.05):
+                fed_s = time.monotonic()
+            if time.monotonic() - fed_s > self._watchdog_s:
+                return False
+        return True
+
+    def kill_when_not_fed(self) -> int:
+        """Watch the daemon until its watchdog bites; return how it ended. systemd also wakes whom it means to end."""
+        assert self.daemon
+        while self.is_fed_until(lambda: False):
+            pass
+        self.daemon.process.send_signal(signal.SIGABRT)
+        self.daemon.process.send_signal(signal.SIGCONT)
+        return self.daemon.ended_code()
+
+    def led_off(self) -> subprocess.CompletedProcess[str]:
+        """Run what the unit runs after the daemon's end, however that came."""
+        command = [sys.executable, "-m", "device.commands.led_off", "--config", "config.toml"]
+        environment = {**os.environ, **self.environment}
+        return subprocess.run(
+            command, cwd=self._folder, env=environment, capture_output=True, text=True, timeout=60, check=False
+        )
+
+    def close(self) -> None:
+        """End the daemon, if it still runs, and the world."""
+        with closing(self._notified):
+            if self.daemon and self.daemon.process.poll() is None:
+                self.daemon.process.send_signal(signal.SIGCONT)
+                self.daemon.stop()
+            self.world.close()
+
+    def _is_told(self, what: str, timeout_s: float) -> bool:
+        """Return whether the daemon says something within a time."""
+        until_s = time.monotonic() + timeout_s
+        while (left_s := until_s - time.monotonic()) > 0:
+            self._notified.settimeout(left_s)
+            try:
+                if what in self._notified.recv(4096).decode().split("\n"):
+                    return True
+            except TimeoutError:
+                return False
+        return False
