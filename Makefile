@@ -61,7 +61,7 @@ test-systemd: ## run the unit under a real systemd, in a Debian container under 
 test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
 	$(PY) tests/deploy/power_cuts.py
 
-test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)
+test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour)
 	tests/deploy/arm64.sh build/arm64
 
 test-deploy: .venv/all.stamp ## make a container a probe by ssh and send it releases, good and bad (root, network, 2 GB, six minutes)
