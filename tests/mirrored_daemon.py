@@ -1,18 +1,21 @@
 """The simulated daemon on an LED chip that outlives it: every transaction also goes to the bus in the test's process.
 
-As a program: `python mirrored_daemon.py SOCKET [ARGUMENT]...` is `python -m device [ARGUMENT]...`.
+As a program: `python mirrored_daemon.py SOCKET [ARGUMENT]...` is `python -m device [ARGUMENT]...`. The environment
+names the chip's enable line outside, if it has one, as `OUTSIDE_LINE`.
 """
 
 from __future__ import annotations
 
+import os
 import runpy
 import sys
+from pathlib import Path
 from typing import Any
 
 from i2c_over_socket import stand_in_for_the_kernel
 from smbus2 import SMBus, i2c_msg
 
-from device.assembly import probe
+from device.assembly import light, probe
 from device.simulation.chips.i2c_bus import I2C_M_RD, EmulatedI2cBus, I2cMessage
 
 
@@ -37,5 +40,7 @@ class MirroredBus(EmulatedI2cBus):
 if __name__ == "__main__":
     stand_in_for_the_kernel(sys.argv[1])
     probe.EmulatedI2cBus = MirroredBus
+    if outside := os.environ.get("OUTSIDE_LINE"):
+        light.PROGRAM = (str(Path(__file__).with_name("mirrored_keeper.py")), outside)
     sys.argv = ["device", *sys.argv[2:]]
     runpy.run_module("device", run_name="__main__", alter_sys=True)

@@ -20,6 +20,7 @@ from device.settings.catalogue import SETTINGS
 
 UNIT = ROOT / "systemd" / "tsis.service"
 RULES = ROOT / "systemd" / "tsis-force.rules"
+LIGHT_RULES = ROOT / "systemd" / "tsis-light.rules"
 PYTHON = "/opt/tsis/current/bin/python"
 needs_systemd = pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
 
@@ -103,6 +104,13 @@ def test_a_group_that_debian_does_not_always_have_is_made_for_the_unit():
     assert set(service_of(UNIT)["SupplementaryGroups"].split()) == {"video", "dialout", *made}
 
 
+def test_the_group_that_may_drive_the_enable_line_is_one_of_the_units():
+    [line] = [line for line in LIGHT_RULES.read_text().splitlines() if line and not line.startswith("#")]
+    [group] = re.findall(r'GROUP="(.*?)"', line)
+    assert group in service_of(UNIT)["SupplementaryGroups"].split()
+    assert "DeviceAllow=char-gpiochip rw" in UNIT.read_text()
+
+
 def test_the_unit_that_is_run_under_a_real_systemd_differs_only_in_its_hardware():
     simulated = service_of(ROOT / "tests" / "systemd" / "simulated.conf")
     assert set(simulated) == {"ExecStart", "Environment"}
@@ -115,6 +123,7 @@ def test_the_rule_names_the_load_cell_as_the_settings_do():
 
 
 @pytest.mark.skipif(udev_version() < 254, reason="no udevadm that verifies (systemd 254)")
-def test_udev_takes_the_rule():
-    verified = subprocess.run(["udevadm", "verify", str(RULES)], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("rules", [RULES, LIGHT_RULES], ids=lambda path: path.name)
+def test_udev_takes_the_rule(rules):
+    verified = subprocess.run(["udevadm", "verify", str(rules)], capture_output=True, text=True, check=False)
     assert verified.returncode == 0, verified.stderr
