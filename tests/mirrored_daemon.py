@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import runpy
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from smbus2 import SMBus, i2c_msg
 
 from device.assembly import light, probe
 from device.simulation.chips.i2c_bus import I2C_M_RD, EmulatedI2cBus, I2cMessage
+
+ASKED = "asked_s"
+"""File in the daemon's folder: when its bus was last asked (s, monotonic)."""
 
 
 class MirroredBus(EmulatedI2cBus):
@@ -27,6 +31,7 @@ class MirroredBus(EmulatedI2cBus):
         self._outside = SMBus(1)
 
     def i2c_rdwr(self, *i2c_msgs: I2cMessage) -> None:
+        Path(ASKED).write_text(repr(time.monotonic()))
         super().i2c_rdwr(*i2c_msgs)
         for message in i2c_msgs:
             if not message.flags & I2C_M_RD:

@@ -18,6 +18,7 @@ from typing import Any
 from cpu_time import ended_cpu_s
 from daemon_process import ROOT, Daemon
 from i2c_over_socket import served
+from mirrored_daemon import ASKED
 
 from device.simulation.chips.i2c_bus import EmulatedI2cBus
 from device.simulation.chips.remote_line import LineServer
@@ -91,6 +92,11 @@ class Supervisor:
         process = subprocess.Popen([sys.executable, *program], cwd=self._folder, env=environment)
         cpu_s = ended_cpu_s(process)
         return process.returncode, cpu_s
+
+    @property
+    def last_asked_s(self) -> float:
+        """When the daemon last asked something of its bus (s, monotonic)."""
+        return float((self._folder / ASKED).read_text() or 0.0)
 
     def close(self) -> None:
         """End the daemon, if it still runs, and take its board away."""
