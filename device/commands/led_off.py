@@ -22,7 +22,6 @@ from device.config import LightSection
 from device.errors import DeviceError, LightBusError, LightError
 from device.hardware.led_driver import open_led_driver
 from device.hardware.light_keeper import GpioLine
-from device.instrument.watch.restart_note import note_end
 from device.settings.last_good import start_settings
 from device.settings.layers import layer_files, read_layers
 
@@ -139,6 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             led_off(config.light)
         finally:
+            from device.instrument.watch.restart_note import note_end  # dark first
+
             note_end(config.data, os.environ)
     except DeviceError as error:
         print(error, file=sys.stderr)

@@ -21,6 +21,7 @@ cp -r "$root/src/models" "$root$packages/models"
 install -D -m 644 "$project/systemd/tsis.service" "$root/usr/lib/systemd/system/tsis.service"
 install -D -m 644 "$project/systemd/tsis.sysusers.conf" "$root/usr/lib/sysusers.d/tsis.conf"
 install -D -m 644 "$project/systemd/tsis-force.rules" "$root/usr/lib/udev/rules.d/60-tsis-force.rules"
+install -D -m 644 "$project/systemd/tsis-light.rules" "$root/usr/lib/udev/rules.d/60-tsis-light.rules"
 inside systemd-sysusers
 
 # What the container adds: no hardware, and a look into the unit's sandbox.
