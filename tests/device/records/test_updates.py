@@ -199,6 +199,8 @@ def test_a_disk_that_refuses_is_a_fault_of_the_store(folder, monkeypatch, number
 def test_the_way_back_is_a_file_too_and_only_where_there_is_one(folder):
     told(folder).ask_to_roll_back()
     assert (folder / "incoming" / "roll_back").exists()
+    with pytest.raises(BusyError):
+        told(folder).ask_to_roll_back()
     (folder / "incoming" / "roll_back").unlink()
     with pytest.raises(InvalidRequest, match="no release before"):
         told(folder, STATE | {"previous": None}).ask_to_roll_back()
