@@ -2,11 +2,16 @@
 PORT ?= 8000
 SCENE ?=
 FILE ?=
+MACHINE ?= aarch64
+KEY ?= $(HOME)/.config/tsis/release_key
+OUT ?= dist
+COUNTER ?=
+SIGNERS ?=
 PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-arm bundle check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -44,6 +49,13 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
+
+test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)
+	tests/deploy/arm64.sh build/arm64
+
+bundle: .venv/all.stamp ## build and sign the file that a probe installs: make bundle [MACHINE=aarch64] [KEY=FILE] [OUT=dist] [COUNTER=N] [SIGNERS=FILE]
+	@$(HOST_TOOLS) release build --machine $(MACHINE) --key $(KEY) --out $(OUT) \
+	  $(if $(COUNTER),--counter $(COUNTER)) $(if $(SIGNERS),--signers $(SIGNERS))
 
 check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .

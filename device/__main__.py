@@ -1,4 +1,4 @@
-"""`python -m device`: start the daemon, analyse or record presses, see settings, certificates and faults, test, darken.
+"""`python -m device`: start the daemon, analyse or record presses, see settings and faults, test, update, save, darken.
 
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
@@ -9,20 +9,25 @@ import argparse
 import faulthandler
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_phantom_press, open_probe, open_simulated_probe
 from device.commands.analyse import add_analyse_command, run_analyse_command
+from device.commands.backup import add_backup_command, run_backup_command
 from device.commands.calibration import add_calibration_command, run_calibration_command
 from device.commands.config import add_config_command, run_config_command
 from device.commands.faults import add_faults_command, run_faults_command
 from device.commands.led_off import led_off
 from device.commands.record import add_record_command, run_record_command
+from device.commands.restore import add_restore_command, run_restore_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
 from device.commands.serve import serve
+from device.commands.support import add_support_command, run_support_command
+from device.commands.update import add_update_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
 from device.instrument.press.phantom_press import PhantomPress
@@ -32,6 +37,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.settings.last_good import StartSettings, start_settings
 from device.settings.layers import ROOT, layer_files, overridden, read_layers
 from device.simulation.scenario import Scenario, read_scenario
+from device.update.__main__ import run_update
 
 EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
@@ -55,14 +61,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
-    verbs = "analyse | record | config | calibration | faults | self-test | led-off"
-    commands = parser.add_subparsers(dest="command", metavar=verbs)
+    commands = parser.add_subparsers(dest="command", metavar="VERB", title="verbs")
     add_analyse_command(commands)
     add_record_command(commands)
     add_config_command(commands)
     add_calibration_command(commands)
     add_faults_command(commands)
     add_self_test_command(commands)
+    add_update_command(commands)
+    add_backup_command(commands)
+    add_restore_command(commands)
+    add_support_command(commands)
     commands.add_parser("led-off", help="darken the LED chip of the real probe")
     return parser
 
@@ -90,6 +99,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run_faults_command(options)
         if options.command == "self-test":
             return _self_test(options)
+        if options.command == "update":
+            return run_update(options)
+        if options.command == "backup":
+            return run_backup_command(options, _start_settings(options, _scenario(options)).config)
+        if options.command == "restore":
+            return run_restore_command(options, _stated(options))
+        if options.command == "support":
+            return run_support_command(options)
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0
@@ -117,6 +134,14 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
     if options.port is None:
         return settings
     return replace(settings, config=overridden(settings.config, {"server": {"port": options.port}}))
+
+
+def _stated(options: argparse.Namespace) -> Mapping[str, Any]:
+    """Return what this machine's settings files say, by full names; of a simulated probe its own settings."""
+    scenario = _scenario(options)
+    if scenario and not options.config:
+        return vars(simulated_config(scenario.serial))
+    return read_layers(layer_files(options.root, options.config)).values
 
 
 def _scenario(options: argparse.Namespace) -> Scenario | None:

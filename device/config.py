@@ -28,6 +28,8 @@ from device.measurement.recording.pixel_scale import PixelScale
 SideRatio = Annotated[float, Bound(0.0, 1.0, "", low_included=False)]
 SideCounts = Annotated[float, Bound(1.0, 255.0, "counts")]
 CellProtocol = Literal["openscale", "mantracourt"]
+HELD_HZ = 8.0
+"""Frames are this fast at least where a line is held from one to the next: three of them, late, and it still is."""
 HEXADECIMAL = "hexadecimal"
 """Marks a number that is written so."""
 SensorPixels = Annotated[int, Bound(64, 8192, "px")]
@@ -157,6 +159,15 @@ class LightSection(Section):
         HEXADECIMAL,
         Doc("I2C address of the LED driver; 0x60 of a tlc59116 and 0x40 of a pca9685 unless given."),
     ] = None
+    enable_chip: Annotated[str, Doc("GPIO chip of the line that enables the LEDs' outputs.")] = "/dev/gpiochip0"
+    enable_line: Annotated[
+        int | None,
+        Bound(0, 511, ""),
+        Doc(
+            "Line of that chip that is wired to RESET of a tlc59116 or OE of a pca9685; "
+            "unless given only the bus switches the light."
+        ),
+    ] = None
     pwm_hz: Annotated[float, Bound(24.0, 1526.0, "Hz"), Doc("Frequency of the brightness of a pca9685.")] = 1526.0
     oscillator_hz: Annotated[float, Bound(20e6, 30e6, "Hz"), Doc("Oscillator of a pca9685, as measured.")] = INTERNAL_HZ
     ratio: Annotated[
@@ -192,13 +203,23 @@ class LightSection(Section):
     max_on_s: Annotated[
         float,
         Bound(1.0, 3600.0, "s"),
-        Doc("Time with light in one press, both of its parts together, after which the light goes off."),
+        Doc("Time with light, over all presses of one and a half times as long, after which the light goes off."),
     ] = 300.0
+    untouched_s: Annotated[
+        float,
+        Bound(0.5, 60.0, "s"),
+        Doc("Time with light in presses that nobody touches, one after the other, after which they wait in the dark."),
+    ] = 5.0
 
     @property
     def chip_address(self) -> int:
         """The chip's I2C address: as given, or with its address pins as they come."""
         return CHIP_ADDRESSES[self.chip].default if self.address is None else self.address
+
+    @property
+    def is_enabled_low(self) -> bool:
+        """Whether a low level lets the chip shine: OE of a PCA9685 does, RESET of a TLC59116 takes its light away."""
+        return self.chip == "pca9685"
 
     @property
     def pwm_clock(self) -> PwmClock:
@@ -369,7 +390,10 @@ class Config(Section):
     server: ServerSection = field(default_factory=ServerSection)
 
     def conflicts(self) -> Iterator[Conflict]:
-        """Yield an exposure that the light does not allow, and a chip that has the bus and address of another."""
+        """Yield exposure and frame rate that the light does not allow, and a chip at the bus and address of another."""
+        if self.light.enable_line is not None:
+            held = Bound(HELD_HZ, 240.0, "Hz: the enable line is held from frame to frame")
+            yield from conflict("camera.frame_rate_hz", self.camera.frame_rate_hz, held, "light.enable_line")
         yield from self.light.exposure_conflicts(self.camera.exposure_us, 1e6 / self.camera.frame_rate_hz)
         chips = {name: part for name, part in vars(self).items() if hasattr(part, "chip_address")}
         for (other, theirs), (name, ours) in combinations(chips.items(), 2):

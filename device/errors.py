@@ -97,8 +97,31 @@ class LastGoodConfigError(ConfigError):
     is_lasting = True
 
 
+class UntrustedRelease(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release file is damaged, was cut off while it was copied, or is not signed by a key that this probe trusts."""
+
+    code = "E010"
+    title = "Release damaged or not signed"
+    status = 422
+
+
+class UnfitRelease(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A release is not for this probe: another product, machine or data, older than what ran here, or known as bad."""
+
+    code = "E011"
+    title = "Release does not fit"
+    status = 422
+
+
+class UpdateFailed(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """A step of an update failed; the release that ran before still does."""
+
+    code = "E012"
+    title = "Update failed"
+
+
 class RolledBack(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """A new release was not healthy within its time; the previous one is back."""
+    """A release did not work on this probe and the one before is back; shown until another one is installed."""
 
     code = "E013"
     title = "Update taken back"
@@ -219,7 +242,7 @@ class HotLedDriverError(LightError):
 
 
 class LightBudgetError(LightError):
-    """The light was on for too long in one press; it goes off, and the next press may begin."""
+    """The light was on for too long over the last presses; it goes off, and the press ends."""
 
     code = "E209"
     title = "Light on for too long"
@@ -231,6 +254,27 @@ class LightLimitError(LightError):
     code = "E210"
     title = "Light at its limit"
     severity = "warning"
+
+
+class LightRestError(LightError):
+    """The light was on for so long over the last presses that none may begin; it passes by itself."""
+
+    code = "E211"
+    title = "Light must rest"
+
+
+class LightCutError(LightError):
+    """The enable line took the light away in a press: loop, bus or camera came to a stop, or the line's keeper did."""
+
+    code = "E212"
+    title = "Light was cut"
+
+
+class LightLineError(LightError):
+    """The line that enables the LEDs cannot be driven, or the LED chip does not obey it."""
+
+    code = "E213"
+    title = "Enable line does not work"
 
 
 class LoadCellError(DeviceError):
@@ -383,6 +427,13 @@ class DiskFullError(StorageError):
     title = "Disk full"
 
 
+class NewerDataError(StorageError):
+    """The data folder was written by a newer release than this one, which cannot read it."""
+
+    code = "E014"
+    title = "Data of a newer release"
+
+
 class ClockJumpError(DeviceError):
     """The wall clock was set; what is measured runs on the monotonic clock, but `taken_at` may be wrong."""
 
@@ -392,7 +443,7 @@ class ClockJumpError(DeviceError):
 
 
 class BusyError(DeviceError):
-    """A press or a self-test is already under way."""
+    """A press, a self-test or an update is already under way."""
 
     code = "E801"
     title = "Busy"

@@ -17,6 +17,8 @@ from host_tools.commands.optics import optics
 from host_tools.commands.output import note
 from host_tools.commands.pages import pages
 from host_tools.commands.paper import paper
+from host_tools.commands.probe_by_ssh import deploy, provision
+from host_tools.commands.release import release
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
 from host_tools.commands.train import train
@@ -41,7 +43,10 @@ app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)
 app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
 app.command(epilog="Example: host_tools pages --check")(pages)
 app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)
+app.command(epilog="Example: host_tools provision RELEASE --host raspberrypi.local --serial TSIS-0007")(provision)
+app.command(epilog="Example: host_tools deploy RELEASE --host tsis-0007.local")(deploy)
 app.add_typer(optics, name="optics")
+app.add_typer(release, name="release")
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Two kinds of import contract that speak of whole packages: what a room may import, and who may import a library.
+"""Import contracts that speak of whole packages: what a room may import, who may import a library, who needs none.
 
 import-linter's own "forbidden" wants a list of what is forbidden, and a module that is new is on no such list. Used by
 `lint-imports` through pyproject.toml; `tests/test_import_contracts.py` breaks each contract once.
@@ -6,6 +6,7 @@ import-linter's own "forbidden" wants a list of what is forbidden, and a module 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator
 
 from grimp import ImportGraph
@@ -68,3 +69,28 @@ class ReservedContract(_Directly):
             for importer in graph.find_modules_that_directly_import(library):
                 if not is_within(importer, [self.room]):
                     yield importer, library
+
+
+class StandardLibraryContract(_Directly):
+    """`room`, and all of ours that it imports, needs nothing but the standard library.
+
+    A package's own `__init__` counts as imported by whoever imports a module in it.
+    """
+
+    type_name = "standard_library"
+    room = fields.StringField()
+
+    def broken(self, graph: ImportGraph) -> Iterator[Import]:
+        needed = [module for module in graph.modules if is_within(module, [self.room])]
+        seen: set[str] = set()
+        while needed:
+            module = needed.pop()
+            if module in seen:
+                continue
+            seen.add(module)
+            needed += [".".join(module.split(".")[:depth]) for depth in range(1, module.count(".") + 1)]
+            for imported in graph.find_modules_directly_imported_by(module):
+                if is_within(imported, ("device", "host_tools")):
+                    needed.append(imported)
+                elif imported.split(".")[0] not in sys.stdlib_module_names:
+                    yield module, imported

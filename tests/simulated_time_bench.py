@@ -55,6 +55,9 @@ class SimulatedTimeProbe:
         self.now_s += 0.001
         return self.now_s
 
+    def go_on(self) -> None:
+        pass
+
     def check_outputs(self) -> None:
         self.now_s += 0.01
 
@@ -126,6 +129,10 @@ class SimulatedTimePress:
 
     def press(self, settings: HandSettings, mode: Mode) -> Pressed:
         """Return what becomes of the two presses of a measurement by such a hand."""
+        return self.press_again(settings, mode, None)[0]
+
+    def press_again(self, settings: HandSettings, mode: Mode, before: Capture | None) -> tuple[Pressed, Capture]:
+        """Return the same on a probe that remembers the presses before, and what the next one is to remember."""
         probe = SimulatedTimeProbe(settings)
         clock = types.SimpleNamespace(monotonic=lambda: probe.now_s, sleep=probe.sleep)
         for module in (bench_module, capture_module):
@@ -134,12 +141,13 @@ class SimulatedTimePress:
         bench, board = Bench(probe, probe, probe, budget=budget), StatusBoard()
         board.on_guidance(lambda guidance: probe.hand.follow(guidance.code, probe.now_s))
         capture, began_s = Capture(bench, self.config, board), probe.now_s
+        capture._untouched_s = before._untouched_s if before else 0.0
         frames, reason = [], ""
         try:
             frames = _measure(capture, budget, probe, mode)
         except (PressEnded, DeviceError) as end:
             reason = str(end)
-        return Pressed(not reason, reason, budget.press_s, probe.now_s - began_s, frames, probe)
+        return Pressed(not reason, reason, budget.press_s, probe.now_s - began_s, frames, probe), capture
 
 
 def _measure(capture: Capture, budget: LightBudget, probe: SimulatedTimeProbe, mode: Mode) -> list[Frame]:

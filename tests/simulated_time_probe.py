@@ -16,8 +16,10 @@ from simulated_time import SimulatedTime
 from device.assembly import camera as camera_assembly
 from device.assembly import probe
 from device.config import CameraSection
+from device.errors import LightCutError, LightLineError
 from device.hardware import load_cell
 from device.hardware.camera import RawMonoCamera
+from device.hardware.light_keeper import HOLD_S
 from device.simulation.chips.emulated_amplifier import MAX_UNREAD_BYTES, EmulatedAmplifier
 
 
@@ -33,6 +35,40 @@ class CameraInProcess:
 
 def camera_in_process(settings: CameraSection, open_camera: Callable[[], Any]) -> RawMonoCamera:
     return RawMonoCamera(open_camera(), **camera_assembly._driver_settings(settings))
+
+
+class LineInProcess:
+    """Stands for a `LineServer` and the keeper above it: its address is itself; it falls by the clock of the test."""
+
+    def __init__(self, obey: Callable[[bool], None], is_busy: Callable[[], bool]) -> None:
+        if is_busy():
+            raise LightLineError("The line that enables the LEDs cannot be had: busy.", "See who has it.")
+        self._obey, self._until_s, self.address = obey, 0.0, self
+        obey(False)
+
+    def up(self) -> bool:
+        was_up = self._is_held()
+        self._obey(True)
+        self._until_s = probe.time.monotonic() + HOLD_S
+        return was_up
+
+    def hold(self) -> None:
+        if not self._is_held():
+            raise LightCutError("The light went off: nothing asked for it in time.", "Press again.")
+        self._until_s = probe.time.monotonic() + HOLD_S
+
+    def down(self) -> None:
+        self._obey(False)
+        self._until_s = 0.0
+
+    def close(self) -> None:
+        self.down()
+
+    def _is_held(self) -> bool:
+        """Return whether the line is up still; a driver that comes back too late finds it fallen."""
+        if probe.time.monotonic() >= self._until_s:
+            self.down()
+        return self._until_s > 0.0
 
 
 class Terminal:
@@ -99,6 +135,8 @@ def simulate_time(monkeypatch: pytest.MonkeyPatch) -> SimulatedTime:
     clock.replace("device", monkeypatch)
     monkeypatch.setattr(probe, "CameraServer", CameraInProcess)
     monkeypatch.setattr(probe, "emulated_camera", camera_in_process)
+    monkeypatch.setattr(probe, "LineServer", LineInProcess)
+    monkeypatch.setattr(probe, "emulated_line", lambda line: line)
     terminals = Terminals(clock)
     monkeypatch.setattr(load_cell, "serial", type("serial", (), {"Serial": staticmethod(terminals.opened)}))
     for name, method in (("_plug_in", "plug_in"), ("_unplug", "unplug"), ("_send", "send")):

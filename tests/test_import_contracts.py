@@ -9,13 +9,18 @@ from typing import Any
 import grimp
 import pytest
 from daemon_process import ROOT
-from import_contracts import OnlyContract, ReservedContract
+from import_contracts import OnlyContract, ReservedContract, StandardLibraryContract
 from importlinter import Contract
 from importlinter.contracts.layers import LayersContract
 
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
 CONTRACTS = {entry["name"]: entry for entry in SETTINGS["contracts"]}
-KINDS = {"only": OnlyContract, "reserved": ReservedContract, "layers": LayersContract}
+KINDS = {
+    "only": OnlyContract,
+    "reserved": ReservedContract,
+    "standard_library": StandardLibraryContract,
+    "layers": LayersContract,
+}
 FORBIDDEN = {
     "The device never imports the workstation toolkit": ("device.web.app", "host_tools.scenes.scene"),
     "The workstation takes only measurement, simulation and files from the device": (
@@ -37,11 +42,21 @@ FORBIDDEN = {
         "device.hardware.camera",
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
+    "Care saves and restores what lies on the disk, whether a daemon runs or not": (
+        "device.care.support",
+        "device.instrument.status",
+    ),
     "Settings are read before any part is opened": ("device.settings.layers", "device.hardware.interfaces"),
+    "Provisioning runs where nothing of the probe is installed yet": ("device.provisioning.plan", "device.errors"),
     "Access judges a request, and knows nothing that could answer it": (
         "device.access.request_rules",
         "device.web.problems",
     ),
+    "An update knows errors, durable files and the number of the store's schema": (
+        "device.update.fits",
+        "device.records.store",
+    ),
+    "An update runs on a machine that has Python alone": ("device.files.durable", "numpy"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
     "A release is built from files alone: its builder knows nothing of the toolkit": (
         "host_tools.release.own_wheel",

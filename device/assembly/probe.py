@@ -17,15 +17,16 @@ from typing import Any, Protocol, TypeVar
 from device.assembly.answers import Answers, active_calibration, answers_for
 from device.assembly.camera import emulated_camera, real_camera
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
+from device.assembly.light import emulated_line
 from device.assembly.opened_parts import OpenedParts
-from device.config import Config
+from device.config import Config, LightSection
 from device.config_chips import RAW_BITS
 from device.errors import ConfigError
 from device.files.bundle_file import read_paper_model
 from device.files.shipped import SIMULATED_PROBE
 from device.hardware.computer import SysfsComputer
 from device.hardware.interfaces import Camera, Computer, Lights, LoadCell
-from device.hardware.led_driver import led_driver, open_led_driver
+from device.hardware.led_driver import led_driver, open_enabled_led_driver
 from device.instrument.acquisition.bench import Bench
 from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.acquisition.frame_check import FramePace
@@ -50,6 +51,7 @@ from device.simulation.chips.emulated_computer import EmulatedComputer
 from device.simulation.chips.emulated_storage import EmulatedBundles, EmulatedDisk
 from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.remote_line import LineServer
 from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 from device.simulation.chips.virtual_camera import ExposureRequest, VirtualPicamera2
 from device.simulation.faults import NO_FAULTS, FaultTimeline
@@ -167,7 +169,7 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
 def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
     """Return what `on_top` makes of the real probe's parts; raise `StartFailed` with every part that failed."""
     parts = OpenedParts()
-    lights = parts.open(lambda: open_led_driver(config.light))
+    lights = parts.open(lambda: open_enabled_led_driver(config.light))
     camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
     clock = ClockWatch(config.clock.max_jump_s)
@@ -202,7 +204,7 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     line = emulated_amplifier(config, probe, faults)
     parts.opened.callback(line.close)
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
-    lights = parts.open(lambda: led_driver(config.light, bus))
+    lights = parts.open(lambda: _emulated_lights(config.light, bus, chip, parts, faults))
     camera = parts.open(lambda: emulated_camera(config.camera, server.address))
     cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
@@ -212,6 +214,21 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     guide.on_request(lambda mode: faults.begin_press())
     lead_by_hand(guide, probe)
     return guide
+
+
+def _emulated_lights(
+    light: LightSection, bus: EmulatedI2cBus, chip: EmulatedLedChip, parts: OpenedParts, faults: FaultTimeline
+) -> Lights:
+    """Return the driver on the emulated bus, and on an emulated line where the settings have one."""
+    if light.enable_line is None:
+        return led_driver(light, bus)
+
+    def obey(is_enabled: bool) -> None:
+        chip.enable(is_enabled or faults.is_active("enable_unwired"))
+
+    server = LineServer(obey, lambda: faults.is_active("enable_busy"))
+    parts.opened.callback(server.close)
+    return led_driver(light, bus, emulated_line(server.address))
 
 
 def _require_own_serial(config: Config, scenario: Scenario) -> None:

@@ -1,4 +1,4 @@
-"""A folder of model.json, model.onnx and what a mode adds to the model that has proved itself.
+"""A folder of model.json, its hash, model.onnx and what a mode adds to the model that has proved itself.
 
 The only place that reads bundles from a disk. What their contents must be: device/measurement/bundle.py, and each
 mode's model. Source of the format: docs/contracts.md.
@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.bundle import CARD_FILE, MODEL_FILE, BundleFiles, BundleRefused, ModelBundle
+from device.measurement.bundle import CARD_FILE, CARD_HASH_FILE, MODEL_FILE, BundleFiles, BundleRefused, ModelBundle
 from device.measurement.mode import Mode
 from device.measurement.mode_models import ModeModels
 from device.measurement.paper_mode.estimate import PAPER_UNITS
@@ -92,7 +92,7 @@ def _files(folder: Path, *more: str) -> BundleFiles:
 
     A file that is missing is refused by what needs it: then the card has been read, and may be of an earlier version.
     """
-    names = (CARD_FILE, MODEL_FILE, *(name for name in more if (folder / name).exists()))
+    names = (CARD_FILE, MODEL_FILE, *(name for name in (CARD_HASH_FILE, *more) if (folder / name).exists()))
     return BundleFiles(folder, {name: _bundle_content(folder, name) for name in names})
 
 

@@ -81,6 +81,12 @@ class Lights(Protocol):
     def check_outputs(self) -> None:
         """Raise `OpenLedError` or `HotLedDriverError` when the chip can tell that current does not flow; end dark."""
 
+    def check_line(self) -> bool:
+        """Return whether the chip has shown that it obeys its enable line; raise `LightLineError` when it does not."""
+
+    def go_on(self) -> None:
+        """Say that whoever has the light on goes on; raise `LightCutError` when an enable line took it away."""
+
     def close(self) -> None:
         """Switch all sides off and release the bus."""
 

@@ -91,6 +91,13 @@ class Pca9685:
     def check_outputs(self) -> None:
         """Do nothing: this chip does not measure the current of its outputs."""
 
+    def check_line(self) -> bool:
+        """Return that there is no enable line."""
+        return False
+
+    def go_on(self) -> None:
+        """Do nothing: without an enable line the light stays."""
+
     def close(self) -> None:
         """Darken all outputs and release the bus, also when darkening fails (`LightError`)."""
         try:

@@ -50,6 +50,12 @@ IDENTITY = (0xD2, 0xD4, 0xD8, 0xD0)
 FULL_SCALE = 255
 
 
+def is_reset(bus: I2cBus, address: int) -> bool:
+    """Return whether the chip is as after power-on or RESET: its oscillator is off, which a set-up starts."""
+    [mode1] = I2cChip(bus, address).read(Tlc59116Register.MODE1, 1)
+    return bool(mode1 & OSCILLATOR_OFF)
+
+
 class Tlc59116:
     """The four sides (+x, +y, -x, -y) on outputs 0-3 of one TLC59116. Implements `Lights`."""
 
@@ -125,6 +131,13 @@ class Tlc59116:
         if not self._obeys_brightness:
             self._chip.write(Tlc59116Register.LEDOUT0, SIDES_IN_PWM_MODE[:1])
             self._obeys_brightness = True
+
+    def check_line(self) -> bool:
+        """Return that there is no enable line."""
+        return False
+
+    def go_on(self) -> None:
+        """Do nothing: without an enable line the light stays."""
 
     def close(self) -> None:
         """Darken all sides and release the bus, also when darkening fails (`LightError`)."""

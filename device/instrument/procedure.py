@@ -212,6 +212,7 @@ class Procedure:
         self._book.warn(self._clock.warning())
         self._warn_of_computer()
         self.calibration.require_valid(self._clock.now())
+        self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
         self._require_no_drift(unloaded)

@@ -23,7 +23,8 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
 
 SCHEMA = "tsis.model/1"
-MODEL_FILE, CARD_FILE = "model.onnx", "model.json"
+MODEL_FILE, CARD_FILE, CARD_HASH_FILE = "model.onnx", "model.json", "model.json.sha256"
+"""The network, its card, and the card's own hash as `sha256sum` writes and checks it."""
 RATIO = "1"
 """The unit of a ratio (`feature_definitions.Definition`); cards of earlier versions left it empty, and hold as well."""
 GOLDEN_TOLERANCE = 1e-4
@@ -76,6 +77,25 @@ class BundleFiles:
         if found != stated:
             raise BundleRefused(self.folder, name, found, f"{stated} as {CARD_FILE} states")
         return self.content(name)
+
+    def verified_card(self) -> ModelCard:
+        """Return the card, which is the one that was exported: ranges and intervals hang on it; raises `BundleRefused`.
+
+        What it says of itself comes first: an earlier version's card had no hash.
+        """
+        card = ModelCard(self.folder, self.content(CARD_FILE))
+        stated, found = self.content(CARD_HASH_FILE), card_hash(self.content(CARD_FILE))
+        if found != stated:
+            told = stated.decode(errors="replace").partition(" ")[0][:64]
+            raise BundleRefused(
+                self.folder, f"sha256 of {CARD_FILE}", found.split()[0].decode(), f"{told!r} as {CARD_HASH_FILE} states"
+            )
+        return card
+
+
+def card_hash(card: bytes) -> bytes:
+    """Return what stands in `CARD_HASH_FILE` for a card: guards against a slip or a worn disk, and is no signature."""
+    return f"{hashlib.sha256(card).hexdigest()}  {CARD_FILE}\n".encode()
 
 
 class ModelCard:
@@ -231,8 +251,7 @@ class ModelBundle:
         Raises `BundleRefused` when anything is missing or does not hold.
         """
         self._made_of, self.folder = (files, feature_units), files.folder
-        card = files.content(CARD_FILE)
-        self.fields, self.card_sha256 = ModelCard(files.folder, card), hashlib.sha256(card).hexdigest()
+        self.fields, self.card_sha256 = files.verified_card(), hashlib.sha256(files.content(CARD_FILE)).hexdigest()
         self.card = self.fields.fields
         self.name = str(self.fields.of("name", str))
         self.sha256 = _verified_hash(self.fields, files.content(MODEL_FILE))

@@ -1,7 +1,8 @@
 """Measurements and press jobs in SQLite, recordings in folders beside it.
 
 A recording is on the disk before its row is, and the row before the press is called done. WAL with synchronous=FULL:
-with NORMAL the last acknowledged row may be gone after a power cut. A job that a restart interrupted says so.
+with NORMAL the last acknowledged row may be gone after a power cut. A job that a restart interrupted says so. The
+database has the number of its form (device/records/schema.py): one of a newer release is left as it is.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from device.errors import DiskFullError, StorageError, UnknownResource
+from device.errors import DiskFullError, NewerDataError, StorageError, UnknownResource
 from device.files.recording_file import write_recording
 from device.measurement.recording.recording import Recording
 from device.records.disk import Disk, LocalDisk, read_uncached
+from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 
 StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
@@ -37,7 +39,10 @@ class Store:
     """The device's memory. All methods may be called from any thread."""
 
     def __init__(self, folder: Path, disk: Disk | None = None) -> None:
-        """Open or create; raise `StorageError` when the folder cannot be written or the database is damaged."""
+        """Open or create; raise `StorageError` when the folder cannot be written or the database is damaged.
+
+        Raises `NewerDataError` when a newer release wrote it, before anything in it is changed.
+        """
         self.folder, self._disk, self._lock = folder, disk or LocalDisk(), threading.Lock()
         with ExitStack() as opened:
             self._db = self._open(opened)
@@ -51,13 +56,29 @@ class Store:
             self._take(opened)
             db = sqlite3.connect(self.folder / "tsis.sqlite", check_same_thread=False)
             opened.enter_context(closing(db))
+            self._require_readable(db)
             db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = FULL")
             db.executescript(TABLES)
+            self._number(db)
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
             raise StorageError(f"The store {self.folder} cannot be opened: {error}.", remedy) from error
         return db
+
+    def _require_readable(self, db: sqlite3.Connection) -> None:
+        """Raise `NewerDataError` when this release does not know the database's form."""
+        form = _form(db) or UNNUMBERED
+        if form not in STORE_READS:
+            known = " and ".join(map(str, STORE_READS))
+            cause = f"The measurements in {self.folder} have schema {form}, and this release reads {known}."
+            raise NewerDataError(cause, "Install the newer release again.")
+
+    def _number(self, db: sqlite3.Connection) -> None:
+        """Write the number of the form into the file itself, where an update reads it, and not only into its log."""
+        if _form(db) != STORE_WRITES or store_schema(self.folder / "tsis.sqlite") != STORE_WRITES:
+            db.execute(f"PRAGMA user_version = {STORE_WRITES:d}")
+            db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def _take(self, opened: ExitStack) -> None:
         """Hold the folder for this process: a second daemon on it would end the first one's presses."""
@@ -209,6 +230,10 @@ class Store:
         """Close the database and let go of the folder."""
         with self._lock:
             self._opened.close()
+
+
+def _form(db: sqlite3.Connection) -> int:
+    return int(db.execute("PRAGMA user_version").fetchone()[0])
 
 
 def _is_full(error: Exception) -> bool:

@@ -27,6 +27,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "i2c_nack": (),
     "i2c_stuck": (),
     "i2c_frozen": (),
+    "enable_busy": (),
+    "enable_unwired": (),
     "led_dead": ("side",),
     "led_stuck_on": ("side",),
     "led_dimmed": ("side", "ratio"),

@@ -6,6 +6,8 @@ is refused is never read.
 
 from __future__ import annotations
 
+import logging
+
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from device.access.known_hosts import KnownHosts
@@ -14,6 +16,7 @@ from device.access.safe_headers import SAFE_HEADERS
 from device.errors import DeviceError
 from device.web.problems import problem
 
+log = logging.getLogger(__name__)
 HEADERS = [(name.encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
 
 
@@ -34,6 +37,7 @@ class RequestGuard:
             require_allowed(request, self._hosts)
             bounded = await _bounded(request, receive)
         except DeviceError as error:
+            log.warning("%s %s", error.code, error)
             await problem(error)(scope, receive, _with_safe_headers(send))
         else:
             await self._app(scope, bounded, _with_safe_headers(send))

@@ -21,7 +21,15 @@ from onnx import TensorProto, helper, numpy_helper
 
 from device.files.durable import sync_directory, write_and_sync
 from device.measurement.arrays import Array
-from device.measurement.bundle import CARD_FILE, MODEL_FILE, SCHEMA, largest_deviation, open_session
+from device.measurement.bundle import (
+    CARD_FILE,
+    CARD_HASH_FILE,
+    MODEL_FILE,
+    SCHEMA,
+    card_hash,
+    largest_deviation,
+    open_session,
+)
 from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import UNKNOWNS
 from host_tools.paper_network.evaluate import ErrorTable
@@ -213,7 +221,7 @@ def _golden(trained: Trained) -> dict[str, list[list[float]]]:
 
 
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
-    """Write files to a new folder beside `folder`, make them durable, and only then put it in place.
+    """Write a bundle's files, and the hash of its card, to a new folder; make it durable, then put it in place.
 
     A crash leaves the old folder, the new one or, between two renames, none; never a mixture.
     """
@@ -221,7 +229,7 @@ def write_folder(folder: Path, files: dict[str, bytes]) -> None:
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as scratch:
         fresh, former = Path(scratch) / "new", Path(scratch) / "old"
         fresh.mkdir()
-        for name, content in files.items():
+        for name, content in {**files, CARD_HASH_FILE: card_hash(files[CARD_FILE])}.items():
             write_and_sync(fresh / name, content)
         sync_directory(fresh)
         if folder.exists():

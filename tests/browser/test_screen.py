@@ -5,9 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 import re
-import shutil
 import socket
 import tarfile
 import threading
@@ -18,8 +16,9 @@ from pathlib import Path
 
 import pytest
 import uvicorn
-from daemon_process import PATIENT, QUICK_HAND, ROOT, WAIT_S, Daemon, wait_for
-from playwright.sync_api import Page, expect, sync_playwright
+from chromium import chromium_page
+from daemon_process import PATIENT, QUICK_HAND, ROOT, Daemon, wait_for
+from playwright.sync_api import Page, expect
 
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
@@ -38,30 +37,14 @@ from device.simulation.scenario import Scenario
 from device.web.app import create_app
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 WAITS_AT_N = 0.3
 SHOTS = ROOT / "build" / "screens"
 
 
 @pytest.fixture(scope="module")
 def page():
-    if CHROMIUM is None:
-        assert not os.environ.get("TSIS_REQUIRE_PEERS"), "Chromium is required here but not installed"
-        pytest.skip("no Chromium on this machine: install it to test the screen")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        page = browser.new_page(viewport={"width": 800, "height": 480})
-        page.set_default_timeout(1000 * WAIT_S)
-        expect.set_options(timeout=1000 * WAIT_S)
+    with chromium_page() as page:
         yield page
-        browser.close()
 
 
 class WaitingHand(VirtualHand):

@@ -31,15 +31,36 @@ install -d "$root/boot/firmware"
 printf '[pi5]\ndtparam=ant2\n\n[all]\ncamera_auto_detect=1\n' > "$root/boot/firmware/config.txt"
 echo 'console=tty1 root=PARTUUID=0-02 rootfstype=ext4 rootwait' > "$root/boot/firmware/cmdline.txt"
 
+echo raspberrypi > "$root/etc/hostname"
+echo '127.0.0.1 localhost raspberrypi' > "$root/etc/hosts"
+
 # Packages are fetched once, also over several runs.
 mkdir -p "$folder/packages/partial"
 # The container's own systemd-nspawn, with its own libraries: the host needs neither. Where systemd is not PID 1 nobody
 # can be asked for a scope. DevicePolicy= takes bpf and the unified control groups.
 libraries=$root/usr/lib/x86_64-linux-gnu
-scope=$([[ -d /run/systemd/system ]] || echo --keep-unit)
+scope=()
+[[ -d /run/systemd/system ]] || scope=(--keep-unit)
 export SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1
-# shellcheck disable=SC2086 # no scope is no word
-exec "$root/lib64/ld-linux-x86-64.so.2" --library-path "$libraries:$libraries/systemd" \
-  "$root/usr/bin/systemd-nspawn" --quiet --register=no $scope --directory="$root" --machine=tsis-probe \
-  --system-call-filter=bpf --resolv-conf=off --timezone=off --link-journal=no \
-  --bind="$folder/packages:/var/cache/apt/archives" --boot --console=pipe < /dev/null
+boot() {
+  "$root/lib64/ld-linux-x86-64.so.2" --library-path "$libraries:$libraries/systemd" \
+    "$root/usr/bin/systemd-nspawn" --quiet --register=no "${scope[@]}" --directory="$root" --machine=tsis-probe \
+    --system-call-filter=bpf --resolv-conf=off --timezone=off --link-journal=no --hostname=raspberrypi \
+    --bind="$folder/packages:/var/cache/apt/archives" --boot --console=pipe < /dev/null &
+  container=$!
+}
+ended() {
+  if kill "$container" 2> /dev/null; then wait "$container" || true; fi
+  [[ ${#scope[@]} == 0 ]] || rmdir /sys/fs/cgroup/*/{payload/init.scope,payload,supervisor} 2> /dev/null || true
+}
+trap ended EXIT
+trap 'exit 143' TERM INT
+
+REBOOT=133 # systemd-nspawn(1)
+status=$REBOOT
+while [[ $status == "$REBOOT" ]]; do
+  status=0
+  boot
+  wait "$container" || status=$?
+done
+[[ $status == 0 ]]

@@ -107,7 +107,23 @@ class Bench:
         with self.progress.inside("camera"):
             taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
         self._not_before_s = taken.exposure_start_s + 1e-6
+        self._go_on()
         return taken
+
+    def _go_on(self) -> None:
+        """Hold the light that the frame was taken under, since all before has come back; it may have gone off."""
+        with self._lock:
+            if self._is_over or not (self._is_known and any(self._light)):
+                return
+            self._is_known = False
+            self.lights.go_on()
+            self._is_known = True
+
+    def check_line(self) -> bool:
+        """Return whether the LED chip has shown that it obeys its enable line; raise `LightLineError`. Ends dark."""
+        self.light(DARK)
+        with self._lock, self.progress.inside("light"):
+            return self.lights.check_line()
 
     def _look(self) -> None:
         """Take a frame that nobody needs."""

@@ -46,6 +46,8 @@ CANCELLED = "Cancelled by the operator."
 BINNED_MM = 0.25
 HARD_RATIO = 0.7
 """Press frames from this part of the largest force on are looked at."""
+WOKEN_S = 1.0
+"""A face that has waited in the dark is lit for so long by what is less than a contact."""
 SPOT_CONTRAST = 0.02
 """A bright spot fainter than this is not told from the residue of two presses that were not quite alike."""
 
@@ -74,7 +76,7 @@ class Capture:
         self._tears = TearWatch(config.camera.tear_counts)
         self._dark: list[Frame] = []
         self._reference: list[Frame] = []
-        self._dark_counts = self._before_s = 0.0
+        self._dark_counts = self._before_s = self._untouched_s = 0.0
 
     def unloaded(self) -> list[Frame]:
         """Return dark and lit frames of the untouched probe; waits until it is, and takes them again if it was not.
@@ -127,7 +129,8 @@ class Capture:
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
         depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
-        light fails before it, `LightBudgetError` when it was on for too long.
+        light fails before it, `LightBudgetError` when it was on for too long. A face that nobody touches is not kept
+        lit: the press waits for the touch in the dark.
         """
         wanted = wanted_frames(mode, role, self.press, self._tears)
         rules = PressRules.of(self.press, wanted.window_n, is_ramp=wanted.is_ramp)
@@ -136,11 +139,16 @@ class Capture:
         self._become(self.machine.begin(role, self._before_s))
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
         self.bench.check_lights()
-        self.bench.light(self.lit)
+        lit_s = self.bench.budget.on_s
         while not wanted.is_complete:
             self._require_going_on()
+            if self._untouched_s >= self.light.untouched_s:
+                self._wait_in_the_dark(rules)
+            self.bench.light(self.lit)
             frame = self.bench.take(role)
             self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
+            before_s, lit_s = lit_s, self.bench.budget.on_s
+            self._untouched_s = 0.0 if self.machine.is_touching else self._untouched_s + lit_s - before_s
             if self.machine.is_touching:
                 guidance = wanted.see(frame, self.machine.state)
                 self._drop_outliers(wanted)
@@ -153,6 +161,21 @@ class Capture:
             require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
         self._become(self.machine.hold(self._spot_mm(role, wanted.frames), rules))
         return wanted.frames
+
+    def _wait_in_the_dark(self, rules: PressRules) -> None:
+        """Return once the force says that the probe is about to touch; raises `PressEnded` when that takes too long.
+
+        A zero that is off by less than a contact does not keep it lit: then it takes a rise.
+        """
+        self.bench.light(DARK)
+        lowest_n = force_n = self.bench.force.latest_n
+        while force_n < rules.contact_n and force_n - lowest_n < rules.contact_n / 2:
+            self._require_going_on()
+            self._become(self.machine.see(FrameSeen(time.monotonic(), force_n, force_n, 0.0, 0.0), rules))
+            time.sleep(POLL_S)
+            force_n = self.bench.force.latest_n
+            lowest_n = min(lowest_n, force_n)
+        self._untouched_s = max(self.light.untouched_s - WOKEN_S, 0.0)
 
     def _drop_outliers(self, wanted: WantedFrames) -> None:
         """Take the frames again that are unlike the others, once all are there."""

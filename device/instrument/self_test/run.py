@@ -113,6 +113,7 @@ class SelfTestRun:
             "models": self._models,
             "dark frames": self._camera,
             "LED circuits": self._circuits,
+            "enable line": self._line,
             "zero": self._rest,
             "known weight": self._weight,
             "LED sides": self._sides,
@@ -141,6 +142,13 @@ class SelfTestRun:
         if self._config.light.chip == "pca9685":
             return [not_tested("Light", "LED circuits", "A pca9685 does not measure current.")]
         return [CheckResult("Light", "LED circuits", "passed")]
+
+    def _line(self, job: SelfTestJob) -> list[CheckResult]:
+        if self._config.light.enable_line is None:
+            return [not_tested("Light", "enable line", "There is none: wire one, and set light.enable_line.")]
+        if self._bench.check_line():
+            return [CheckResult("Light", "enable line", "passed")]
+        return [not_tested("Light", "enable line", "A pca9685 does not tell whether its outputs are enabled.")]
 
     def _rest(self, job: SelfTestJob) -> list[CheckResult]:
         press, cell = self._config.press, self._config.cell

@@ -32,6 +32,7 @@ class EmulatedChip(Protocol):
     """What the bus asks of a chip."""
 
     nacks_to_come: int
+    is_answering: bool
 
     def write(self, data: bytes) -> None:
         """Take the bytes of one write message."""
@@ -44,7 +45,10 @@ class EmulatedChip(Protocol):
 
 
 class EmulatedLedChip(EmulatedChip, Protocol):
-    """A chip that makes light of what it is written."""
+    """A chip that makes light of what it is written, while it is enabled."""
+
+    def enable(self, is_enabled: bool) -> None:
+        """Set the level of the line that enables its outputs; without one they are."""
 
     def led_ratio(self) -> LedRatio:
         """Return the light of the four sides as it was set last."""
@@ -80,8 +84,8 @@ class EmulatedI2cBus:
 
     def _acknowledging(self, address: int) -> EmulatedChip:
         chip = self._chips.get(address)
-        if chip is None or chip.nacks_to_come > 0:
-            if chip is not None:
+        if chip is None or chip.nacks_to_come > 0 or not chip.is_answering:
+            if chip is not None and chip.nacks_to_come > 0:
                 chip.nacks_to_come -= 1
             raise OSError(121, "Remote I/O error")  # EREMOTEIO, which macOS does not name
         return chip

@@ -32,8 +32,13 @@ class Pca9685Chip:
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock, self._history = clock, LightHistory()
-        self.nacks_to_come = 0
+        self.nacks_to_come, self.is_answering, self._is_enabled = 0, True, True
         self.power_on()
+
+    def enable(self, is_enabled: bool) -> None:
+        """Set the level of OE: disabled, every output is off at once, whatever its registers hold (7.4, OUTNE = 0)."""
+        self._is_enabled = is_enabled
+        self._history.note(self._clock(), self._light())
 
     def power_on(self) -> None:
         """Put all registers into their state after power-on: asleep, outputs off."""
@@ -92,7 +97,7 @@ class Pca9685Chip:
     def _output(self, number: int) -> float:
         first = LED0_ON_L + 4 * number
         on_low, on_high, off_low, off_high = self._registers[first : first + 4]
-        if self._registers[MODE1] & SLEEP or off_high & FULL:
+        if not self._is_enabled or self._registers[MODE1] & SLEEP or off_high & FULL:
             return 0.0
         if on_high & FULL:
             return 1.0

@@ -32,8 +32,14 @@ class Tlc59116Chip:
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, faults: FaultTimeline = NO_FAULTS) -> None:
         self._clock, self._history, self._faults = clock, LightHistory(), faults
-        self.nacks_to_come = 0
+        self.nacks_to_come, self.is_answering = 0, True
         self.power_on()
+
+    def enable(self, is_enabled: bool) -> None:
+        """Set the level of RESET: low, the chip is off the bus, and its registers are as after power-on."""
+        if not is_enabled:
+            self.power_on()
+        self.is_answering = is_enabled
 
     def power_on(self) -> None:
         """Put all registers into their state after power-on: oscillator off, outputs off."""

@@ -19,6 +19,10 @@ PROVOKED_BY = {
     "test_with_bad_files_the_last_good_settings_are_used_with_a_warning_of_its_own_code",
     "E013": "device/records/test_updates.py::"
     "test_an_update_taken_back_is_a_lasting_warning_until_the_next_one_is_installed",
+    "E010": "device/update/test_refusals.py::test_a_flipped_byte_is_refused_wherever_it_is",
+    "E011": "device/update/test_refusals.py::test_what_is_not_for_this_probe_is_refused",
+    "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
+    "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",

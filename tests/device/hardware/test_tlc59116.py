@@ -155,7 +155,7 @@ def test_a_chip_at_another_address_is_a_light_error(bus):
 class SharedAddress:
     """Two chips at one address: both take what is written, and a 0 from either wins on the line."""
 
-    nacks_to_come = 0
+    nacks_to_come, is_answering = 0, True
 
     def __init__(self, *chips):
         self.chips = chips

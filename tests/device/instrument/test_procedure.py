@@ -17,6 +17,7 @@ from device.errors import (
     ExpiredCalibration,
     LastGoodConfigError,
     LightError,
+    LightRestError,
     ModeUnavailable,
     StorageError,
     UnknownResource,
@@ -248,12 +249,43 @@ def test_what_the_counter_was_not_told_yet_is_kept_at_the_end(rig):
 
 
 def test_a_press_that_ran_out_of_light_fails_with_its_code_and_seconds(rig):
-    rig.bench.budget._max_on_s = 1.0
-    rig.board.on_guidance(
-        lambda guidance: guidance is Guidance.PRESS_LESION and setattr(rig.bench.budget, "_before_s", 2.0)
-    )
+    light_two_seconds(rig, max_on_s=1.0)
     job = rig.press()
     assert (job["state"], job["code"], job["light_on_s"]) == ("failed", "E209", 2.0)
+
+
+def light_two_seconds(rig, max_on_s):
+    """Let the light of the press on the lesion be on for 2 s; return the clock of that light."""
+    now_s = [0.0]
+    budget = rig.bench.budget = LightBudget(max_on_s, clock=lambda: now_s[0])
+    rig.procedure._book._budget = budget
+
+    def light(guidance):
+        if guidance is Guidance.PRESS_LESION:
+            budget.note_lit()
+            now_s[0] += 2.0
+            budget.note_dark()
+
+    rig.board.on_guidance(light)
+    return now_s
+
+
+def test_no_press_begins_until_the_light_has_rested_by_request_or_by_touch(rig, monkeypatch):
+    """2 s of at most 2.1 s are used; the window, 3.15 s, ends after another 1.15 s and more."""
+    monkeypatch.setattr(procedure_module, "AFTER_FAULT_S", 0.01)
+    now_s = light_two_seconds(rig, max_on_s=2.1)
+    assert rig.press()["state"] == "done"
+    rig.until(lambda: rig.board.now.fault is not None)
+    with pytest.raises(LightRestError, match=r"on for 2 s in the last 3 s, of at most 2.1 s. Wait 2 s"):
+        rig.procedure.request()
+    rig.bench.is_at_work = True
+    assert rig.bench.ratio == (0.0, 0.0, 0.0, 0.0)
+    last = rig.board.now.press
+    rig.bench.is_at_work = False
+    now_s[0] += 2.0
+    rig.until(lambda: rig.board.now.fault is None)
+    assert rig.board.now.press == last, "a touch has begun one"
+    assert rig.press()["state"] == "done"
 
 
 def test_a_recording_holds_the_frames_of_all_roles_and_where_they_come_from(rig):

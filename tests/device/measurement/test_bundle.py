@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import pickle
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from daemon_process import ROOT
+from model_card import edit_card
 from onnx import TensorProto, helper
 
-from device.files.bundle_file import read_paper_model, read_quick_model
+from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
 from device.measurement.bundle import BundleRefused
 from device.measurement.feature_definitions import INCLUSION_FIELD_FEATURES
 from device.measurement.paper_mode.estimate import PAPER_UNITS
@@ -45,12 +46,6 @@ def trained() -> Trained:
 def folder(trained: Trained, tmp_path: Path) -> Path:
     export(trained, tmp_path / "demo", software_version="1")
     return tmp_path / "demo"
-
-
-def edit_card(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
-    card = json.loads((folder / "model.json").read_text())
-    change(card)
-    (folder / "model.json").write_text(json.dumps(card))
 
 
 def replace_network(folder: Path, network: bytes) -> None:
@@ -92,6 +87,50 @@ def test_one_tampered_byte_is_refused(folder: Path, position: int) -> None:
     (folder / "model.onnx").write_bytes(network)
     with pytest.raises(BundleRefused, match=r"sha256 of model\.onnx is [0-9a-f]{64}, but must be [0-9a-f]{64}"):
         read_paper_model(folder)
+
+
+def widened(card: dict[str, Any]) -> None:
+    for group in card["training_range"].values():
+        group.update({name: [low - (high - low) / 2, high + (high - low) / 2] for name, (low, high) in group.items()})
+
+
+@pytest.mark.parametrize(
+    ("name", "read"), [("paper", read_paper_model), ("quick", read_quick_model), ("standard", read_ramp_model)]
+)
+def test_a_card_with_doubled_training_ranges_is_refused(
+    tmp_path: Path, name: str, read: Callable[[Path], object]
+) -> None:
+    """All else in it holds: only its hash tells that it is not the one that was exported."""
+    folder = shutil.copytree(ROOT / "models" / name, tmp_path / name)
+    stated = (folder / "model.json.sha256").read_bytes()
+    edit_card(folder, widened)
+    read(folder)
+    (folder / "model.json.sha256").write_bytes(stated)
+    with pytest.raises(
+        BundleRefused, match=r"sha256 of model\.json is [0-9a-f]{64}, but must be '[0-9a-f]{64}' as model"
+    ):
+        read(folder)
+
+
+@pytest.mark.parametrize("stated", [b"", b"no hash", b"\xff\xfe"])
+def test_a_hash_that_is_none_is_refused(folder: Path, stated: bytes) -> None:
+    (folder / "model.json.sha256").write_bytes(stated)
+    with pytest.raises(BundleRefused, match=r"sha256 of model\.json"):
+        read_paper_model(folder)
+
+
+def test_a_bundle_without_the_hash_of_its_card_is_refused(folder: Path) -> None:
+    (folder / "model.json.sha256").unlink()
+    with pytest.raises(BundleRefused, match=r"model\.json\.sha256 is missing, but must be in the bundle's folder"):
+        read_paper_model(folder)
+
+
+@pytest.mark.parametrize("name", ["paper", "quick", "standard"])
+def test_the_hash_of_a_card_is_what_sha256sum_checks(name: str) -> None:
+    done = subprocess.run(
+        ["sha256sum", "--check", "--strict", "model.json.sha256"], cwd=ROOT / "models" / name, check=False
+    )
+    assert done.returncode == 0
 
 
 @pytest.mark.parametrize("file", ["model.onnx", "model.json"])

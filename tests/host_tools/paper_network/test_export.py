@@ -74,7 +74,7 @@ def test_a_new_bundle_replaces_the_old_one_and_leaves_nothing_else(untrained: Tr
     (tmp_path / "demo" / "stray").touch()
     export(untrained, tmp_path / "demo", software_version="2")
     assert read_paper_model(tmp_path / "demo").card["software_version"] == "2"
-    assert set(contents(tmp_path / "demo")) == {"model.onnx", "model.json"}
+    assert set(contents(tmp_path / "demo")) == {"model.onnx", "model.json", "model.json.sha256"}
     assert [path.name for path in tmp_path.iterdir()] == ["demo"]
 
 

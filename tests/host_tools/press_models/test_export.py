@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 import pytest
+from model_card import write_card
 from small_surrogate import COLUMNS, random_surrogate, white_noise
 
 from device.files.bundle_file import read_ramp_model
@@ -273,7 +274,7 @@ def test_the_same_parts_give_the_same_bytes(trained: TrainedRamp, folder: Path, 
     twice = folder, write(trained, tmp_path / "demo")
     first, again = ({path.name: path.read_bytes() for path in at.iterdir()} for at in twice)
     assert first == again
-    assert set(first) == {"model.onnx", "model.json", SURROGATE_FILE, RANGE_FILE, ROUND_FILE}
+    assert set(first) == {"model.onnx", "model.json", "model.json.sha256", SURROGATE_FILE, RANGE_FILE, ROUND_FILE}
 
 
 def changed(trained: TrainedRamp, tmp_path: Path, file: str) -> Path:
@@ -311,7 +312,7 @@ def test_a_card_that_states_no_hash_of_the_round_spot_is_refused_by_the_device(t
     folder = write(trained, tmp_path / "demo")
     card = json.loads((folder / "model.json").read_text())
     del card["round_sha256"]
-    (folder / "model.json").write_text(json.dumps(card))
+    write_card(folder, json.dumps(card))
     (folder / ROUND_FILE).unlink()
     with pytest.raises(BundleRefused, match=r"hash of round.npz is missing, but must be in the card: use a bundle"):
         read_ramp_model(folder)
@@ -321,7 +322,7 @@ def test_a_card_without_a_modes_usual_elongation_is_refused_by_the_device(traine
     folder = write(trained, tmp_path / "demo")
     card = json.loads((folder / "model.json").read_text())
     del card["modes"]["precise"]["elongation_deviations"]
-    (folder / "model.json").write_text(json.dumps(card))
+    write_card(folder, json.dumps(card))
     with pytest.raises(BundleRefused, match="elongation_deviations"):
         read_ramp_model(folder)
 
@@ -330,7 +331,7 @@ def test_a_card_without_limits_is_refused_by_the_device(trained, tmp_path) -> No
     folder = write(trained, tmp_path / "demo")
     card = json.loads((folder / "model.json").read_text())
     del card["modes"]
-    (folder / "model.json").write_text(json.dumps(card))
+    write_card(folder, json.dumps(card))
     with pytest.raises(BundleRefused, match="incomplete .*modes"):
         read_ramp_model(folder)
 

@@ -27,6 +27,9 @@ class FakeHardware:
         self.log.append(ratio)
         return 10.0
 
+    def go_on(self):
+        pass
+
     def check_outputs(self):
         self.log.append("check")
 
@@ -246,3 +249,23 @@ def test_a_thread_that_lights_while_another_darkens_for_good_is_the_one_that_wai
     bench.darken_for_good()
     assert hardware.log[-1] == DARK
     assert LIT not in hardware.log
+
+
+def test_light_is_held_after_each_frame_that_has_come_and_darkness_never(bench, hardware, monkeypatch):
+    monkeypatch.setattr(hardware, "go_on", lambda: hardware.log.append("held"))
+    bench.light(DARK)
+    bench.expose()
+    bench.light(LIT)
+    bench.expose()
+    bench.take("press")
+    assert [entry for entry in hardware.log if entry == "held" or entry == LIT] == [LIT, "held", "held"]
+
+
+def test_light_that_went_off_by_itself_is_set_again_whatever_is_asked_for(bench, hardware, monkeypatch):
+    bench.light(LIT)
+    with monkeypatch.context() as cut:
+        cut.setattr(hardware, "go_on", lambda: (_ for _ in ()).throw(LightError("It went off.", "Press again.")))
+        with pytest.raises(LightError):
+            bench.take("press")
+    bench.light(LIT)
+    assert hardware.log.count(LIT) == 2

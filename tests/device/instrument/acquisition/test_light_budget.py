@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from device.errors import LightBudgetError
+from device.errors import LightBudgetError, LightRestError
 from device.instrument.acquisition.light_budget import LightBudget
 
 
@@ -27,16 +27,21 @@ def test_a_press_may_use_its_budget_and_no_more(clock):
     clock.now_s = 10.0
     budget.require_left()
     clock.now_s = 10.1
-    with pytest.raises(LightBudgetError, match=r"on for 10 s in this press, above 10 s") as end:
+    with pytest.raises(LightBudgetError, match=r"on for 10 s in the last 15 s, above 10 s") as end:
         budget.require_left()
     assert end.value.code == "E209"
 
 
-def test_darkness_costs_nothing_and_the_next_press_begins_anew(clock):
-    budget = LightBudget(10.0, clock=clock)
+def lit(budget, clock, from_s, until_s):
+    clock.now_s = from_s
     budget.note_lit()
-    clock.now_s = 9.0
+    clock.now_s = until_s
     budget.note_dark()
+
+
+def test_darkness_costs_nothing_and_the_seconds_of_the_next_press_begin_anew(clock):
+    budget = LightBudget(10.0, clock=clock)
+    lit(budget, clock, 0.0, 9.0)
     clock.now_s = 100.0
     budget.require_left()
     assert budget.press_s == 9.0
@@ -45,6 +50,56 @@ def test_darkness_costs_nothing_and_the_next_press_begins_anew(clock):
     budget.note_lit()
     clock.now_s = 110.0
     budget.require_left()
+    assert budget.press_s == budget.window_s == 10.0
+
+
+def test_the_light_of_all_presses_of_the_window_counts_and_of_none_before(clock):
+    """Of 15 s: 2 s of the first spell are still inside, 3 s of the second, and 1 s of the one that goes on."""
+    budget = LightBudget(10.0, clock=clock)
+    lit(budget, clock, 0.0, 5.0)
+    lit(budget, clock, 10.0, 13.0)
+    clock.now_s = 17.0
+    budget.note_lit()
+    clock.now_s = 18.0
+    budget.begin_press()
+    assert budget.window_s == 6.0
+    assert budget.on_s == 9.0
+
+
+def test_a_press_is_refused_for_as_long_as_it_takes_until_a_tenth_is_left(clock):
+    """9.5 s are used at 9.5 s, of 10 s in 15 s: at 15.5 s the first half second lies behind the window."""
+    budget = LightBudget(10.0, clock=clock)
+    lit(budget, clock, 0.0, 9.5)
+    with pytest.raises(LightRestError, match=r"on for 10 s in the last 15 s, of at most 10 s. Wait 6 s") as refusal:
+        budget.require_for_press()
+    assert refusal.value.code == "E211"
+    clock.now_s = 15.4
+    with pytest.raises(LightRestError, match="Wait 1 s"):
+        budget.require_for_press()
+    clock.now_s = 15.5
+    budget.require_for_press()
+
+
+def test_presses_one_after_the_other_can_be_lit_for_two_thirds_of_the_time(clock):
+    """For hours, a press of 7 s begun as soon as it may: what was used up never locks the probe for longer than it."""
+    budget, lit_s = LightBudget(300.0, clock=clock), 0.0
+    while clock.now_s < 7200.0:
+        try:
+            budget.require_for_press()
+        except LightRestError:
+            clock.now_s += 1.0
+        else:
+            lit(budget, clock, clock.now_s, clock.now_s + 7.0)
+            budget.require_left()
+            lit_s += 7.0
+    assert 0.55 < lit_s / clock.now_s <= 2 / 3
+
+
+def test_without_a_limit_nothing_is_refused(clock):
+    budget = LightBudget(clock=clock)
+    lit(budget, clock, 0.0, 1e6)
+    budget.require_left()
+    budget.require_for_press()
 
 
 def test_what_was_saved_is_not_told_twice(clock):

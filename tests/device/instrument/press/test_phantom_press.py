@@ -48,6 +48,9 @@ class Rig:
         self.lights.append(ratio)
         return self.probe.set_ratio(ratio)
 
+    def go_on(self):
+        pass
+
     def check_outputs(self):
         self.probe.check_outputs()
 

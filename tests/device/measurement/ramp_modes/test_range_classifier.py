@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from daemon_process import ROOT
+from model_card import write_card
 from onnx import TensorProto, helper, numpy_helper
 
 from device.files.bundle_file import read_ramp_model
@@ -26,10 +27,6 @@ def folder(tmp_path):
 
 def card_of(folder):
     return json.loads((folder / "model.json").read_text(encoding="utf-8"))
-
-
-def write_card(folder, card):
-    (folder / "model.json").write_text(json.dumps(card), encoding="utf-8")
 
 
 @pytest.mark.parametrize("mode", RAMP_MODES)
@@ -71,7 +68,7 @@ def test_a_changed_bit_is_refused(folder):
 def test_a_card_without_the_entry_is_refused(folder):
     card = card_of(folder)
     del card["range"]
-    write_card(folder, card)
+    write_card(folder, json.dumps(card))
     with pytest.raises(BundleRefused, match="range is missing"):
         read_ramp_model(folder)
 
@@ -92,7 +89,7 @@ def test_a_card_without_the_entry_is_refused(folder):
 def test_golden_log_odds_that_it_does_not_give_are_refused(folder, golden, words):
     card = card_of(folder)
     card["range"]["golden"] = golden
-    write_card(folder, card)
+    write_card(folder, json.dumps(card))
     with pytest.raises(BundleRefused, match=rf"range\.golden{words}"):
         read_ramp_model(folder)
 
@@ -116,7 +113,7 @@ def test_a_network_of_other_outputs_or_of_so_many_rows_is_refused(folder, other)
     first = [row[0] for row in card["golden"]["features"]]
     card["range"] |= {"sha256": hashlib.sha256(other).hexdigest(), "golden": dict.fromkeys(RAMP_MODES, first)}
     (folder / RANGE_FILE).write_bytes(other)
-    write_card(folder, card)
+    write_card(folder, json.dumps(card))
     with pytest.raises(BundleRefused, match=r"(in|out)puts of range\.onnx"):
         read_ramp_model(folder)
 

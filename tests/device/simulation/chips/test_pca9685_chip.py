@@ -84,3 +84,17 @@ def test_light_changes_at_the_end_of_the_period_in_which_the_transaction_ended()
     now_s[0] = 1.5 * period_s
     send(chip, "06 00 10 00 00")
     assert [chip.ratio_at(periods * period_s)[0] for periods in (1.0, 1.99, 2.01)] == [0.0, 0.0, 1.0]
+
+
+def test_outputs_that_are_not_enabled_are_dark_and_its_registers_stay():
+    now_s = [1.0]
+    chip = Pca9685Chip(clock=lambda: now_s[0])
+    chip.write(bytes([0x00, 0x20]))
+    chip.write(bytes([0x06, 0x00, 0x10, 0x00, 0x00]))
+    chip.stop()
+    now_s[0] = 2.0
+    chip.enable(False)
+    assert (chip.ratio_at(1.9)[0], chip.ratio_at(2.0)[0], chip.is_answering) == (1.0, 0.0, True)
+    now_s[0] = 3.0
+    chip.enable(True)
+    assert chip.ratio_at(3.0)[0] == 1.0

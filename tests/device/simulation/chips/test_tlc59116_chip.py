@@ -144,3 +144,17 @@ def test_overheating_is_remembered_until_it_is_cleared():
     assert flags(chip) == 0
     send(chip, "01 80", "01 00")
     assert flags(chip) == 0b1111
+
+
+def test_a_reset_line_that_is_low_takes_it_off_the_bus_dark_and_with_the_registers_of_a_power_on():
+    chip = Tlc59116Chip()
+    fresh = chip.read(32)
+    chip.write(bytes([0x00, 0x00]))
+    chip.write(bytes([0x14, 0b01]))
+    chip.stop()
+    assert max(chip.led_ratio()) == 1.0
+    chip.enable(False)
+    assert (max(chip.led_ratio()), chip.is_answering) == (0.0, False)
+    chip.enable(True)
+    chip.write(bytes([0x00]))
+    assert (chip.read(32), chip.is_answering, max(chip.led_ratio())) == (fresh, True, 0.0)

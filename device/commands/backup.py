@@ -1,0 +1,49 @@
+"""`python -m device backup`: all that this probe's card holds and no release brings back, to one file.
+
+Exit codes: 0 ok, 1 nothing was written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from device.care.backup import write_backup
+from device.config import Config
+
+EXAMPLES = """examples:
+  python -m device backup /media/stick/TSIS-0007.backup         while the daemon runs or not
+  python -m device --root /mnt/card backup TSIS-0007.backup     of the card of a probe that is dead
+Patients' measurements are inside: keep it as you keep them. It is not encrypted.
+"""
+
+
+def add_backup_command(commands: Any) -> None:
+    """Add `backup` to the daemon's commands."""
+    backup = commands.add_parser(
+        "backup", help="save measurements, settings, certificates and own models to a file", epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    backup.add_argument("file", type=Path, metavar="FILE", help="the backup, a new file")
+    backup.add_argument("--json", action="store_true", help="as one JSON object")
+
+
+def run_backup_command(options: argparse.Namespace, config: Config) -> int:
+    """Write the backup and say what is in it; return the exit code, or raise what kept it from being written."""
+    report = write_backup(config, options.file, options.root)
+    if options.json:
+        print(json.dumps(asdict(report)))
+        return 0
+    size_mb = report.size_bytes / 1e6
+    print(
+        f"{report.path}: {report.measurements} measurements of {report.serial}, {report.files} files, {size_mb:.1f} MB"
+    )
+    for one in report.missing:
+        print(f"not in it: recording {one}, which is not on the disk any more")
+    for one in report.left_out:
+        print(f"not in it: {one}, a link")
+    print("Every file was read back. Patients' measurements are inside: keep it as you keep them.")
+    return 0

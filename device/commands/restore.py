@@ -1,0 +1,54 @@
+"""`python -m device restore`: a backup back to a new card, or only its measurements to another probe.
+
+Exit codes: 0 ok, 1 refused or failed: then no measurement of the backup is there yet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from device.care.restore import check_backup, restore_backup
+
+EXAMPLES = """examples:
+  python -m device restore --check TSIS-0007.backup     read every byte, and say what is inside
+  sudo systemctl stop tsis
+  sudo /opt/tsis/current/bin/python -m device restore TSIS-0007.backup
+  python -m device restore --records-only OTHER.backup  the measurements of another probe, not its settings
+"""
+
+
+def add_restore_command(commands: Any) -> None:
+    """Add `restore` to the daemon's commands."""
+    restore = commands.add_parser(
+        "restore", help="bring a backup to a card that holds no measurements yet", epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    restore.add_argument("file", type=Path, metavar="FILE", help="the backup")
+    restore.add_argument("--check", action="store_true", help="only read it, and say what is inside")
+    restore.add_argument(
+        "--records-only", action="store_true", help="measurements and recordings, also of another probe"
+    )
+    restore.add_argument("--json", action="store_true", help="as one JSON object")
+
+
+def run_restore_command(options: argparse.Namespace, own: Mapping[str, Any]) -> int:
+    """Check or restore; return the exit code, or raise what is wrong. `own` is what this machine's settings say."""
+    if options.check:
+        facts = check_backup(options.file)
+        told = "\n".join(f"{name:20} {value}" for name, value in facts.items())
+        print(json.dumps(facts) if options.json else f"{told}\nEvery file in it is whole.")
+        return 0
+    report = restore_backup(options.file, own, options.root, records_only=options.records_only)
+    if options.json:
+        print(json.dumps(asdict(report)))
+        return 0
+    print(f"{report.data}: {report.measurements} measurements of {report.serial}, as of {report.made_at}")
+    for path in report.kept_aside:
+        print(f"what stood in its place lies in {path}")
+    print("Start the daemon: systemctl start tsis.")
+    return 0

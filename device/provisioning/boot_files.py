@@ -1,0 +1,129 @@
+"""What is read before Linux runs, and the partition that it lies on: Raspberry Pi's config.txt and cmdline.txt.
+
+Where a machine has no such file, as a container, there is nothing to be set. The boot partition is FAT, which has no
+journal: a power cut while it is written may leave a card that does not boot. So it is mounted read-only, but for apt.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from device.files.durable import write_durably
+from device.provisioning.item import TextItem
+from device.provisioning.target import TargetMachine
+
+FOLDER = "/boot/firmware"
+CONFIG, KERNEL_LINE = f"{FOLDER}/config.txt", f"{FOLDER}/cmdline.txt"
+BEGIN, END = "# begin of the probe's own lines", "# end of the probe's own lines"
+MEMORY = "cgroup_enable=memory"
+"""Raspberry Pi's kernel counts memory by unit only then, and without it no MemoryMax= holds."""
+FSTAB = "/etc/fstab"
+APT_HOOK = f"""// Made by provisioning: the boot partition is read-only, but while packages are installed.
+DPkg::Pre-Invoke {{"mountpoint -q {FOLDER} && mount -o remount,rw {FOLDER} || true";}};
+DPkg::Post-Invoke {{"mountpoint -q {FOLDER} && mount -o remount,ro {FOLDER} || true";}};
+"""
+
+
+@dataclass(frozen=True)
+class BootSettingsItem:
+    """I2C on the header, and the sensor by its name: what detection finds is only Raspberry Pi's own cameras."""
+
+    camera_overlay: str = "ov9281"
+    title: str = "I2C and camera at boot"
+    wants_reboot: bool = True
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return whether config.txt lacks our lines; nothing where there is no such file."""
+        return _differs(target, CONFIG, self._with_ours, "does not set I2C and camera")
+
+    def apply(self, target: TargetMachine) -> None:
+        """Put our lines at its end, where they hold for every model and override what is above."""
+        _rewrite(target, CONFIG, self._with_ours)
+
+    def _with_ours(self, text: str) -> str:
+        lines = ["[all]", "dtparam=i2c_arm=on", "camera_auto_detect=0", f"dtoverlay={self.camera_overlay}"]
+        before, begin, rest = text.partition(f"{BEGIN}\n")
+        after = rest.partition(f"{END}\n")[2] if begin else ""
+        kept = before.rstrip("\n") + "\n" + after
+        return "\n".join([kept.rstrip("\n"), "", BEGIN, *lines, END, ""]).lstrip("\n")
+
+
+@dataclass(frozen=True)
+class KernelLineItem:
+    """The word of the kernel's command line by which the limits of memory hold."""
+
+    title: str = "limits of memory at boot"
+    wants_reboot: bool = True
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return whether cmdline.txt lacks the word; nothing where there is no such file."""
+        return _differs(target, KERNEL_LINE, _with_word, f"lacks {MEMORY}")
+
+    def apply(self, target: TargetMachine) -> None:
+        """Add it at the end of the one line."""
+        _rewrite(target, KERNEL_LINE, _with_word)
+
+
+@dataclass(frozen=True)
+class ReadOnlyBootItem:
+    """The boot partition, mounted read-only from the next boot on."""
+
+    title: str = "boot partition read-only"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return whether fstab mounts it for writing, or apt would be in the way."""
+        return _differs(target, FSTAB, _read_only, f"mounts {FOLDER} for writing") or _apt_hook().differs(target)
+
+    def apply(self, target: TargetMachine) -> None:
+        """Change its line in fstab, and let apt write all the same."""
+        if target.text(FSTAB):
+            write_durably(target.path(FSTAB), _read_only(target.text(FSTAB)).encode())
+            target.path(FSTAB).chmod(0o644)
+        _apt_hook().apply(target)
+
+
+def _apt_hook() -> TextItem:
+    return TextItem("apt", "/etc/apt/apt.conf.d/90-tsis-boot", APT_HOOK)
+
+
+def _with_word(line: str) -> str:
+    return line if MEMORY in line.split() else f"{line.strip()} {MEMORY}\n"
+
+
+def _read_only(table: str) -> str:
+    return "".join(_read_only_line(line) for line in table.splitlines(keepends=True))
+
+
+def _read_only_line(line: str) -> str:
+    words = line.split()
+    if len(words) < 4 or words[0].startswith("#") or words[1] != FOLDER or "ro" in words[3].split(","):
+        return line
+    options = [option for option in words[3].split(",") if option != "rw"] + ["ro"]
+    return "\t".join([*words[:3], ",".join(options), *words[4:]]) + "\n"
+
+
+def _differs(target: TargetMachine, file: str, changed: Callable[[str], str], words: str) -> str:
+    text = target.text(file)
+    return f"{file} {words}" if text and changed(text) != text else ""
+
+
+def _rewrite(target: TargetMachine, file: str, changed: Callable[[str], str]) -> None:
+    with _writable(target):
+        write_durably(target.path(file), changed(target.text(file)).encode())
+
+
+@contextmanager
+def _writable(target: TargetMachine) -> Iterator[None]:
+    """Let the boot partition be written meanwhile, also when we have made it read-only before."""
+    is_read_only = bool(os.statvfs(target.path(FOLDER)).f_flag & os.ST_RDONLY)
+    if is_read_only:
+        target.run("mount", "-o", "remount,rw", FOLDER)
+    try:
+        yield
+    finally:
+        if is_read_only:
+            target.run("mount", "-o", "remount,ro", FOLDER)

@@ -1,0 +1,98 @@
+"""The probe's units as links into the release that runs, the first release, and that all of it goes.
+
+The daemon and what belongs to it are those of `current`; boot check and installer are those of `updater`, the last
+release that has proved itself. So a release changes its units by being switched to, and a bad one cannot take the way
+back with it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass
+
+from device.provisioning.item import LinkItem, told
+from device.provisioning.target import ProvisioningFailed, TargetMachine, systemd_files
+
+CURRENT, UPDATER = "/opt/tsis/current", "/opt/tsis/updater"
+UNITS = "/etc/systemd/system"
+UNIT_KINDS = (".service", ".path", ".socket", ".timer")
+OF_UPDATER = ("tsis-boot.", "tsis-update.")
+AT_BOOT = "WantedBy=multi-user.target"
+OTHER_FOLDERS = {
+    ".rules": "/etc/udev/rules.d/60-",
+    ".sysusers.conf": "/etc/sysusers.d/",
+    ".tmpfiles.conf": "/etc/tmpfiles.d/",
+}
+"""Where files go that are no units, by how their names end."""
+GOING = ("tsis.service", "tsis-update.path")
+RELOAD = ("systemctl", "daemon-reload")
+UDEV = (("udevadm", "control", "--reload"), ("udevadm", "trigger", "--subsystem-match=tty"))
+
+
+def unit_links() -> LinkItem:
+    """Return the links of all units, and of those that start at boot."""
+    links = {}
+    for name, text in systemd_files():
+        if name.endswith(UNIT_KINDS):
+            release = UPDATER if name.startswith(OF_UPDATER) else CURRENT
+            links[f"{UNITS}/{name}"] = f"{release}/systemd/{name}"
+            if AT_BOOT in text.splitlines():
+                links[f"{UNITS}/multi-user.target.wants/{name}"] = f"../{name}"
+    return LinkItem("systemd's units", links, (RELOAD,))
+
+
+def other_links() -> LinkItem:
+    """Return the links of rules, users and folders."""
+    links = {}
+    for name, _ in systemd_files():
+        for ending, before in OTHER_FOLDERS.items():
+            if name.endswith(ending):
+                as_there = name if ending == ".rules" else name.removesuffix(ending) + ".conf"
+                links[f"{before}{as_there}"] = f"{CURRENT}/systemd/{name}"
+    return LinkItem("udev's rules, users and folders of the release", links)
+
+
+@dataclass(frozen=True)
+class FirstReleaseItem:
+    """A release that is installed. Which one is none of ours later on: that is what `make deploy` is for."""
+
+    file: str
+    title: str = "release"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return whether none is installed."""
+        whole = all(target.path(f"{link}/manifest.json").is_file() for link in (CURRENT, UPDATER))
+        return "" if whole else "no release is installed"
+
+    def apply(self, target: TargetMachine) -> None:
+        """Let the installer of this wheel install it, telling its progress as it goes."""
+        if not self.file:
+            raise ProvisioningFailed("No release file was given.", "Name it: --release.")
+        command = [sys.executable, "-m", "device.update", "--root", str(target.root), "install", self.file]
+        ended = subprocess.run(command, check=False)
+        if ended.returncode:
+            raise ProvisioningFailed(f"The release was not installed (exit code {ended.returncode}).", "See above.")
+        for udev in UDEV:
+            target.asked(*udev)  # a machine without udev has no parts that are plugged in either
+
+
+@dataclass(frozen=True)
+class GoingItem:
+    """The daemon and the updater's path, going."""
+
+    title: str = "the probe goes"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return which of them does not."""
+        states = target.asked("systemctl", "is-active", *GOING).split()
+        pairs = zip(GOING, [*states, *["unknown"] * len(GOING)], strict=False)
+        return told([f"{unit} is {state}" for unit, state in pairs if state != "active"])
+
+    def apply(self, target: TargetMachine) -> None:
+        """Start them, and the screen."""
+        target.run_each(
+            (RELOAD, ("systemctl", "start", *GOING), ("systemctl", "start", "--no-block", "tsis-kiosk.service"))
+        )

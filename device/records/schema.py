@@ -1,0 +1,34 @@
+"""Which form the store's database has, and which forms this code reads: SQLite's `user_version`.
+
+A release's manifest states both numbers (`data_schemas.store`), so that an update can be refused before it writes what
+the release one back cannot read. Standard library only: the manifest's builder reads them without the daemon's
+packages.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+STORE_WRITES = 1
+"""The form that this code leaves behind. Whoever changes the tables raises it, and converts what it finds."""
+STORE_READS = (1,)
+"""The forms that this code can open; one release long it reads and leaves the older one."""
+UNNUMBERED = 1
+"""What a database without a number is: the form before it had one."""
+MAGIC, VERSION_AT = b"SQLite format 3\0", 60
+"""https://www.sqlite.org/fileformat2.html#user_version_number"""
+
+
+def store_schema(database: Path) -> int | None:
+    """Return the form of a database by its header, or None when there is none; opens no SQLite and takes no lock.
+
+    The store brings the number to the file itself, not only to its log, before it writes a record.
+    """
+    try:
+        with database.open("rb") as file:
+            header = file.read(100)
+    except FileNotFoundError:
+        return None
+    if not header.startswith(MAGIC) or len(header) < VERSION_AT + 4:
+        return None
+    return int.from_bytes(header[VERSION_AT : VERSION_AT + 4], "big") or UNNUMBERED

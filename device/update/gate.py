@@ -1,0 +1,123 @@
+"""Whether a release is healthy: its daemon is asked for every part, until all are ready three times in a row.
+
+A fault that was there before the switch is not the new release's. The models' answers and the store depend on no
+cable, and have to be ready always.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+PATH = "/api/v1/health/parts"
+PARTS = ("camera", "light", "force", "answers", "store")
+ALWAYS = ("answers", "store")
+ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
+Baseline = dict[str, str | None]
+"""The parts that were not ready before the switch, each with its fault's code."""
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long a release may take to be healthy, and how often it has to be seen so."""
+
+    within_s: float = 120.0
+    every_s: float = 2.0
+    looks: int = 3
+
+
+@dataclass(frozen=True)
+class PartsHealth:
+    """What the daemon says: which release it is, and of each part None when ready, else its fault's code or ""."""
+
+    release: str
+    faults: Mapping[str, str | None]
+
+
+class NotHealthy(Exception):  # noqa: N818 - it is an answer, not an error of the updater
+    """The release was not healthy in its time; says what was missing at the last look."""
+
+
+class DaemonGone(NotHealthy):
+    """Nobody listens on the port, or who did has just gone."""
+
+
+def ask_parts(port: int) -> PartsHealth:
+    """Return what the daemon of this machine says of its parts; raise `NotHealthy` when it does not answer so."""
+    line = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWER_WITHIN_S)
+    try:
+        line.request("GET", PATH)
+        answer = line.getresponse()
+        return _read(json.loads(answer.read(MOST_BYTES)))
+    except (OSError, http.client.HTTPException) as error:
+        kind = DaemonGone if isinstance(error, ConnectionError) else NotHealthy
+        raise kind(f"the daemon does not answer on port {port} ({error or type(error).__name__})") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise NotHealthy(f"the daemon's answer on port {port} is not that of a probe") from None
+    finally:
+        line.close()
+
+
+def take_baseline(port: int, patience: Patience) -> Baseline | None:
+    """Return what is not ready before the switch, or None when the daemon does not answer for a few looks."""
+    for look in range(patience.looks):
+        if look:
+            time.sleep(patience.every_s)
+        try:
+            return {part: code for part, code in ask_parts(port).faults.items() if code is not None}
+        except NotHealthy:
+            continue
+    return None
+
+
+def wait_until_healthy(
+    port: int, release: str, baseline: Baseline | None, patience: Patience, told: Callable[[float], None]
+) -> None:
+    """Return when the release was healthy at every one of some looks in a row.
+
+    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone. `told` hears, from 0 to 1,
+    how much of the time is over.
+    """
+    began, healthy, reason = time.monotonic(), 0, ""
+    while healthy < patience.looks:
+        spent = time.monotonic() - began
+        told(min(1.0, spent / patience.within_s))
+        try:
+            _require_healthy(ask_parts(port), release, baseline)
+            healthy += 1
+        except NotHealthy as error:
+            if healthy and isinstance(error, DaemonGone):
+                raise NotHealthy(f"It was ready, and then {error}.") from None  # though systemd starts it again
+            healthy, reason = 0, str(error)
+        if healthy < patience.looks:
+            if spent > patience.within_s:
+                raise NotHealthy(f"After {patience.within_s:g} s {reason or 'it was not ready often enough'}.")
+            time.sleep(patience.every_s)
+
+
+def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | None) -> None:
+    if health.release != release:
+        raise NotHealthy(f"the daemon that answers is {health.release or 'of no release'}")
+    for part in PARTS:
+        if part not in health.faults:
+            raise NotHealthy(f"the daemon says nothing of its {part}")
+        code = health.faults[part]
+        if code is not None and not _is_excused(part, code, baseline):
+            raise NotHealthy(f"{part} is not ready ({code or 'without a code'})")
+
+
+def _is_excused(part: str, code: str, baseline: Baseline | None) -> bool:
+    """Return whether a fault is not held against the release: it was there, or nobody could tell whether it was."""
+    if part in ALWAYS:
+        return False
+    return baseline is None or baseline.get(part) == code
+
+
+def _read(record: Mapping[str, Mapping[str, Mapping[str, object]]]) -> PartsHealth:
+    faults = {
+        name: None if part["ready"] is True else str(part["code"] or "") for name, part in record["parts"].items()
+    }
+    return PartsHealth(str(record["release"] or ""), faults)

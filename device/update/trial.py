@@ -1,0 +1,216 @@
+"""A release on trial: switched to, watched, then committed or left. Each part may be interrupted, and goes on.
+
+What is to be done stands in state.json before it is done. A trial that was interrupted is carried through from there:
+by `resume` while the machine runs, by device/update/boot_check.py when it starts.
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+from device.errors import RolledBack, UpdateFailed
+from device.files.durable import sync_directory, write_durably
+from device.update.gate import NotHealthy, Patience, wait_until_healthy
+from device.update.layout import UpdateLayout, make_link, point
+from device.update.manifest import read_installed
+from device.update.progress import ENDED, ProgressReport, read_progress
+from device.update.services import reload_units, start_daemon, stop_daemon
+from device.update.settings import daemon_port
+from device.update.state import PendingRelease, UpdateState, counter_of, read_state, write_state
+from device.update.unpack import remove_release
+
+log = logging.getLogger(__name__)
+INTERRUPTED = "The power went, or the updater was killed, before the release was whole."
+REMEDY = "The release that ran before does again; the maker of the failed one needs to know the reason."
+
+
+@dataclass(frozen=True)
+class Updater:
+    """What every step of an update needs: the places, who is told, how long to wait."""
+
+    layout: UpdateLayout
+    report: ProgressReport
+    patience: Patience = field(default_factory=Patience)
+
+
+def begin_trial(updater: Updater, pending: PendingRelease) -> None:
+    """Write down that a release is on trial. Raises `OSError`; then nothing was begun."""
+    layout, state = updater.layout, read_state(updater.layout)
+    try:
+        if state.committed:
+            make_link(layout.way_back, layout.release(state.committed))
+        write_state(layout, replace(state, pending=pending))
+    except OSError:
+        with suppress(OSError):
+            write_state(layout, state)  # the first may have failed after it had replaced the file
+        raise
+
+
+def carry_through(updater: Updater) -> None:
+    """Bring the trial that is written down to its end, from wherever it is; raise `RolledBack` when it was left.
+
+    Raises `OSError` when the disk refuses even the return; then the next call goes on with it.
+    """
+    pending = read_state(updater.layout).pending
+    if not pending:
+        finish_commit(updater.layout)
+        tell_interrupted(updater)
+        return
+    updater.report.release = pending.release
+    if pending.leaving:
+        leave(updater, pending.leaving, is_bad=pending.is_bad)
+    try:
+        _switch(updater, pending.release)
+        _watch(updater, pending)
+        commit(updater)
+    except NotHealthy as reason:
+        leave(updater, str(reason), is_bad=True)
+    except (OSError, UpdateFailed) as error:
+        leave(updater, f"A step failed: {error}", is_bad=False)
+
+
+def commit(updater: Updater) -> None:
+    """Make the release on trial the one that comes back from now on. Raises `OSError`; then it is still on trial."""
+    state = read_state(updater.layout)
+    pending = state.pending
+    if not pending:
+        return
+    floor = max(state.floor, counter_of(pending.release))
+    committed = replace(
+        state, committed=pending.release, previous=state.committed, pending=None, floor=floor, is_finishing=True,
+        bad={release: reason for release, reason in state.bad.items() if counter_of(release) > floor},
+    ).noted(pending.release, "committed", "asked for by the operator" if pending.is_roll_back else "")  # fmt: skip
+    write_state(updater.layout, committed)
+    try:
+        finish_commit(updater.layout)
+    except OSError as error:
+        log.warning("What follows the commit is left to the next start: %s", error)
+    updater.report.end("committed")
+
+
+def finish_commit(layout: UpdateLayout) -> None:
+    """Do what follows a commit, as often as it takes: the updater's link, the keys, old releases. Raises `OSError`."""
+    state = read_state(layout)
+    if not state.is_finishing or not state.committed:
+        return
+    point(layout.updater, layout.release(state.committed))
+    signers = read_installed(layout, state.committed).signers
+    if signers and counter_of(state.committed) == state.floor:  # a release that came back brings no old keys back
+        write_durably(layout.signers, signers.encode())
+        layout.signers.chmod(0o644)
+    remove_others(layout, state)
+    write_state(layout, replace(state, is_finishing=False))
+
+
+def leave(updater: Updater, reason: str, *, is_bad: bool, starts_daemon: bool = True) -> None:
+    """Bring the committed release back; always raises `RolledBack` with the reason, when there is nothing more to do.
+
+    The reason is written down first. On a full disk that waits until the failed release is removed.
+    """
+    layout, state = updater.layout, read_state(updater.layout)
+    pending = state.pending
+    if not pending:
+        return
+    if not pending.leaving:
+        with suppress(OSError):
+            write_state(layout, replace(state, pending=replace(pending, leaving=reason, is_bad=is_bad)))
+    problems = _return_to(layout, state, starts_daemon)
+    left = _left(state, replace(pending, is_bad=is_bad), reason)
+    try:
+        write_state(layout, left)
+        remove_others(layout, left)
+    except OSError:
+        remove_others(layout, left)
+        write_state(layout, left)
+    told = RolledBack(" ".join([f"{pending.release} was left: {reason}", *problems]), REMEDY)
+    updater.report.release = pending.release
+    updater.report.end("rolled_back", told)
+    raise told
+
+
+def remove_others(layout: UpdateLayout, state: UpdateState) -> None:
+    """Remove every release that is neither committed, previous nor on trial, and what is none yet. Raises `OSError`."""
+    keeps = state.keeps()
+    if not layout.releases.is_dir():
+        return
+    for folder in sorted(layout.releases.iterdir()):
+        if folder.name not in keeps:  # nor has one that is none yet, or no longer, such a name
+            remove_release(folder)
+
+
+def return_link(layout: UpdateLayout, state: UpdateState) -> bool:
+    """Let `current` point to the committed release, or nowhere when there is none; return whether that changed it."""
+    if layout.linked(layout.current) == state.committed:
+        return False
+    if state.committed and layout.linked(layout.way_back) == state.committed:
+        layout.way_back.replace(layout.current)
+    elif state.committed:
+        point(layout.current, layout.release(state.committed))
+    else:
+        layout.current.unlink(missing_ok=True)
+    sync_directory(layout.programs)
+    return True
+
+
+def tell_interrupted(updater: Updater) -> None:
+    """Say how an update ended of which progress.json tells only the middle."""
+    layout, state, report = updater.layout, read_state(updater.layout), updater.report
+    last = read_progress(layout)
+    if last.state in (*ENDED, "idle"):
+        return
+    report.release, report.file = last.release, last.file
+    if last.release and last.release == state.committed:
+        report.end("committed")
+    elif last.release in state.bad:
+        report.end("rolled_back", RolledBack(f"{last.release} was left: {state.bad[last.release]}", REMEDY))
+    else:
+        report.end("refused", UpdateFailed(INTERRUPTED, "Send it again; the release before runs unchanged."))
+    report.release, report.file = "", ""
+
+
+def _switch(updater: Updater, release: str) -> None:
+    """Stop the daemon, exchange the link, start the daemon. Done again, it changes nothing."""
+    layout, report = updater.layout, updater.report
+    if layout.linked(layout.current) != release:
+        report.tell("switching", 0.6, "stop")
+        stop_daemon()
+        report.tell("switching", 0.62, "link")
+        point(layout.current, layout.release(release))
+    report.tell("switching", 0.64, "start")
+    reload_units()
+    start_daemon()
+
+
+def _watch(updater: Updater, pending: PendingRelease) -> None:
+    updater.report.tell("checking", 0.65, "health")
+    wait_until_healthy(
+        daemon_port(updater.layout), pending.release, pending.baseline, updater.patience,
+        lambda part: updater.report.tell("checking", 0.65 + 0.3 * part, "health"),
+    )  # fmt: skip
+
+
+def _return_to(layout: UpdateLayout, state: UpdateState, starts_daemon: bool) -> list[str]:
+    """Bring link and daemon back; return what did not work, each as a sentence. Raises `OSError` for the link alone."""
+    is_current = layout.linked(layout.current) == state.committed
+    wanted = ([] if is_current else [stop_daemon]) if starts_daemon else []
+    problems = [problem for step in wanted if (problem := _attempt(step))]
+    return_link(layout, state)
+    after = [reload_units, start_daemon] if starts_daemon and state.committed else [reload_units]
+    return problems + [problem for step in after if (problem := _attempt(step))]
+
+
+def _attempt(step: object) -> str | None:
+    try:
+        step()  # type: ignore[operator]
+    except UpdateFailed as error:
+        return str(error)
+    return None
+
+
+def _left(state: UpdateState, pending: PendingRelease, reason: str) -> UpdateState:
+    """Return the state without the trial; a new release is bad from now on, unless there was nothing to return to."""
+    is_bad = pending.is_bad and not pending.is_roll_back and state.committed
+    bad = state.bad | {pending.release: reason} if is_bad else state.bad
+    return replace(state, pending=None, bad=bad).noted(pending.release, "rolled_back", reason)

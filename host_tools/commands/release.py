@@ -1,0 +1,97 @@
+"""`host_tools release`: keys, the release file that a probe installs, and what such a file says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.commands.output import note, source_tree
+
+KEYS = Path("~/.config/tsis").expanduser()
+KEY, SIGNERS = KEYS / "release_key", KEYS / "release_signers"
+KEPT = Path("build", "wheels")
+MB = 1e6
+release = typer.Typer(no_args_is_help=True, help="Release files, which a probe installs: keys, build, show.")
+
+
+@release.command(epilog="Example: host_tools release build --machine aarch64 --out dist")
+def build(
+    machine: Annotated[str, typer.Option(help="aarch64, or x86_64 for a simulated probe.")] = "aarch64",
+    key: Annotated[Path, typer.Option(help="File of the private key; the public one if an agent holds it.")] = KEY,
+    out: Annotated[Path, typer.Option(help="Folder of the release file.")] = Path("dist"),
+    counter: Annotated[
+        int | None, typer.Option(help="Instead of the number of commits: above the last one's, to go back to old code.")
+    ] = None,
+    signers: Annotated[
+        Path | None, typer.Option(help="List of signers that probes take over with this release.")
+    ] = None,
+    allow_dirty: Annotated[
+        bool, typer.Option("--allow-dirty", help="Build also what is not committed; the version says so.")
+    ] = False,
+) -> None:
+    """Build and sign the release file of this commit: the same commit gives the same bytes.
+
+    The wheels of requirements/device.lock are downloaded once and kept in build/wheels.
+    """
+    from host_tools.release.build import ReleaseOrder, build_release
+    from host_tools.release.checkout import Checkout
+    from host_tools.release.locked_wheels import sha256_of
+    from host_tools.release.target import Target
+
+    root = source_tree("build a release")
+    trusted = signers.read_text(encoding="utf-8") if signers else ""
+    order = ReleaseOrder(
+        Checkout.at(root), Target.named(machine), key.expanduser(), root / KEPT, counter, trusted, allow_dirty
+    )
+    built = build_release(order, out, lambda step: note.print(step, markup=False))
+    size = built.path.stat().st_size
+    largest = sorted(built.sizes.items(), key=lambda one: -one[1])[:3]
+    print(f"{built.path}: release {built.edition.version}, counter {built.edition.counter}, for {machine}")
+    print(f"commit {built.edition.commit}")
+    print(f"{size} bytes ({size / MB:.1f} MB), {len(built.sizes)} files; largest:")
+    for name, bytes_ in largest:
+        print(f"  {bytes_ / MB:6.1f} MB  {name}")
+    print(f"sha256 {sha256_of(built.path)}")
+
+
+@release.command(epilog="Example: host_tools release show dist/tsis-0.1.0-aarch64.release")
+def show(
+    file: Annotated[Path, typer.Argument(help="Release file.")],
+    signers: Annotated[Path, typer.Option(help="List of signers: whom to trust.")] = SIGNERS,
+) -> None:
+    """Print the manifest of a release file, once signature and every file of it are found to be right."""
+    from host_tools.release.release_file import checked_manifest
+
+    if not signers.is_file():
+        raise InvalidQuantity("signers", signers, "a file", "write one with `host_tools release signers KEY.pub`")
+    print(json.dumps(checked_manifest(file, signers.read_text(encoding="utf-8")), indent=1))
+
+
+@release.command(epilog="Example: host_tools release key ~/.config/tsis/release_key")
+def key(
+    file: Annotated[Path, typer.Argument(help="File of the private key; the public one gets .pub.")] = KEY,
+    hardware: Annotated[bool, typer.Option("--hardware", help="Make it in a FIDO token that is plugged in.")] = False,
+    no_passphrase: Annotated[
+        bool, typer.Option("--no-passphrase", help="Whoever has the file can sign: for tests and build machines.")
+    ] = False,
+) -> None:
+    """Make a key that signs releases; ssh-keygen asks for its passphrase."""
+    from host_tools.release.signing import new_key, signers_list
+
+    public = new_key(file.expanduser(), hardware=hardware, passphrase="" if no_passphrase else None)
+    note.print(f"{file} made: keep it secret, and a copy of it apart. A probe trusts it by this line:", soft_wrap=True)
+    print(signers_list([public]), end="")
+
+
+@release.command(epilog="Example: host_tools release signers release_key.pub next_key.pub > release_signers")
+def signers(
+    public_keys: Annotated[list[Path], typer.Argument(help="Public keys, of which each may sign.")],
+) -> None:
+    """Print the list of signers that trusts some keys: a probe has it in /etc/tsis/release_signers."""
+    from host_tools.release.signing import signers_list
+
+    print(signers_list(public_keys), end="")

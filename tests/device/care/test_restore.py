@@ -1,0 +1,246 @@
+"""A backup on a new card is the probe as it was; what does not fit is refused, and nothing that is there is lost."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sqlite3
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from probe_card import SERIAL, add_measurement, data_of, kept_files, put, records, write_card, write_settings
+
+from device.care import restore as restore_module
+from device.care.backup import write_backup
+from device.care.restore import RestoreReport, restore_backup
+from device.errors import BusyError, DiskFullError, StorageError
+from device.files.recording_file import read_recording
+from device.measurement.quantities import InvalidQuantity
+from device.records.schema import STORE_WRITES
+from device.records.store import Store
+from device.settings.layers import layer_files, read_layers
+
+
+@pytest.fixture
+def card(tmp_path: Path) -> Path:
+    write_card(tmp_path / "card")
+    return tmp_path / "card"
+
+
+@pytest.fixture
+def backup(card: Path, tmp_path: Path) -> Path:
+    write_backup(read_layers(layer_files(card)).config(), tmp_path / "a.backup", card)
+    return tmp_path / "a.backup"
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Path:
+    (tmp_path / "fresh/var/lib").mkdir(parents=True)
+    return tmp_path / "fresh"
+
+
+def restored(backup: Path, root: Path, *, records_only: bool = False) -> RestoreReport:
+    return restore_backup(backup, own(root), root, records_only=records_only)
+
+
+def own(root: Path) -> Mapping[str, Any]:
+    return read_layers(layer_files(root)).values
+
+
+def test_a_fresh_card_is_the_probe_again(card: Path, backup: Path, fresh: Path) -> None:
+    report = restored(backup, fresh)
+    assert (report.serial, report.measurements, report.kept_aside) == (SERIAL, 3, ())
+    assert kept_files(fresh) == kept_files(card)
+    assert records(data_of(fresh)) == records(data_of(card))
+    assert stat.S_IMODE((data_of(fresh) / "calibrations/c-1.json").stat().st_mode) == 0o444
+    store = Store(data_of(fresh))
+    assert store.press("p-2")["state"] == "done"
+    assert store.light_on_s == 12.5
+    assert read_recording(store.recording_folder("r-3")).serial == SERIAL
+    assert add_measurement(store, 9)["seq"] == 4  # numbers go on where they were
+    store.close()
+
+
+def test_a_backup_of_the_restored_card_holds_the_same(backup: Path, fresh: Path, tmp_path: Path) -> None:
+    restored(backup, fresh)
+    again = write_backup(read_layers(layer_files(fresh)).config(), tmp_path / "b.backup", fresh)
+    assert (again.measurements, again.missing) == (3, ())
+
+
+def test_a_card_whose_daemon_has_run_without_a_press_is_fresh(card: Path, backup: Path, fresh: Path) -> None:
+    write_settings(fresh, f'serial = "{SERIAL}"\n')
+    Store(data_of(fresh)).close()
+    put(data_of(fresh) / "config.last_good.toml", "other\n")
+    report = restored(backup, fresh)
+    assert len(records(data_of(fresh))) == 3
+    aside = {Path(path).relative_to(fresh).as_posix() for path in report.kept_aside}
+    assert aside == {
+        "etc/tsis/config.toml.before-restore",
+        "var/lib/tsis/before-restore/config.last_good.toml",
+        "var/lib/tsis/before-restore/tsis.sqlite",
+    }
+    assert (data_of(fresh) / "before-restore/config.last_good.toml").read_text() == "other\n"
+    assert (fresh / "etc/tsis/config.toml").read_bytes() == (card / "etc/tsis/config.toml").read_bytes()
+
+
+def test_a_data_folder_with_measurements_is_refused_and_stays(backup: Path, fresh: Path) -> None:
+    store = Store(data_of(fresh))
+    kept = add_measurement(store, 7)
+    store.close()
+    before = kept_files(fresh)
+    with pytest.raises(InvalidQuantity, match="empty, but it holds 1 measurements"):
+        restored(backup, fresh)
+    assert kept_files(fresh) == before
+    assert records(data_of(fresh)) == [kept]
+
+
+def test_a_recording_that_the_backup_does_not_have_is_not_lost(backup: Path, fresh: Path) -> None:
+    put(data_of(fresh) / "recordings/mine/recording.json", "{}")
+    with pytest.raises(InvalidQuantity, match="it holds recordings/mine/recording.json"):
+        restored(backup, fresh)
+    shutil.rmtree(data_of(fresh) / "recordings/mine")
+    put(data_of(fresh) / "recordings/r-1/recording.json", "another")
+    with pytest.raises(InvalidQuantity, match="it holds recordings/r-1/recording.json"):
+        restored(backup, fresh)
+
+
+def test_a_database_that_cannot_be_read_is_not_taken_for_an_empty_one(backup: Path, fresh: Path) -> None:
+    put(data_of(fresh) / "tsis.sqlite", "no database at all, but somebody's measurements once" * 50)
+    with pytest.raises(StorageError, match="Move it away first"):
+        restored(backup, fresh)
+
+
+def test_while_a_daemon_runs_nothing_is_restored(backup: Path, fresh: Path) -> None:
+    running = Store(data_of(fresh))
+    try:
+        with pytest.raises(BusyError, match="systemctl stop tsis"):
+            restored(backup, fresh)
+    finally:
+        running.close()
+
+
+def test_the_settings_of_another_probe_are_refused_its_measurements_are_not(backup: Path, fresh: Path) -> None:
+    write_settings(fresh, 'serial = "TSIS-0001"\n')
+    put(data_of(fresh) / "calibrations/active", "mine\n")
+    before = kept_files(fresh)
+    with pytest.raises(InvalidQuantity, match="must be TSIS-0001, as this probe's settings say"):
+        restored(backup, fresh)
+    assert kept_files(fresh) == before
+    restored(backup, fresh, records_only=True)
+    assert {name for name in kept_files(fresh) if "/recordings/" not in name} == set(before)
+    assert kept_files(fresh).items() >= before.items()
+    assert len(records(data_of(fresh))) == 3
+
+
+def test_records_alone_go_to_this_probes_own_data_folder(backup: Path, fresh: Path) -> None:
+    write_settings(fresh, 'serial = "TSIS-0001"\ndata = "/srv/elsewhere"\n')
+    assert restored(backup, fresh, records_only=True).data == str(fresh / "srv/elsewhere")
+    assert len(records(fresh / "srv/elsewhere")) == 3
+
+
+def test_a_store_of_newer_software_is_refused(card: Path, fresh: Path, tmp_path: Path) -> None:
+    db = sqlite3.connect(data_of(card) / "tsis.sqlite")
+    db.execute(f"PRAGMA user_version = {STORE_WRITES + 1}")
+    db.close()
+    write_backup(read_layers(layer_files(card)).config(), tmp_path / "new.backup", card)
+    with pytest.raises(InvalidQuantity, match="but must be 1, which this software reads"):
+        restored(tmp_path / "new.backup", fresh)
+    assert not data_of(fresh).exists()
+
+
+def test_a_damaged_backup_changes_nothing(backup: Path, fresh: Path) -> None:
+    content = bytearray(backup.read_bytes())
+    content[len(content) // 2] ^= 1
+    backup.write_bytes(content)
+    with pytest.raises(InvalidQuantity, match="changed or damaged"):
+        restored(backup, fresh)
+    assert list((fresh / "var/lib").iterdir()) == []
+
+
+@pytest.mark.parametrize("place", ["/etc", "/root/.ssh", "/var/lib", "/var/lib/../../etc", "/usr/lib/tsis"])
+def test_a_backup_brings_nothing_to_where_a_program_keeps_no_data(
+    place: str, fresh: Path, tmp_path: Path, card: Path
+) -> None:
+    """A file from elsewhere is not trusted with root's rights."""
+    config = read_layers(layer_files(card)).config()
+    forged = tmp_path / "forged"
+    shutil.copytree(data_of(card), forged / place.removeprefix("/"))
+    write_settings(forged, f'serial = "{SERIAL}"\ndata = "{place}"\n')
+    (forged / place.removeprefix("/") / "tsis.sqlite").exists()
+    config = read_layers(layer_files(forged)).config()
+    write_backup(config, tmp_path / "forged.backup", forged)
+    with pytest.raises(InvalidQuantity, match="in this machine's settings first"):
+        restored(tmp_path / "forged.backup", fresh)
+
+
+def test_a_card_that_is_too_small_is_told_before_anything_is_written(
+    backup: Path, fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Small:
+        free = 1000
+
+    monkeypatch.setattr(restore_module.shutil, "disk_usage", lambda path: Small)
+    with pytest.raises(DiskFullError, match="a larger card"):
+        restored(backup, fresh)
+    assert {path.name for path in data_of(fresh).iterdir()} == {"lock"}
+
+
+class PowerCut(BaseException):
+    """Nothing of the program runs after it."""
+
+
+def test_wherever_the_power_fails_no_measurement_is_shown_and_the_same_command_finishes(
+    card: Path, backup: Path, fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every rename and every file that is staged is such a place."""
+    steps, places = [0], 0
+    kept = records(data_of(card))
+    real_replace, real_stage = Path.replace, restore_module._stage
+
+    def cut_after(real: Any, *arguments: Any) -> Any:
+        steps[0] -= 1
+        if steps[0] < 0:
+            raise PowerCut
+        return real(*arguments)
+
+    monkeypatch.setattr(restore_module, "_stage", lambda *a: cut_after(real_stage, *a))
+    monkeypatch.setattr(restore_module.shutil, "rmtree", lambda *a, **k: None if steps[0] < 0 else _rmtree(*a, **k))
+    monkeypatch.setattr(Path, "replace", lambda self, to: cut_after(real_replace, self, to))
+    while True:
+        steps[0] = places
+        try:
+            restored(backup, fresh)
+        except PowerCut:
+            places += 1
+            if (data_of(fresh) / "tsis.sqlite").exists():
+                assert records(data_of(fresh)) == []
+            else:
+                Store(data_of(fresh)).close()  # the daemon starts in between, and shows an empty probe
+            steps[0] = 10**6
+            if places % 5:
+                continue
+            restored(backup, fresh)
+            assert records(data_of(fresh)) == kept
+            shutil.rmtree(fresh)
+            (fresh / "var/lib").mkdir(parents=True)
+        else:
+            break
+    assert places > 20
+    assert records(data_of(fresh)) == kept
+    assert kept_files(card).items() <= kept_files(fresh).items()
+
+
+_rmtree = shutil.rmtree
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file away")
+def test_what_is_restored_belongs_to_the_owner_of_the_data_folder(backup: Path, fresh: Path) -> None:
+    data_of(fresh).mkdir(parents=True)
+    os.chown(data_of(fresh), 4711, 4712)
+    restored(backup, fresh)
+    owners = {(path.stat().st_uid, path.stat().st_gid) for path in [data_of(fresh), *data_of(fresh).rglob("*")]}
+    assert owners == {(4711, 4712)}
+    assert (fresh / "etc/tsis/config.toml").stat().st_uid == 0

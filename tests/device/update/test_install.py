@@ -1,0 +1,44 @@
+"""A release file becomes the release that runs, or is left; what ran before is back by itself."""
+
+import pytest
+
+
+def test_a_first_release_is_installed_committed_and_runs(probe):
+    done = probe.run("install", probe.write("1.0", 10))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert probe.require_whole() == "1.0+10"
+    assert probe.layout.linked(probe.layout.updater) == "1.0+10"
+    assert (probe.state.floor, probe.state.previous, probe.state.pending) == (10, None, None)
+    assert probe.progress.state == "committed"
+
+
+def test_the_next_one_takes_its_place_and_the_one_before_the_last_goes(probe):
+    for counter in (10, 11, 12):
+        probe.install(f"1.{counter}", counter)
+    assert probe.require_whole() == "1.12+12"
+    assert probe.releases() == ["1.11+11", "1.12+12"]
+    assert probe.state.previous == "1.11+11"
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "reason"),
+    [
+        ({"mute": True}, "the daemon does not answer"),
+        ({"faults": {"camera": "E101"}}, r"camera is not ready (E101)"),
+        ({"faults": {"answers": None}}, "answers is not ready"),
+        ({"dies_after": 2}, "It was ready, and then the daemon does not answer"),
+        ({"says": "0.9+9"}, "the daemon that answers is 0.9+9"),
+    ],
+)
+def test_a_release_that_is_not_healthy_is_left_and_the_one_before_is_back(probe, behaviour, reason):
+    probe.install("1.0", 10)
+    done = probe.run("install", probe.write("1.1", 11, behaviour))
+    assert done.returncode == 1
+    assert done.stderr.startswith("E013 1.1+11 was left: ")
+    assert reason in done.stderr
+    assert probe.require_whole() == "1.0+10"
+    assert probe.releases() == ["1.0+10"]
+    assert reason in probe.state.bad["1.1+11"]
+    assert (probe.state.history[-1].event, probe.state.floor) == ("rolled_back", 10)
+    assert (probe.progress.state, probe.progress.code) == ("rolled_back", "E013")
+    assert reason in probe.progress.reason
