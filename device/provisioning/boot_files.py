@@ -29,7 +29,10 @@ DPkg::Post-Invoke {{"mountpoint -q {FOLDER} && mount -o remount,ro {FOLDER} || t
 
 @dataclass(frozen=True)
 class BootSettingsItem:
-    """I2C on the header, and the sensor by its name: what detection finds is only Raspberry Pi's own cameras."""
+    """I2C and the LEDs' enable line on the header, and the sensor by its name.
+
+    What detection finds is only Raspberry Pi's own cameras.
+    """
 
     camera_overlay: str = "ov9281"
     title: str = "I2C and camera at boot"
@@ -44,7 +47,9 @@ class BootSettingsItem:
         _rewrite(target, CONFIG, self._with_ours)
 
     def _with_ours(self, text: str) -> str:
-        lines = ["[all]", "dtparam=i2c_arm=on", "camera_auto_detect=0", f"dtoverlay={self.camera_overlay}"]
+        camera = ["camera_auto_detect=0", f"dtoverlay={self.camera_overlay}"]
+        # Else the kernel leaves the LEDs' enable line as it was when the process that held it was killed.
+        lines = ["[all]", "dtparam=i2c_arm=on", "dtparam=strict_gpiod", *camera]
         before, begin, rest = text.partition(f"{BEGIN}\n")
         after = rest.partition(f"{END}\n")[2] if begin else ""
         kept = before.rstrip("\n") + "\n" + after

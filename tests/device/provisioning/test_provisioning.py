@@ -138,7 +138,8 @@ def test_the_boot_comes_before_the_release_which_needs_its_camera(machine, capsy
 def test_lines_of_the_boot_hold_for_every_model_and_stand_once(probe):
     assert probe.text(CONFIG).startswith("[pi5]\ndtparam=ant2\n")
     ours = probe.text(CONFIG).split("[all]\n")[1]
-    assert ours.splitlines()[:3] == ["dtparam=i2c_arm=on", "camera_auto_detect=0", "dtoverlay=ov9281"]
+    stated = ["dtparam=i2c_arm=on", "dtparam=strict_gpiod", "camera_auto_detect=0", "dtoverlay=ov9281"]
+    assert ours.splitlines()[:4] == stated
     assert probe.text(KERNEL_LINE) == "console=tty1 rootwait cgroup_enable=memory\n"
     assert probe.run("--camera-overlay", "imx296") == REBOOT
     assert probe.text(CONFIG).count("[all]") == 1
