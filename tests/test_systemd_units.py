@@ -16,17 +16,27 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
+from device.fallback.server import GIVEN_UP_S
+from device.fallback.start_note import NOTE
 from device.instrument.watch.watchdog import WITHOUT_SYSTEMD_S
 from device.settings.catalogue import SETTINGS
 
 FOLDER = ROOT / "systemd"
 UNIT = FOLDER / "tsis.service"
+FALLBACK = FOLDER / "tsis-fallback.service"
 UNITS = sorted(path for kind in ("service", "path") for path in FOLDER.glob(f"*.{kind}"))
 RULES = FOLDER / "tsis-force.rules"
+LIGHT_RULES = FOLDER / "tsis-light.rules"
 PYTHON = "/opt/tsis/current/bin/python"
 PROGRAMS = re.compile(r"/opt/tsis/(?:current|updater)/bin/python|/usr/bin/(?:cage|chromium)")
 """What is on a probe and not here; systemd looks whether the program of a line is there."""
-MOST_EXPOSED = {"tsis.service": 1.5, "tsis-boot.service": 1.5, "tsis-update.service": 2.0, "tsis-kiosk.service": 4.5}
+MOST_EXPOSED = {
+    "tsis.service": 1.5,
+    "tsis-fallback.service": 1.5,
+    "tsis-boot.service": 1.5,
+    "tsis-update.service": 2.0,
+    "tsis-kiosk.service": 4.5,
+}
 """systemd's own score: 10 is exposed, 2 is well shut in. The installer is root and asks the probe how it is, by
 loopback; a browser writes code that it runs and makes name spaces for its own sandbox."""
 INCOMING = "/var/lib/tsis-update/incoming"
@@ -79,6 +89,20 @@ def test_the_unit_shuts_its_program_in(tmp_path, name):
     assert verified.returncode == 0, verified.stdout
 
 
+def test_the_fallback_runs_from_the_last_good_release_by_the_systems_python_alone():
+    service = service_of(FALLBACK)
+    assert service["ExecStart"].split() == ["/usr/bin/python3", "-S", "-P", "-m", "device.fallback"]
+    assert "PYTHONPATH=/opt/tsis/updater/" in service["Environment"]
+    assert int(service["WatchdogSec"]) > 2 * GIVEN_UP_S
+
+
+def test_the_daemon_notes_where_the_fallback_reads_and_what_it_noted_stays():
+    service = service_of(UNIT)
+    assert f"run/{service['RuntimeDirectory']}" == str(Path(NOTE).parent)
+    assert service["RuntimeDirectoryPreserve"] == "yes"
+    assert service["User"] == service_of(FALLBACK)["User"]
+
+
 def section_of(path: Path, name: str) -> configparser.SectionProxy:
     """Return a section; of a key with several lines the last one."""
     unit = configparser.RawConfigParser(strict=False)
@@ -121,12 +145,12 @@ def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_en
     assert service["Restart"] == "on-failure"
 
 
-def test_the_daemon_can_write_its_state_and_lay_a_release_ready_and_nothing_else():
+def test_the_daemon_can_write_its_state_its_note_in_memory_and_lay_a_release_ready_and_nothing_else():
     """systemd 252 gives a ConfigurationDirectory= to the unit's user, who could then write the settings."""
     service = service_of(UNIT)
     assert service["ProtectSystem"] == "strict"
     assert service["StateDirectory"] == "tsis"
-    others = ("Configuration", "Cache", "Logs", "Runtime")
+    others = ("Configuration", "Cache", "Logs")
     assert not {*(f"{kind}Directory" for kind in others), "BindPaths"} & set(service)
     assert service["ReadWritePaths"] == f"-{INCOMING}"
 
@@ -173,6 +197,13 @@ def test_the_screen_shows_the_page_of_this_machine_and_comes_back():
     assert service["User"] == "tsis-screen"
 
 
+def test_the_group_that_may_drive_the_enable_line_is_one_of_the_units():
+    [line] = [line for line in LIGHT_RULES.read_text().splitlines() if line and not line.startswith("#")]
+    [group] = re.findall(r'GROUP="(.*?)"', line)
+    assert group in service_of(UNIT)["SupplementaryGroups"].split()
+    assert "DeviceAllow=char-gpiochip rw" in UNIT.read_text()
+
+
 def test_the_unit_that_is_run_under_a_real_systemd_differs_only_in_its_hardware():
     simulated = service_of(ROOT / "tests" / "systemd" / "simulated.conf")
     assert set(simulated) == {"ExecStart", "Environment"}
@@ -185,6 +216,7 @@ def test_the_rule_names_the_load_cell_as_the_settings_do():
 
 
 @pytest.mark.skipif(udev_version() < 254, reason="no udevadm that verifies (systemd 254)")
-def test_udev_takes_the_rule():
-    verified = subprocess.run(["udevadm", "verify", str(RULES)], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("rules", [RULES, LIGHT_RULES], ids=lambda path: path.name)
+def test_udev_takes_the_rule(rules):
+    verified = subprocess.run(["udevadm", "verify", str(rules)], capture_output=True, text=True, check=False)
     assert verified.returncode == 0, verified.stderr
