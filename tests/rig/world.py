@@ -127,6 +127,7 @@ class ScreenReader:
             with suppress(OSError, http.client.HTTPException, ValueError):
                 if self._at:
                     self._follow(self._at)
+            self._hand.follow("fault", time.monotonic())  # the screen says that the probe is gone: let go
             time.sleep(LOOK_EVERY_S)
 
     def _follow(self, at: str) -> None:

@@ -121,6 +121,8 @@ def killed(service: RealService) -> Iterator[Claim]:
     until("active again", lambda: int(service.shown("NRestarts")) == restarts + 1, 60)
     until("ready again", service.is_ready, 60)
     yield Claim("real: it is started again and ready", True)
+    cause = service.faults().get("E903", {}).get("cause", "")
+    yield Claim("real: E903 on the screen says by what", "signal KILL" in cause, cause)
 
 
 def frozen(service: RealService) -> Iterator[Claim]:

@@ -75,7 +75,7 @@ def killed(service: Service) -> Iterator[Claim]:
     until("ready again", service.is_ready, 60)
     yield Claim("it is started again", service.shown("NRestarts") == "1", f"active after {again_s:.1f} s")
     warning = service.faults().get("E903", {})
-    yield Claim("E903 on the screen says by what", "signal" in warning.get("cause", ""), warning.get("cause"))
+    yield Claim("E903 is on the screen", "killed" in warning.get("cause", ""), warning.get("cause"))
 
 
 def pressed(service: Service) -> Iterator[Claim]:
