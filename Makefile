@@ -7,11 +7,19 @@ KEY ?= $(HOME)/.config/tsis/release_key
 OUT ?= dist
 COUNTER ?=
 SIGNERS ?=
+HOST ?=
+SERIAL ?=
+LOGIN ?= pi
+SSH ?=
+TIME_ZONE ?=
+CHECK ?=
+TRUSTED ?= $(HOME)/.config/tsis/release_signers
+DEPLOY_KEY ?= $(HOME)/.ssh/id_ed25519.pub
 PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm bundle check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -56,9 +64,25 @@ test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)
 	tests/deploy/arm64.sh build/arm64
 
+test-deploy: .venv/all.stamp ## make a container a probe by ssh and send it releases, good and bad (root, network, 2 GB, six minutes)
+	tests/deploy/run.sh build/deploy
+
 bundle: .venv/all.stamp ## build and sign the file that a probe installs: make bundle [MACHINE=aarch64] [KEY=FILE] [OUT=dist] [COUNTER=N] [SIGNERS=FILE]
 	@$(HOST_TOOLS) release build --machine $(MACHINE) --key $(KEY) --out $(OUT) \
 	  $(if $(COUNTER),--counter $(COUNTER)) $(if $(SIGNERS),--signers $(SIGNERS))
+
+RELEASE = $(or $(FILE),$(OUT)/tsis-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' device/__init__.py)-$(MACHINE).release)
+
+provision: .venv/all.stamp ## make a fresh Raspberry Pi OS a probe: make provision HOST=NAME SERIAL=TSIS-0007 [CHECK=1] [LOGIN=pi] [TIME_ZONE=Europe/Berlin] [SSH="-p 22"] [FILE=RELEASE]
+	@test -n "$(HOST)" || { echo "Name the machine: make provision HOST=raspberrypi.local SERIAL=TSIS-0007"; exit 2; }
+	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
+	@$(HOST_TOOLS) provision "$(RELEASE)" --host "$(HOST)" --user "$(LOGIN)" --signers "$(TRUSTED)" --deploy-key "$(DEPLOY_KEY)" \
+	  $(if $(SSH),--ssh "$(SSH)") $(if $(SERIAL),--serial "$(SERIAL)") $(if $(TIME_ZONE),--time-zone "$(TIME_ZONE)") $(if $(CHECK),--check)
+
+deploy: .venv/all.stamp ## build a release and send it to a probe: make deploy HOST=NAME [SSH="-p 22 -i KEY"] [FILE=RELEASE]
+	@test -n "$(HOST)" || { echo "Name the probe: make deploy HOST=tsis-0007.local"; exit 2; }
+	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
+	@$(HOST_TOOLS) deploy "$(RELEASE)" --host "$(HOST)" --signers "$(TRUSTED)" $(if $(SSH),--ssh "$(SSH)")
 
 check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates
 	.venv/bin/ruff check .

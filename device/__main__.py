@@ -25,11 +25,12 @@ from device.commands.led_off import led_off
 from device.commands.record import add_record_command, run_record_command
 from device.commands.restore import add_restore_command, run_restore_command
 from device.commands.self_test import add_self_test_command, run_self_test_command
-from device.commands.serve import serve
+from device.commands.serve import refusal_noted, serve
 from device.commands.support import add_support_command, run_support_command
 from device.commands.update import add_update_command
 from device.config import Config, simulated_config
 from device.errors import DeviceError
+from device.fallback.start_note import clear_note
 from device.instrument.press.phantom_press import PhantomPress
 from device.instrument.procedure import Procedure
 from device.measurement.bundle import BundleRefused
@@ -110,12 +111,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "led-off":
             led_off(_start_settings(options, None).config.light)
             return 0
-        scenario = _scenario(options)
-        settings = _start_settings(options, scenario)
-        return serve(settings, lambda: _opened(settings.config, scenario))
+        return _serve(options)
     except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
         print(error, file=sys.stderr)
         return 1
+
+
+def _serve(options: argparse.Namespace) -> int:
+    with refusal_noted(options.root):
+        scenario = _scenario(options)
+        settings = _start_settings(options, scenario)
+        return serve(settings, lambda: _opened(settings.config, scenario), lambda: clear_note(options.root))
 
 
 def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> StartSettings:

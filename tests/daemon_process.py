@@ -48,7 +48,7 @@ class Daemon:
 
     To its scene comes that no frame is late, unless that has settings of the camera: on a busy machine many are.
     `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests. With
-    `arguments` it is not simulated: they are its whole command line.
+    `arguments` it is not simulated: they are its whole command line. `root` stands for / where it looks for files.
     """
 
     def __init__(
@@ -60,10 +60,13 @@ class Daemon:
         program: Sequence[str] = ("-m", "device"),
         environment: Mapping[str, str] | None = None,
         arguments: Sequence[str] = (),
+        root: Path | None = None,
     ) -> None:
         if not arguments:
             (folder / "scene.toml").write_text(scene if "[settings.camera]" in scene else scene + PATIENT)
             arguments = ("--simulate", "--port", str(port), "--scene", "scene.toml")
+        if root:
+            arguments = (*arguments, "--root", str(root))
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         whole = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", **(environment or {})}
         self._log_path = folder / "log.txt"

@@ -28,6 +28,9 @@ def systemctl(words):
     verb = words[-2] if words[-1] == "tsis.service" else words[-1]
     if REFUSED.exists() and verb in REFUSED.read_text().split():
         sys.exit(f"Failed to {verb}: as the test asked.")
+    if verb == "stop" and not (ROOT / "opt/tsis/current").exists():
+        print("Failed to stop tsis.service: Unit tsis.service not loaded.", file=sys.stderr)
+        sys.exit(5)
     if verb == "start" and not alive():
         command = [sys.executable, "-S", "-E", __file__, "daemon"]
         quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)

@@ -116,6 +116,8 @@ def test_the_settings_of_step_7_are_settings() -> None:
     [text] = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
     config = from_table(Config, tomllib.loads(re.sub(r"^ +", "", text, flags=re.MULTILINE)))
     assert config.camera.raw_mode.crop_px == (1070, 800)
+    [line] = [row for row in table("header pin") if "RESET" in row[2]]
+    assert line[1] == f"BCM{config.light.enable_line}"
 
 
 def test_there_are_ten_steps_each_with_a_command() -> None:

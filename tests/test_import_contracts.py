@@ -57,6 +57,7 @@ FORBIDDEN = {
         "device.records.store",
     ),
     "An update runs on a machine that has Python alone": ("device.files.durable", "numpy"),
+    "The fallback runs when nothing else does": ("device.fallback.situation", "device.files.durable"),
     "The web shows what the instrument and the records say": ("device.web.app", "device.hardware.interfaces"),
     "A release is built from files alone: its builder knows nothing of the toolkit": (
         "host_tools.release.own_wheel",

@@ -16,17 +16,26 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
+from device.fallback.server import GIVEN_UP_S
+from device.fallback.start_note import NOTE
 from device.instrument.watch.watchdog import WITHOUT_SYSTEMD_S
 from device.settings.catalogue import SETTINGS
 
 FOLDER = ROOT / "systemd"
 UNIT = FOLDER / "tsis.service"
+FALLBACK = FOLDER / "tsis-fallback.service"
 UNITS = sorted(path for kind in ("service", "path") for path in FOLDER.glob(f"*.{kind}"))
 RULES = FOLDER / "tsis-force.rules"
 PYTHON = "/opt/tsis/current/bin/python"
 PROGRAMS = re.compile(r"/opt/tsis/(?:current|updater)/bin/python|/usr/bin/(?:cage|chromium)")
 """What is on a probe and not here; systemd looks whether the program of a line is there."""
-MOST_EXPOSED = {"tsis.service": 1.5, "tsis-boot.service": 1.5, "tsis-update.service": 2.0, "tsis-kiosk.service": 4.5}
+MOST_EXPOSED = {
+    "tsis.service": 1.5,
+    "tsis-fallback.service": 1.5,
+    "tsis-boot.service": 1.5,
+    "tsis-update.service": 2.0,
+    "tsis-kiosk.service": 4.5,
+}
 """systemd's own score: 10 is exposed, 2 is well shut in. The installer is root and asks the probe how it is, by
 loopback; a browser writes code that it runs and makes name spaces for its own sandbox."""
 INCOMING = "/var/lib/tsis-update/incoming"
@@ -79,6 +88,20 @@ def test_the_unit_shuts_its_program_in(tmp_path, name):
     assert verified.returncode == 0, verified.stdout
 
 
+def test_the_fallback_runs_from_the_last_good_release_by_the_systems_python_alone():
+    service = service_of(FALLBACK)
+    assert service["ExecStart"].split() == ["/usr/bin/python3", "-S", "-P", "-m", "device.fallback"]
+    assert "PYTHONPATH=/opt/tsis/updater/" in service["Environment"]
+    assert int(service["WatchdogSec"]) > 2 * GIVEN_UP_S
+
+
+def test_the_daemon_notes_where_the_fallback_reads_and_what_it_noted_stays():
+    service = service_of(UNIT)
+    assert f"run/{service['RuntimeDirectory']}" == str(Path(NOTE).parent)
+    assert service["RuntimeDirectoryPreserve"] == "yes"
+    assert service["User"] == service_of(FALLBACK)["User"]
+
+
 def section_of(path: Path, name: str) -> configparser.SectionProxy:
     """Return a section; of a key with several lines the last one."""
     unit = configparser.RawConfigParser(strict=False)
@@ -121,12 +144,12 @@ def test_the_unit_asks_for_the_watchdogs_time_and_darkens_the_light_after_any_en
     assert service["Restart"] == "on-failure"
 
 
-def test_the_daemon_can_write_its_state_and_lay_a_release_ready_and_nothing_else():
+def test_the_daemon_can_write_its_state_its_note_in_memory_and_lay_a_release_ready_and_nothing_else():
     """systemd 252 gives a ConfigurationDirectory= to the unit's user, who could then write the settings."""
     service = service_of(UNIT)
     assert service["ProtectSystem"] == "strict"
     assert service["StateDirectory"] == "tsis"
-    others = ("Configuration", "Cache", "Logs", "Runtime")
+    others = ("Configuration", "Cache", "Logs")
     assert not {*(f"{kind}Directory" for kind in others), "BindPaths"} & set(service)
     assert service["ReadWritePaths"] == f"-{INCOMING}"
 

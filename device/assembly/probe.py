@@ -102,7 +102,13 @@ def _phantom_press(probe: OpenedProbe) -> PhantomPress:
     assert store is not None  # or there were no bench
     is_simulated = probe.scenario is not None
     return PhantomPress(
-        probe.config, bench, store, clock=probe.clock, opened=probe.parts.opened, simulated=is_simulated
+        probe.config,
+        bench,
+        store,
+        clock=probe.clock,
+        opened=probe.parts.opened,
+        simulated=is_simulated,
+        computer=ComputerWatch(probe.computer),
     )
 
 

@@ -46,6 +46,11 @@ def known_only(text: str) -> str:
     return "\n".join(_line(line) for line in text.splitlines())
 
 
+def learn_words() -> None:
+    """Read the program's own sentences now, which takes a second or more, and not in each thread that needs them."""
+    _vocabulary()
+
+
 def known_in(value: Any) -> Any:
     """Return a JSON value with every text in it, keys included, as `known_only` or as a release's name or a time."""
     if isinstance(value, dict):

@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from device.care.places import DATABASE
 from device.errors import StorageError
+from device.records.schema import UNNUMBERED
 
 BUSY_S = 10.0
 DAMAGED = "Copy the folder of recordings away by hand, and send the support file: python -m device support FILE."
@@ -64,7 +65,7 @@ def facts_of(database: Path) -> StoreFacts:
     except (sqlite3.Error, ValueError) as error:
         raise StorageError(f"The database {database} cannot be read: {error}.", DAMAGED) from error
     named = dict.fromkeys(str(row["recording_id"]) for row in rows if "recording_id" in row)
-    return StoreFacts(schema, len(rows), presses, tuple(named))
+    return StoreFacts(schema or UNNUMBERED, len(rows), presses, tuple(named))
 
 
 def _copy(source: Path, target: Path) -> None:

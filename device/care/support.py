@@ -1,7 +1,7 @@
 """The support file: a zip of what a maintainer needs to know, `tsis.support/1`, without patients' data.
 
-It is written also where no daemon starts: each section is collected by itself, in a time of its own, and one that
-cannot be had says why in `summary.json`. Only the standard library is needed to begin with.
+It is written also where no daemon starts: the sections are collected side by side, each by itself, and one that cannot
+be had in time says why in `summary.json`. Only the standard library is needed to begin with.
 """
 
 from __future__ import annotations
@@ -15,14 +15,16 @@ from pathlib import Path
 from typing import Any
 
 from device import __version__
-from device.care.known_words import known_only
+from device.care.known_words import known_only, learn_words
 from device.care.support_sections import SECTIONS, SupportContext
 
 SCHEMA = "tsis.support/1"
 SUMMARY = "summary.json"
 PRIVATE = 0o600
-SECTION_S = 20.0
-"""A disk that does not answer costs this, not the file."""
+WITHIN_S = 30.0
+"""A disk that does not answer costs this, not the file; who shows the file waits for a minute."""
+Answered = tuple[dict[str, Any] | None, str]
+"""Its content, and "ok"; or None and why."""
 
 
 def write_support(file: Path, context: SupportContext) -> dict[str, str]:
@@ -30,7 +32,7 @@ def write_support(file: Path, context: SupportContext) -> dict[str, str]:
 
     Raises `OSError` when the file cannot be written.
     """
-    collected = {name: _collected(name, context) for name in SECTIONS}
+    collected = _collected(context)
     told = {name: reason for name, (_, reason) in collected.items()}
     made_at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     summary = {"schema": SCHEMA, "software": __version__, "made_at": made_at, "sections": told}
@@ -52,20 +54,25 @@ def write_support(file: Path, context: SupportContext) -> dict[str, str]:
     return told
 
 
-def _collected(name: str, context: SupportContext) -> tuple[dict[str, Any] | None, str]:
-    """Return a section, or None, with "ok" or the reason; one that does not return is left behind."""
-    ended: list[tuple[dict[str, Any] | None, str]] = []
+def _collected(context: SupportContext) -> dict[str, Answered]:
+    """Return each section by its name; one that does not return in time is left behind."""
+    learn_words()
+    ended: dict[str, Answered] = {}
 
-    def collect() -> None:
+    def collect(name: str) -> None:
         try:
-            ended.append((SECTIONS[name](context), "ok"))
+            ended[name] = SECTIONS[name](context), "ok"
         except Exception as error:  # noqa: BLE001 - whatever it is, it is the reason
-            ended.append((None, f"{type(error).__name__}: {known_only(str(error))}"))
+            ended[name] = None, f"{type(error).__name__}: {known_only(str(error))}"
 
-    thread = threading.Thread(target=collect, name=f"support {name}", daemon=True)
-    thread.start()
-    thread.join(SECTION_S)
-    return ended[0] if ended else (None, f"It did not come within {SECTION_S:g} s.")
+    threads = [threading.Thread(target=collect, args=(name,), name=f"support {name}", daemon=True) for name in SECTIONS]
+    for thread in threads:
+        thread.start()
+    deadline_s = time.monotonic() + WITHIN_S
+    for thread in threads:
+        thread.join(max(0.0, deadline_s - time.monotonic()))
+    late = None, f"It did not come within {WITHIN_S:g} s."
+    return {name: ended.get(name, late) for name in SECTIONS}
 
 
 def _json(value: Any) -> str:

@@ -5,33 +5,45 @@ It takes the port, opens the probe, and serves until it is told to stop; then ev
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import socket
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from types import FrameType
 
 import uvicorn
 
 from device.access.known_hosts import ANYWHERE, KnownHosts
+from device.assembly.opened_parts import StartFailed
 from device.config import Config
-from device.errors import DeviceError
+from device.errors import ConfigError, DeviceError, ModelError
+from device.fallback.handover import ask_for_port, is_fallback
+from device.fallback.start_note import write_note
 from device.instrument.procedure import Procedure
 from device.instrument.watch.restart_note import RestartNote
 from device.instrument.watch.watchdog import Watchdog
+from device.measurement.bundle import BundleRefused
+from device.measurement.quantities import InvalidQuantity
 from device.records.updates import Updates
 from device.settings.last_good import StartSettings
 from device.web.app import create_app
 
+HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
+START_AGAIN = "Then start the daemon again."
 
-def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
+
+def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Callable[[], None] = lambda: None) -> int:
     """Serve the probe that `opened` opens until SIGTERM or SIGINT; return the exit code.
 
-    Raises `DeviceError` when the port is taken, and whatever `opened` raises when a part does not open.
+    `ready` is called once every part has opened. Raises `DeviceError` when the port is taken, and whatever `opened`
+    raises when a part does not open.
     """
     config = settings.config
-    listening = _listen(config)
-    with listening:
+    with DaemonPort(config) as port:
         procedure = opened()
         note = RestartNote(config.data)
         updates = Updates(config.updates)
@@ -43,9 +55,10 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure]) -> int:
             ending.callback(procedure.close)
             watchdog.start()
             ending.callback(watchdog.close)
+            ready()
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, updates, listening)
+            _run_server(procedure, updates, port.listening())
     return 0
 
 
@@ -61,23 +74,79 @@ def _noted(note: RestartNote) -> Iterator[None]:
     note.remove()
 
 
-def _listen(config: Config) -> socket.socket:
-    """Take the port before any hardware is opened; raise `DeviceError` when it is in use."""
-    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    # What it accepts inherits this. asyncio leaves sockets of a listener without a stated protocol alone, and then
-    # every answer of two parts waits 44 ms for the client's delayed acknowledgement.
-    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    host, port = config.server.host, config.server.port
+class DaemonPort:
+    """The daemon's port, taken before any hardware is opened; from the fallback, which has a page on it, only after.
+
+    Raises `DeviceError` when anybody else has it.
+    """
+
+    def __init__(self, config: Config) -> None:
+        """Take the port, or find that the fallback has it."""
+        self._host, self._port = config.server.host, config.server.port
+        self._socket = self._taken()
+        if self._socket is None and not is_fallback(self._host, self._port):
+            raise self._refusal(os.strerror(errno.EADDRINUSE))
+
+    def __enter__(self) -> DaemonPort:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._socket:
+            self._socket.close()
+
+    def listening(self) -> socket.socket:
+        """Return what listens on the port; the fallback has given it up by then."""
+        asked, until_s = False, time.monotonic() + HANDOVER_S
+        while self._socket is None:
+            asked = asked or ask_for_port(self._host, self._port)
+            if time.monotonic() > until_s:
+                raise self._refusal("the fallback does not give it up")
+            time.sleep(HANDOVER_LOOK_S)
+            self._socket = self._taken()
+        return self._socket
+
+    def _taken(self) -> socket.socket | None:
+        """Return what listens on the port, None when it is in use."""
+        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # What it accepts inherits this. asyncio leaves sockets of a listener without a stated protocol alone, and then
+        # every answer of two parts waits 44 ms for the client's delayed acknowledgement.
+        listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        try:
+            listening.bind((self._host, self._port))
+            listening.listen()
+        except OSError as error:
+            listening.close()
+            if error.errno == errno.EADDRINUSE:
+                return None
+            raise self._refusal(str(error.strerror)) from error
+        return listening
+
+    def _refusal(self, why: str) -> DeviceError:
+        return DeviceError(f"Port {self._port} of {self._host} cannot be used: {why}.", "Choose another with --port.")
+
+
+@contextmanager
+def refusal_noted(root: Path) -> Iterator[None]:
+    """Note why a start fails, for the page that stands in for the daemon; the error itself goes on."""
     try:
-        listening.bind((host, port))
-        listening.listen()
-    except OSError as error:
-        listening.close()
-        raise DeviceError(
-            f"Port {port} of {host} cannot be used: {error.strerror}.", "Choose another with --port."
-        ) from error
-    return listening
+        yield
+    except Exception as error:
+        write_note(root, faults_of(error))
+        raise
+
+
+def faults_of(error: Exception) -> list[DeviceError]:
+    """Return what kept a daemon from starting as faults, each with code, cause and remedy."""
+    if isinstance(error, StartFailed):
+        return error.faults
+    if isinstance(error, DeviceError):
+        return [error]
+    if isinstance(error, BundleRefused):
+        return [ModelError(str(error), START_AGAIN)]
+    if isinstance(error, InvalidQuantity):
+        return [ConfigError(str(error), START_AGAIN)]
+    return [DeviceError(f"{type(error).__name__}: {error}.", "Report the daemon's log.")]
 
 
 def _run_server(procedure: Procedure, updates: Updates, listening: socket.socket) -> None:

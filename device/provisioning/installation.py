@@ -11,23 +11,24 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from device.provisioning.item import LinkItem, told
+from device.provisioning.item import LinkItem, TextItem, told
 from device.provisioning.target import ProvisioningFailed, TargetMachine, systemd_files
 
 CURRENT, UPDATER = "/opt/tsis/current", "/opt/tsis/updater"
 UNITS = "/etc/systemd/system"
 UNIT_KINDS = (".service", ".path", ".socket", ".timer")
-OF_UPDATER = ("tsis-boot.", "tsis-update.")
+OF_UPDATER = ("tsis-boot.", "tsis-update.", "tsis-fallback.")
 AT_BOOT = "WantedBy=multi-user.target"
-OTHER_FOLDERS = {
-    ".rules": "/etc/udev/rules.d/60-",
-    ".sysusers.conf": "/etc/sysusers.d/",
-    ".tmpfiles.conf": "/etc/tmpfiles.d/",
-}
+FOLDERS_OF = {".sysusers.conf": "/etc/sysusers.d/", ".tmpfiles.conf": "/etc/tmpfiles.d/"}
 """Where files go that are no units, by how their names end."""
+RULES = "/etc/udev/rules.d/60-"
 GOING = ("tsis.service", "tsis-update.path")
 RELOAD = ("systemctl", "daemon-reload")
-UDEV = (("udevadm", "control", "--reload"), ("udevadm", "trigger", "--subsystem-match=tty"))
+SUBSYSTEMS = ("tty", "i2c-dev", "gpio", "video4linux")
+UDEV = (
+    ("udevadm", "control", "--reload"),
+    ("udevadm", "trigger", "--settle", *(f"--subsystem-match={name}" for name in SUBSYSTEMS)),
+)
 
 
 def unit_links() -> LinkItem:
@@ -43,14 +44,36 @@ def unit_links() -> LinkItem:
 
 
 def other_links() -> LinkItem:
-    """Return the links of rules, users and folders."""
+    """Return the links of users and folders."""
     links = {}
     for name, _ in systemd_files():
-        for ending, before in OTHER_FOLDERS.items():
+        for ending, folder in FOLDERS_OF.items():
             if name.endswith(ending):
-                as_there = name if ending == ".rules" else name.removesuffix(ending) + ".conf"
-                links[f"{before}{as_there}"] = f"{CURRENT}/systemd/{name}"
-    return LinkItem("udev's rules, users and folders of the release", links)
+                links[f"{folder}{name.removesuffix(ending)}.conf"] = f"{CURRENT}/systemd/{name}"
+    return LinkItem("users and folders of the release", links)
+
+
+@dataclass(frozen=True)
+class UdevItem:
+    """Names and groups of the probe's parts. They are copies: the first release needs them before it is installed."""
+
+    title: str = "udev's rules"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return which rules are missing or other ones."""
+        return told([words for rule in self._rules() if (words := rule.differs(target))])
+
+    def apply(self, target: TargetMachine) -> None:
+        """Write them and let udev look at every part anew; a machine without udev has no parts that are plugged in."""
+        for rule in self._rules():
+            rule.apply(target)
+        for command in UDEV:
+            target.asked(*command)
+
+    def _rules(self) -> list[TextItem]:
+        rules = [(name, text) for name, text in systemd_files() if name.endswith(".rules")]
+        return [TextItem(self.title, f"{RULES}{name}", text) for name, text in rules]
 
 
 @dataclass(frozen=True)
@@ -74,8 +97,6 @@ class FirstReleaseItem:
         ended = subprocess.run(command, check=False)
         if ended.returncode:
             raise ProvisioningFailed(f"The release was not installed (exit code {ended.returncode}).", "See above.")
-        for udev in UDEV:
-            target.asked(*udev)  # a machine without udev has no parts that are plugged in either
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from device.provisioning.accounts import AccountsItem, DeployKeyItem, FoldersItem, SshItem
 from device.provisioning.boot_files import BootSettingsItem, KernelLineItem, ReadOnlyBootItem
 from device.provisioning.identity import SerialItem, SignersItem, TimeZoneItem
-from device.provisioning.installation import FirstReleaseItem, GoingItem, other_links, unit_links
+from device.provisioning.installation import FirstReleaseItem, GoingItem, UdevItem, other_links, unit_links
 from device.provisioning.item import ProvisioningItem, TextItem
 from device.provisioning.packages import NEEDED, ONLY_RASPBERRY_PI_OS, PackagesItem
 
@@ -54,6 +54,7 @@ def plan_of(wishes: ProvisioningWishes) -> list[ProvisioningItem]:
         BootSettingsItem(wishes.camera_overlay),
         KernelLineItem(),
         ReadOnlyBootItem(),
+        UdevItem(),
         other_links(),
         unit_links(),
         FirstReleaseItem(wishes.release),

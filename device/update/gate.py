@@ -42,7 +42,7 @@ class NotHealthy(Exception):  # noqa: N818 - it is an answer, not an error of th
 
 
 class DaemonGone(NotHealthy):
-    """Nobody listens on the port, or somebody else does: the page that stands in for a daemon that ended."""
+    """Nobody listens on the port, or somebody else does: the page that stands in for a daemon (device/fallback/)."""
 
 
 def ask_parts(port: int) -> PartsHealth:
@@ -51,7 +51,10 @@ def ask_parts(port: int) -> PartsHealth:
     try:
         line.request("GET", PATH)
         answer = line.getresponse()
-        return _read(json.loads(answer.read(MOST_BYTES)))
+        record = json.loads(answer.read(MOST_BYTES))
+        if answer.status == http.client.SERVICE_UNAVAILABLE:
+            raise DaemonGone(f"the daemon does not start ({record['code']}: {record['detail']})")
+        return _read(record)
     except (OSError, http.client.HTTPException) as error:
         kind = DaemonGone if isinstance(error, ConnectionError) else NotHealthy
         raise kind(f"the daemon does not answer on port {port} ({error or type(error).__name__})") from None

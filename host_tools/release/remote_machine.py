@@ -47,14 +47,15 @@ class RemoteMachine:
 
         `told` hears its lines as they come, errors among them. Raises `NotReachable`.
         """
-        with (stdin or Path("/dev/null")).open("rb") as file:
-            began = subprocess.Popen(
+        with (
+            (stdin or Path("/dev/null")).open("rb") as file,
+            subprocess.Popen(
                 self._command(words), stdin=file, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-            )
-            assert began.stdout
-            for line in began.stdout:
+            ) as ssh,
+        ):
+            for line in ssh.stdout or ():
                 (told or print)(line.rstrip())
-            code = began.wait()
+            code = ssh.wait()
         if code == CONNECTION_FAILED:
             raise NotReachable(f"ssh to {self} has failed.")
         return code
@@ -70,9 +71,8 @@ class RemoteMachine:
 
     def send(self, file: Path, to: str) -> None:
         """Copy a file; raise `NotReachable` when it did not get there whole."""
-        if self.run(f"cat > {shlex.quote(to)}", stdin=file) or self.answer(f"wc -c < {shlex.quote(to)}") != str(
-            file.stat().st_size
-        ):
+        code = self.run(f"cat > {shlex.quote(to)}", stdin=file)
+        if code or self.answer(f"wc -c < {shlex.quote(to)}") != str(file.stat().st_size):
             raise NotReachable(f"{file.name} could not be copied to {self}.")
 
     def wait_for_reboot(self, before: str, within_s: float) -> None:

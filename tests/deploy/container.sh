@@ -39,9 +39,22 @@ mkdir -p "$folder/packages/partial"
 # The container's own systemd-nspawn, with its own libraries: the host needs neither. Where systemd is not PID 1 nobody
 # can be asked for a scope. DevicePolicy= takes bpf and the unified control groups.
 libraries=$root/usr/lib/x86_64-linux-gnu
-scope=()
-[[ -d /run/systemd/system ]] || scope=(--keep-unit)
-export SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1
+# Its control groups then lie below those of this shell, which are its own, so that two containers do not meet.
+scope=() before=() own=tsis-deploy-$$
+if [[ ! -d /run/systemd/system ]]; then
+  scope=(--keep-unit)
+  while IFS=: read -r _ controllers path; do
+    case $controllers in
+      '') hierarchy=/sys/fs/cgroup/unified ;;
+      name=systemd) hierarchy=/sys/fs/cgroup/systemd ;;
+      *) continue ;;
+    esac
+    [[ -d $hierarchy ]] || hierarchy=/sys/fs/cgroup
+    mkdir "$hierarchy$path/$own"
+    echo $$ > "$hierarchy$path/$own/cgroup.procs"
+    before+=("$hierarchy$path")
+  done < /proc/self/cgroup
+fi
 boot() {
   "$root/lib64/ld-linux-x86-64.so.2" --library-path "$libraries:$libraries/systemd" \
     "$root/usr/bin/systemd-nspawn" --quiet --register=no "${scope[@]}" --directory="$root" --machine=tsis-probe \
@@ -51,7 +64,10 @@ boot() {
 }
 ended() {
   if kill "$container" 2> /dev/null; then wait "$container" || true; fi
-  [[ ${#scope[@]} == 0 ]] || rmdir /sys/fs/cgroup/*/{payload/init.scope,payload,supervisor} 2> /dev/null || true
+  for group in "${before[@]}"; do
+    echo $$ > "$group/cgroup.procs"
+    find "$group/$own" -depth -type d -exec rmdir {} + 2> /dev/null || true
+  done
 }
 trap ended EXIT
 trap 'exit 143' TERM INT

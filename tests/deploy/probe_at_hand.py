@@ -6,7 +6,6 @@ import json
 import subprocess
 import sys
 import time
-import urllib.error
 import urllib.request
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -58,6 +57,15 @@ def asked(url: str) -> Any:
         return None
 
 
+def posted(path: str, body: object) -> Any:
+    """Return what the REST API answers to a POST of JSON, or of a file's bytes; raise `OSError` when it refuses."""
+    is_file = isinstance(body, bytes)
+    headers = {"Content-Type": "application/octet-stream" if is_file else "application/json"}
+    request = urllib.request.Request(URL + path, body if is_file else json.dumps(body).encode(), headers)
+    with urllib.request.urlopen(request, timeout=60) as response:
+        return json.load(response)
+
+
 class ProbeAtHand:
     """The container, the key of its user pi, and the keys of releases."""
 
@@ -105,9 +113,8 @@ class ProbeAtHand:
 
     def fill_disk(self, free_mb: int) -> None:
         """Leave so much space (MB) on its disk."""
-        filled = self.root(
-            f"rm -f /full; free=$(df --output=avail --block-size=1M / | tail -n 1); fallocate -l $((free - {free_mb}))M /full"
-        )
+        free = "$(df --output=avail --block-size=1M / | tail -n 1)"
+        filled = self.root(f"rm -f /full; fallocate -l $(({free} - {free_mb}))M /full")
         if filled.code:
             raise NotReached(filled.said)
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tarfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +33,7 @@ class ReleaseShop:
     def __init__(self, folder: Path) -> None:
         """Make keys and clone in a folder; wheels that were downloaded before are kept."""
         self.folder, self.clone = folder, folder / "clone"
-        for path in (self.clone, folder / "releases", folder / "keys"):
+        for path in (self.clone, folder / "releases"):
             shutil.rmtree(path, ignore_errors=True)
         (folder / "releases").mkdir(parents=True)
         run("git", "clone", "--quiet", str(ROOT), str(self.clone))
@@ -40,9 +41,9 @@ class ReleaseShop:
         kept.mkdir(parents=True, exist_ok=True)
         (self.clone / "build").mkdir()
         (self.clone / "build/wheels").symlink_to(kept)
-        self.key, self.evil_key = folder / "keys/release_key", folder / "keys/evil_key"
-        self.signers = folder / "keys/release_signers"
-        self.key.parent.mkdir()
+        self._keys = TemporaryDirectory(prefix="tsis-keys-")  # a key in a repository is refused
+        keys = Path(self._keys.name)
+        self.key, self.evil_key, self.signers = keys / "release_key", keys / "evil_key", keys / "release_signers"
         self.signers.write_text(self._made_key(self.key))
         self._made_key(self.evil_key)
 

@@ -5,17 +5,22 @@ Run by run.sh as `python -m stories FOLDER`, while the container boots; exits 1 
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from probe_at_hand import BROWSER, URL, Ended, NotReached, ProbeAtHand, asked, until
+from probe_at_hand import BROWSER, URL, Ended, NotReached, ProbeAtHand, asked, posted, until
 from releases import ReleaseShop
 
 HERE = Path(__file__).parent
 UNITS = "/etc/systemd/system"
 MB = 10**6
+CODE = re.compile(r"\bE01[0-9]\b")
+ENDED = ("done", "rejected", "cancelled", "failed")
+TRIES = 3
+"""A machine that is busy besides may spoil a press, as a trembling hand does."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +126,17 @@ def shown(stage: Stage) -> Iterator[Claim]:
     probe.root("rm /etc/chromium.d/stories; systemctl restart tsis-kiosk")
 
 
+def pressed(stage: Stage) -> Iterator[Claim]:
+    """A press to its result: whatever the units' limits deny to camera, models or store would end it."""
+    until("ready for a press", lambda: asked(URL + "health/ready") is not None, 60)
+    jobs = []
+    while len(jobs) < TRIES and "done" not in jobs:
+        path = f"presses/{posted('presses', {'mode': 'quick'})['id']}"
+        until("the press has ended", lambda path=path: asked(URL + path)["state"] in ENDED, 120)
+        jobs.append(asked(URL + path)["state"])
+    yield Claim("a press of mode quick has its result", jobs[-1] == "done", jobs)
+
+
 def good(stage: Stage) -> Iterator[Claim]:
     """A good release."""
     done = stage.probe.deploy(stage.files["second"])
@@ -160,7 +176,6 @@ def refused(stage: Stage) -> Iterator[Claim]:
         "a file without its last bytes": shop.damaged(third, "short", keep=size - 20_000),
         "an empty file": shop.damaged(third, "empty", keep=0),
         "an older counter": stage.files["older"],
-        "the counter that runs": stage.files["second"],
         "another product": shop.altered(third, "product", product="toaster"),
         "another machine": shop.altered(third, "machine", machine="riscv64"),
         "another major data schema": shop.altered(third, "store", data_schemas={"store": {"writes": 9, "reads": [9]}}),
@@ -168,11 +183,28 @@ def refused(stage: Stage) -> Iterator[Claim]:
     before = probe.running()
     for words, file in bad.items():
         yield from refused_claims(words, probe.deploy_unseen(file), probe.running() == before)
+    again = probe.deploy(stage.files["second"])
+    yield Claim("the release that runs is known as such", again.code == 0 and "already" in again.said, again.last)
+    yield Claim("and is not started again", probe.running() == before)
     for words in ("a signature of an unknown key", "a flipped byte in a wheel"):
         done = probe.deploy(bad[words])
         yield Claim(
             f"{words} is not even sent by make deploy", done.code == 1 and "sending" not in done.said, done.last
         )
+
+
+def by_rest(stage: Stage) -> Iterator[Claim]:
+    """The same installer behind the screen's buttons: the daemon itself may only lay the file, or the wish, ready."""
+    probe = stage.probe
+    before = probe.running()
+    posted("updates", stage.files["older"].read_bytes())
+    until("it is refused", lambda: (asked(URL + "updates") or {}).get("state") == "refused", 60)
+    seen = asked(URL + "updates")
+    yield Claim("an older counter by REST: refused with the reason", "counter" in seen["reason"], seen["reason"])
+    yield Claim("an older counter by REST: what runs is untouched", probe.running() == before)
+    posted("updates/roll-back", {})
+    took_s = until("the first release runs", lambda: probe.running()[0].endswith("+1000") and probe.is_ready(), 120)
+    yield Claim("the release before comes back when the screen asks for it", True, f"after {took_s:.0f} s")
 
 
 def full_disk(stage: Stage) -> Iterator[Claim]:
@@ -190,7 +222,7 @@ def full_disk(stage: Stage) -> Iterator[Claim]:
 
 def refused_claims(words: str, ended: Ended, is_untouched: bool) -> Iterator[Claim]:
     """The claims of one refusal."""
-    yield Claim(f"{words}: refused with the reason", ended.code == 1 and " E01" in f" {ended.said}", ended.last)
+    yield Claim(f"{words}: refused with the reason", ended.code == 1 and bool(CODE.search(ended.said)), ended.last)
     yield Claim(f"{words}: what runs is untouched", is_untouched)
 
 
@@ -216,9 +248,11 @@ STORIES: list[Callable[[Stage], Iterator[Claim]]] = [
     provisioned,
     shut_in,
     shown,
+    pressed,
     good,
     dying_camera,
     refused,
+    by_rest,
     full_disk,
     in_the_end,
 ]

@@ -17,9 +17,18 @@ inside() { chroot "$root" /usr/bin/env -C / "$@"; }
 inside /opt/tsis/current/bin/python -m pip install -qq --root-user-action=ignore --no-deps --no-build-isolation \
   --no-index --force-reinstall /src
 install -D -m 644 "$project/systemd/tsis.service" "$root/usr/lib/systemd/system/tsis.service"
+install -D -m 644 "$project/systemd/tsis-fallback.service" "$root/usr/lib/systemd/system/tsis-fallback.service"
 install -D -m 644 "$project/systemd/tsis.sysusers.conf" "$root/usr/lib/sysusers.d/tsis.conf"
 install -D -m 644 "$project/systemd/tsis-force.rules" "$root/usr/lib/udev/rules.d/60-tsis-force.rules"
 inside systemd-sysusers
+# The fallback runs from the last good release, here the same; there is one before it, and whom to ask for that.
+rm -rf "$root/opt/tsis/updater" "$root/var/lib/tsis-update"
+mkdir -p "$root/opt/tsis/updater/lib/python3.11/site-packages" "$root/var/lib/tsis-update/incoming"
+cp -r "$root/src/device" "$root/opt/tsis/updater/lib/python3.11/site-packages"
+echo '{"committed": "0.2.0+2", "previous": "0.1.0+1"}' > "$root/var/lib/tsis-update/state.json"
+inside groupadd --force --system tsis-update
+inside chgrp tsis-update /var/lib/tsis-update/incoming
+chmod 770 "$root/var/lib/tsis-update/incoming"
 
 # What the container adds: no hardware, and a look into the unit's sandbox.
 etc=$root/etc/systemd/system

@@ -14,6 +14,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from claim import Claim
+from fallback_stories import fallback_stories
 from real_stories import RealService, real_stories
 from service import NAME, NotReached, Service, run, until
 
@@ -150,7 +151,7 @@ def simulated_stories(service: Service) -> list[Callable[[], Iterator[Claim]]]:
     stories: list[Callable[[], Iterator[Claim]]] = [analysed, shut_in]
     stories += [partial(story, service) for story in (started, pressed, killed)]
     stories += [partial(frozen, service, kind) for kind in FROZEN]
-    return [*stories, partial(stopped, service)]
+    return [*stories, partial(stopped, service), *fallback_stories(service)]
 
 
 def main(only: str = "") -> int:

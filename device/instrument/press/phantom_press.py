@@ -21,6 +21,7 @@ from device.instrument.press.record import recording_of
 from device.instrument.press.states import Guidance
 from device.instrument.status import StatusBoard
 from device.instrument.watch.clock_watch import ClockWatch
+from device.instrument.watch.computer_watch import ComputerWatch
 from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
@@ -42,11 +43,21 @@ class PhantomPress:
     """Leads the operator, by the guidance on `board`, through a measurement that is recorded only."""
 
     def __init__(
-        self, config: Config, bench: Bench, store: Store, *, clock: ClockWatch, opened: ExitStack, simulated: bool
+        self,
+        config: Config,
+        bench: Bench,
+        store: Store,
+        *,
+        clock: ClockWatch,
+        opened: ExitStack,
+        simulated: bool,
+        computer: ComputerWatch | None = None,
     ) -> None:
         self.board = StatusBoard()
         self._config, self._bench, self._store, self._clock = config, bench, store, clock
-        self._opened, self._simulated = opened, simulated
+        self._opened, self._simulated, self._computer = opened, simulated, computer
+        if computer:
+            computer.start()
         self._listeners: list[Callable[[Mode], None]] = []
 
     def on_request(self, listener: Callable[[Mode], None]) -> None:
@@ -76,6 +87,8 @@ class PhantomPress:
         except DeviceError as error:
             log.error("%s %s", error.code, error)
         finally:
+            if self._computer:
+                self._computer.close()
             self._opened.close()
 
     def _recording(self, phantom: PhantomTruth, mode: Mode, cancelled: threading.Event) -> Recording:
@@ -88,6 +101,8 @@ class PhantomPress:
         finally:
             self._darken()
         self._warn(self._clock.warning())
+        for warning in self._computer.taken() if self._computer else ():
+            self._warn(warning)
         recording = recording_of(
             [*unloaded, *frames], self._config, started_at=started_at, calibration_id=None, simulated_truth=None
         )

@@ -7,6 +7,12 @@ const WATCH_MS = 250;
 const ANSWER_MS = 5000;
 const RELEASE_MS = 600000; // a slow stick
 
+/** Load the page anew when it is no longer the daemon that answers, but what stands in for it and says why. */
+async function loadFallback() {
+  const response = await fetch("/fallback/state", { signal: AbortSignal.timeout(ANSWER_MS) }).catch(() => null);
+  if (response?.ok) location.reload();
+}
+
 /** Call onStatus with each status, and onSilence again and again while none arrives. */
 export function followStatus(onStatus, onSilence) {
   let source = null;
@@ -29,7 +35,9 @@ export function followStatus(onStatus, onSilence) {
     const now = performance.now();
     if (now - heardAt <= SILENCE_MS) return;
     onSilence();
-    if (now - openedAt > REOPEN_MS) open();
+    if (now - openedAt <= REOPEN_MS) return;
+    loadFallback();
+    open();
   }
 
   open();

@@ -151,6 +151,15 @@ def test_a_store_of_newer_software_is_refused(card: Path, fresh: Path, tmp_path:
     assert not data_of(fresh).exists()
 
 
+def test_a_card_of_before_databases_had_a_number_is_restored(card: Path, fresh: Path, tmp_path: Path) -> None:
+    db = sqlite3.connect(data_of(card) / "tsis.sqlite")
+    db.execute("PRAGMA user_version = 0")
+    db.close()
+    write_backup(read_layers(layer_files(card)).config(), tmp_path / "old.backup", card)
+    restored(tmp_path / "old.backup", fresh)
+    assert len(records(data_of(fresh))) == 3
+
+
 def test_a_damaged_backup_changes_nothing(backup: Path, fresh: Path) -> None:
     content = bytearray(backup.read_bytes())
     content[len(content) // 2] ^= 1

@@ -132,3 +132,11 @@ def test_wrong_usage_is_exit_code_2(run, arguments):
     code, out, told = run(arguments)
     assert (code, out) == (2, [])
     assert told[0].startswith("usage: python -m device")
+
+
+def test_a_supply_that_is_too_low_is_told_and_the_recording_stands(run, caplog):
+    """A certificate that is made of it would be of a weak supply."""
+    low = '[[faults]]\nkind = "undervoltage"\nfrom_press = 1\n'
+    code, out, _ = run(command(*PHANTOM, "--out", str(OUT), scene=low))
+    assert (code, out) == (0, [str(OUT)])
+    assert [record for record in caplog.messages if record.startswith("E015 ")]

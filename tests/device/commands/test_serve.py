@@ -1,13 +1,52 @@
-"""The daemon's port: taken at once, and every connection to it answers without waiting."""
+"""The daemon's port, and what it leaves behind when it does not start. Its change of hands: test_server.py."""
 
 import socket
+from contextlib import ExitStack
+from pathlib import Path
 
-from device.commands.serve import _listen
+import pytest
+
+from device.assembly.opened_parts import StartFailed
+from device.commands.serve import DaemonPort, refusal_noted
 from device.config import Config, ServerSection
+from device.errors import CameraError, ConfigError, LightError
+from device.fallback.start_note import NOTE, read_note
+from device.measurement.bundle import BundleRefused
+from device.measurement.quantities import InvalidQuantity
 
 
 def test_an_answer_of_two_parts_does_not_wait_for_the_clients_acknowledgement():
     """Without it every request over a connection that stays open takes 44 ms instead of half a millisecond."""
     config = Config(server=ServerSection(port=0))
-    with _listen(config) as listening, socket.create_connection(listening.getsockname()), listening.accept()[0] as one:
-        assert one.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    with ExitStack() as opened:
+        listening = opened.enter_context(DaemonPort(config)).listening()
+        opened.enter_context(socket.create_connection(listening.getsockname()))
+        accepted = opened.enter_context(listening.accept()[0])
+        assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
+@pytest.mark.parametrize(
+    ("error", "codes"),
+    [
+        (ConfigError("a.", "b."), ["E001"]),
+        (StartFailed([CameraError("a.", "b."), LightError("c.", "d.")]), ["E101", "E201"]),
+        (InvalidQuantity("press.target_n", 99, "at most 20 N", "correct it"), ["E001"]),
+        (BundleRefused(Path("models/paper"), "name", "missing", "there"), ["E401"]),
+        (ZeroDivisionError("division by zero"), ["E000"]),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_why_a_start_fails_is_noted_with_a_code_and_the_error_goes_on(tmp_path, error, codes):
+    (tmp_path / NOTE).parent.mkdir(parents=True)
+    with pytest.raises(type(error)), refusal_noted(tmp_path):
+        raise error
+    faults = read_note(tmp_path).faults
+    assert [fault["code"] for fault in faults] == codes
+    assert all(fault["cause"] and fault["remedy"] for fault in faults)
+
+
+def test_what_ends_as_it_should_notes_nothing(tmp_path):
+    (tmp_path / NOTE).parent.mkdir(parents=True)
+    with refusal_noted(tmp_path):
+        pass
+    assert read_note(tmp_path) is None

@@ -31,7 +31,7 @@ FAKES = {
     "systemctl": 'echo "systemctl $*" >> "$ROOT/asked"; case $1 in is-active) cat "$ROOT/active" 2> /dev/null;; '
     'start) echo active > "$ROOT/active"; echo active >> "$ROOT/active";; esac; true',
     "sshd": 'echo "sshd $*" >> "$ROOT/asked"',
-    "udevadm": "exit 1",
+    "udevadm": 'echo "udevadm $*" >> "$ROOT/asked"; exit 1',
 }
 
 
@@ -250,3 +250,10 @@ def test_it_runs_from_a_zip_with_the_standard_library_alone(machine, tmp_path):
     done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(wheel)}, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (1, "")
     assert "tsis-boot.service is no link" in done.stdout
+
+
+def test_names_of_the_parts_are_there_before_the_first_release_asks_for_them(machine):
+    assert machine.run() == REBOOT
+    for name in ("tsis-force.rules", "tsis-parts.rules"):
+        assert machine.text(f"etc/udev/rules.d/60-{name}") == (ROOT / "systemd" / name).read_text()
+    assert "udevadm trigger --settle --subsystem-match=tty" in machine.asked()

@@ -1,0 +1,72 @@
+"""The ways out that the page offers at the probe: back to the last good release, and a support file.
+
+Neither is done here: the updater, which is root's, sees a file appear; the support file has a command of its own.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from device.errors import BusyError, DeviceError, UnknownResource
+from device.fallback.situation import NOTES, Situation
+
+ROLL_BACK = f"{NOTES}/incoming/roll_back"
+SUPPORT = "device.commands.support"
+SUPPORT_S = 60.0
+
+
+def roll_back(root: Path, situation: Situation) -> None:
+    """Ask the updater for the last good release.
+
+    Raises `UnknownResource` when there is none, `BusyError` when it was asked already, `DeviceError` when it cannot be.
+    """
+    if not situation.may_roll_back:
+        raise UnknownResource("There is no other release on this probe.", "Install one: `make deploy`, or a USB stick.")
+    path = root / ROLL_BACK
+    try:
+        handle, name = tempfile.mkstemp(prefix=".roll_back-", dir=path.parent)
+        os.close(handle)
+    except OSError as error:
+        raise _not_asked(error) from None
+    try:
+        os.link(name, path)  # unlike a rename it replaces nothing
+    except FileExistsError:
+        raise BusyError("The probe was asked to go back already.", "Wait a minute, or switch it off and on.") from None
+    except OSError as error:
+        raise _not_asked(error) from None
+    finally:
+        os.unlink(name)
+
+
+def has_support() -> bool:
+    """Return whether this release has the command that writes a support file."""
+    try:
+        return importlib.util.find_spec(SUPPORT) is not None
+    except ImportError:
+        return False
+
+
+def support_file() -> bytes:
+    """Return a support file, a zip. Raises `DeviceError` when its command writes none."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "support.zip"
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", SUPPORT, str(path)],
+                capture_output=True, text=True, errors="replace", timeout=SUPPORT_S, check=False,
+            )  # fmt: skip
+            if done.returncode == 0:
+                return path.read_bytes()
+            reason = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
+        except (OSError, subprocess.TimeoutExpired) as error:
+            reason = str(error)
+    raise DeviceError(f"The support file was not written: {reason}.", "Fetch the log: `journalctl -u tsis`.")
+
+
+def _not_asked(error: OSError) -> DeviceError:
+    return DeviceError(f"The updater cannot be asked: {error.strerror}.", "Install a release: `make deploy`.")

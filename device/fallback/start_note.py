@@ -1,0 +1,74 @@
+"""Why the daemon did not start, written by itself in memory (/run) and read by the fallback: schema `tsis.start/1`.
+
+The folder is the unit's RuntimeDirectory; where it is missing, as on a laptop, nothing is written.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from device.errors import DeviceError
+
+SCHEMA = "tsis.start/1"
+NOTE, RELEASE_LINK = "run/tsis/start.json", "opt/tsis/current"
+FIELDS = ("code", "title", "severity", "cause", "remedy")
+
+
+@dataclass(frozen=True)
+class StartNote:
+    """The faults of a start that failed, as records of `FIELDS`; the process and the release that failed."""
+
+    pid: int
+    release: str
+    faults: tuple[dict[str, str], ...]
+
+
+def write_note(root: Path, faults: Sequence[DeviceError]) -> None:
+    """Note why this process does not start; that it cannot be written changes nothing."""
+    path = root / NOTE
+    record = {
+        "schema": SCHEMA,
+        "pid": os.getpid(),
+        "release": linked_release(root),
+        "faults": [fault.as_record() for fault in faults],
+    }
+    temporary = path.with_name(f"{path.name}.tmp")
+    with suppress(OSError):
+        temporary.write_text(json.dumps(record), encoding="utf-8")
+        temporary.replace(path)
+
+
+def linked_release(root: Path) -> str:
+    """Return the name of the release that the daemon is to run; empty when it is none."""
+    try:
+        return Path(os.readlink(root / RELEASE_LINK)).name
+    except OSError:
+        return ""
+
+
+def clear_note(root: Path) -> None:
+    """Forget why an earlier start failed: this one did not."""
+    with suppress(OSError):
+        (root / NOTE).unlink(missing_ok=True)
+
+
+def read_note(root: Path) -> StartNote | None:
+    """Return why the last start that said so failed; None when there is nothing that can be read."""
+    try:
+        record = json.loads((root / NOTE).read_bytes())
+        if record["schema"] != SCHEMA:
+            return None
+        faults = tuple(_fault(fault) for fault in record["faults"])
+        return StartNote(int(record["pid"]), str(record["release"]), faults) if faults else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _fault(record: dict[str, Any]) -> dict[str, str]:
+    return {field: str(record[field]) for field in FIELDS}

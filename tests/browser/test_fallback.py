@@ -1,0 +1,88 @@
+"""A daemon that refuses to start, in a real Chromium: the page that says why, its ways out, and the daemon's return."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from chromium import chromium_page
+from daemon_process import ROOT, wait_for
+from fallback_process import Fallback, ProbeRoot, failed_start, good_daemon
+from playwright.sync_api import Page, expect
+
+pytestmark = [pytest.mark.browser, pytest.mark.real_time]
+SHOTS = ROOT / "build" / "screens"
+BAD = '[press]\ntarget_n = 99\n[camera]\nexposure_ms = 4\nwidth_px = "wide"\n'
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    with chromium_page() as page:
+        yield page
+
+
+@pytest.fixture
+def fallback(page: Page, tmp_path: Path) -> Iterator[Fallback]:
+    root = ProbeRoot(tmp_path)
+    root.releases("0.2.0+412", committed="0.2.0+412", previous="0.1.0+398")
+    running = Fallback(root)
+    yield running
+    page.goto("about:blank")
+    assert running.stop() == 0
+
+
+def shoot(page: Page, name: str) -> None:
+    SHOTS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=str(SHOTS / f"{name}.png"))
+
+
+def test_bad_settings_are_a_page_that_says_what_is_wrong_and_the_mended_probe_is_the_screen_again(page, fallback):
+    root = fallback.root
+    page.goto(root.url)
+    expect(page.locator("#instruction")).to_have_text("The probe is starting")
+    root.settings(BAD)
+    said = failed_start(root)
+    expect(page.locator("#instruction")).to_have_text("The probe does not start")
+    expect(page.locator(".fault-code")).to_have_text("E001")
+    for setting in ("press.target_n is 99", "camera.exposure_ms", "camera.width_px"):
+        assert setting in said
+        expect(page.locator(".fault-cause")).to_contain_text(setting)
+    expect(page.locator(".facts")).to_contain_text("0.1.0+398")
+    shoot(page, "fallback")
+    size = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert size == [800, 480]
+    root.settings("")
+    daemon = good_daemon(root)
+    try:
+        expect(page.locator("#press-button")).to_contain_text("simulated probe")
+        assert not (root.folder / "run/tsis/start.json").exists()
+    finally:
+        daemon.stop()
+    expect(page.locator("#instruction")).to_have_text("The probe is starting")
+
+
+def test_the_page_at_the_probe_goes_back_to_the_last_good_release(page, fallback):
+    page.goto(fallback.root.url)
+    button = page.locator("#roll-back")
+    expect(button).to_have_text("Go back to 0.1.0+398")
+    button.click()
+    expect(page.locator("#told")).to_contain_text("goes back")
+    asked = fallback.root.folder / "var/lib/tsis-update/incoming/roll_back"
+    wait_for(asked.exists, bool)
+
+
+def test_a_release_that_ends_before_it_can_say_why_shows_its_last_words(page, fallback):
+    root = fallback.root
+    root.command(
+        "systemctl",
+        "#!/bin/sh\nprintf 'LoadState=loaded\\nActiveState=activating\\nResult=exit-code\\nExecMainStatus=1\\n"
+        "ExecMainPID=77\\nMainPID=0\\n'\n",
+    )
+    root.command("journalctl", "#!/bin/sh\necho \"ModuleNotFoundError: No module named 'numpy' <b>\"\n")
+    page.goto(root.url)
+    expect(page.locator(".fault-cause")).to_contain_text(
+        "Release 0.2.0+412 ended before it could say why (exit-code, 1)"
+    )
+    expect(page.locator(".log")).to_contain_text("No module named 'numpy' <b>")
+    shoot(page, "fallback-broken-release")

@@ -1,0 +1,177 @@
+"""The fallback as a process without any package: what it answers, whom it refuses, and when it gives up the port."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from daemon_process import wait_for
+from fallback_process import Fallback, ProbeRoot
+
+from device.access.safe_headers import SAFE_HEADERS
+from device.commands.serve import DaemonPort
+from device.config import Config, ServerSection
+from device.errors import ConfigError, DeviceError
+from device.fallback.address import own_addresses
+from device.fallback.handover import ask_for_port, is_fallback
+from device.fallback.start_note import write_note
+
+REFUSED = ConfigError("press.target_n is 99.", "Correct it.")
+ROLL_BACK = "/api/v1/updates/roll-back"
+
+
+@pytest.fixture(scope="module")
+def fallback(tmp_path_factory):
+    root = ProbeRoot(tmp_path_factory.mktemp("probe"))
+    root.releases("0.2.0+9", committed="0.2.0+9", previous="0.1.0+3")
+    write_note(root.folder, [REFUSED])
+    running = Fallback(root)
+    yield running
+    assert running.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        *(("GET", f"/api/v1/{path}") for path in ("health/live", "health/ready", "health/parts", "status", "events")),
+        *(("POST", "/api/v1/presses"), ("POST", "/api/v1/tare"), ("DELETE", "/api/v1/presses/p-1")),
+    ],
+)
+def test_a_program_is_told_why_and_to_come_again(fallback, method, path):
+    answer = fallback.ask(method, path)
+    assert (answer.status, answer.json["code"], answer.json["detail"]) == (503, "E001", "press.target_n is 99.")
+    assert answer.json["faults"] == [REFUSED.as_record()]
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.headers["retry-after"] == "5"
+
+
+def test_the_page_says_it_too_and_its_files_are_there(fallback):
+    answer = fallback.ask("GET", "/")
+    assert answer.status == 503
+    assert "press.target_n is 99." in answer.body.decode()
+    for name in ("screen.css", "fallback.css", "fallback.js"):
+        assert len(fallback.ask("GET", f"/static/{name}").body) > 500
+    assert fallback.ask("HEAD", "/").body == b""
+
+
+@pytest.mark.parametrize(
+    "path", ["/static/../server.py", "/static/%2e%2e/server.py", "/static/server.py", "/etc/passwd", "/x"]
+)
+def test_nothing_else_is(fallback, path):
+    answer = fallback.ask("GET", path)
+    assert (answer.status, answer.json["code"]) == (404, "E804")
+
+
+def test_every_answer_has_the_headers_of_the_daemons(fallback):
+    assert fallback.ask("GET", "/").headers.items() >= SAFE_HEADERS.items()
+
+
+@pytest.mark.parametrize("path", [ROLL_BACK, "/fallback/yield", "/fallback/support"])
+@pytest.mark.parametrize(
+    ("headers", "code"),
+    [
+        ({"Host": "evil.example"}, "E806"),
+        ({"Origin": "http://evil.example"}, "E807"),
+        ({"Sec-Fetch-Site": "cross-site"}, "E807"),
+        ({"Content-Type": "text/plain"}, "E808"),
+        ({"Content-Length": "65537"}, "E809"),
+    ],
+)
+def test_the_daemons_rules_hold_for_the_ways_out(fallback, path, headers, code):
+    answer = fallback.ask("POST", path, headers)
+    assert answer.json["code"] == code
+    assert not list((fallback.root.folder / "var/lib/tsis-update/incoming").iterdir())
+
+
+def test_the_probe_itself_may_ask_the_updater(fallback):
+    assert fallback.ask("POST", ROLL_BACK, {"Origin": fallback.root.url}).status == 202
+    asked = fallback.root.folder / "var/lib/tsis-update/incoming/roll_back"
+    assert asked.exists()
+    assert fallback.ask("POST", ROLL_BACK).status == 409
+    asked.unlink()
+
+
+def test_many_who_say_nothing_keep_nobody_from_being_answered(fallback):
+    silent = [socket.create_connection(("127.0.0.1", fallback.root.port)) for _ in range(50)]
+    assert fallback.ask("GET", "/api/v1/status").status == 503
+    for one in silent:
+        one.close()
+
+
+def test_a_page_is_served_to_another_machine_but_no_way_out(tmp_path):
+    """This machine's own address on the network stands for another one: it is not loopback."""
+    addresses = own_addresses()
+    if not addresses:
+        pytest.skip("this machine has no address but loopback")
+    root = ProbeRoot(tmp_path)
+    root.settings('host = "0.0.0.0"\n')
+    root.releases("0.2.0+9", committed="0.2.0+9", previous="0.1.0+3")
+    running = Fallback(root)
+    try:
+        answer = running.ask("GET", "/", at=addresses[0])
+        assert answer.status == 503
+        assert b"<button" not in answer.body
+        assert b"0.1.0+3" in answer.body
+        for path in (ROLL_BACK, "/fallback/yield", "/fallback/support"):
+            refused = running.ask("POST", path, at=addresses[0])
+            assert (refused.status, refused.json["code"]) == (403, "E807")
+        assert running.state() == 200
+    finally:
+        running.stop()
+
+
+def test_a_host_that_this_machine_has_not_is_served_on_loopback(tmp_path):
+    """It is why the daemon does not start."""
+    root = ProbeRoot(tmp_path)
+    root.settings('host = "192.0.2.77"\n')
+    running = Fallback(root)
+    assert running.state() == 200
+    running.stop()
+
+
+class TestThePort:
+    @pytest.fixture
+    def running(self, tmp_path):
+        running = Fallback(ProbeRoot(tmp_path))
+        yield running
+        running.stop()
+
+    def daemon_port(self, running):
+        return DaemonPort(Config(server=ServerSection(port=running.root.port)))
+
+    def test_a_daemon_that_starts_in_vain_leaves_the_page_where_it_is(self, running):
+        with self.daemon_port(running):
+            assert running.state() == 200  # while parts are opened
+        assert running.state() == 200
+
+    def test_a_daemon_that_is_ready_gets_it_and_the_fallback_has_it_again_afterwards(self, running):
+        with self.daemon_port(running) as port:
+            listening = port.listening()
+            assert listening.getsockname()[1] == running.root.port
+            with pytest.raises(DeviceError, match="cannot be used: Address already in use"):
+                self.daemon_port(running)  # a second daemon
+        wait_for(running.state, lambda state: state == 200)
+
+    def test_who_asks_without_taking_it_gets_it_no_longer_than_that(self, running):
+        assert is_fallback("127.0.0.1", running.root.port)
+        assert ask_for_port("127.0.0.1", running.root.port)
+        wait_for(running.state, lambda state: state is None)
+        wait_for(running.state, lambda state: state == 200)
+
+
+def test_a_port_that_somebody_else_has_is_waited_for(tmp_path):
+    root = ProbeRoot(tmp_path)
+    with socket.create_server(("127.0.0.1", root.port)):
+        running = Fallback(root, waits=False)
+        wait_for(lambda: running.process.poll() or Path(running.log.name).exists(), bool)
+        assert not is_fallback("127.0.0.1", root.port)
+    wait_for(running.state, lambda state: state == 200)
+    running.stop()
+
+
+def test_systemd_is_told_that_it_goes_on(tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        running = Fallback(ProbeRoot(tmp_path / "probe"), environment={"NOTIFY_SOCKET": str(tmp_path / "notify")})
+        told = [systemd.recv(100) for _ in range(4)]
+        running.stop()
+    assert told == [b"READY=1", b"WATCHDOG=1", b"WATCHDOG=1", b"WATCHDOG=1"]
