@@ -19,7 +19,9 @@ from device.update.layout import UpdateLayout
 from device.update.progress import UpdateProgress, read_progress
 from device.update.state import UpdateState, read_state
 
-QUICK = ("--health-within", "3", "--look-every", "0.03")
+QUICK = ("--health-within", "20", "--look-every", "0.03")
+IMPATIENT = ("--health-within", "3")
+"""For a release that will not be healthy however long one waits."""
 
 
 class UpdatedProbe:

@@ -1,6 +1,7 @@
 """A release file becomes the release that runs, or is left; what ran before is back by itself."""
 
 import pytest
+from updated_probe import IMPATIENT
 
 
 def test_a_first_release_is_installed_committed_and_runs(probe):
@@ -33,7 +34,7 @@ def test_the_next_one_takes_its_place_and_the_one_before_the_last_goes(probe):
 )
 def test_a_release_that_is_not_healthy_is_left_and_the_one_before_is_back(probe, behaviour, reason):
     probe.install("1.0", 10)
-    done = probe.run("install", probe.write("1.1", 11, behaviour))
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, behaviour))
     assert done.returncode == 1
     assert done.stderr.startswith("E013 1.1+11 was left: ")
     assert reason in done.stderr

@@ -8,7 +8,7 @@ from threading import Event, Thread
 
 import pytest
 from small_release import release_file, signer, small_files
-from updated_probe import QUICK
+from updated_probe import IMPATIENT, QUICK
 
 from device.errors import BusyError, UnfitRelease, UpdateFailed
 from device.update.follow import FollowLimits, follow, receive, request_roll_back
@@ -101,7 +101,7 @@ def test_a_way_back_to_a_release_that_cannot_answer_comes_forth_again(probe):
     probe.install("1.1", 11)
     behaviour = next(probe.layout.release("1.0+10").glob("lib/*/site-packages/tsis_fake.json"))
     behaviour.write_text('{"faults": {"store": "E601"}}')
-    done = probe.run("roll-back")
+    done = probe.run(*IMPATIENT, "roll-back")
     assert (done.returncode, "store is not ready (E601)" in done.stderr) == (1, True)
     assert probe.current == "1.1+11"
     assert (probe.state.committed, probe.state.previous, probe.state.bad) == ("1.1+11", "1.0+10", {})
@@ -111,9 +111,9 @@ def test_a_way_back_to_a_release_that_cannot_answer_comes_forth_again(probe):
 def test_a_fault_from_before_is_not_held_against_a_release_and_another_one_is(probe):
     probe.install("1.0", 10, {"faults": {"camera": "E101"}})
     probe.install("1.1", 11, {"faults": {"camera": "E101"}})
-    done = probe.run("install", probe.write("1.2", 12, {"faults": {"camera": "E104"}}))
+    done = probe.run(*IMPATIENT, "install", probe.write("1.2", 12, {"faults": {"camera": "E104"}}))
     assert "camera is not ready (E104)" in done.stderr
-    done = probe.run("install", probe.write("1.3", 13, {"faults": {"camera": "E101", "light": "E201"}}))
+    done = probe.run(*IMPATIENT, "install", probe.write("1.3", 13, {"faults": {"camera": "E101", "light": "E201"}}))
     assert "light is not ready (E201)" in done.stderr
     assert probe.require_whole() == "1.1+11"
 
@@ -124,7 +124,7 @@ def test_answers_and_store_have_to_be_ready_though_they_were_not_before(probe, p
     behaviour = next(probe.layout.release("1.0+10").glob("lib/*/site-packages/tsis_fake.json"))
     behaviour.write_text(f'{{"faults": {{"{part}": "E401"}}}}')
     probe.start_machine()
-    done = probe.run("install", probe.write("1.1", 11, {"faults": {part: "E401"}}))
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"faults": {part: "E401"}}))
     assert f"{part} is not ready (E401)" in done.stderr
 
 
