@@ -32,7 +32,7 @@ HUNG_S = 1.0
 HUNG_BUS = (
     f'{LINE}[settings.press]\nmode = "standard"\n[[faults]]\nkind = "i2c_frozen"\nfrom_press = 1\nfrom_s = {HUNG_S}\n'
 )
-"""The bus is asked once a second in a press, and hangs the next time."""
+"""The LED chip is asked five times a second in a press, and hangs the next time."""
 
 
 def darkness_s(folder: Path, scene: str, end: Callable[[Supervisor, Daemon], float]) -> float:

@@ -20,6 +20,8 @@ DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
 FRAME_TIMEOUT_S = 1.0
 LATE_S = 0.1
 """Three frames of 30 Hz."""
+LOOK_AT_LIGHT_EVERY_S = 0.2
+"""With the 0.75 s after which the keeper of the enable line gives up, a bus that hangs is dark within a second."""
 
 
 @dataclass
@@ -44,7 +46,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         self.progress.exercise("camera", self._look)
-        self.progress.exercise("light", self._confirm_light)
+        self.progress.exercise("light", self._confirm_light, LOOK_AT_LIGHT_EVERY_S)
 
     def light(self, ratio: LedRatio) -> None:
         """Set the four sides; frames begun before the chip acknowledged it are not taken.

@@ -82,7 +82,7 @@ class ProgressBoard:
         self._errors: dict[Part, DeviceError | None] = dict.fromkeys(PARTS)
         self._returned_s = dict(self._progress_s)
         self._entered: dict[str, tuple[Part, float]] = {}
-        self._exercises: dict[Part, Callable[[], None]] = {}
+        self._exercises: dict[Part, tuple[Callable[[], None], float | None]] = {}
 
     @contextmanager
     def inside(self, part: Part) -> Iterator[None]:
@@ -113,15 +113,15 @@ class ProgressBoard:
                 self._worked_s[part] = self._awaited_s[part] = now_s
             self._errors[part] = error if isinstance(error, DeviceError) else None
 
-    def exercise(self, part: Part, action: Callable[[], None]) -> None:
-        """Use a part by `action` at each beat that finds it idle."""
-        self._exercises[part] = action
+    def exercise(self, part: Part, action: Callable[[], None], every_s: float | None = None) -> None:
+        """Use a part by `action` at each beat that finds it idle for so long, a second unless told otherwise."""
+        self._exercises[part] = action, every_s
 
     def beat(self) -> None:
-        """Exercise the parts that have been idle for a second; then raise the first `DeviceError` of any."""
+        """Exercise the parts that have been idle for long enough; then raise the first `DeviceError` of any."""
         faults = []
-        for part, action in self._exercises.items():
-            if self._clock() - self._returned_s[part] >= BEAT_S:
+        for part, (action, every_s) in self._exercises.items():
+            if self._clock() - self._returned_s[part] >= (BEAT_S if every_s is None else every_s):
                 try:
                     action()
                 except DeviceError as error:
