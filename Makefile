@@ -19,7 +19,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -58,7 +58,10 @@ test-camera-virtual: ## run the camera's contract on real picamera2, in a Debian
 test-systemd: ## run the unit under a real systemd, in a Debian container under build (root, 0.9 GB, four minutes)
 	tests/systemd/run.sh build/bookworm
 
-test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, half an hour)
+test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
+	$(PY) tests/deploy/power_cuts.py
+
+test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour)
 	tests/deploy/arm64.sh build/arm64
 
 test-deploy: .venv/all.stamp ## make a container a probe by ssh and send it releases, good and bad (root, network, 6 GB, ten minutes and more)
@@ -90,7 +93,7 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
 
-bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; time the darkness after a kill
+bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; time the darkness after a stop, a kill, a freeze, a hung bus
 	$(PY) tests/bench.py
 	$(PY) tests/bench_forward.py
 	$(PY) tests/bench_acquisition.py

@@ -392,7 +392,7 @@ class Config(Section):
     def conflicts(self) -> Iterator[Conflict]:
         """Yield exposure and frame rate that the light does not allow, and a chip at the bus and address of another."""
         if self.light.enable_line is not None:
-            held = Bound(HELD_HZ, 240.0, "Hz: the enable line is held from frame to frame")
+            held = Bound(HELD_HZ, 240.0, "Hz, to hold the enable line from frame to frame")
             yield from conflict("camera.frame_rate_hz", self.camera.frame_rate_hz, held, "light.enable_line")
         yield from self.light.exposure_conflicts(self.camera.exposure_us, 1e6 / self.camera.frame_rate_hz)
         chips = {name: part for name, part in vars(self).items() if hasattr(part, "chip_address")}

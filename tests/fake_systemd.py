@@ -2,7 +2,8 @@
 
 `fake_systemd.py systemctl VERB...` is the command; it starts and kills `fake_systemd.py daemon`, which answers as the
 release under `opt/tsis/current` tells it to (`tsis_fake.json`): `{"mute": true}` never answers, `{"dies_after": 2}`
-ends after so many answers, `{"faults": {"camera": "E101"}}` is not ready, `{"says": "..."}` is of another release.
+ends after so many answers, `{"falls_back_after": 2}` gives way to the page that stands in for it,
+`{"faults": {"camera": "E101"}}` is not ready, `{"says": "..."}` is of another release.
 """
 
 import json
@@ -52,10 +53,13 @@ def alive():
 
 class Answers(BaseHTTPRequestHandler):
     left = None
+    good = None
     record = None
 
     def do_GET(self):
-        body = json.dumps(self.record).encode()
+        body = json.dumps(self.record if self.good is None or self.good > 0 else {"status": 503}).encode()
+        if self.good is not None:
+            Answers.good -= 1
         self.send_response(200 if self.path == "/api/v1/health/parts" else 404)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
@@ -82,6 +86,7 @@ def daemon():
         for part in ("camera", "light", "force", "answers", "store")
     }
     Answers.left, Answers.record = behaviour.get("dies_after"), {"release": behaviour.get("says", name), "parts": parts}
+    Answers.good = behaviour.get("falls_back_after")
     HTTPServer(("127.0.0.1", PORT), Answers).serve_forever()
 
 

@@ -2,7 +2,7 @@
 
 `killed_updater.py HOW N WORDS...`: every call that changes a folder or synchronises is counted; at the N-th the process
 is killed before it (`kill`), or the call raises ENOSPC (`full`: it alone; `stays_full`: every later one too that needs
-space). With `count` it only counts. The number of calls is written to the file TSIS_FAKE_STATE/calls.
+space). With `count` it only counts. What was called is written to the file TSIS_FAKE_STATE/calls, a line each.
 """
 
 import builtins
@@ -22,7 +22,9 @@ def main():
     seen = []
 
     def changes(name, original, *arguments, **keywords):
-        seen.append(name)
+        if "progress.json" in str(arguments[0]):  # how often that is written depends on the time
+            return original(*arguments, **keywords)
+        seen.append(f"{name} {arguments[0]}")
         if how == "kill" and len(seen) == at:
             os.kill(os.getpid(), signal.SIGKILL)
         is_hit = len(seen) == at if how == "full" else how == "stays_full" and len(seen) >= at
@@ -39,7 +41,7 @@ def main():
     try:
         code = update(words)
     finally:
-        Path(os.environ["TSIS_FAKE_STATE"], "calls").write_text(str(len(seen)))
+        Path(os.environ["TSIS_FAKE_STATE"], "calls").write_text("\n".join(seen))
     return code
 
 

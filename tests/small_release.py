@@ -29,7 +29,7 @@ def new_key(folder: Path, name: str) -> Path:
 def signer(key: Path, identity: str = IDENTITY) -> str:
     """Return a key's line of an allowed-signers file."""
     kind, public = key.with_suffix(".pub").read_text().split()[:2]
-    return f"{identity} {kind} {public}\n"
+    return f'{identity} namespaces="{NAMESPACE}" {kind} {public}\n'
 
 
 def signature(content: bytes, key: Path, namespace: str = NAMESPACE) -> bytes:

@@ -18,8 +18,10 @@ from typing import Any
 from cpu_time import ended_cpu_s
 from daemon_process import ROOT, Daemon
 from i2c_over_socket import served
+from mirrored_daemon import ASKED
 
 from device.simulation.chips.i2c_bus import EmulatedI2cBus
+from device.simulation.chips.remote_line import LineServer
 from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 
 START_S = 60.0
@@ -28,12 +30,17 @@ DARK_WITHIN_S = 1.0
 
 
 class Supervisor:
-    """A daemon on an LED board that outlives it, in a folder of its own."""
+    """A daemon on an LED board that outlives it, in a folder of its own.
 
-    def __init__(self, folder: Path, scene: str, watchdog_s: float) -> None:
+    `has_line`: the board has an enable line; the scene's settings have to name one.
+    """
+
+    def __init__(self, folder: Path, scene: str, watchdog_s: float, *, has_line: bool = False) -> None:
         self._folder, self._scene, self._watchdog_s = folder, scene, watchdog_s
-        (folder / "probe.toml").write_text('data = "var"\n')
+        light = "[light]\nenable_line = 17\n" if has_line else ""
+        (folder / "probe.toml").write_text(f'data = "var"\n{light}')
         self.chip = Tlc59116Chip()
+        self._line = LineServer(self.chip.enable) if has_line else None
         self._serving = served(EmulatedI2cBus({0x60: self.chip}), folder / "i2c")
         self._serving.__enter__()
         self._notified = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -46,6 +53,8 @@ class Supervisor:
         environment = {
             "NOTIFY_SOCKET": str(self._folder / "notify"), "WATCHDOG_USEC": str(round(1e6 * self._watchdog_s)),
         }  # fmt: skip
+        if self._line:
+            environment["OUTSIDE_LINE"] = self._line.address
         program = str(ROOT / "tests" / "mirrored_daemon.py"), str(self._folder / "i2c")
         self.daemon = Daemon(self._folder, self._scene, program=program, environment=environment)
         while "READY=1" not in (message := self._next_message(START_S)):
@@ -77,16 +86,26 @@ class Supervisor:
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         program = [str(ROOT / "tests" / "i2c_over_socket.py"), str(self._folder / "i2c"), "device.commands.led_off"]
         program += ["--config", "probe.toml"]
+        if self._line:
+            program = [str(ROOT / "tests" / "gpiod_over_socket.py"), self._line.address, *program]
         environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", **told}
         process = subprocess.Popen([sys.executable, *program], cwd=self._folder, env=environment)
         cpu_s = ended_cpu_s(process)
         return process.returncode, cpu_s
 
+    @property
+    def last_asked_s(self) -> float:
+        """When the daemon last asked something of its bus (s, monotonic)."""
+        return float((self._folder / ASKED).read_text() or 0.0)
+
     def close(self) -> None:
         """End the daemon, if it still runs, and take its board away."""
         if self.daemon and self.daemon.process.poll() is None:
+            self.daemon.process.send_signal(signal.SIGCONT)
             self.daemon.stop()
         self._serving.__exit__(None, None, None)
+        if self._line:
+            self._line.close()
         self._notified.close()
 
     def _is_fed(self, wait_s: float) -> bool:

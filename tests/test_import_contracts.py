@@ -23,9 +23,9 @@ KINDS = {
 }
 FORBIDDEN = {
     "The device never imports the workstation toolkit": ("device.web.app", "host_tools.scenes.scene"),
-    "The workstation takes only measurement, simulation and files from the device": (
+    "The workstation takes only measurement, simulation, files and updates from the device": (
         "host_tools.scores.dial",
-        "device.errors",
+        "device.config",
     ),
     "Measurement is pure: it imports nothing else of ours": ("device.measurement.mode", "device.files.text_table"),
     "Files know what they hold, and nothing of the daemon": ("device.files.durable", "device.errors"),

@@ -73,7 +73,9 @@ def test_the_toolkit_of_a_wheel_finds_protocols_models_and_tables(installed, tmp
     assert (tmp_path / "frame.png").is_file()
 
 
-@pytest.mark.parametrize("verb", [["train"], ["optics", "build"], ["pages"], ["table"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "verb", [["train"], ["optics", "build"], ["pages"], ["table"], ["release", "build"]], ids=" ".join
+)
 def test_the_toolkit_of_a_wheel_never_writes_into_the_package(verb, installed, tmp_path):
     refused = run(installed, tmp_path, "-m", "host_tools", *verb)
     assert refused.returncode == 1, refused.stderr

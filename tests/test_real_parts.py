@@ -21,7 +21,11 @@ from daemon_process import QUICK_HAND, ROOT, wait_for
 sys.path.insert(0, str(ROOT / "tests" / "rig"))
 from rig import Rig, build_shim
 
+from device.hardware.light_keeper import HOLD_S
+
 pytestmark = pytest.mark.real_time
+BUSY_S = 2.0
+"""What a machine that is busy besides may add; a quiet one adds some hundredths."""
 TRUTH = {"size_mm": 12.0, "depth_mm": 6.0}
 
 
@@ -36,7 +40,7 @@ def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def rig(shim: Path, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """In a folder with a short name, for Unix sockets have no long ones."""
-    rig = Rig(tmp_path_factory.mktemp("rig"), shim, QUICK_HAND, watchdog_s=getattr(request, "param", None))
+    rig = Rig(tmp_path_factory.mktemp("rig"), shim, QUICK_HAND, **getattr(request, "param", {}))
     yield rig
     rig.close()
 
@@ -85,7 +89,7 @@ def test_one_that_is_killed_while_lit_is_darkened_by_the_command_after_it_and_st
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("rig", [4.0], indirect=True)
+@pytest.mark.parametrize("rig", [{"watchdog_s": 4.0}], indirect=True, ids=str)
 def test_one_that_is_frozen_whole_is_ended_by_the_watchdog_and_darkened(rig: Rig):
     daemon = rig.start()
     rig.press_until_lit()
@@ -126,3 +130,23 @@ def test_the_parts_are_told_at_once_also_while_a_press_is_under_way(rig: Rig):
         assert all(part["ready"] for part in told.values()), told
     assert daemon.ask(location).json["state"] == "done"
     assert sorted(took_s)[len(took_s) // 2] < 0.1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rig", [{"is_wired": True}], indirect=True, ids=str)
+@pytest.mark.parametrize("how", ["frozen", "killed", "bus hangs"])
+def test_with_the_enable_line_wired_it_is_dark_soon_whatever_becomes_of_daemon_and_bus(rig: Rig, how: str):
+    """Nobody is there to darken it: no systemd, no command after the end."""
+    daemon = rig.start()
+    job = daemon.press("quick")
+    assert job["state"] == "done", job
+    rig.press_until_lit()
+    since_s = time.monotonic()
+    if how == "bus hangs":
+        rig.world.wish(bus_hangs=True)
+    else:
+        daemon.process.send_signal(signal.SIGSTOP if how == "frozen" else signal.SIGKILL)
+    wait_for(rig.world.is_dark, bool)
+    dark_s = time.monotonic() - since_s
+    assert dark_s < HOLD_S + BUSY_S
+    rig.world.wish(bus_hangs=False)

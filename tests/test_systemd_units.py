@@ -26,6 +26,7 @@ UNIT = FOLDER / "tsis.service"
 FALLBACK = FOLDER / "tsis-fallback.service"
 UNITS = sorted(path for kind in ("service", "path") for path in FOLDER.glob(f"*.{kind}"))
 RULES = FOLDER / "tsis-force.rules"
+LIGHT_RULES = FOLDER / "tsis-light.rules"
 PYTHON = "/opt/tsis/current/bin/python"
 PROGRAMS = re.compile(r"/opt/tsis/(?:current|updater)/bin/python|/usr/bin/(?:cage|chromium)")
 """What is on a probe and not here; systemd looks whether the program of a line is there."""
@@ -196,6 +197,13 @@ def test_the_screen_shows_the_page_of_this_machine_and_comes_back():
     assert service["User"] == "tsis-screen"
 
 
+def test_the_group_that_may_drive_the_enable_line_is_one_of_the_units():
+    [line] = [line for line in LIGHT_RULES.read_text().splitlines() if line and not line.startswith("#")]
+    [group] = re.findall(r'GROUP="(.*?)"', line)
+    assert group in service_of(UNIT)["SupplementaryGroups"].split()
+    assert "DeviceAllow=char-gpiochip rw" in UNIT.read_text()
+
+
 def test_the_unit_that_is_run_under_a_real_systemd_differs_only_in_its_hardware():
     simulated = service_of(ROOT / "tests" / "systemd" / "simulated.conf")
     assert set(simulated) == {"ExecStart", "Environment"}
@@ -208,6 +216,7 @@ def test_the_rule_names_the_load_cell_as_the_settings_do():
 
 
 @pytest.mark.skipif(udev_version() < 254, reason="no udevadm that verifies (systemd 254)")
-def test_udev_takes_the_rule():
-    verified = subprocess.run(["udevadm", "verify", str(RULES)], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("rules", [RULES, LIGHT_RULES], ids=lambda path: path.name)
+def test_udev_takes_the_rule(rules):
+    verified = subprocess.run(["udevadm", "verify", str(rules)], capture_output=True, text=True, check=False)
     assert verified.returncode == 0, verified.stderr

@@ -1,7 +1,8 @@
 """`python -m device led-off`: darkens the LED chip whatever became of the daemon, as systemd's `ExecStopPost=`.
 
 Imports no more than the settings and the driver, and no NumPy, so that `python -m device.commands.led_off` is done long
-before the daemon would have started. A bus that is held low cannot be helped by any program: see docs/contracts.md.
+before the daemon would have started. The enable line goes first, if there is one; the bus is asked in a process of its
+own, since a transfer that hangs in the kernel cannot be ended and may keep any process that made it.
 Exit codes: 0 dark, 1 not known to be dark, 2 usage.
 """
 
@@ -9,25 +10,110 @@ from __future__ import annotations
 
 import argparse
 import os
+import select
+import signal
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from device.config import LightSection
-from device.errors import DeviceError, LightError
+from device.errors import DeviceError, LightBusError, LightError
 from device.hardware.led_driver import open_led_driver
-from device.instrument.watch.restart_note import note_end
+from device.hardware.light_keeper import GpioLine
 from device.settings.last_good import start_settings
 from device.settings.layers import layer_files, read_layers
 
 TRY_FOR_S = 0.5
 """A transaction that the killed daemon was in may spoil the next one; beyond this a chip that is silent stays so."""
 PAUSE_S = 0.05
+LINE_FOR_S = 0.2
+"""The keeper of a daemon that has ended has let the line go long before this program runs."""
+HANGS_AFTER_S = TRY_FOR_S + 0.2
+"""A process that has not come back from the bus by then hangs in it."""
+MOST_FILES = 256
+"""A program that has just begun has opened fewer."""
+SPLIT = "\x1f"
 
 
 def led_off(light: LightSection) -> None:
-    """Darken all sides and read it back; raise `LightError` when bus or chip do not answer."""
+    """Darken all sides, by the line and by the bus, and read it back; returns in time also when the bus hangs.
+
+    Raises `LightError` when bus or chip do not answer: then nobody knows, or the line alone is what keeps it dark.
+    """
+    line, told = _lowered(light)
+    try:
+        if line and not light.is_enabled_low:
+            line.switch(True)  # a chip that has been reset is dark, and answers only so
+        _darken_in_time(light)
+    except LightError as error:
+        raise type(error)(f"{error.cause}{told}", error.remedy) from error
+    finally:
+        if line:
+            line.close()
+
+
+def _lowered(light: LightSection) -> tuple[GpioLine | None, str]:
+    """Return the enable line, low, once whoever held it has gone, and what there is to tell of it."""
+    deadline_s = time.monotonic() + LINE_FOR_S
+    while light.enable_line is not None:
+        try:
+            line = GpioLine(light.enable_chip, light.enable_line, active_low=light.is_enabled_low)
+            return line, " The line that enables the LEDs is low."
+        except OSError as error:
+            if time.monotonic() > deadline_s:
+                return None, f" The line that enables the LEDs cannot be had: {error.strerror or error}."
+            time.sleep(PAUSE_S)
+    return None, ""
+
+
+def _darken_in_time(light: LightSection) -> None:
+    """Darken the chip in a child process; raise what it raised, or `LightBusError` when it does not come back."""
+    hearing, telling = os.pipe()
+    child = os.fork()
+    if not child:
+        _darken_and_tell(light, telling)
+    os.close(telling)
+    with open(hearing, "rb") as answer:
+        is_back = bool(select.select([answer], [], [], HANGS_AFTER_S)[0])
+        said = answer.read().decode() if is_back else ""
+    if not is_back:
+        os.kill(child, signal.SIGKILL)  # which a process in the kernel heeds only when it comes out again
+        remedy = "Switch the probe off and on; if it stays, a chip on the bus or its cable is broken."
+        raise LightBusError(f"The I2C bus of the LED chip hangs: no answer for {HANGS_AFTER_S:g} s.", remedy)
+    os.waitpid(child, 0)
+    if said:
+        code, cause, remedy = said.split(SPLIT)
+        raise DeviceError.by_code[code](cause, remedy)
+
+
+def _darken_and_tell(light: LightSection, telling: int) -> None:
+    """Darken the chip, say nothing or what went wrong, and end this process, which may be long after its parent."""
+    _keep_only(telling)
+    said = SPLIT.join(["E201", "The LED chip could not be darkened.", "Switch the probe off and on."])
+    try:
+        darken(light)
+        said = ""
+    except LightError as error:
+        said = SPLIT.join([error.code, error.cause, error.remedy])
+    finally:
+        with suppress(OSError):
+            os.write(telling, said.encode())
+        os._exit(0)
+
+
+def _keep_only(handle: int) -> None:
+    """Let go of all files but one: a process that hangs in the bus must not keep the line, or whoever reads output."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for standard in range(3):
+        os.dup2(nowhere, standard)
+    os.closerange(3, handle)
+    os.closerange(handle + 1, MOST_FILES)
+
+
+def darken(light: LightSection) -> None:
+    """Darken the chip and read it back, again and again for a while; raise `LightError` when that does not help."""
     deadline_s = time.monotonic() + TRY_FOR_S
     while True:
         try:
@@ -52,6 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             led_off(config.light)
         finally:
+            from device.instrument.watch.restart_note import note_end  # dark first
+
             note_end(config.data, os.environ)
     except DeviceError as error:
         print(error, file=sys.stderr)

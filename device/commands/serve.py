@@ -46,8 +46,8 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     with DaemonPort(config) as port:
         procedure = opened()
         note = RestartNote(config.data)
-        updates = Updates(config.updates)
-        warnings = tuple(one for one in (settings.warning, note.warning(), updates.warning()) if one)
+        told = settings.warning, note.warning(), Updates(config.updates).warning()
+        warnings = tuple(warning for warning in told if warning)
         procedure.board.update(warnings=warnings)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
         with _noted(note), ExitStack() as ending:
@@ -58,7 +58,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             ready()
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, updates, port.listening())
+            _run_server(procedure, port.listening())
     return 0
 
 
@@ -149,14 +149,14 @@ def faults_of(error: Exception) -> list[DeviceError]:
     return [DeviceError(f"{type(error).__name__}: {error}.", "Report the daemon's log.")]
 
 
-def _run_server(procedure: Procedure, updates: Updates, listening: socket.socket) -> None:
+def _run_server(procedure: Procedure, listening: socket.socket) -> None:
     host, port = listening.getsockname()
     kind = "simulated probe" if procedure.is_simulated else "probe"
     reached_at = socket.gethostname() if host in ANYWHERE else host
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{reached_at}:{port}/", flush=True)
     stated = procedure.config.server
     hosts = KnownHosts.of_machine(stated.host, *stated.hosts)
-    app = create_app(procedure, procedure.store, hosts=hosts, updates=updates)
+    app = create_app(procedure, procedure.store, hosts=hosts, updates=Updates(procedure.config.updates))
     # Open event streams never end by themselves; without the limit a stop would wait for them.
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server = DarkeningServer(settings, procedure)

@@ -120,7 +120,8 @@ class Procedure:
 
     def stop(self) -> None:
         """Darken the probe at once and end the press under way; waits for nothing, so a signal may ask for it."""
-        self._capture.stopping.set()
+        if not self._capture.stopping.is_set():  # a signal may come while the event is being set
+            self._capture.stopping.set()
 
     def close(self) -> None:
         """End the press under way, switch the light off and release every part that was opened."""

@@ -145,9 +145,9 @@ class Updates:
             raise BusyError(f"An update is under way: {record.step or record.state}.", "Wait until it has ended.")
 
     def _is_waiting(self) -> bool:
-        """Return whether a file was handed over of which the updater has not told anything yet."""
-        handed_s, told_s = (_changed_s(path) for path in (self._incoming / HANDED_OVER, self._folder / "progress.json"))
-        return handed_s > told_s
+        """Return whether something was handed over of which the updater has not told anything yet."""
+        handed_s = max(_changed_s(self._incoming / name) for name in (HANDED_OVER, WAY_BACK))
+        return handed_s >= max(_changed_s(self._folder / "progress.json"), 0.0)
 
     def receive(self, announced_bytes: int | None) -> IncomingRelease:
         """Begin to take a release file of so many bytes, if that is known.

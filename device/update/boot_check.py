@@ -14,7 +14,7 @@ from device.update.incoming import clear_incoming
 from device.update.layout import UpdateLayout, point
 from device.update.services import reload_units
 from device.update.state import PendingRelease, UpdateState, is_on_disk, read_state, write_state
-from device.update.trial import Updater, finish_commit, leave, remove_others, return_link, tell_interrupted
+from device.update.trial import GONE, Updater, finish_commit, leave, remove_others, return_link, tell_interrupted
 
 MOST_TRIES = 3
 
@@ -46,7 +46,7 @@ def _reason_to_leave(layout: UpdateLayout, pending: PendingRelease) -> tuple[str
     if pending.leaving:
         return pending.leaving, pending.is_bad
     if not layout.is_installed(pending.release):
-        return "Its folder is not there.", False
+        return GONE, False
     if pending.tries >= MOST_TRIES:
         return f"The machine was started {pending.tries} times with it, and it was never healthy for long.", True
     return "", False
@@ -63,14 +63,14 @@ def _try_again(layout: UpdateLayout, state: UpdateState, pending: PendingRelease
 def _repair(updater: Updater, state: UpdateState) -> None:
     """Nothing is on trial: the committed release is current, what a commit leaves to do is done, the rest removed."""
     layout = updater.layout
+    if state.committed and not is_on_disk(layout, state):  # it was found by the links
+        write_state(layout, state)
     if return_link(layout, state):
         _reload()
     if state.is_finishing:
         finish_commit(layout)
     remove_others(layout, state)
     clear_incoming(layout)
-    if state.committed and not is_on_disk(layout, state):
-        write_state(layout, state)
     tell_interrupted(updater)
 
 

@@ -42,7 +42,7 @@ class NotHealthy(Exception):  # noqa: N818 - it is an answer, not an error of th
 
 
 class DaemonGone(NotHealthy):
-    """Nobody listens on the port, or who did has just gone."""
+    """Nobody listens on the port, or somebody else does: the page that stands in for a daemon (device/fallback/)."""
 
 
 def ask_parts(port: int) -> PartsHealth:
@@ -51,12 +51,15 @@ def ask_parts(port: int) -> PartsHealth:
     try:
         line.request("GET", PATH)
         answer = line.getresponse()
-        return _read(json.loads(answer.read(MOST_BYTES)))
+        record = json.loads(answer.read(MOST_BYTES))
+        if answer.status == http.client.SERVICE_UNAVAILABLE:
+            raise DaemonGone(f"the daemon does not start ({record['code']}: {record['detail']})")
+        return _read(record)
     except (OSError, http.client.HTTPException) as error:
         kind = DaemonGone if isinstance(error, ConnectionError) else NotHealthy
         raise kind(f"the daemon does not answer on port {port} ({error or type(error).__name__})") from None
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise NotHealthy(f"the daemon's answer on port {port} is not that of a probe") from None
+        raise DaemonGone(f"what answers on port {port} is no daemon of a probe") from None
     finally:
         line.close()
 
@@ -100,7 +103,7 @@ def wait_until_healthy(
 
 def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | None) -> None:
     if health.release != release:
-        raise NotHealthy(f"the daemon that answers is {health.release or 'of no release'}")
+        raise DaemonGone(f"the daemon that answers is {health.release or 'of no release'}")
     for part in PARTS:
         if part not in health.faults:
             raise NotHealthy(f"the daemon says nothing of its {part}")

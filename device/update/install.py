@@ -135,7 +135,7 @@ class _Steps:
         self._begin("unpacking", 0.25, "unpack")
         folder = write_staged(self._layout, plan, file, self._between(0.25, 0.4))
         self._begin("unpacking", 0.4, "compile")
-        compile_modules(self._layout, folder, plan.manifest)
+        compile_modules(self._layout, folder, plan.manifest, self._between(0.4, 0.5))
         self._begin("unpacking", 0.5, "sync")
         synchronise(folder, self._between(0.5, 0.58))
         self._begin("unpacking", 0.58, "name")

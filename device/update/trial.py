@@ -18,11 +18,12 @@ from device.update.manifest import read_installed
 from device.update.progress import ENDED, ProgressReport, read_progress
 from device.update.services import reload_units, start_daemon, stop_daemon
 from device.update.settings import daemon_port
-from device.update.state import PendingRelease, UpdateState, counter_of, read_state, write_state
+from device.update.state import PendingRelease, UpdateState, counter_of, is_on_disk, read_state, write_state
 from device.update.unpack import remove_release
 
 log = logging.getLogger(__name__)
 INTERRUPTED = "The power went, or the updater was killed, before the release was whole."
+GONE = "Its folder is not there."
 REMEDY = "The release that ran before does again; the maker of the failed one needs to know the reason."
 
 
@@ -58,9 +59,11 @@ def carry_through(updater: Updater) -> None:
         finish_commit(updater.layout)
         tell_interrupted(updater)
         return
-    updater.report.release = pending.release
+    _go_on_telling(updater, pending.release)
     if pending.leaving:
         leave(updater, pending.leaving, is_bad=pending.is_bad)
+    if not updater.layout.is_installed(pending.release):
+        leave(updater, GONE, is_bad=False)
     try:
         _switch(updater, pending.release)
         _watch(updater, pending)
@@ -82,7 +85,11 @@ def commit(updater: Updater) -> None:
         state, committed=pending.release, previous=state.committed, pending=None, floor=floor, is_finishing=True,
         bad={release: reason for release, reason in state.bad.items() if counter_of(release) > floor},
     ).noted(pending.release, "committed", "asked for by the operator" if pending.is_roll_back else "")  # fmt: skip
-    write_state(updater.layout, committed)
+    try:
+        write_state(updater.layout, committed)
+    except OSError:
+        if not is_on_disk(updater.layout, committed):  # it may have failed after it had replaced the file
+            raise
     try:
         finish_commit(updater.layout)
     except OSError as error:
@@ -95,12 +102,12 @@ def finish_commit(layout: UpdateLayout) -> None:
     state = read_state(layout)
     if not state.is_finishing or not state.committed:
         return
+    remove_others(layout, state)  # first, for it makes space
     point(layout.updater, layout.release(state.committed))
     signers = read_installed(layout, state.committed).signers
     if signers and counter_of(state.committed) == state.floor:  # a release that came back brings no old keys back
         write_durably(layout.signers, signers.encode())
         layout.signers.chmod(0o644)
-    remove_others(layout, state)
     write_state(layout, replace(state, is_finishing=False))
 
 
@@ -168,6 +175,14 @@ def tell_interrupted(updater: Updater) -> None:
     else:
         report.end("refused", UpdateFailed(INTERRUPTED, "Send it again; the release before runs unchanged."))
     report.release, report.file = "", ""
+
+
+def _go_on_telling(updater: Updater, release: str) -> None:
+    """Tell the progress under the name of the file with which this trial began, by which its sender follows it."""
+    report, last = updater.report, read_progress(updater.layout)
+    if last.release == release and not report.file:
+        report.file = last.file
+    report.release = release
 
 
 def _switch(updater: Updater, release: str) -> None:

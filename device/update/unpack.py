@@ -25,6 +25,7 @@ INTERPRETER = "/usr/bin/python3"
 SPARE_BYTES = 64 * 2**20
 """What an update leaves free, for the state and for the measurements that are taken meanwhile."""
 DISK_BLOCK = 4096
+BY_HASH = PycInvalidationMode.UNCHECKED_HASH
 VENV = "home = /usr/bin\ninclude-system-site-packages = true\nversion = {version}\n"
 """Makes bin/python see the release's own packages before the system's, of which picamera2 is one."""
 
@@ -84,13 +85,18 @@ def write_staged(layout: UpdateLayout, plan: UnpackPlan, file: ReleaseFile, told
     return folder
 
 
-def compile_modules(layout: UpdateLayout, folder: Path, manifest: ReleaseManifest) -> None:
+def compile_modules(
+    layout: UpdateLayout, folder: Path, manifest: ReleaseManifest, told: Callable[[float], None]
+) -> None:
     """Compile every module for its place to be; one that cannot be is left as it is, as pip does."""
-    final = layout.release(manifest.name) / _site_packages(manifest)
-    mode = PycInvalidationMode.UNCHECKED_HASH
-    compileall.compile_dir(
-        folder / _site_packages(manifest), ddir=str(final), quiet=2, force=True, invalidation_mode=mode
-    )
+    packages, final = folder / _site_packages(manifest), layout.release(manifest.name) / _site_packages(manifest)
+    entries = sorted(packages.iterdir())
+    for done, entry in enumerate(entries):
+        told(done / len(entries))
+        if entry.is_dir():
+            compileall.compile_dir(entry, ddir=str(final / entry.name), quiet=2, invalidation_mode=BY_HASH)
+        else:
+            compileall.compile_file(entry, ddir=str(final), quiet=2, invalidation_mode=BY_HASH)
 
 
 def synchronise(folder: Path, told: Callable[[float], None]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -68,7 +67,7 @@ def show(
 
     if not signers.is_file():
         raise InvalidQuantity("signers", signers, "a file", "write one with `host_tools release signers KEY.pub`")
-    print(json.dumps(checked_manifest(file, signers.read_text(encoding="utf-8")), indent=1))
+    print(checked_manifest(file, signers).decode(), end="")
 
 
 @release.command(epilog="Example: host_tools release key ~/.config/tsis/release_key")

@@ -10,23 +10,24 @@ import json
 import tarfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
 
+from device.errors import DeviceError
 from device.files.durable import sync_directory
 from device.measurement.quantities import InvalidQuantity
 from device.records.schema import STORE_READS, STORE_WRITES
+from device.update.manifest import read_manifest
+from device.update.release_file import opened
+from device.update.signature import require_signature
 from host_tools.release.locked_wheels import sha256_of
-from host_tools.release.signing import require_signed
 from host_tools.release.target import PYTHON, Target
 
 SCHEMA, PRODUCT = "tsis.release/1", "tsis"
 HARDWARE = ("tsis-probe-1",)
 """The kinds of probe that this software drives."""
 MANIFEST, SIGNATURE = "manifest.json", "manifest.json.sig"
-MOST_MANIFEST_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -76,47 +77,19 @@ def write_release(out: Path, manifest: bytes, signature: bytes, files: Mapping[s
     sync_directory(out.parent)
 
 
-def signed_manifest(path: Path) -> tuple[bytes, bytes]:
-    """Return the manifest of a release file and its signature, neither of them checked.
+def checked_manifest(path: Path, signers: Path) -> bytes:
+    """Return the manifest of a release file as a probe that trusts a list of signers finds it: signed, all files whole.
 
-    Raises `InvalidQuantity` for a file that does not begin with them.
+    Raises `InvalidQuantity` with the probe's own reason otherwise.
     """
     try:
-        with tarfile.open(path, "r:") as archive:
-            return _next(archive, MANIFEST), _next(archive, SIGNATURE)
-    except (tarfile.TarError, EOFError) as error:
-        raise InvalidQuantity("file", path, "a release file", f"build one with `make bundle`: {error}") from error
-
-
-def checked_manifest(path: Path, signers: str) -> dict[str, Any]:
-    """Return the manifest of a release file that a key in a list of signers has signed, and whose files are all whole.
-
-    Raises `InvalidQuantity` otherwise.
-    """
-    manifest, signature = signed_manifest(path)
-    require_signed(manifest, signature, signers)
-    record: dict[str, Any] = json.loads(manifest)
-    with tarfile.open(path, "r:") as archive:
-        found = [(member.name, _sha256(archive, member)) for member in archive][2:]
-    stated = [(entry["path"], entry["sha256"]) for entry in record["files"]]
-    if found != stated:
-        wrong = next((name for name, _ in set(stated) ^ set(found)), "the order of its files")
-        raise InvalidQuantity("file", path, "as its manifest says", f"copy it again: {wrong} differs")
-    return record
-
-
-def _sha256(archive: tarfile.TarFile, member: tarfile.TarInfo) -> str:
-    content = archive.extractfile(member)
-    return sha256(content.read()).hexdigest() if content else "no file"
-
-
-def _next(archive: tarfile.TarFile, name: str) -> bytes:
-    member = archive.next()
-    if member is None or member.name != name or not member.isreg() or member.size > MOST_MANIFEST_BYTES:
-        raise tarfile.ReadError(f"{name} is not where it has to be")
-    content = archive.extractfile(member)
-    assert content is not None
-    return content.read()
+        with opened(path) as file:
+            manifest, signature = file.signed()
+            require_signature(manifest, signature, signers)
+            file.check_files(read_manifest(manifest), lambda _: None)
+            return manifest
+    except DeviceError as error:
+        raise InvalidQuantity("file", path, "a release that a probe takes", str(error)) from error
 
 
 def _add(archive: tarfile.TarFile, name: str, size: int, content: IO[bytes]) -> None:

@@ -12,9 +12,9 @@ import subprocess
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from device.errors import DeviceError
 from device.measurement.quantities import InvalidQuantity
-
-IDENTITY, NAMESPACE = "release@tsis", "tsis-release"
+from device.update.signature import IDENTITY, NAMESPACE, require_signature
 
 
 def new_key(path: Path, *, hardware: bool = False, passphrase: str | None = None) -> Path:
@@ -72,16 +72,15 @@ def signature_of(content: bytes, key: Path) -> bytes:
 
 
 def require_signed(content: bytes, signature: bytes, signers: str) -> None:
-    """Raise `InvalidQuantity` unless a key of a list of signers has signed a manifest."""
+    """Raise `InvalidQuantity` unless a key of a list of signers has signed a manifest, as a probe would find."""
     with TemporaryDirectory() as folder:
-        trusted, sealed = Path(folder, "release_signers"), Path(folder, "manifest.json.sig")
+        trusted = Path(folder, "release_signers")
         trusted.write_text(signers, encoding="utf-8")
-        sealed.write_bytes(signature)
-        words = ["ssh-keygen", "-Y", "verify", "-f", str(trusted), "-I", IDENTITY, "-n", NAMESPACE, "-s", str(sealed)]
-        done = subprocess.run(words, input=content, capture_output=True, check=False)
-    if done.returncode:
-        said = " ".join((done.stderr + done.stdout).decode(errors="replace").split())
-        raise InvalidQuantity("signature", "of no key in the list of signers", "of one of them", f"ssh-keygen: {said}")
+        try:
+            require_signature(content, signature, trusted)
+        except DeviceError as error:
+            bound = "of a key in the list of signers"
+            raise InvalidQuantity("signature", "not what a probe takes", bound, str(error)) from error
 
 
 def repository_of(path: Path) -> Path | None:

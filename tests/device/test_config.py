@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from pydantic.dataclasses import dataclass
 
 from device.config import (
+    HELD_HZ,
     CameraSection,
     Config,
     Conflict,
@@ -22,6 +23,7 @@ from device.config import (
 from device.config_chips import RawMode
 from device.errors import ConfigError
 from device.files.toml_record import STRICT, InvalidRecord, from_table
+from device.hardware.light_keeper import HOLD_S
 from device.measurement.quantities import Bound, InvalidQuantity
 from device.settings.layers import read_config
 
@@ -44,6 +46,8 @@ BOUNDS = [
     ("light.max_dimming_ratio", 0.01, 0.9),
     ("light.min_contrast_ratio", 0.01, 0.9),
     ("light.max_on_s", 1.0, 3600.0),
+    ("light.untouched_s", 0.5, 60.0),
+    ("light.enable_line", 0, 511),
     ("cell.baud", 300, 4_000_000),
     ("cell.station", 1, 999),
     ("cell.sensitivity_counts_per_n", 1.0, 1e7),
@@ -320,3 +324,12 @@ def test_what_does_not_fit_together_may_say_better_what_to_do():
 def test_settings_that_do_not_hold_alone_are_not_compared():
     [problem] = problems_of(height_mm=5.0)
     assert problem.quantity == "height_mm"
+
+
+def test_frames_that_come_too_slowly_to_hold_the_enable_line_from_one_to_the_next_are_refused(read):
+    slow = "[camera]\nframe_rate_hz = 7.0\n"
+    assert read(slow).light.enable_line is None
+    words = r"is 7\.0, but must be at least 8 .* Hz, to hold the enable line .* or light\.enable_line"
+    with pytest.raises(ConfigError, match=words):
+        read(slow + "[light]\nenable_line = 17\n")
+    assert CameraSection().late_frames / HELD_HZ < HOLD_S

@@ -31,6 +31,7 @@ data = "var"
 late_frames = 100.0
 [cell]
 """
+WIRED = "[light]\nenable_line = 17\n"
 START_S = 60.0
 
 
@@ -87,15 +88,21 @@ class WorldProcess:
 class Rig:
     """A world and, when it is started, the daemon in it."""
 
-    def __init__(self, folder: Path, shim: Path, scene: str = "", watchdog_s: float | None = None) -> None:
+    def __init__(
+        self, folder: Path, shim: Path, scene: str = "", *, watchdog_s: float | None = None, is_wired: bool = False
+    ) -> None:
+        """Take whether the chip's RESET is wired to a line of the board, as docs/build.md has it."""
         self._folder, self._watchdog_s = folder, watchdog_s
         self.world = WorldProcess(folder / "world", scene)
-        (folder / "config.toml").write_text(SETTINGS + f'device = "{folder / "world" / "force"}"\n')
+        self.world.wish(wired=is_wired)
+        settings = SETTINGS + f'device = "{folder / "world" / "force"}"\n' + (WIRED if is_wired else "")
+        (folder / "config.toml").write_text(settings)
         self.environment = {
             "LD_PRELOAD": str(shim),
             "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT))),
             "TSIS_RIG_I2C": str(folder / "world" / "i2c"),
             "TSIS_RIG_CAMERA": str(folder / "world" / "camera"),
+            "TSIS_RIG_LINE": str(folder / "world" / "line"),
             "NOTIFY_SOCKET": str(folder / "notify"),
             "WATCHDOG_USEC": str(round(1e6 * watchdog_s)) if watchdog_s else "",
         }
@@ -151,7 +158,7 @@ class Rig:
     def close(self) -> None:
         """End the daemon, if it still runs, and the world."""
         with closing(self._notified):
-            if self.daemon and self.daemon.process.poll() is None:
+            if self.daemon:
                 self.daemon.process.send_signal(signal.SIGCONT)
                 self.daemon.stop()
             self.world.close()

@@ -1,11 +1,12 @@
 """The world around a real daemon, in a process of its own: tissue, hand, and the chips that the daemon's wires reach.
 
-`python world.py FOLDER [SCENE]` puts into the folder the socket `i2c` (for i2c_shim.c), the socket `camera` (for the
-package picamera2 beside this file), the terminal `force`, and `control`, and prints `ready`. Nothing but I2C bytes,
-serial bytes and frames goes between it and the daemon: the light that the registers say is what a frame shows.
+`python world.py FOLDER [SCENE]` puts into the folder the socket `i2c` (for i2c_shim.c), the sockets `camera` and `line`
+(for the packages picamera2 and gpiod beside this file), the terminal `force`, and `control`, and prints `ready`. Only
+I2C bytes, a level, serial bytes and frames go between it and the daemon: a frame shows the light of the registers.
 The hand reads the daemon's screen, `GET /api/v1/status`, as a person does. On `control`, a line of JSON is a wish:
-`{"url": URL}` lets the hand read that screen, `{"bus_errno": N}` lets the bus fail (null: no more), `{}` only asks; the
-answer is `{"light": [the four sides], "force_n": F}`.
+`{"url": URL}` lets the hand read that screen, `{"bus_errno": N}` lets the bus fail (null: no more), `{"bus_hangs": B}`
+lets it not answer, `{"wired": B}` connects the line to the chip's RESET, `{}` only asks; the answer is
+`{"light": [the four sides], "force_n": F}`.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from device.config import SIMULATED_PROBE, Config
 from device.records.store import ENDED
 from device.simulation.chips.camera_server import CameraServer
 from device.simulation.chips.i2c_bus import EmulatedI2cBus, I2cMessage
+from device.simulation.chips.remote_line import LineServer
 from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 from device.simulation.chips.virtual_camera import VirtualPicamera2
 from device.simulation.faults import NO_FAULTS
@@ -43,11 +45,17 @@ LOOK_EVERY_S = 0.03
 
 
 class FailingBus(EmulatedI2cBus):
-    """The bus of the LED board; while it has an `error_number` no transaction passes."""
+    """The bus of the LED board; while it has an `error_number` no transaction passes, and none ends while it hangs."""
 
     error_number: int | None = None
 
+    def __init__(self, *chips: Any) -> None:
+        super().__init__(*chips)
+        self.goes_on = threading.Event()
+        self.goes_on.set()
+
     def i2c_rdwr(self, *i2c_msgs: I2cMessage) -> None:
+        self.goes_on.wait()
         if self.error_number:
             raise OSError(self.error_number, os.strerror(self.error_number))
         super().i2c_rdwr(*i2c_msgs)
@@ -77,9 +85,17 @@ class World:
             ),
             emulated_amplifier(config, self.probe, NO_FAULTS),
         ]
-        camera, line = self._wires
+        camera, cell = self._wires
         (folder / "camera").symlink_to(camera.address)
-        (folder / "force").symlink_to(line.device_path)
+        (folder / "force").symlink_to(cell.device_path)
+        self._is_wired, self._is_up = False, False
+        self._line = LineServer(self._reset)
+        (folder / "line").symlink_to(self._line.address)
+
+    def _reset(self, is_up: bool) -> None:
+        """Let the chip's RESET follow the line, if it is wired to it."""
+        self._is_up = is_up
+        self.chip.enable(is_up or not self._is_wired)
 
     def obey(self, wish: dict[str, Any]) -> dict[str, Any]:
         """Do what a line on `control` says; return what can be seen and felt of the probe now."""
@@ -87,6 +103,11 @@ class World:
             self.reader.read(wish["url"])
         if "bus_errno" in wish:
             self.bus.error_number = wish["bus_errno"]
+        if "bus_hangs" in wish:
+            (self.bus.goes_on.clear if wish["bus_hangs"] else self.bus.goes_on.set)()
+        if "wired" in wish:
+            self._is_wired = wish["wired"]
+            self._reset(self._is_up)
         return {"light": self.chip.led_ratio(), "force_n": self.probe.hand.force_n(time.monotonic())}
 
 

@@ -87,7 +87,8 @@ class Service:
     def processes(self) -> set[int]:
         """Return the numbers of all processes of the unit."""
         group = Path("/sys/fs/cgroup" + self.shown("ControlGroup"))
-        return {int(line) for line in (group / "cgroup.procs").read_text().split()}
+        numbers = {int(line) for line in (group / "cgroup.procs").read_text().split()}
+        return numbers - {0}  # one that is just being made, seen from this name space: cgroups(7)
 
     def log(self, since: str = "") -> str:
         """Return the journal of the unit, systemd's own lines among it, after a cursor."""

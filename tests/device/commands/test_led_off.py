@@ -5,34 +5,51 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 from cpu_time import ended_cpu_s
-from daemon_process import ROOT
+from daemon_process import ROOT, wait_for
 from i2c_over_socket import served
 from supervisor import DARK_WITHIN_S
 
 from device.__main__ import main as daemon_main
 from device.commands import led_off as led_off_module
-from device.commands.led_off import PAUSE_S, led_off, main
+from device.commands.led_off import HANGS_AFTER_S, PAUSE_S, darken, main
 from device.config import LightSection
 from device.hardware.led_driver import led_driver
 from device.settings.last_good import NAME
 from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.chips.pca9685_chip import Pca9685Chip
+from device.simulation.chips.remote_line import LineServer, RemoteLine
 from device.simulation.chips.tlc59116_chip import Tlc59116Chip
 from device.simulation.faults import FaultTimeline, ScriptedFault
 
 DARK = (0.0, 0.0, 0.0, 0.0)
-SETTINGS = {"tlc59116": "", "pca9685": '[light]\nchip = "pca9685"\n[camera]\nexposure_us = 3932\n'}
+SETTINGS = {"tlc59116": "", "pca9685": '[camera]\nexposure_us = 3932\n[light]\nchip = "pca9685"\n'}
+LINES = {"tlc59116": "[light]\nenable_line = 17\n", "pca9685": "enable_line = 17\n"}
 CHIPS: dict[str, tuple[int, Callable[[], EmulatedLedChip]]] = {
     "tlc59116": (0x60, Tlc59116Chip),
     "pca9685": (0x40, Pca9685Chip),
 }
+
+
+class HangingBus(EmulatedI2cBus):
+    """A bus on which no transaction returns while it hangs."""
+
+    def __init__(self, *chips: Any, **settings: Any) -> None:
+        super().__init__(*chips, **settings)
+        self.goes_on = threading.Event()
+        self.goes_on.set()
+
+    def i2c_rdwr(self, *messages: Any) -> None:
+        self.goes_on.wait()
+        super().i2c_rdwr(*messages)
 
 
 class Board:
@@ -40,14 +57,26 @@ class Board:
 
     def __init__(self, folder: Path, kind: str, *faults: ScriptedFault) -> None:
         self.folder, address = folder, CHIPS[kind][0]
-        self.chip = CHIPS[kind][1]()
-        self.bus = EmulatedI2cBus({address: self.chip}, faults=FaultTimeline(faults))
+        self.chip, self.kind = CHIPS[kind][1](), kind
+        self.line: LineServer | None = None
+        self.is_wired = False
+        self.bus = HangingBus({address: self.chip}, faults=FaultTimeline(faults))
         (folder / "probe.toml").write_text(SETTINGS[kind])
+
+    def wire(self) -> None:
+        """Wire the chip's enable line to a GPIO of the board that the programs run on, as it was left."""
+        self.line = LineServer(lambda level: self.is_wired and self.chip.enable(level))
+        self.is_wired = True  # what is up already stays so: a line that was let go keeps its level on some boards
+        with (self.folder / "probe.toml").open("a") as settings:
+            settings.write(LINES[self.kind])
 
     def start(self, *program: str) -> subprocess.Popen[str]:
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+        below = [str(ROOT / "tests" / "i2c_over_socket.py"), str(self.folder / "i2c")]
+        if self.line:
+            below = [str(ROOT / "tests" / "gpiod_over_socket.py"), self.line.address, *below]
         return subprocess.Popen(
-            [sys.executable, str(ROOT / "tests" / "i2c_over_socket.py"), str(self.folder / "i2c"), *program],
+            [sys.executable, *below, *program],
             cwd=self.folder, env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
@@ -116,7 +145,7 @@ def test_it_pauses_only_for_the_chips_oscillator_and_before_it_asks_again(board_
     board.chip.nacks_to_come = nacks
     monkeypatch.setattr(time, "sleep", pauses_s.append)
     monkeypatch.setattr(led_off_module, "open_led_driver", lambda light: led_driver(light, board.bus))
-    led_off(LightSection(chip=kind))
+    darken(LightSection(chip=kind))
     assert sum(pauses_s) <= nacks * PAUSE_S + 0.01
     assert board.chip.led_ratio() == DARK
 
@@ -168,3 +197,59 @@ def test_the_emulated_probe_has_no_light_to_darken(capsys):
         daemon_main(["--simulate", "led-off"])
     assert usage.value.code == 2
     assert "leave out --simulate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("program", [("device.commands.led_off", "--config"), ("device", "--config")])
+def test_a_bus_that_hangs_is_not_waited_for(board_of, program):
+    """The transaction never returns, as on a bus that a broken chip holds: the command says so and ends."""
+    board = board_of("tlc59116")
+    board.kill_while_lit()
+    board.bus.goes_on.clear()
+    command = ("led-off",) if program[0] == "device" else ()
+    code, errors = board.run(*program, "probe.toml", *command)
+    assert code == 1
+    [line] = errors.splitlines()
+    assert line.startswith(f"The I2C bus of the LED chip hangs: no answer for {HANGS_AFTER_S:g} s.")
+    assert "enables" not in line
+    board.bus.goes_on.set()
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_with_an_enable_line_a_chip_on_a_bus_that_hangs_is_dark_all_the_same(board_of, kind):
+    board = board_of(kind)
+    board.kill_while_lit()
+    board.wire()
+    assert min(board.chip.led_ratio()) > 0.5
+    board.bus.goes_on.clear()
+    code, errors = board.run("device.commands.led_off", "--config", "probe.toml")
+    assert code == 1
+    assert "hangs" in errors
+    assert "The line that enables the LEDs is low." in errors
+    assert board.chip.led_ratio() == DARK
+    board.bus.goes_on.set()
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_with_an_enable_line_the_chip_is_darkened_by_both_and_read_back(board_of, kind):
+    board = board_of(kind)
+    board.kill_while_lit()
+    board.wire()
+    assert board.run("device.commands.led_off", "--config", "probe.toml") == (0, "")
+    board.chip.enable(True)
+    assert board.chip.led_ratio() == DARK
+
+
+def test_a_line_that_another_program_has_keeps_it_from_nothing_but_the_line(board_of):
+    board = board_of("tlc59116")
+    board.kill_while_lit()
+    board.wire()
+    owner = RemoteLine(board.line.address)
+    owner.switch(True)
+    assert board.run("device.commands.led_off", "--config", "probe.toml")[0] == 0
+    assert board.chip.led_ratio() == DARK
+    owner.switch(False)
+    wait_for(lambda: board.chip.is_answering, lambda is_answering: not is_answering)
+    code, errors = board.run("device.commands.led_off", "--config", "probe.toml")
+    assert code == 1
+    assert "The line that enables the LEDs cannot be had: Device or resource busy." in errors
+    owner.close()

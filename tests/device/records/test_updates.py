@@ -3,13 +3,18 @@
 import errno
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from device.errors import BusyError, DiskFullError, InvalidRequest, StorageError
+from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
 from device.records import updates as module
 from device.records.updates import RELEASES, IncomingRelease, Updates, release_of
+from device.update.incoming import clear_incoming, take_uploaded
+from device.update.layout import UpdateLayout
+from device.update.progress import ProgressReport
+from device.update.state import PendingRelease, UpdateState, write_state
 
 STATE = {
     "committed": "0.1.0+400",
@@ -199,6 +204,8 @@ def test_a_disk_that_refuses_is_a_fault_of_the_store(folder, monkeypatch, number
 def test_the_way_back_is_a_file_too_and_only_where_there_is_one(folder):
     told(folder).ask_to_roll_back()
     assert (folder / "incoming" / "roll_back").exists()
+    with pytest.raises(BusyError):
+        told(folder).ask_to_roll_back()
     (folder / "incoming" / "roll_back").unlink()
     with pytest.raises(InvalidRequest, match="no release before"):
         told(folder, STATE | {"previous": None}).ask_to_roll_back()
@@ -209,3 +216,34 @@ def test_without_an_updater_nothing_is_taken(tmp_path):
     with pytest.raises(InvalidRequest, match="not installed as a release") as refused:
         Updates(tmp_path / "none").receive(10)
     assert refused.value.status == 409
+
+
+def test_what_the_updater_writes_is_what_is_read(tmp_path):
+    """By the updater's own code: a release that is being left, then was, then another one that is committed."""
+    layout = UpdateLayout(tmp_path)
+    (layout.incoming).mkdir(parents=True)
+    updates = Updates(layout.notes, "0.1.0+400")
+    assert updates.now().state == "not_installed"
+    before = UpdateState(committed="0.1.0+400", previous="0.0.9+390", floor=400).noted("0.1.0+400", "committed")
+    reason = "camera is not ready (E101)"
+    write_state(layout, replace(before, pending=PendingRelease("0.2.0+412", tries=1, leaving=reason)))
+    report = ProgressReport(layout)
+    report.release = "0.2.0+412"
+    report.tell("checking", 0.7, "health")
+    record = updates.now()
+    assert (record.state, record.progress, record.step) == ("checking", 0.7, "health")
+    assert updates.warning().cause == f"Version 0.2.0 did not work: {reason}."
+    write_state(layout, before.noted("0.2.0+412", "rolled_back", reason))
+    report.end("rolled_back", RolledBack(f"0.2.0+412 was left: {reason}", "Send the log."))
+    words = f"Version 0.2.0 did not work: {reason}. This probe went back to 0.1.0."
+    assert (updates.now().outcome, updates.now().can_roll_back) == (words, True)
+    write_state(layout, replace(before, committed="0.3.0+420").noted("0.3.0+420", "committed"))
+    report.release = "0.3.0+420"
+    report.end("committed")
+    assert updates.warning() is None
+    assert updates.now().outcome == "Version 0.3.0 is installed and works."
+    incoming = updates.receive(3)
+    incoming.write(b"abc")
+    clear_incoming(layout)  # of an updater that starts meanwhile
+    incoming.hand_over()
+    assert take_uploaded(layout)

@@ -27,6 +27,7 @@ def test_the_next_one_takes_its_place_and_the_one_before_the_last_goes(probe):
         ({"faults": {"camera": "E101"}}, r"camera is not ready (E101)"),
         ({"faults": {"answers": None}}, "answers is not ready"),
         ({"dies_after": 2}, "It was ready, and then the daemon does not answer"),
+        ({"falls_back_after": 2}, "It was ready, and then what answers on port"),
         ({"says": "0.9+9"}, "the daemon that answers is 0.9+9"),
     ],
 )

@@ -29,9 +29,11 @@ def test_a_list_of_two_keys_trusts_both_and_no_third(keys, tmp_path):
     for key in keys:
         require_signed(CONTENT, signature_of(CONTENT, key), both)
     stranger = new_key(tmp_path / "stranger", passphrase="").with_suffix("")
-    with pytest.raises(InvalidQuantity, match="signature is of no key in the list of signers"):
+    with pytest.raises(
+        InvalidQuantity, match="signature is not what a probe takes, but must be of a key in the list of signers"
+    ):
         require_signed(CONTENT, signature_of(CONTENT, stranger), both)
-    with pytest.raises(InvalidQuantity, match="signature is of no key"):
+    with pytest.raises(InvalidQuantity, match="signature is not what a probe takes"):
         require_signed(CONTENT, signature_of(CONTENT, keys[1]), signers_list([public(keys[0])]))
 
 
@@ -43,6 +45,12 @@ def test_a_signature_is_of_these_bytes_and_for_this_purpose(keys, tmp_path):
     subprocess.run(["ssh-keygen", "-q", "-Y", "sign", "-f", keys[0], "-n", "file", tmp_path / "m"], check=True)
     with pytest.raises(InvalidQuantity, match="signature"):
         require_signed(CONTENT, (tmp_path / "m.sig").read_bytes(), trusted)
+
+
+def test_a_list_with_a_date_is_refused_for_a_probe_has_no_clock(keys):
+    dated = signers_list([public(keys[0])]).replace(" ssh-", ',valid-before="20990101" ssh-')
+    with pytest.raises(InvalidQuantity, match="has a date, which the probe's clock cannot keep"):
+        require_signed(CONTENT, signature_of(CONTENT, keys[0]), dated)
 
 
 def test_the_same_bytes_and_key_give_the_same_signature(keys):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from device.config import CameraSection, Config, LightSection, simulated_config
-from device.errors import CameraError, LightError, LoadCellError
+from device.errors import CameraError, LightError, LightLineError, LoadCellError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.acquisition.bench import DARK
 from device.instrument.press.states import Guidance
@@ -22,7 +22,7 @@ from device.measurement.recording.led_sides import SIDES
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
 
-CONFIG = replace(simulated_config(), light=LightSection(ratio=(0.1, 0.2, 0.3, 0.4)))
+CONFIG = replace(simulated_config(), light=LightSection(ratio=(0.1, 0.2, 0.3, 0.4), enable_line=17))
 ON_BLOCK = SelfTestJob("j", "2026-01-01T00:00:00Z", on_block=True, weight_n=1.0)
 NOBODY = {Guidance.HOLD_BLOCK: 0.0, Guidance.PUT_WEIGHT: 0.0}
 
@@ -37,7 +37,7 @@ class PatientBench:
         self.board, self.force, self.zero_shift_n = board, self, 0.01
         self.forces_n = {Guidance.HOLD_BLOCK: 0.5, Guidance.HOLD_STILL: 0.5, Guidance.PUT_WEIGHT: 1.0}
         self.break_at, self.lights, self.now_s = {}, [], 0.0
-        self.progress = ProgressBoard(lambda: self.now_s)
+        self.progress, self.has_shown_its_line = ProgressBoard(lambda: self.now_s), True
 
     def _at(self, part):
         if part in self.break_at:
@@ -61,6 +61,10 @@ class PatientBench:
     def check_lights(self):
         self._at("circuits")
         self.lights.append(DARK)
+
+    def check_line(self):
+        self._at("line")
+        return self.has_shown_its_line
 
     def expose(self):
         self._at("camera")
@@ -167,6 +171,7 @@ def test_after_a_wrong_zero_no_force_is_believed(test_of, bench):
         ("camera", CameraError("No frame.", "Check it."), {"dark frames": "Camera", "LED sides": "Camera"}),
         ("light", LightError("No answer.", "Check it."), {"dark frames": "Light", "LED sides": "Light"}),
         ("circuits", LightError("No answer.", "Check it."), {"LED circuits": "Light"}),
+        ("line", LightLineError("It is not wired.", "Wire it."), {"enable line": "Light"}),
         ("force", LoadCellError("Silent.", "Check it."), {"zero": "Load cell"}),
     ],
 )
@@ -182,3 +187,10 @@ def test_a_chip_that_does_not_measure_current_is_not_said_to_have_found_it(test_
     config = replace(CONFIG, light=LightSection(chip="pca9685"), camera=CameraSection(exposure_us=3932))
     results = test_of(config=config)
     assert results["LED circuits"].verdict == "not_tested"
+
+
+def test_an_enable_line_that_nobody_has_seen_is_not_tested_and_what_is_missing_is_said(test_of, bench):
+    bench.has_shown_its_line = False
+    assert test_of()["enable line"].verdict == "not_tested"
+    none = test_of(config=replace(CONFIG, light=LightSection()))["enable line"]
+    assert (none.verdict, "light.enable_line" in none.remedy) == ("not_tested", True)
