@@ -64,7 +64,7 @@ test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour)
 	tests/deploy/arm64.sh build/arm64
 
-test-deploy: .venv/all.stamp ## make a container a probe by ssh and send it releases, good and bad (root, network, 2 GB, six minutes)
+test-deploy: .venv/all.stamp ## make a container a probe by ssh and send it releases, good and bad (root, network, 6 GB, ten minutes and more)
 	tests/deploy/run.sh build/deploy
 
 bundle: .venv/all.stamp ## build and sign the file that a probe installs: make bundle [MACHINE=aarch64] [KEY=FILE] [OUT=dist] [COUNTER=N] [SIGNERS=FILE]

@@ -22,7 +22,7 @@ AT_BOOT = "WantedBy=multi-user.target"
 FOLDERS_OF = {".sysusers.conf": "/etc/sysusers.d/", ".tmpfiles.conf": "/etc/tmpfiles.d/"}
 """Where files go that are no units, by how their names end."""
 RULES = "/etc/udev/rules.d/60-"
-GOING = ("tsis.service", "tsis-update.path")
+GOING = ("tsis.service", "tsis-update.path", "tsis-fallback.service")
 RELOAD = ("systemctl", "daemon-reload")
 SUBSYSTEMS = ("tty", "i2c-dev", "gpio", "video4linux")
 UDEV = (
@@ -101,7 +101,7 @@ class FirstReleaseItem:
 
 @dataclass(frozen=True)
 class GoingItem:
-    """The daemon and the updater's path, going."""
+    """The daemon, the updater's path and the page for when the daemon is gone, going."""
 
     title: str = "the probe goes"
     wants_reboot: bool = False

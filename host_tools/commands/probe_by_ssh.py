@@ -30,7 +30,7 @@ def deploy(
 
     machine = RemoteMachine(host, ACCOUNT, f"-oBatchMode=yes {ssh}")
     try:
-        done = send_release(file, signers.read_text(encoding="utf-8"), machine, _tell, is_checked_here=check_here)
+        done = send_release(file, signers, machine, _tell, is_checked_here=check_here)
     except NotReachable as error:
         _tell(str(error))
         done = False

@@ -5,6 +5,7 @@ The account on the probe can do nothing else, whatever it is asked for; and the 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,7 +20,7 @@ LOST = (
 
 
 def send_release(
-    file: Path, signers: str, machine: RemoteMachine, told: Callable[[str], None], *, is_checked_here: bool = True
+    file: Path, signers: Path, machine: RemoteMachine, told: Callable[[str], None], *, is_checked_here: bool = True
 ) -> bool:
     """Send a release file and follow it to its end; return whether the probe has committed it.
 
@@ -27,7 +28,7 @@ def send_release(
     `is_checked_here` the probe is left to find that out. Raises `NotReachable`.
     """
     if is_checked_here:
-        manifest = checked_manifest(file, signers)
+        manifest = json.loads(checked_manifest(file, signers))
         told(
             f"{file.name}: release {manifest['version']}+{manifest['counter']}, {manifest['machine']}, signed and whole"
         )

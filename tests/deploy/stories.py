@@ -19,6 +19,7 @@ UNITS = "/etc/systemd/system"
 MB = 10**6
 CODE = re.compile(r"\bE01[0-9]\b")
 ENDED = ("done", "rejected", "cancelled", "failed")
+BOOT_ID = "cat /proc/sys/kernel/random/boot_id"
 TRIES = 3
 """A machine that is busy besides may spoil a press, as a trembling hand does."""
 
@@ -231,9 +232,14 @@ def in_the_end(stage: Stage) -> Iterator[Claim]:
     probe = stage.probe
     done = probe.deploy(stage.files["third"])
     yield Claim("the next good release is taken", done.code == 0, f"{done.took_s:.0f} s")
-    before = probe.inside("cat /proc/sys/kernel/random/boot_id").said
+    before = probe.inside(BOOT_ID)
     probe.inside("sudo systemctl reboot")
-    until("it has rebooted", lambda: probe.inside("cat /proc/sys/kernel/random/boot_id").said not in ("", before), 90)
+
+    def has_rebooted() -> bool:
+        seen = probe.inside(BOOT_ID)
+        return seen.code == 0 and seen.said != before.said
+
+    until("it has rebooted", has_rebooted, 90)
     took_s = until("it works after a reboot", probe.is_ready, 90)
     release, _ = probe.running()
     yield Claim("it runs after a reboot, too", release.endswith("+1003"), f"{release}, {took_s:.1f} s after sshd")

@@ -29,7 +29,7 @@ FAKES = {
     "systemd-tmpfiles": 'while read -r kind path mode rest; do [ "$kind" != d ] || '
     '{ mkdir -p "$ROOT$path"; chmod "$mode" "$ROOT$path"; }; done',
     "systemctl": 'echo "systemctl $*" >> "$ROOT/asked"; case $1 in is-active) cat "$ROOT/active" 2> /dev/null;; '
-    'start) echo active > "$ROOT/active"; echo active >> "$ROOT/active";; esac; true',
+    'start) printf "active\\n%.0s" 1 2 3 > "$ROOT/active";; esac; true',
     "sshd": 'echo "sshd $*" >> "$ROOT/asked"',
     "udevadm": 'echo "udevadm $*" >> "$ROOT/asked"; exit 1',
 }
@@ -107,7 +107,10 @@ def test_what_is_in_place_stays_as_it_is(probe, capsys):
     capsys.readouterr()
     assert probe.run("--time-zone", "Europe/Berlin") == 0
     assert {line.split()[0] for line in capsys.readouterr().out.splitlines()} == {"in", "next"}
-    assert probe.asked().removeprefix(before) == "systemctl is-active tsis.service tsis-update.path\n"
+    assert (
+        probe.asked().removeprefix(before)
+        == "systemctl is-active tsis.service tsis-update.path tsis-fallback.service\n"
+    )
 
 
 def test_check_tells_each_difference_and_changes_nothing(machine, capsys):

@@ -37,7 +37,9 @@ def release(tmp_path):
     key = new_key(tmp_path, "key")
     path = tmp_path / "tsis-1.0-x86_64.release"
     path.write_bytes(release_file(key, "1.0", 10))
-    return path, signer(key)
+    signers = tmp_path / "signers"
+    signers.write_text(signer(key))
+    return path, signers
 
 
 @pytest.fixture
@@ -56,10 +58,8 @@ def machine(tmp_path, monkeypatch) -> RemoteMachine:
     return RemoteMachine("tsis-0007.local", "tsis-deploy", "-p 18022 -i key")
 
 
-def order(release: Path, signers: str, *options: str) -> ProvisioningOrder:
-    beside = release.with_name("signers")
-    beside.write_text(signers)
-    return ProvisioningOrder(release, beside, release.with_name("key.pub"), options)
+def order(release: Path, signers: Path, *options: str) -> ProvisioningOrder:
+    return ProvisioningOrder(release, signers, release.with_name("key.pub"), options)
 
 
 def test_a_release_arrives_byte_for_byte_and_its_progress_is_told(machine, release, tmp_path):
