@@ -68,8 +68,8 @@ inside /srv/tsis PYTHONPATH="/srv/tsis/$wheel" /usr/bin/python3 -m device.update
 claim "installed and committed" readlink "$root/opt/tsis/current"
 device=/opt/tsis/current/bin/python
 
-# Not judged: a frame of the simulated camera takes an emulated processor longer than the 3 s that its process is given,
-# so the daemon says E104. The computing of a press is judged below, on recordings.
+# Not judged: on a busy machine a frame of the simulated camera takes longer than the 3 s that its process is given, and
+# the daemon says E104. The computing of a press is judged below, on recordings.
 tried() { "$python" "$here/press.py" "http://127.0.0.1:$port" quick || true; }
 claim "a press by the daemon, not judged" tried
 inside / /usr/bin/systemctl stop tsis.service
