@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -67,7 +68,7 @@ def show(
 
     if not signers.is_file():
         raise InvalidQuantity("signers", signers, "a file", "write one with `host_tools release signers KEY.pub`")
-    print(checked_manifest(file, signers).decode(), end="")
+    print(json.dumps(checked_manifest(file, signers.read_text(encoding="utf-8")), indent=1))
 
 
 @release.command(epilog="Example: host_tools release key ~/.config/tsis/release_key")

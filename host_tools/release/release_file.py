@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from device.errors import DeviceError
@@ -77,19 +78,22 @@ def write_release(out: Path, manifest: bytes, signature: bytes, files: Mapping[s
     sync_directory(out.parent)
 
 
-def checked_manifest(path: Path, signers: Path) -> bytes:
+def checked_manifest(path: Path, signers: str) -> dict[str, Any]:
     """Return the manifest of a release file as a probe that trusts a list of signers finds it: signed, all files whole.
 
     Raises `InvalidQuantity` with the probe's own reason otherwise.
     """
     try:
-        with opened(path) as file:
+        with TemporaryDirectory() as folder, opened(path) as file:
+            trusted = Path(folder, "release_signers")
+            trusted.write_text(signers, encoding="utf-8")
             manifest, signature = file.signed()
-            require_signature(manifest, signature, signers)
+            require_signature(manifest, signature, trusted)
             file.check_files(read_manifest(manifest), lambda _: None)
-            return manifest
     except DeviceError as error:
         raise InvalidQuantity("file", path, "a release that a probe takes", str(error)) from error
+    record: dict[str, Any] = json.loads(manifest)
+    return record
 
 
 def _add(archive: tarfile.TarFile, name: str, size: int, content: IO[bytes]) -> None:

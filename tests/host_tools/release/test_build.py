@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import tarfile
@@ -65,7 +64,7 @@ def signers(key: Path) -> Path:
 
 
 def checked(path: Path, signers: Path) -> dict[str, Any]:
-    return json.loads(checked_manifest(path, signers))
+    return checked_manifest(path, signers.read_text())
 
 
 @pytest.fixture(autouse=True)
