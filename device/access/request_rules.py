@@ -37,7 +37,7 @@ class BodyRule:
 
 JSON_BODY = BodyRule()
 BODY_RULES: Mapping[str, BodyRule] = {
-    "/api/v1/updates": BodyRule("application/octet-stream", 300 * 1024 * 1024, streamed=True, local_only=True),
+    "/api/v1/updates": BodyRule("application/octet-stream", 300_000_000, streamed=True, local_only=True),
     "/api/v1/updates/roll-back": BodyRule(local_only=True),
 }
 """The paths with a rule of their own: a release file, or the wish for another release, comes from the local screen."""

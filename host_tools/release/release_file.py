@@ -19,6 +19,7 @@ from device.errors import DeviceError
 from device.files.durable import sync_directory
 from device.measurement.quantities import InvalidQuantity
 from device.records.schema import STORE_READS, STORE_WRITES
+from device.update.fits import FIRST_HARDWARE
 from device.update.manifest import read_manifest
 from device.update.release_file import opened
 from device.update.signature import require_signature
@@ -26,8 +27,6 @@ from host_tools.release.locked_wheels import sha256_of
 from host_tools.release.target import PYTHON, Target
 
 SCHEMA, PRODUCT = "tsis.release/1", "tsis"
-HARDWARE = ("tsis-probe-1",)
-"""The kinds of probe that this software drives."""
 MANIFEST, SIGNATURE = "manifest.json", "manifest.json.sig"
 
 
@@ -54,7 +53,7 @@ def manifest_of(edition: Edition, target: Target, files: Mapping[str, Path]) -> 
         "commit": edition.commit,
         "machine": target.machine,
         "python": ".".join(map(str, PYTHON)),
-        "hardware": list(HARDWARE),
+        "hardware": [FIRST_HARDWARE],
         "data_schemas": {"store": {"writes": STORE_WRITES, "reads": list(STORE_READS)}},
         "signers": edition.signers,
         "files": [
