@@ -27,6 +27,12 @@ def pressing(supervisor):
     fails: then another one is asked for.
     """
     daemon = supervisor.start()
+    light_a_press(supervisor, daemon)
+    return daemon
+
+
+def light_a_press(supervisor, daemon):
+    """Ask for presses until one is lit."""
 
     def is_lit():
         status = daemon.ask("/api/v1/status").json
@@ -35,7 +41,6 @@ def pressing(supervisor):
         return status["press_state"] in PRESSED and min(supervisor.chip.led_ratio()) > 0.5
 
     wait_for(is_lit, bool)
-    return daemon
 
 
 @pytest.fixture
@@ -47,13 +52,19 @@ def supervisor(tmp_path, request):
 
 @pytest.mark.parametrize("supervisor", [""], indirect=True, ids=[""])
 def test_a_frozen_daemon_is_dark_while_it_is_frozen_and_measures_again_when_it_goes_on(supervisor):
-    daemon = pressing(supervisor)
-    daemon.process.send_signal(signal.SIGSTOP)
-    wait_for(supervisor.chip.led_ratio, lambda light: not any(light))
-    assert daemon.process.poll() is None
-    daemon.process.send_signal(signal.SIGCONT)
-    job = daemon.ask("/api/v1/status").json["press"]
-    assert daemon.ended(f"/api/v1/presses/{job['id']}")["state"] == "failed"
+    daemon = supervisor.start()
+
+    def press_frozen():
+        """Return how a press ended that was frozen while lit, or "done" when it had just ended by itself."""
+        light_a_press(supervisor, daemon)
+        daemon.process.send_signal(signal.SIGSTOP)
+        wait_for(supervisor.chip.led_ratio, lambda light: not any(light))
+        assert daemon.process.poll() is None
+        daemon.process.send_signal(signal.SIGCONT)
+        job = daemon.ask("/api/v1/status").json["press"]
+        return daemon.ended(f"/api/v1/presses/{job['id']}")["state"]
+
+    wait_for(press_frozen, lambda state: state == "failed")
 
     def has_measured():
         answer = daemon.ask("/api/v1/presses", "POST", {})

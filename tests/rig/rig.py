@@ -99,7 +99,7 @@ class Rig:
         (folder / "config.toml").write_text(settings)
         self.environment = {
             "LD_PRELOAD": str(shim),
-            "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT))),
+            "PYTHONPATH": os.pathsep.join(map(str, (HERE / "stubs", HERE, ROOT))),
             "TSIS_RIG_I2C": str(folder / "world" / "i2c"),
             "TSIS_RIG_CAMERA": str(folder / "world" / "camera"),
             "TSIS_RIG_LINE": str(folder / "world" / "line"),
