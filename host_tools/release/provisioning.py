@@ -47,7 +47,7 @@ def provision_machine(order: ProvisioningOrder, machine: RemoteMachine, told: Ca
 
     Raises `InvalidQuantity` for a release file that is not signed or not whole, `NotReachable`.
     """
-    checked_manifest(order.release, order.signers)
+    checked_manifest(order.release, order.signers.read_text(encoding="utf-8"))
     with _folder_on(machine) as folder, TemporaryDirectory() as here:
         wheel = own_wheel(order.release, Path(here))
         sent = [wheel, *_beside(order, Path(here))]

@@ -5,7 +5,6 @@ The account on the probe can do nothing else, whatever it is asked for; and the 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,7 +27,7 @@ def send_release(
     `is_checked_here` the probe is left to find that out. Raises `NotReachable`.
     """
     if is_checked_here:
-        manifest = json.loads(checked_manifest(file, signers))
+        manifest = checked_manifest(file, signers.read_text(encoding="utf-8"))
         told(
             f"{file.name}: release {manifest['version']}+{manifest['counter']}, {manifest['machine']}, signed and whole"
         )
