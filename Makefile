@@ -80,7 +80,7 @@ provision: .venv/all.stamp ## make a fresh Raspberry Pi OS a probe: make provisi
 	  $(if $(SSH),--ssh "$(SSH)") $(if $(SERIAL),--serial "$(SERIAL)") $(if $(TIME_ZONE),--time-zone "$(TIME_ZONE)") $(if $(CHECK),--check)
 
 deploy: .venv/all.stamp ## build a release and send it to a probe: make deploy HOST=NAME [SSH="-p 22 -i KEY"] [FILE=RELEASE]
-	@test -n "$(HOST)" || { echo "Name the probe: make deploy HOST=tsis-0007.local"; exit 2; }
+	@test -n "$(HOST)" || { echo "Name the probe: make deploy HOST=raspberrypi.local"; exit 2; }
 	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
 	@$(HOST_TOOLS) deploy "$(RELEASE)" --host "$(HOST)" --signers "$(TRUSTED)" $(if $(SSH),--ssh "$(SSH)")
 

@@ -32,6 +32,7 @@ def systemctl(words):
         print("Failed to stop tsis.service: Unit tsis.service not loaded.", file=sys.stderr)
         sys.exit(5)
     if verb == "start" and not alive():
+        subprocess.run(os.environ.get("TSIS_FAKE_ON_START", "true").split(), check=True)
         command = [sys.executable, "-S", "-E", __file__, "daemon"]
         quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
         PID.write_text(str(subprocess.Popen(command, start_new_session=True, **quiet).pid))
@@ -57,10 +58,13 @@ class Answers(BaseHTTPRequestHandler):
     record = None
 
     def do_GET(self):
+        if self.path != "/api/v1/health/parts":
+            self.send_error(404)
+            return
         body = json.dumps(self.record if self.good is None or self.good > 0 else {"status": 503}).encode()
         if self.good is not None:
             Answers.good -= 1
-        self.send_response(200 if self.path == "/api/v1/health/parts" else 404)
+        self.send_response(200)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)

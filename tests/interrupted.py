@@ -45,4 +45,5 @@ class Interrupted:
     def _seen(self) -> dict[str, bytes]:
         found = self.probe.snapshot()
         found.pop("opt/tsis/.current.back", None)  # made before a trial, of no meaning without one
+        found.pop("var/lib/tsis-update/state.json.tmp", None)  # half written; the next write begins it anew
         return found

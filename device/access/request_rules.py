@@ -94,7 +94,7 @@ def require_allowed(request: AskedRequest, hosts: KnownHosts) -> None:
 
 
 def require_local(request: AskedRequest) -> None:
-    """Raise `ForeignRequest` unless a request comes from this very machine."""
+    """Raise `ForeignRequest` unless a request comes from this very machine, by loopback."""
     if not is_loopback(request.client):
         raise ForeignRequest(
             f"{request.method} {request.path} comes from {request.client}, another machine.",

@@ -11,6 +11,7 @@ import fcntl
 import hashlib
 import os
 import pwd
+import re
 import shutil
 import sqlite3
 from collections.abc import Collection, Iterator, Mapping
@@ -34,6 +35,7 @@ STAGED, ASIDE = "restore.tmp", "before-restore"
 DAEMON_USER = "tsis"
 STATE_FOLDERS = (Path("/var/lib"), Path("/srv"))
 """Only below these may a backup bring files of its own accord; anywhere else this machine's settings must say so."""
+SETTINGS_FILES = re.compile(r"config\.toml|config\.d/[^./][^/]*\.toml")
 SPARE_BYTES = 1 << 20
 
 
@@ -72,6 +74,8 @@ def restore_backup(
         _require_fitting(archive, own, records_only=records_only)
         targets = _Targets(archive.manifest, own, root, records_only=records_only)
         wanted = {entry.name: entry for entry in archive.entries.values() if targets.wants(entry.name)}
+        for name in wanted:
+            targets.of(name)  # refuses what has no place here before anything is written
         with _daemon_kept_out(targets.data):
             _require_nothing_lost(targets.data, wanted)
             _require_room(targets, wanted.values())
@@ -113,6 +117,8 @@ class _Targets:
         if section == "data":
             return self.data / rest
         if section == "settings":
+            if not SETTINGS_FILES.fullmatch(rest):  # beside them lie the keys whose releases this probe trusts
+                raise InvalidQuantity("backup", name, "a settings file of a probe", "take another backup")
             return (self._root / LOCAL).parent / rest
         if section == "models":
             setting, _, rest = rest.partition("/")
@@ -155,7 +161,8 @@ def _require_place(name: str, place: Path, own: Mapping[str, Any]) -> None:
 def _daemon_kept_out(data: Path) -> Iterator[None]:
     """Hold the data folder's lock; raise `BusyError` while a daemon has it."""
     data.mkdir(parents=True, exist_ok=True)
-    with (data / "lock").open("w") as lock:
+    # Root must not follow a link that lies in the daemon's own folder.
+    with os.fdopen(os.open(data / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o640), "w") as lock:
         _give(data / "lock", data)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -53,11 +53,12 @@ class Situation:
     log: tuple[str, ...] = ()
     release: str = ""
     last_good: str = ""
+    is_updating: bool = False
 
     @property
     def may_roll_back(self) -> bool:
-        """Whether there is another release to go back to."""
-        return bool(self.last_good) and self.last_good != self.release
+        """Whether there is another release to go back to, and no update that may go back by itself."""
+        return bool(self.last_good) and self.last_good != self.release and not self.is_updating
 
 
 def read_situation(root: Path = Path("/")) -> Situation:
@@ -66,12 +67,13 @@ def read_situation(root: Path = Path("/")) -> Situation:
     note = read_note(root)
     if note and release and note.release != release:
         note = None  # of a release that does not run any more
-    told = _told(root, _unit(), note, release)
-    return Situation(**told, release=release, last_good=last_good)
+    updating = UPDATING.get(str(_record(root / NOTES / "progress.json").get("state")), "")
+    told = _told(updating, _unit(), note, release)
+    return Situation(**told, release=release, last_good=last_good, is_updating=bool(updating))
 
 
-def _told(root: Path, unit: UnitState | None, note: StartNote | None, release: str) -> dict[str, Any]:
-    if updating := UPDATING.get(str(_record(root / NOTES / "progress.json").get("state"))):
+def _told(updating: str, unit: UnitState | None, note: StartNote | None, release: str) -> dict[str, Any]:
+    if updating:
         return {"headline": "A release is being installed", "hint": updating}
     if unit and unit.active == "inactive":
         return {"headline": "The probe's software is stopped", "hint": "Whoever stopped it starts it again."}

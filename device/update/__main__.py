@@ -20,7 +20,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import BinaryIO
 
-from device.errors import BusyError, DeviceError, UpdateFailed
+from device.errors import BusyError, DeviceError, RolledBack, UpdateFailed
 from device.update.boot_check import check_boot
 from device.update.contents import damage
 from device.update.follow import follow, receive, request_roll_back
@@ -121,13 +121,16 @@ def _resume(updater: Updater, options: argparse.Namespace) -> None:
 
 def _watch_incoming(updater: Updater, options: argparse.Namespace) -> None:
     """Do what waits; how it ended is in the progress, and no failure of the unit."""
-    _logged(lambda: carry_through(updater))
+    has_gone_back = _logged(lambda: carry_through(updater))
     clear_incoming(updater.layout)
     while True:
-        if asked := take_roll_back_request(updater.layout):
+        asked = take_roll_back_request(updater.layout)
+        if asked and not has_gone_back:
             _logged(lambda asked=asked: roll_back(updater, asked))  # type: ignore[misc]
+        elif asked:
+            has_gone_back = False  # it was asked for while that was under way; twice would be one release too far
         elif take_uploaded(updater.layout):
-            _logged(lambda: install(updater, updater.layout.taken))
+            has_gone_back = _logged(lambda: install(updater, updater.layout.taken))
             clear_incoming(updater.layout)
         else:
             return
@@ -142,11 +145,14 @@ _VERBS: dict[str, Callable[[Updater, argparse.Namespace], None]] = {
 }
 
 
-def _logged(step: Callable[[], None]) -> None:
+def _logged(step: Callable[[], None]) -> bool:
+    """Take a step; return whether it ended with the way back to the release before."""
     try:
         step()
     except DeviceError as error:
         log.warning("%s %s", error.code, error)
+        return isinstance(error, RolledBack)
+    return False
 
 
 def _hand_over(options: argparse.Namespace, layout: UpdateLayout) -> int:

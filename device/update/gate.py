@@ -11,8 +11,15 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
-PATH = "/api/v1/health/parts"
+from device.update.settings import DaemonAddress
+
+Answer = TypeVar("Answer")
+
+PATH, STATUS = "/api/v1/health/parts", "/api/v1/status"
+UNDER_WAY = ("waiting", "capturing", "computing", "running")
+LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
 ALWAYS = ("answers", "store")
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
@@ -45,16 +52,41 @@ class DaemonGone(NotHealthy):
     """Nobody listens on the port, or somebody else does: the page that stands in for a daemon (device/fallback/)."""
 
 
-def ask_parts(port: int) -> PartsHealth:
+def ask_parts(address: DaemonAddress) -> PartsHealth:
     """Return what the daemon of this machine says of its parts; raise `NotHealthy` when it does not answer so."""
-    line = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWER_WITHIN_S)
+    return _asked(address, PATH, _read)
+
+
+def wait_for_press(address: DaemonAddress, every_s: float) -> None:
+    """Return once no press and no self-test is under way: to stop the daemon in one would lose it.
+
+    Returns at once when nobody can tell, and after three minutes all the same.
+    """
+    until_s = time.monotonic() + LONGEST_PRESS_S
+    while _is_pressed(address) and time.monotonic() < until_s:
+        time.sleep(every_s)
+
+
+def _is_pressed(address: DaemonAddress) -> bool:
     try:
-        line.request("GET", PATH)
+        return _asked(address, STATUS, lambda status: any(
+            (status.get(job) or {}).get("state") in UNDER_WAY for job in ("press", "self_test")
+        ))  # fmt: skip
+    except NotHealthy:
+        return False
+
+
+def _asked(address: DaemonAddress, path: str, read: Callable[[Any], Answer]) -> Answer:
+    """Return what `read` makes of the daemon's answer; raise `NotHealthy` when there is none, or none of a daemon."""
+    port = address.port
+    line = http.client.HTTPConnection(address.host, port, timeout=ANSWER_WITHIN_S)
+    try:
+        line.request("GET", path)
         answer = line.getresponse()
         record = json.loads(answer.read(MOST_BYTES))
         if answer.status == http.client.SERVICE_UNAVAILABLE:
             raise DaemonGone(f"the daemon does not start ({record['code']}: {record['detail']})")
-        return _read(record)
+        return read(record)
     except (OSError, http.client.HTTPException) as error:
         kind = DaemonGone if isinstance(error, ConnectionError) else NotHealthy
         raise kind(f"the daemon does not answer on port {port} ({error or type(error).__name__})") from None
@@ -64,20 +96,24 @@ def ask_parts(port: int) -> PartsHealth:
         line.close()
 
 
-def take_baseline(port: int, patience: Patience) -> Baseline | None:
+def take_baseline(address: DaemonAddress, patience: Patience) -> Baseline | None:
     """Return what is not ready before the switch, or None when the daemon does not answer for a few looks."""
     for look in range(patience.looks):
         if look:
             time.sleep(patience.every_s)
         try:
-            return {part: code for part, code in ask_parts(port).faults.items() if code is not None}
+            return {part: code for part, code in ask_parts(address).faults.items() if code is not None}
         except NotHealthy:
             continue
     return None
 
 
 def wait_until_healthy(
-    port: int, release: str, baseline: Baseline | None, patience: Patience, told: Callable[[float], None]
+    address: DaemonAddress,
+    release: str,
+    baseline: Baseline | None,
+    patience: Patience,
+    told: Callable[[float], None],
 ) -> None:
     """Return when the release was healthy at every one of some looks in a row.
 
@@ -89,7 +125,7 @@ def wait_until_healthy(
         spent = time.monotonic() - began
         told(min(1.0, spent / patience.within_s))
         try:
-            _require_healthy(ask_parts(port), release, baseline)
+            _require_healthy(ask_parts(address), release, baseline)
             healthy += 1
         except NotHealthy as error:
             if healthy and isinstance(error, DaemonGone):

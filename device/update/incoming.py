@@ -6,6 +6,7 @@ of their reach before it looks at it, and believes only what the signature says.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import shutil
@@ -28,9 +29,9 @@ class Upload:
     def __init__(self, layout: UpdateLayout) -> None:
         """Begin. Raises `UpdateFailed` when the folder cannot be written, `BusyError` when another one waits there."""
         self._layout, self._bytes = layout, 0
-        if layout.uploaded.exists():
-            raise BusyError("Another release waits to be installed.", BUSY)
         try:
+            if layout.uploaded.exists():
+                raise BusyError("Another release waits to be installed.", BUSY)
             handle, name = tempfile.mkstemp(prefix=PART, dir=layout.incoming)
         except OSError as error:
             raise _failed(error) from None
@@ -137,4 +138,5 @@ def _remove(path: Path) -> None:
 
 
 def _failed(error: OSError) -> UpdateFailed:
-    return UpdateFailed(f"The release file could not be put on the probe: {error}.", "Free space, or see its rights.")
+    remedy = "Free space." if error.errno == errno.ENOSPC else "Use sudo, or an account of the group tsis-update."
+    return UpdateFailed(f"The release file could not be put on the probe: {error}.", remedy)

@@ -63,7 +63,8 @@ class ProgressReport:
         self._last = moment
         with suppress(OSError):
             _replace(self._layout, json.dumps({"schema": SCHEMA, **asdict(moment)}))
-        self._listener(moment)
+        with suppress(OSError):  # whoever read it may be gone, as with a terminal that was closed
+            self._listener(moment)
 
 
 def read_progress(layout: UpdateLayout) -> UpdateProgress:

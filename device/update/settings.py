@@ -6,19 +6,33 @@ A file that cannot be read is passed over: the daemon itself then runs on its la
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from device.update.layout import UpdateLayout
 
 FILES, DROP_INS = ("usr/lib/tsis/config.toml", "etc/tsis/config.toml"), "etc/tsis/config.d"
-PORT, DATA = 8000, "/var/lib/tsis"
+PORT, DATA, LOOPBACK = 8000, "/var/lib/tsis", "127.0.0.1"
+ANYWHERE = ("", "0.0.0.0", "::")
 
 
-def daemon_port(layout: UpdateLayout) -> int:
-    """Return the port on which the daemon answers."""
-    stated = [table.get("server", {}).get("port") for table in _tables(layout)]
-    return next((port for port in reversed(stated) if type(port) is int and port), PORT)
+@dataclass(frozen=True)
+class DaemonAddress:
+    """Where the daemon of this machine answers."""
+
+    port: int = PORT
+    host: str = LOOPBACK
+
+
+def daemon_address(layout: UpdateLayout) -> DaemonAddress:
+    """Return where the daemon answers: by loopback, unless it serves one other address only."""
+    servers = [table.get("server", {}) for table in reversed(_tables(layout))]
+    ports = (one.get("port") for one in servers)
+    hosts = (one.get("host") for one in servers)
+    port = next((port for port in ports if type(port) is int and port), PORT)
+    host = next((host for host in hosts if isinstance(host, str)), LOOPBACK)
+    return DaemonAddress(port, LOOPBACK if host in ANYWHERE else host)
 
 
 def data_folder(layout: UpdateLayout) -> Path:

@@ -23,6 +23,8 @@ from device.records.schema import STORE_WRITES
 from device.records.store import Store
 from device.settings.layers import layer_files, read_layers
 
+PLACES = {"data": "/var/lib/tsis", "calibration": "/var/lib/tsis/calibrations", "models": {}}
+
 
 @pytest.fixture
 def card(tmp_path: Path) -> Path:
@@ -158,6 +160,26 @@ def test_a_card_of_before_databases_had_a_number_is_restored(card: Path, fresh: 
     write_backup(read_layers(layer_files(card)).config(), tmp_path / "old.backup", card)
     restored(tmp_path / "old.backup", fresh)
     assert len(records(data_of(fresh))) == 3
+
+
+@pytest.mark.parametrize("name", ["release_signers", "deploy_keys", "config.d/../release_signers", "config.d/a.sh"])
+def test_a_backup_brings_settings_and_no_keys(fresh: Path, name: str) -> None:
+    """Else a file that nobody signs would say whose releases this probe trusts."""
+    targets = restore_module._Targets({"places": PLACES}, {}, fresh, records_only=False)
+    with pytest.raises(InvalidQuantity, match="a settings file of a probe"):
+        targets.of(f"settings/{name}")
+    assert targets.of("settings/config.toml") == fresh / "etc/tsis/config.toml"
+    assert targets.of("settings/config.d/10-light.toml") == fresh / "etc/tsis/config.d/10-light.toml"
+
+
+def test_root_follows_no_link_in_the_daemons_folder(backup: Path, fresh: Path, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("kept")
+    data_of(fresh).mkdir(parents=True)
+    (data_of(fresh) / "lock").symlink_to(victim)
+    with pytest.raises(OSError, match="symbolic links"):
+        restored(backup, fresh)
+    assert victim.read_text() == "kept"
 
 
 def test_a_damaged_backup_changes_nothing(backup: Path, fresh: Path) -> None:

@@ -111,10 +111,25 @@ def test_a_page_is_served_to_another_machine_but_no_way_out(tmp_path):
         assert answer.status == 503
         assert b"<button" not in answer.body
         assert b"0.1.0+3" in answer.body
-        for path in (ROLL_BACK, "/fallback/yield", "/fallback/support"):
+        for path in (ROLL_BACK, "/fallback/support"):
             refused = running.ask("POST", path, at=addresses[0])
             assert (refused.status, refused.json["code"]) == (403, "E807")
         assert running.state() == 200
+    finally:
+        running.stop()
+
+
+def test_a_daemon_that_serves_one_address_of_this_machine_gets_its_port(tmp_path):
+    """It asks from that very address, which nobody else has."""
+    addresses = own_addresses()
+    if not addresses:
+        pytest.skip("this machine has no address but loopback")
+    root = ProbeRoot(tmp_path)
+    root.settings(f'host = "{addresses[0]}"\n')
+    running = Fallback(root, waits=False)
+    try:
+        wait_for(lambda: is_fallback(addresses[0], root.port), bool)
+        assert ask_for_port(addresses[0], root.port)
     finally:
         running.stop()
 

@@ -133,6 +133,8 @@ def test_the_last_good_release_is_another_than_the_one_that_does_not_start(probe
     probe.note("state.json", schema="tsis.update_state/1", committed=committed, previous=previous)
     assert (probe.situation.release, probe.situation.last_good) == (current, good)
     assert probe.situation.may_roll_back == bool(good)
+    probe.note("progress.json", schema="tsis.update/1", state="checking")
+    assert not probe.situation.may_roll_back, "the updater may be going back by itself"
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "7"])

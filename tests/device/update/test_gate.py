@@ -10,7 +10,17 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
-from device.update.gate import PARTS, DaemonGone, NotHealthy, Patience, ask_parts, take_baseline, wait_until_healthy
+from device.update.gate import (
+    PARTS,
+    DaemonGone,
+    NotHealthy,
+    Patience,
+    ask_parts,
+    take_baseline,
+    wait_for_press,
+    wait_until_healthy,
+)
+from device.update.settings import DaemonAddress
 
 READY = {"release": "1.1+11", "parts": {part: {"ready": True, "code": None} for part in PARTS}}
 FALLBACK = {"type": "about:blank", "status": 503, "code": "E401", "detail": "The model's card was changed."}
@@ -47,7 +57,7 @@ def test_the_page_that_stands_in_for_a_daemon_is_no_daemon_and_its_reason_is_tol
         answering((503, FALLBACK)) as port,
         pytest.raises(DaemonGone, match=r"does not start \(E401: The model's card"),
     ):
-        ask_parts(port)
+        ask_parts(DaemonAddress(port))
 
 
 def test_a_daemon_that_was_ready_and_then_leaves_the_port_to_the_page_is_not_waited_for():
@@ -55,31 +65,49 @@ def test_a_daemon_that_was_ready_and_then_leaves_the_port_to_the_page_is_not_wai
         answering((200, READY), (503, FALLBACK)) as port,
         pytest.raises(NotHealthy, match=r"^It was ready, and then the daemon does not start \(E401"),
     ):
-        wait_until_healthy(port, "1.1+11", None, Patience(within_s=600.0, every_s=0.01), lambda part: None)
+        wait_until_healthy(
+            DaemonAddress(port), "1.1+11", None, Patience(within_s=600.0, every_s=0.01), lambda part: None
+        )
 
 
 def test_a_daemon_that_comes_after_the_page_is_healthy_once_it_was_ready_three_times():
     told = []
     with answering((503, FALLBACK), (503, FALLBACK), (200, READY)) as port:
-        wait_until_healthy(port, "1.1+11", None, Patience(within_s=600.0, every_s=0.01), told.append)
+        wait_until_healthy(DaemonAddress(port), "1.1+11", None, Patience(within_s=600.0, every_s=0.01), told.append)
     assert len(told) == 2 + 3
 
 
 def test_the_page_leaves_no_baseline():
     with answering((503, FALLBACK)) as port:
-        assert take_baseline(port, AT_ONCE) is None
+        assert take_baseline(DaemonAddress(port), AT_ONCE) is None
 
 
 @pytest.mark.parametrize("part", ["answers", "store"])
 def test_models_and_store_are_never_excused(part):
     ill = {**READY, "parts": {**READY["parts"], part: {"ready": False, "code": "E601"}}}
     with answering((200, ill)) as port, pytest.raises(NotHealthy, match=f"{part} is not ready"):
-        wait_until_healthy(port, "1.1+11", {part: "E601"}, AT_ONCE, lambda share: None)
+        wait_until_healthy(DaemonAddress(port), "1.1+11", {part: "E601"}, AT_ONCE, lambda share: None)
 
 
 def test_a_part_with_the_fault_of_before_is_excused_and_with_another_it_is_not():
     ill = {**READY, "parts": {**READY["parts"], "camera": {"ready": False, "code": "E101"}}}
     with answering((200, ill)) as port:
-        wait_until_healthy(port, "1.1+11", {"camera": "E101"}, AT_ONCE, lambda share: None)
+        wait_until_healthy(DaemonAddress(port), "1.1+11", {"camera": "E101"}, AT_ONCE, lambda share: None)
         with pytest.raises(NotHealthy, match=r"camera is not ready \(E101\)"):
-            wait_until_healthy(port, "1.1+11", {"camera": "E104"}, AT_ONCE, lambda share: None)
+            wait_until_healthy(DaemonAddress(port), "1.1+11", {"camera": "E104"}, AT_ONCE, lambda share: None)
+
+
+def test_a_press_under_way_is_waited_for_and_one_that_has_ended_is_not():
+    def status(press, self_test):
+        return 200, {"press": press and {"state": press}, "self_test": self_test and {"state": self_test}}
+
+    pressed, tested, ended = status("capturing", None), status("done", "running"), status("done", "done")
+    with answering(pressed, tested, ended, (500, {})) as port:
+        wait_for_press(DaemonAddress(port), every_s=0.01)
+        with pytest.raises(DaemonGone):  # the three answers were asked for, and no more
+            ask_parts(DaemonAddress(port))
+
+
+def test_where_nobody_can_tell_no_press_is_waited_for():
+    with answering((503, FALLBACK)) as port:
+        wait_for_press(DaemonAddress(port), every_s=600.0)

@@ -328,3 +328,37 @@ def test_whoever_is_not_root_hands_the_file_over(probe, monkeypatch, capsys):
     assert capsys.readouterr().out.endswith("100% 1.0+10 committed\n")
     assert main(["--root", str(probe.root), "install", str(path) + "x"]) == 1
     assert "cannot be read" in capsys.readouterr().err
+
+
+def test_a_way_back_that_is_asked_for_while_the_updater_goes_back_is_that_one_and_no_second(probe):
+    """Whoever presses the button of a release that does not start means the one before it, not the one before that."""
+    probe.install("1.0", 10)
+    probe.install("1.1", 11)
+    bad = probe.write("1.2", 12, {"faults": {"answers": None}})
+    bad.rename(probe.layout.uploaded)
+    with_request = {**probe.environment, "TSIS_FAKE_ON_START": f"touch {probe.layout.roll_back_request}"}
+    done = probe.run(*IMPATIENT, "watch-incoming", env=with_request)
+    assert done.returncode == 0, done.stderr
+    assert probe.require_whole() == probe.state.committed == "1.1+11"
+    assert not probe.layout.roll_back_request.exists()
+
+
+def test_a_reader_that_is_gone_stops_no_update(probe):
+    """As a terminal that was closed: what cannot be printed is not printed."""
+    file = probe.write("1.0", 10)
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        probe.run("install", file, capture_output=False, stdout=writing, stderr=subprocess.DEVNULL)
+    finally:
+        os.close(writing)
+    assert probe.require_whole() == probe.state.committed == "1.0+10"
+
+
+def test_who_may_not_write_the_folder_is_told_who_may(probe, monkeypatch):
+    def refused(path):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(type(probe.layout.uploaded), "exists", refused)
+    with pytest.raises(UpdateFailed, match="Use sudo, or an account of the group tsis-update"):
+        Upload(probe.layout)
