@@ -5,6 +5,7 @@ import { fetchSelfTest, startSelfTest } from "./probe.js";
 
 const VERDICTS = { passed: "passed", failed: "failed", not_tested: "not tested" };
 const WORST_FIRST = ["failed", "not_tested", "passed"];
+const ERASE = "⌫";
 const UNDER_WAY = new Set(["waiting", "running"]);
 const dialog = byId("self-test");
 let summaryShown = "";
@@ -52,11 +53,27 @@ export function showSelfTest(status) {
   else fetchSelfTest().then(({ results }) => showResults(results), () => { summaryShown = ""; });
 }
 
+// The probe's panel has no keyboard: its one number is pressed on keys that stand there while its field is chosen.
+const weightField = byId("self-test-weight");
+const keys = byId("self-test-keys");
+for (const key of [..."1234567890.", ERASE]) {
+  const button = element("button", "key", key);
+  button.type = "button";
+  button.setAttribute("aria-label", key === ERASE ? "Erase" : key);
+  button.addEventListener("click", () => {
+    weightField.value = key === ERASE ? weightField.value.slice(0, -1) : weightField.value + key;
+  });
+  keys.append(button);
+}
+keys.addEventListener("mousedown", (event) => event.preventDefault()); // so the field stays chosen
+weightField.addEventListener("focus", () => { keys.hidden = false; });
+weightField.addEventListener("blur", () => { keys.hidden = true; });
+
 byId("self-test-open").addEventListener("click", () => dialog.showModal());
 byId("self-test-close").addEventListener("click", () => dialog.close());
 byId("self-test-form").addEventListener("submit", async (event) => {
   event.preventDefault();
-  const weight = byId("self-test-weight").value;
+  const weight = weightField.value.replace(",", ".");
   problem = "";
   try {
     await startSelfTest({ on_block: byId("self-test-block").checked, weight_n: weight ? Number(weight) : null });
