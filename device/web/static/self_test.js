@@ -53,7 +53,7 @@ export function showSelfTest(status) {
   else fetchSelfTest().then(({ results }) => showResults(results), () => { summaryShown = ""; });
 }
 
-// The probe's panel has no keyboard: its one number is pressed on keys that stand there while its field is chosen.
+// The probe's panel has no keyboard: its one number is pressed on keys that stand there once its field was chosen.
 const weightField = byId("self-test-weight");
 const keys = byId("self-test-keys");
 for (const key of [..."1234567890.", ERASE]) {
@@ -67,7 +67,8 @@ for (const key of [..."1234567890.", ERASE]) {
 }
 keys.addEventListener("mousedown", (event) => event.preventDefault()); // so the field stays chosen
 weightField.addEventListener("focus", () => { keys.hidden = false; });
-weightField.addEventListener("blur", () => { keys.hidden = true; });
+// Not when it loses its focus: then the button below would move away from under the finger that presses it.
+dialog.addEventListener("close", () => { keys.hidden = true; });
 
 byId("self-test-open").addEventListener("click", () => dialog.showModal());
 byId("self-test-close").addEventListener("click", () => dialog.close());
