@@ -17,7 +17,7 @@ import pytest
 from daemon_process import QUICK_HAND
 from supervisor import DARK_WITHIN_S, Supervisor, codes, faults
 
-from device.instrument.watch.progress import PARTS
+from device.instrument.watch.progress import PARTS, Part
 
 pytestmark = [pytest.mark.long, pytest.mark.real_time]
 WATCHDOG_S = 6.0
@@ -31,6 +31,8 @@ FAULTS = {
 SPARING = "[settings.camera]\nframe_rate_hz = 10.0\nlate_frames = 100.0\n"
 """Five daemons at once keep each other waiting: a third of the frames, and no press that ends since they are late."""
 DARK = (0.0, 0.0, 0.0, 0.0)
+LIT = ("light", "inference", "storage")
+"""The parts in which the procedure's loop freezes with the light on."""
 
 
 @dataclass
@@ -52,9 +54,18 @@ def test_each_part_that_is_watched_is_frozen():
     assert set(FAULTS) == set(PARTS)
 
 
-def story_of(folder: Path, kind: str) -> Story:
+def story_of(folder: Path, part: Part) -> Story:
+    """Return the story of a part that freezes; on a busy machine a press may not be lit yet then: told again, later."""
+    for from_s in (1.0, 2.0, 4.0):
+        story = told(folder / f"{part}_{from_s:g}", FAULTS[part][0], from_s)
+        if part not in LIT or min(story.light_at_the_kill) > 0.5:
+            break
+    return story
+
+
+def told(folder: Path, kind: str, from_s: float) -> Story:
     folder.mkdir()
-    scene = f'{QUICK_HAND}{SPARING}[[faults]]\nkind = "{kind}"\nfrom_press = 1\nfrom_s = 1.0\n'
+    scene = f'{QUICK_HAND}{SPARING}[[faults]]\nkind = "{kind}"\nfrom_press = 1\nfrom_s = {from_s}\n'
     supervisor = Supervisor(folder, scene, WATCHDOG_S)
     try:
         daemon = supervisor.start()
@@ -82,7 +93,7 @@ def story_of(folder: Path, kind: str) -> Story:
 def stories(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future[Story]]]:
     folder = tmp_path_factory.mktemp("frozen")
     with ThreadPoolExecutor(len(FAULTS)) as pool:
-        yield {part: pool.submit(story_of, folder / part, kind) for part, (kind, _) in FAULTS.items()}
+        yield {part: pool.submit(story_of, folder, part) for part in FAULTS}
 
 
 @pytest.mark.parametrize("part", FAULTS)
@@ -104,7 +115,7 @@ def test_after_the_restart_of_a_frozen_loop_it_is_dark(stories, part):
     story = stories[part].result()
     assert story.light_after == DARK
     assert story.darkening_cpu_s < DARK_WITHIN_S  # why not the time on the wall: tests/device/commands/test_led_off.py
-    if part in ("light", "inference", "storage"):
+    if part in LIT:
         assert min(story.light_at_the_kill) > 0.5, story.log
 
 
