@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import http.client
-import io
 import json
-import tarfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,21 +11,13 @@ from urllib.parse import urlsplit
 
 import pytest
 from daemon_process import PATIENT, QUICK_HAND, Daemon, wait_for
+from small_release import tar
 
 pytestmark = [pytest.mark.real_time, pytest.mark.long]
 SIZE_BYTES, PART_BYTES = 120_000_000, 64_000
 MORE_KB = 30_000
 """Far below the file's size, above what a press takes besides."""
 PARTS_A_LOOK = 50
-
-
-def _beginning() -> bytes:
-    content, file = b'{"product": "tsis"}', io.BytesIO()
-    member = tarfile.TarInfo("manifest.json")
-    member.size = len(content)
-    with tarfile.open(fileobj=file, mode="w") as archive:
-        archive.addfile(member, io.BytesIO(content))
-    return file.getvalue()
 
 
 def _peak_kb(daemon: Daemon) -> int:
@@ -47,7 +37,7 @@ def test_a_release_arrives_while_a_press_is_taken(tmp_path: Path):
     assert daemon.press("quick")["state"] == "done"  # what a press takes is there
     Path(f"/proc/{daemon.process.pid}/clear_refs").write_text("5")  # proc(5): the peak counts anew
     before_kb = _peak_kb(daemon)
-    beginning, presses = _beginning(), list[str]()
+    beginning, presses = tar({"manifest.json": b'{"product": "tsis"}'}), list[str]()
 
     def parts() -> Iterator[bytes]:
         """The press begins when the file has begun; the file ends when the press has."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from device.config import Config
+from device.files.plain_settings import DROP_INS, LOCAL
 from device.files.shipped import MODELS
-from device.settings.layers import DROP_INS, LOCAL
 
 DATABASE = "tsis.sqlite"
 RELEASES = Path("/opt/tsis")

@@ -26,10 +26,10 @@ from device.care.places import DATABASE, MODEL_SETTINGS, below
 from device.care.snapshot import StoreFacts, facts_of
 from device.errors import BusyError, DiskFullError, StorageError
 from device.files.durable import sync_directory
+from device.files.plain_settings import LOCAL
 from device.measurement.quantities import InvalidQuantity
 from device.records.schema import STORE_READS
 from device.settings.catalogue import SETTINGS
-from device.settings.layers import LOCAL
 
 STAGED, ASIDE = "restore.tmp", "before-restore"
 DAEMON_USER = "tsis"

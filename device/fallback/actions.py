@@ -6,7 +6,6 @@ Neither is done here: the updater, which is root's, sees a file appear; the supp
 from __future__ import annotations
 
 import importlib.util
-import os
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,7 @@ from pathlib import Path
 
 from device.errors import BusyError, DeviceError, UnknownResource
 from device.fallback.situation import NOTES, Situation
+from device.files.handed_over import HandedOverFile
 
 ROLL_BACK = f"{NOTES}/incoming/roll_back"
 SUPPORT = "device.commands.support"
@@ -29,18 +29,13 @@ def roll_back(root: Path, situation: Situation) -> None:
         raise UnknownResource("There is no other release on this probe.", "Install one: `make deploy`, or a USB stick.")
     path = root / ROLL_BACK
     try:
-        handle, name = tempfile.mkstemp(prefix=".roll_back-", dir=path.parent)
-        os.close(handle)
-    except OSError as error:
-        raise _not_asked(error) from None
-    try:
-        os.link(name, path)  # unlike a rename it replaces nothing
+        HandedOverFile(path.parent).hand_over(path.name)
     except FileExistsError:
         raise BusyError("The probe was asked to go back already.", "Wait a minute, or switch it off and on.") from None
     except OSError as error:
-        raise _not_asked(error) from None
-    finally:
-        os.unlink(name)
+        raise DeviceError(
+            f"The updater cannot be asked: {error.strerror}.", "Install a release: `make deploy`."
+        ) from None
 
 
 def has_support() -> bool:
@@ -66,7 +61,3 @@ def support_file() -> bytes:
         except (OSError, subprocess.TimeoutExpired) as error:
             reason = str(error)
     raise DeviceError(f"The support file was not written: {reason}.", "Fetch the log: `journalctl -u tsis`.")
-
-
-def _not_asked(error: OSError) -> DeviceError:
-    return DeviceError(f"The updater cannot be asked: {error.strerror}.", "Install a release: `make deploy`.")

@@ -7,16 +7,12 @@ from __future__ import annotations
 
 import socket
 import subprocess
-import tomllib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from device.access.known_hosts import ANYWHERE, KnownHosts
+from device.files.plain_settings import HOST, PORT, daemon_address, plain_settings, stated_server
 
-HOST, PORT = "127.0.0.1", 8000
-FILES, DROP_INS = ("usr/lib/tsis/config.toml", "etc/tsis/config.toml"), "etc/tsis/config.d"
 HOSTNAME_S = 2.0
 
 
@@ -46,18 +42,12 @@ class ServedAddress:
 
 def read_address(root: Path = Path("/")) -> ServedAddress:
     """Return what the settings files below a root say, each over those before it."""
-    server: dict[str, Any] = {}
-    serial = ""
-    for table in _tables(root):
-        section = table.get("server")
-        server |= section if isinstance(section, dict) else {}
-        serial = table["serial"] if isinstance(table.get("serial"), str) else serial
-    host, port, hosts = server.get("host"), server.get("port"), server.get("hosts")
+    address, hosts, serial = daemon_address(root), stated_server(root).get("hosts"), plain_settings(root).get("serial")
     return ServedAddress(
-        host if isinstance(host, str) and host else HOST,
-        port if type(port) is int and 0 < port < 65536 else PORT,
+        address.host,
+        address.port,
         tuple(name for name in hosts if isinstance(name, str)) if isinstance(hosts, list) else (),
-        serial,
+        serial if isinstance(serial, str) else "",
     )
 
 
@@ -68,12 +58,3 @@ def own_addresses() -> list[str]:
     except (OSError, subprocess.TimeoutExpired):
         return []
     return [one for one in done.stdout.split() if ":" not in one]
-
-
-def _tables(root: Path) -> Iterator[dict[str, Any]]:
-    drop_ins = sorted((root / DROP_INS).glob("[!.]*.toml"))
-    for path in [*(root / name for name in FILES), *drop_ins]:
-        try:
-            yield tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue

@@ -8,7 +8,7 @@ from __future__ import annotations
 import http.client
 import json
 
-from device.access.known_hosts import ANYWHERE
+from device.access.known_hosts import asked_at
 from device.fallback.server import LIVE, YIELD
 
 ANSWER_S = 2.0
@@ -27,7 +27,7 @@ def ask_for_port(host: str, port: int) -> bool:
 
 
 def _asked(method: str, host: str, port: int, path: str) -> dict[str, object] | None:
-    line = http.client.HTTPConnection("127.0.0.1" if host in ANYWHERE else host, port, timeout=ANSWER_S)
+    line = http.client.HTTPConnection(asked_at(host), port, timeout=ANSWER_S)
     try:
         line.request(method, path, headers=HEADERS)
         answer = line.getresponse()

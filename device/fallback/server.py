@@ -16,14 +16,15 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from device.access.known_hosts import ANYWHERE, is_loopback
+from device.access.known_hosts import asked_at, is_loopback
 from device.access.request_rules import AskedRequest, joined, require_allowed, require_local
 from device.access.safe_headers import SAFE_HEADERS
 from device.errors import DeviceError, UnknownPath
 from device.fallback.actions import has_support, roll_back, support_file
-from device.fallback.address import HOST, ServedAddress, read_address
+from device.fallback.address import ServedAddress, read_address
 from device.fallback.page import STATUS, page, problem, revision
 from device.fallback.situation import Situation, read_situation
+from device.files.plain_settings import HOST
 
 log = logging.getLogger(__name__)
 API, OWN = "/api/v1", "/fallback"
@@ -229,9 +230,7 @@ def _leave(address: ServedAddress, stop: threading.Event) -> None:
     until_s = time.monotonic() + GIVEN_UP_S
     while time.monotonic() < until_s and not stop.wait(TAKEN_LOOK_S):
         try:
-            socket.create_connection(
-                (HOST if address.host in ANYWHERE else address.host, address.port), REQUEST_S
-            ).close()
+            socket.create_connection((asked_at(address.host), address.port), REQUEST_S).close()
         except OSError:
             continue
         return

@@ -7,22 +7,20 @@ file appears in its folder `incoming` by a rename, whole or not at all. Files th
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import logging
 import math
 import os
 import sys
-import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, TypeVar
 
 from device import __version__
 from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
-from device.files.durable import sync_directory
+from device.files.handed_over import PART, HandedOverFile, is_held
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -158,7 +156,7 @@ class Updates:
         self.require_free()
         if self._taking and self._taking.is_open:
             raise BusyError("Another file is being taken.", "Wait until it has arrived.")
-        for path in self._incoming.glob(".upload-*"):
+        for path in self._incoming.glob(f"{PART}*"):
             _remove_unless_held(path)
         require_size(announced_bytes or 0)
         space = os.statvfs(self._incoming)
@@ -166,7 +164,7 @@ class Updates:
         if left_bytes < (announced_bytes or 0):
             cause = f"A release of {announced_bytes} bytes does not fit: {max(left_bytes, 0)} bytes are left for it."
             raise DiskFullError(cause, "Copy recordings away and delete them there.")
-        self._taking = _on_disk(lambda: IncomingRelease(self._incoming / f".upload-{uuid.uuid4()}"))
+        self._taking = _on_disk(lambda: IncomingRelease(self._incoming))
         return self._taking
 
     def ask_to_roll_back(self) -> None:
@@ -174,31 +172,32 @@ class Updates:
         self.require_free()
         if not self.now().can_roll_back:
             raise _refused("There is no release before this one on the probe.", "Install another one.", 409)
-        _on_disk(lambda: IncomingRelease(self._incoming / f".upload-{uuid.uuid4()}").hand_over(WAY_BACK))
+        _on_disk(lambda: IncomingRelease(self._incoming).hand_over(WAY_BACK))
 
 
 class IncomingRelease:
     """A file that is being taken: not there for the updater until it is handed over."""
 
-    def __init__(self, path: Path) -> None:
-        """Create it, for this user and the updater; what nobody holds was left by somebody who is gone."""
-        self._path, self.bytes_taken, self._unsynced_bytes = path, 0, 0
-        self._file: BinaryIO = path.open("xb")
-        fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.chmod(self._file.fileno(), 0o640)
+    def __init__(self, folder: Path) -> None:
+        """Begin it in the updater's folder. Raises `OSError`."""
+        self._file, self._unsynced_bytes = HandedOverFile(folder), 0
+
+    @property
+    def bytes_taken(self) -> int:
+        """How much has come."""
+        return self._file.bytes_written
 
     @property
     def is_open(self) -> bool:
         """Whether it is still being taken."""
-        return not self._file.closed
+        return self._file.is_open
 
     def write(self, part: bytes) -> None:
         """Append; raise `InvalidRequest` when it grows too large, `StorageError` when the disk refuses it.
 
         Synchronised every few megabytes: what is written at the end of a press must not wait behind all of it.
         """
-        self.bytes_taken += len(part)
-        require_size(self.bytes_taken)
+        require_size(self.bytes_taken + len(part))
         _on_disk(lambda: self._file.write(part))
         self._unsynced_bytes += len(part)
         if self._unsynced_bytes >= SYNC_EVERY_BYTES:
@@ -207,26 +206,18 @@ class IncomingRelease:
     def synchronise(self) -> None:
         """Bring what was written to the disk; raise `StorageError` when that refuses it."""
         self._unsynced_bytes = 0
-        _on_disk(self._file.flush)
-        _on_disk(lambda: os.fsync(self._file.fileno()))
+        _on_disk(self._file.synchronise)
 
     def hand_over(self, name: str = HANDED_OVER) -> None:
         """Bring it to the disk and give it the name that the updater waits for; raise `BusyError` when one is there."""
-        self.synchronise()
         try:
-            _on_disk(lambda: os.link(self._path, self._path.with_name(name)))  # unlike a rename it replaces nothing
+            _on_disk(lambda: self._file.hand_over(name))
         except FileExistsError:
             raise BusyError("An update is under way: another file waits for it.", "Wait until it has ended.") from None
-        finally:
-            self.discard()
-        _on_disk(lambda: sync_directory(self._path.parent))
 
     def discard(self) -> None:
         """Remove it, if it was not handed over."""
-        with suppress(OSError):  # what is not written yet may be refused once more
-            self._file.close()
-        with suppress(OSError):
-            self._path.unlink(missing_ok=True)
+        self._file.discard()
 
 
 def require_size(size_bytes: int) -> None:
@@ -256,9 +247,9 @@ def _on_disk(action: Callable[[], Result]) -> Result:
 
 def _remove_unless_held(path: Path) -> None:
     """Remove what an upload left that nobody goes on with; another door of the probe may be taking its own."""
-    with suppress(OSError), path.open("rb") as file:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        path.unlink()
+    with suppress(OSError):
+        if not is_held(path):
+            path.unlink()
 
 
 def _read(path: Path) -> dict[str, Any]:

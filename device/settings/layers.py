@@ -14,12 +14,12 @@ from typing import Any
 
 from device.config import RENAMED, Config, Conflict
 from device.errors import ConfigError
+from device.files.plain_settings import DROP_INS, LOCAL, VENDOR
 from device.files.toml_record import as_table, from_table, read_table, table_problems
 from device.measurement.quantities import InvalidQuantity
 from device.settings.catalogue import SETTINGS
 
 ROOT = Path("/")
-VENDOR, LOCAL, DROP_INS = "usr/lib/tsis/config.toml", "etc/tsis/config.toml", "etc/tsis/config.d"
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import platform
 import sys
 
 from device.errors import UnfitRelease
+from device.files.plain_settings import data_folder
 from device.records.schema import store_schema
 from device.update.layout import UpdateLayout
 from device.update.manifest import ReleaseManifest, read_installed
-from device.update.settings import data_folder
 from device.update.signature import require_signers
 from device.update.state import UpdateState, counter_of
 
@@ -51,7 +51,7 @@ def probe_hardware(layout: UpdateLayout) -> str:
 def require_readable_data(layout: UpdateLayout, manifest: ReleaseManifest) -> None:
     """Raise `UnfitRelease` when a release cannot read the measurements that are there."""
     try:
-        schema = store_schema(data_folder(layout) / "tsis.sqlite")
+        schema = store_schema(data_folder(layout.root) / "tsis.sqlite")
     except OSError as error:
         raise UnfitRelease(f"The measurements cannot be looked at: {error}.", "Check the disk.") from None
     if schema is not None and schema not in manifest.store_reads:

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from device.update.settings import DaemonAddress
+from device.access.known_hosts import asked_at
+from device.files.plain_settings import DaemonAddress
 
 Answer = TypeVar("Answer")
 
@@ -79,7 +80,7 @@ def _is_pressed(address: DaemonAddress) -> bool:
 def _asked(address: DaemonAddress, path: str, read: Callable[[Any], Answer]) -> Answer:
     """Return what `read` makes of the daemon's answer; raise `NotHealthy` when there is none, or none of a daemon."""
     port = address.port
-    line = http.client.HTTPConnection(address.host, port, timeout=ANSWER_WITHIN_S)
+    line = http.client.HTTPConnection(asked_at(address.host), port, timeout=ANSWER_WITHIN_S)
     try:
         line.request("GET", path)
         answer = line.getresponse()

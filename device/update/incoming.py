@@ -7,18 +7,15 @@ of their reach before it looks at it, and believes only what the signature says.
 from __future__ import annotations
 
 import errno
-import fcntl
-import os
 import shutil
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
 from device.errors import BusyError, UpdateFailed
+from device.files.handed_over import PART, HandedOverFile, is_held
 from device.update.layout import UpdateLayout
 from device.update.progress import file_id
 
-PART = ".upload-"
 MOST_BYTES = 2**31
 BUSY = "Wait until it has ended: progress.json, the screen and `python -m device.update status` tell."
 
@@ -28,20 +25,17 @@ class Upload:
 
     def __init__(self, layout: UpdateLayout) -> None:
         """Begin. Raises `UpdateFailed` when the folder cannot be written, `BusyError` when another one waits there."""
-        self._layout, self._bytes = layout, 0
+        self._layout = layout
         try:
             if layout.uploaded.exists():
                 raise BusyError("Another release waits to be installed.", BUSY)
-            handle, name = tempfile.mkstemp(prefix=PART, dir=layout.incoming)
+            self._file = HandedOverFile(layout.incoming)
         except OSError as error:
             raise _failed(error) from None
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # what nobody holds was left by somebody who is gone
-        self._file, self._path = os.fdopen(handle, "wb"), Path(name)
 
     def write(self, piece: bytes) -> None:
         """Take the next piece. Raises `UpdateFailed` when there is no space, or it becomes too large."""
-        self._bytes += len(piece)
-        if self._bytes > MOST_BYTES:
+        if self._file.bytes_written + len(piece) > MOST_BYTES:
             raise UpdateFailed(f"The release file has more than {MOST_BYTES} bytes.", "Send a release file.")
         try:
             self._file.write(piece)
@@ -51,24 +45,15 @@ class Upload:
     def hand_over(self) -> str:
         """Let the updater see the file; return how it is named in the progress. Raises `BusyError`, `UpdateFailed`."""
         try:
-            self._file.flush()
-            os.fchmod(self._file.fileno(), 0o640)
-            os.fsync(self._file.fileno())
-            os.link(self._path, self._layout.uploaded)  # unlike a rename it replaces nothing
+            return file_id(self._file.hand_over(self._layout.uploaded.name))
         except FileExistsError:
             raise BusyError("Another release waits to be installed.", BUSY) from None
         except OSError as error:
             raise _failed(error) from None
-        finally:
-            identifier = file_id(os.fstat(self._file.fileno()))
-            self.abandon()
-        return identifier
 
     def abandon(self) -> None:
         """Remove what has come so far."""
-        self._path.unlink(missing_ok=True)
-        with suppress(OSError):  # on a full disk closing writes what is left, in vain
-            self._file.close()
+        self._file.discard()
 
 
 def ask_for_roll_back(layout: UpdateLayout) -> None:
@@ -111,22 +96,8 @@ def clear_incoming(layout: UpdateLayout) -> None:
     """Remove what an interrupted update or upload left; what waits stays. Raises `OSError`."""
     _remove(layout.taken)
     for path in layout.incoming.glob(f"{PART}*"):
-        if not _is_held(path):
+        if not is_held(path):
             _remove(path)
-
-
-def _is_held(path: Path) -> bool:
-    try:
-        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return True
-    finally:
-        os.close(handle)
-    return False
 
 
 def _remove(path: Path) -> None:

@@ -13,12 +13,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from device.errors import DeviceError, RolledBack, UnfitRelease, UpdateFailed
+from device.files.plain_settings import daemon_address
 from device.update.fits import require_fit, require_readable_data
 from device.update.gate import take_baseline
 from device.update.manifest import ReleaseManifest, read_installed, read_manifest
 from device.update.progress import StateName, file_id
 from device.update.release_file import ReleaseFile, opened
-from device.update.settings import daemon_address
 from device.update.signature import require_signature
 from device.update.state import PendingRelease, read_state
 from device.update.trial import Updater, begin_trial, carry_through, remove_others
@@ -144,7 +144,7 @@ class _Steps:
     def try_out(self, manifest: ReleaseManifest) -> None:
         """Note what does not work before the switch, write the trial down, and carry it through."""
         self._begin("switching", 0.59, "baseline")
-        baseline = take_baseline(daemon_address(self._layout), self._updater.patience)
+        baseline = take_baseline(daemon_address(self._layout.root), self._updater.patience)
         begin_trial(self._updater, PendingRelease(manifest.name, baseline=baseline))
         carry_through(self._updater)
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 
 from device.errors import RolledBack, UpdateFailed
 from device.files.durable import sync_directory, write_durably
+from device.files.plain_settings import daemon_address
 from device.update.gate import NotHealthy, Patience, wait_for_press, wait_until_healthy
 from device.update.layout import UpdateLayout, make_link, point
 from device.update.manifest import read_installed
 from device.update.progress import ENDED, ProgressReport, read_progress
 from device.update.services import reload_units, start_daemon, stop_daemon
-from device.update.settings import daemon_address
 from device.update.state import PendingRelease, UpdateState, counter_of, is_on_disk, read_state, write_state
 from device.update.unpack import remove_release
 
@@ -190,7 +190,7 @@ def _switch(updater: Updater, release: str) -> None:
     layout, report = updater.layout, updater.report
     if layout.linked(layout.current) != release:
         report.tell("switching", 0.59, "press")
-        wait_for_press(daemon_address(layout), updater.patience.every_s)
+        wait_for_press(daemon_address(layout.root), updater.patience.every_s)
         report.tell("switching", 0.6, "stop")
         stop_daemon()
         report.tell("switching", 0.62, "link")
@@ -203,7 +203,7 @@ def _switch(updater: Updater, release: str) -> None:
 def _watch(updater: Updater, pending: PendingRelease) -> None:
     updater.report.tell("checking", 0.65, "health")
     wait_until_healthy(
-        daemon_address(updater.layout), pending.release, pending.baseline, updater.patience,
+        daemon_address(updater.layout.root), pending.release, pending.baseline, updater.patience,
         lambda part: updater.report.tell("checking", 0.65 + 0.3 * part, "health"),
     )  # fmt: skip
 

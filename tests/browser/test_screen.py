@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import re
 import socket
-import tarfile
 import threading
 import time
 from collections.abc import Iterator
@@ -19,6 +17,7 @@ import uvicorn
 from chromium import chromium_page
 from daemon_process import PATIENT, QUICK_HAND, ROOT, Daemon, wait_for
 from playwright.sync_api import Page, expect
+from small_release import tar
 
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
@@ -342,7 +341,7 @@ def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_fr
     expect(page.locator("#release-previous")).to_have_text("0.0.9+390")
     holiday, release = tmp_path / "holiday.jpg", tmp_path / "tsis-0.2.0-x86_64.release"
     holiday.write_bytes(b"\xff\xd8" * 1000)
-    release.write_bytes(_release())
+    release.write_bytes(tar({"manifest.json": b'{"product": "tsis"}'}))
     page.locator("#release-file").set_input_files(holiday)
     expect(page.locator("#releases-line")).to_contain_text("holiday.jpg is no release file")
     _shoot(page, "software")
@@ -368,15 +367,6 @@ def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_fr
     expect(page.locator("#releases-line")).to_have_text(words)
     page.locator("#release-back").click()
     wait_for((probe.updates / "incoming" / "roll_back").exists, bool)
-
-
-def _release() -> bytes:
-    content, file = b'{"product": "tsis"}', io.BytesIO()
-    member = tarfile.TarInfo("manifest.json")
-    member.size = len(content)
-    with tarfile.open(fileobj=file, mode="w") as archive:
-        archive.addfile(member, io.BytesIO(content))
-    return file.getvalue()
 
 
 def test_an_update_that_was_taken_back_is_a_lasting_warning_that_leaves_the_view_readable(page: Page, tmp_path: Path):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from claim import Claim
 from probe_at_hand import BROWSER, URL, Ended, NotReached, ProbeAtHand, asked, posted, until
 from releases import ReleaseShop
 
@@ -22,19 +23,6 @@ ENDED = ("done", "rejected", "cancelled", "failed")
 BOOT_ID = "cat /proc/sys/kernel/random/boot_id"
 TRIES = 3
 """A machine that is busy besides may spoil a press, as a trembling hand does."""
-
-
-@dataclass(frozen=True)
-class Claim:
-    """What has to hold, whether it does, and what was seen."""
-
-    words: str
-    holds: bool
-    seen: object = ""
-
-    def __str__(self) -> str:
-        seen = f": {self.seen}" if self.seen != "" else ""
-        return f"{'pass' if self.holds else 'FAIL'}  {self.words}{seen}"
 
 
 @dataclass

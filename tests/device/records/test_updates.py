@@ -139,13 +139,14 @@ def test_a_file_is_there_for_the_updater_only_when_it_is_whole(folder):
 def test_one_that_is_given_up_leaves_nothing_and_a_leftover_is_removed(folder):
     updates = told(folder)
     (folder / "incoming" / ".upload-old").write_bytes(b"of a daemon that was killed")
-    of_ssh = IncomingRelease(folder / "incoming" / ".upload-ssh")
+    of_ssh = IncomingRelease(folder / "incoming")
+    (kept,) = (folder / "incoming").glob(".upload-????????")
     incoming = updates.receive(None)
     incoming.write(b"one")
     with pytest.raises(BusyError, match="Another file"):
         updates.receive(None)
     incoming.discard()
-    assert [path.name for path in (folder / "incoming").iterdir()] == [".upload-ssh"]  # is still being taken
+    assert list((folder / "incoming").iterdir()) == [kept]  # is still being taken
     of_ssh.discard()
     updates.receive(None).discard()
 

@@ -10,6 +10,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
+from device.files.plain_settings import DaemonAddress
 from device.update.gate import (
     PARTS,
     DaemonGone,
@@ -20,7 +21,6 @@ from device.update.gate import (
     wait_for_press,
     wait_until_healthy,
 )
-from device.update.settings import DaemonAddress
 
 READY = {"release": "1.1+11", "parts": {part: {"ready": True, "code": None} for part in PARTS}}
 FALLBACK = {"type": "about:blank", "status": 503, "code": "E401", "detail": "The model's card was changed."}
