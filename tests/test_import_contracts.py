@@ -64,6 +64,7 @@ FORBIDDEN = {
         "host_tools.forward.plan",
     ),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
+    "Only the toolkit touches the workstation's libraries": ("device.assembly.probe", "scipy"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
     "The rooms of the toolkit stand in one order, and a new one has its place": (
         "host_tools.forward.plan",

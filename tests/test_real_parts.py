@@ -64,7 +64,7 @@ def test_a_real_probe_starts_measures_and_stops_dark(rig: Rig):
     assert (device["serial"], device["simulated"]) == ("SIM-0001", False)
     wait_for(lambda: parts(rig), lambda told: all(part["ready"] for part in told.values()))
     job = daemon.press("standard")
-    assert job["state"] == "done", job
+    assert job["state"] == "done", f"{job}"  # whole, or pytest shortens it
     measurement = daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json
     assert (measurement["truth"], measurement["estimate"]["simulated"]) == (None, False)
     for name, truth in TRUTH.items():
@@ -139,7 +139,7 @@ def test_with_the_enable_line_wired_it_is_dark_soon_whatever_becomes_of_daemon_a
     """Nobody is there to darken it: no systemd, no command after the end."""
     daemon = rig.start()
     job = daemon.press("quick")
-    assert job["state"] == "done", job
+    assert job["state"] == "done", f"{job}"  # whole, or pytest shortens it
     rig.press_until_lit()
     since_s = time.monotonic()
     if how == "bus hangs":

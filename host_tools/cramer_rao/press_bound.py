@@ -40,7 +40,7 @@ def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: 
     parameters = np.array([at[name] for name in PARAMETERS])
     if mode not in answers.noise or not np.all((parameters >= LOW) & (parameters <= HIGH)):
         return np.full(COUNT, np.nan)
-    row, jacobian = answers.surrogate.rows_and_jacobian(normalise(parameters))
+    (row,), (jacobian,) = answers.surrogate.rows_and_jacobian(normalise(parameters)[None])
     return cramer_rao(jacobian, answers.noise[mode].covariance(row), BOX_STD).std[:COUNT]
 
 

@@ -16,7 +16,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import NUISANCES, PARAMETERS, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.ellipticity import EllipticityTest, second_factor
-from device.measurement.ramp_modes.legendre import LegendreSum, terms
+from device.measurement.ramp_modes.legendre import LegendreSum, LegendreTerms
 from device.measurement.ramp_modes.surrogate import (
     CONTRAST_COLUMNS,
     RESPONSE_COLUMNS,
@@ -88,10 +88,10 @@ def fit_polynomials(
     contrast, reference_response, offset = np.split(
         samples.rows, [CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS], axis=1
     )
-    factor, design = inclusion_factor(samples.parameters), terms(inclusion_degrees, at)
+    factor, design = inclusion_factor(samples.parameters), LegendreTerms(inclusion_degrees).values(at)
     strength, placed = factor[:, 0], factor[:, -1]
     inclusion = [_weighted(design, strength, contrast), _weighted(design, placed, offset)]
-    baseline, *_ = np.linalg.lstsq(terms(baseline_degrees, at), reference_response, rcond=None)
+    baseline, *_ = np.linalg.lstsq(LegendreTerms(baseline_degrees).values(at), reference_response, rcond=None)
     return LegendreSum(inclusion_degrees, np.hstack(inclusion)), LegendreSum(
         baseline_degrees, np.asarray(baseline, np.float64)
     )
@@ -103,7 +103,7 @@ def fit_second_harmonics(samples: PressSamples) -> LegendreSum:
     bound = Bound(PRESSES_A_TERM * len(found), np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
     at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
-    design = second_factor(samples.parameters)[:, None] * terms(found, at)
+    design = second_factor(samples.parameters)[:, None] * LegendreTerms(found).values(at)
     coefficients, *_ = np.linalg.lstsq(design, samples.second_harmonics, rcond=None)
     return LegendreSum(found, np.asarray(coefficients))
 

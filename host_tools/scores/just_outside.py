@@ -102,8 +102,12 @@ def inclusion_ramps(tables: ProbeTables, inclusion: Inclusion) -> PressRamps:
 def nearest_inside(posterior: PressPosterior, seed: int) -> NearestInside:
     """Return what inside the ranges looks most like a press without noise."""
     starts = np.random.default_rng(seed).uniform(-0.9, 0.9, (STARTS, len(PARAMETERS)))
+
+    def jacobian(normalised: Array) -> Array:
+        return np.asarray(posterior.residuals_and_jacobian(normalised[None])[1][0])
+
     fits = [
-        least_squares(posterior.residuals, start, jac=posterior.jacobian, bounds=(-1.0, 1.0), xtol=1e-7, ftol=1e-7)
+        least_squares(posterior.residuals, start, jac=jacobian, bounds=(-1.0, 1.0), xtol=1e-7, ftol=1e-7)
         for start in starts
     ]
     best = min(fits, key=lambda fit: float(fit.cost))

@@ -100,7 +100,7 @@ def known_nuisances_fit(surrogate: PressSurrogate, row: Array, normalised: Array
         least_squares(
             lambda at: (surrogate.rows(whole(at)[None])[0] - row) / std,
             np.array(start),
-            jac=lambda at: surrogate.rows_and_jacobian(whole(at))[1][:, : len(UNKNOWNS)] / std[:, None],
+            jac=lambda at: surrogate.rows_and_jacobian(whole(at)[None])[1][0][:, : len(UNKNOWNS)] / std[:, None],
             bounds=(-1.0, 1.0),
             x_scale=1e-2,
             xtol=1e-10,

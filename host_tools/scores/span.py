@@ -11,9 +11,8 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.estimate import SPOKEN
 from device.measurement.mode import Mode
-from device.measurement.parameters import normalise
+from device.measurement.parameters import EVEN_STD, normalise
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.fit import EVENLY_HELD
 from device.measurement.ramp_modes.model import RAMP_MODES, RampAnswers
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Chapter, at_most
@@ -51,8 +50,8 @@ def span_chapter(answers: RampAnswers, tables: ProbeTables) -> Chapter:
 
 def _shift(answers: RampAnswers, mode: Mode, normalised: Array, change: Array) -> Array:
     """Return the shift of the linearised answer to one press over its spread [3], for a change [P] of its row."""
-    row, jacobian = answers.surrogate.rows_and_jacobian(normalised)
+    (row,), (jacobian,) = answers.surrogate.rows_and_jacobian(normalised[None])
     weighted = np.linalg.solve(answers.noise[mode].covariance(row), jacobian)
-    covariance = np.linalg.inv(jacobian.T @ weighted + EVENLY_HELD.T @ EVENLY_HELD)
+    covariance = np.linalg.inv(jacobian.T @ weighted + np.eye(len(normalised)) / EVEN_STD**2)
     unknowns = slice(len(UNKNOWNS))
     return np.asarray((covariance @ weighted.T @ change)[unknowns] / np.sqrt(np.diag(covariance))[unknowns])

@@ -16,10 +16,10 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid, harmonic, lights_of
+from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, harmonic, lights_of, rings_of
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import reference_light
-from device.measurement.recording.ring_means import RING_RADII_MM, RingMeans, ring_weights
+from device.measurement.recording.ring_means import RING_RADII_MM
 
 QUICK_FORCES_N = 0.44, 0.56
 """Mean forces of a hold that the network has learnt from; `press.target_n` is 0.5 N."""
@@ -50,12 +50,7 @@ def quick_press(recording: Recording) -> QuickPress:
             raise InvalidQuantity(f"{name} frames", 0, "at least one", AGAIN)
         require(f"mean {name} force", float(np.mean(force_n)), Bound(*QUICK_FORCES_N, "N"), AGAIN)
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
-    weights = ring_weights(press.images[0].shape, press.scale)
-    frames = [
-        weights.means(*contrast_and_valid(image, light, float(force)))
-        for force, image in zip(press.force_n, press.images, strict=True)
-    ]
-    rings = RingMeans(*(np.array(part) for part in zip(*frames, strict=True)))
+    rings = rings_of(press, light)
     row = np.append(rings.mean.mean(axis=0), np.mean(press.force_n))
     return QuickPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))
 

@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, PARAMETERS
-from device.measurement.ramp_modes.fit import EVENLY_HELD, PressPosterior, best_fit
+from device.measurement.ramp_modes.fit import PressPosterior, best_fit, best_fits
 from device.measurement.ramp_modes.surrogate import MODULUS
 
 CELLS, SAMPLES = 11, 6000
@@ -30,8 +29,8 @@ SEED = 20130317
 EDGES = np.linspace(-1.0, 1.0, CELLS + 1)
 MIDDLES = (EDGES[1:] + EDGES[:-1]) / 2
 REST = np.arange(len(PARAMETERS)) != MODULUS
-STEPS = 12
-"""A cell's best fit is begun at its neighbour's and needs to be near, not exact: the weights correct it."""
+NEAR = 1e-8
+"""A cell's best fit needs to be near, not exact: the weights correct it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,49 +90,30 @@ def sample_press(posterior: PressPosterior, start: Array) -> PressFit:
 
 def _cells(posterior: PressPosterior, best: Array) -> _Cells:
     centres = _best_in_cells(posterior, best)
-    slopes, factors, log_evidence = [], [], []
-    for centre in centres:
-        jacobian = posterior.jacobian(centre)
-        precision = jacobian.T @ jacobian + np.eye(len(best)) / EVEN_STD**2
-        covariance = np.linalg.inv(precision[np.ix_(REST, REST)])
-        slopes.append(-covariance @ precision[REST, MODULUS])
-        factors.append(WIDER * np.linalg.cholesky(covariance))
-        log_evidence.append(posterior.log_density(centre[None])[0])
-    factor = np.array(factors)
-    log = np.array(log_evidence) + _log_volume(factor)
+    residuals, jacobian = posterior.residuals_and_jacobian(centres)
+    precision = _precision(jacobian)
+    covariance = np.linalg.inv(precision[:, REST][:, :, REST])
+    factor = WIDER * np.linalg.cholesky(covariance)
+    log = _log_volume(factor) - 0.5 * np.sum(residuals**2, axis=1)
     share = np.exp(log - log.max())
     share = (1 - DEFENSIVE_SHARE) * share / share.sum() + DEFENSIVE_SHARE / CELLS
-    return _Cells(np.array(centres), np.array(slopes), factor, share)
+    return _Cells(centres, -np.einsum("nij,nj->ni", covariance, precision[:, REST, MODULUS]), factor, share)
 
 
-def _best_in_cells(posterior: PressPosterior, best: Array) -> list[Array]:
-    """Return the best fits [9] with the modulus held in the middle of each cell, from the cell of `best` outwards."""
-    first = int(np.clip(np.searchsorted(EDGES, best[MODULUS]) - 1, 0, CELLS - 1))
-    found = {first: _best_given_modulus(posterior, MIDDLES[first], best)}
-    for cell in range(first + 1, CELLS):
-        found[cell] = _best_given_modulus(posterior, MIDDLES[cell], found[cell - 1])
-    for cell in range(first - 1, -1, -1):
-        found[cell] = _best_given_modulus(posterior, MIDDLES[cell], found[cell + 1])
-    return [found[cell] for cell in range(CELLS)]
+def _best_in_cells(posterior: PressPosterior, best: Array) -> Array:
+    """Return the best fits [C, 9] with the modulus held in the middle of each cell, begun where `best` slides to."""
+    _, jacobian = posterior.residuals_and_jacobian(best[None])
+    precision = _precision(jacobian)[0]
+    slope = -np.linalg.solve(precision[np.ix_(REST, REST)], precision[REST, MODULUS])
+    start = np.tile(best, (CELLS, 1))
+    start[:, MODULUS] = MIDDLES
+    start[:, REST] += slope * (MIDDLES - best[MODULUS])[:, None]
+    return best_fits(posterior, np.clip(start, -1.0, 1.0), REST, tolerance=NEAR)
 
 
-def _best_given_modulus(posterior: PressPosterior, modulus: float, start: Array) -> Array:
-    def whole(rest: Array) -> Array:
-        normalised = np.empty(len(start))
-        normalised[REST], normalised[MODULUS] = rest, modulus
-        return normalised
-
-    held = EVENLY_HELD[:-1, :-1]
-    fit = least_squares(
-        lambda rest: np.concatenate([posterior.residuals(whole(rest)), rest / EVEN_STD]),
-        np.clip(start[REST], -0.98, 0.98),
-        jac=lambda rest: np.vstack([posterior.jacobian(whole(rest))[:, REST], held]),
-        bounds=(-1.0, 1.0),
-        xtol=1e-4,
-        ftol=1e-4,
-        max_nfev=STEPS,
-    )
-    return whole(fit.x)
+def _precision(jacobian: Array) -> Array:
+    """Return the inverse covariances [n, 9, 9] of a Gaussian posterior: of the press, and of the ranges."""
+    return np.asarray(jacobian.transpose(0, 2, 1) @ jacobian + np.eye(len(PARAMETERS)) / EVEN_STD**2)
 
 
 def _log_volume(factor: Array) -> Array:

@@ -109,14 +109,10 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile
     press = _within(press, reference.force_n)
     _require_ramp("press", press.force_n)
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
+    rings, residual = _at_profile_forces(press.force_n, rings_of(press, light))
+    baseline_light = np.array([light.at(force) for force in PROFILE_FORCES_N])
     weights = ring_weights(press.images[0].shape, press.scale)
-    everywhere = np.ones(press.images[0].shape, dtype=bool)
-    frames = [
-        weights.means(*contrast_and_valid(image, light, force))
-        for force, image in zip(press.force_n, press.images, strict=True)
-    ]
-    rings, residual = _at_profile_forces(press.force_n, frames)
-    baseline = np.array([weights.means(light.at(force), everywhere).mean for force in PROFILE_FORCES_N])
+    baseline = weights.means(baseline_light, np.ones(baseline_light.shape, dtype=bool)).mean
     return RadialProfile(
         force_n=PROFILE_FORCES_N,
         contrast=rings.mean,
@@ -125,6 +121,13 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile
         second_harmonic=second_harmonic(rings),
         residual=residual,
     )
+
+
+def rings_of(press: RampLights, light: HeldLight | RampLight) -> RingMeans:
+    """Return the ring means of press frames' contrast: means [n, J] and harmonics [n, 2, J]."""
+    frames = zip(press.images, press.force_n, strict=True)
+    contrast, valid = zip(*(contrast_and_valid(image, light, force) for image, force in frames), strict=True)
+    return ring_weights(press.images[0].shape, press.scale).means(np.array(contrast), np.array(valid))
 
 
 def contrast_and_valid(image: Image, light: HeldLight | RampLight, force_n: float) -> tuple[Image, NDArray[np.bool_]]:
@@ -213,13 +216,12 @@ def _require_ramp(name: str, force_n: Array) -> None:
     require(f"largest step of the {name} force", step_n, Bound(0.0, LARGEST_STEP_N, "N"), AGAIN)
 
 
-def _at_profile_forces(force_n: Array, frames: Sequence[RingMeans]) -> tuple[RingMeans, float]:
+def _at_profile_forces(force_n: Array, frames: RingMeans) -> tuple[RingMeans, float]:
     """Return polynomials' values at the profile's forces, and the root mean square of what they leave of the means."""
     top = float(PROFILE_FORCES_N[-1])
     powers = np.vander(force_n / top, RAMP_DEGREE + 1, increasing=True)
     at = np.vander(PROFILE_FORCES_N / top, RAMP_DEGREE + 1, increasing=True)
     onto = np.linalg.pinv(powers)
-    parts = [np.array(part) for part in zip(*frames, strict=True)]
-    fitted = RingMeans(*(np.tensordot(at @ onto, part, 1) for part in parts))
-    left = parts[0] - powers @ (onto @ parts[0])
+    fitted = RingMeans(*(np.tensordot(at @ onto, part, 1) for part in frames))
+    left = frames.mean - powers @ (onto @ frames.mean)
     return fitted, float(np.sqrt(np.mean(left**2)))

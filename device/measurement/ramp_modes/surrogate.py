@@ -57,19 +57,15 @@ class PressSurrogate:
         return assemble(factor * self.inclusion_field.values(at), self.baseline.values(at))
 
     def rows_and_jacobian(self, normalised: Array) -> tuple[Array, Array]:
-        """Return the row [P] at coordinates [9] and its derivatives [P, 9] by them."""
-        parameters = denormalise(normalised[None])
-        at = polynomial_coordinates(normalised[None], parameters)
-        factor, inclusion, baseline = (
-            inclusion_factor(parameters),
-            self.inclusion_field.values(at),
-            self.baseline.values(at),
-        )
-        inclusion_slope, baseline_slope = (
-            _by_normalised(field.gradient(at)[:, 0], parameters[0]) for field in (self.inclusion_field, self.baseline)
-        )
-        inclusion_slope = factor * inclusion_slope + _factor_slope(parameters[0]) * inclusion
-        return assemble(factor * inclusion, baseline)[0], assemble(inclusion_slope, baseline_slope).T
+        """Return the rows [n, P] at coordinates [n, 9] and their derivatives [n, P, 9] by them."""
+        parameters = denormalise(normalised)
+        at = polynomial_coordinates(normalised, parameters)
+        inclusion, inclusion_slope = self.inclusion_field.values_and_gradient(at)
+        baseline, baseline_slope = self.baseline.values_and_gradient(at)
+        factor = inclusion_factor(parameters)
+        inclusion_slope = factor * _by_normalised(inclusion_slope, parameters) + _factor_slope(parameters) * inclusion
+        slope = assemble(inclusion_slope, _by_normalised(baseline_slope, parameters))
+        return assemble(factor * inclusion, baseline), slope.transpose(1, 2, 0)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the polynomials by the names in `ARRAYS`, as a file holds them: single precision."""
@@ -118,34 +114,34 @@ def inclusion_factor(parameters: Array) -> Array:
 
 
 def assemble(inclusion: Array, baseline: Array) -> Array:
-    """Return rows [n, P] in the order of `radial_profile.ROW_NAMES`: contrast, reference response, offset."""
-    return np.hstack([inclusion[:, :CONTRAST_COLUMNS], baseline, inclusion[:, CONTRAST_COLUMNS:]])
+    """Return rows [..., P] in the order of `radial_profile.ROW_NAMES`: contrast, reference response, offset."""
+    return np.concatenate([inclusion[..., :CONTRAST_COLUMNS], baseline, inclusion[..., CONTRAST_COLUMNS:]], axis=-1)
 
 
 def _strength(parameters: Array) -> Array:
     return np.asarray(far_field_strength(parameters[:, SIZE], parameters[:, DEPTH]))
 
 
-def _factor_slope(at: Array) -> Array:
-    """Return the derivatives [9, contrast + offset columns] of `inclusion_factor` by the coordinates."""
-    slope, by_normalised = np.zeros((len(PARAMETERS), CONTRAST_COLUMNS + OFFSET_COLUMNS)), slope_of_normalised(at)
-    strength, centre, place = float(_strength(at[None])[0]), at[DEPTH] + at[SIZE] / 2, at[OFFSET] / HIGH[OFFSET]
-    by_size, by_depth = 3 / at[SIZE] - 1.5 / centre, -3 / centre
-    both = np.repeat([1.0, place], [CONTRAST_COLUMNS, OFFSET_COLUMNS])
-    slope[SIZE], slope[DEPTH] = (
-        strength * by_size * by_normalised[SIZE] * both,
-        strength * by_depth * by_normalised[DEPTH] * both,
-    )
-    slope[OFFSET, CONTRAST_COLUMNS:] = strength / HIGH[OFFSET] * by_normalised[OFFSET]
+def _factor_slope(parameters: Array) -> Array:
+    """Return the derivatives [9, n, contrast + offset columns] of `inclusion_factor` by the coordinates."""
+    size, depth, place = parameters[:, SIZE], parameters[:, DEPTH], parameters[:, OFFSET] / HIGH[OFFSET]
+    slope = np.zeros((len(PARAMETERS), len(parameters), CONTRAST_COLUMNS + OFFSET_COLUMNS))
+    by_normalised, strength, centre = slope_of_normalised(parameters), _strength(parameters), depth + size / 2
+    by_size = strength * (3 / size - 1.5 / centre) * by_normalised[:, SIZE]
+    by_depth = strength * (-3 / centre) * by_normalised[:, DEPTH]
+    for parameter, by_parameter in ((SIZE, by_size), (DEPTH, by_depth)):
+        slope[parameter, :, :CONTRAST_COLUMNS] = by_parameter[:, None]
+        slope[parameter, :, CONTRAST_COLUMNS:] = (place * by_parameter)[:, None]
+    slope[OFFSET, :, CONTRAST_COLUMNS:] = (strength / HIGH[OFFSET] * by_normalised[:, OFFSET])[:, None]
     return slope
 
 
-def _by_normalised(gradient: Array, at: Array) -> Array:
-    """Return derivatives [9, Q] by `normalised` of derivatives by the polynomials' coordinates, at parameters [9]."""
-    (low, high), by_normalised = ELASTIC_MISMATCH_RANGE, slope_of_normalised(at)
-    E, Et = at[MODULUS], at[TISSUE]
-    by_mismatch = gradient[MODULUS] * 2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2
-    slope = gradient.copy()
-    slope[MODULUS] = by_mismatch * Et * by_normalised[MODULUS]
-    slope[TISSUE] = gradient[TISSUE] - by_mismatch * E * by_normalised[TISSUE]
+def _by_normalised(gradient: Array, parameters: Array) -> Array:
+    """Return derivatives [9, n, Q] by `normalised` of those by the polynomials' coordinates, at parameters [n, 9]."""
+    (low, high), by_normalised = ELASTIC_MISMATCH_RANGE, slope_of_normalised(parameters)
+    E, Et = parameters[:, MODULUS], parameters[:, TISSUE]
+    by_mismatch = gradient[MODULUS] * (2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2)[:, None]
+    slope = np.array(gradient)
+    slope[MODULUS] = by_mismatch * (Et * by_normalised[:, MODULUS])[:, None]
+    slope[TISSUE] -= by_mismatch * (E * by_normalised[:, TISSUE])[:, None]
     return slope

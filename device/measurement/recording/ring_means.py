@@ -42,24 +42,24 @@ class RingMeans(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RingWeights:
-    """Weights [J, pixels] of the pixels inside the window, and the angle's cosines and sines [2, pixels] there."""
+    """The pixels inside the window, and their weights [5 J, pixels]: rings, and rings times each wave of the angle."""
 
     inside: NDArray[np.bool_]
     weight: Image
-    cosine: Image
-    sine: Image
 
-    def means(self, image: Image, valid: NDArray[np.bool_]) -> RingMeans:
-        """Return the ring means over the valid pixels of an image [height, width]; a ring without one is 0."""
-        seen = valid[self.inside].astype(np.float32)
-        values = np.where(seen > 0, image[self.inside], np.float32(0))
-        waves = np.concatenate([self.cosine, self.sine])
-        rows = np.concatenate([[values], [seen], values * waves, seen * waves])
-        total, count, of_values, of_seen = np.split(self.weight @ rows.T, (1, 2, 2 + len(waves)), axis=1)
-        norm = np.maximum(count, np.float32(1e-6))
-        mean = total / norm
-        cosine, sine = np.split((2 * (of_values - mean * of_seen) / norm).T.astype(float), 2)
-        return RingMeans(mean[:, 0].astype(float), cosine, sine)
+    def means(self, images: Image, valid: NDArray[np.bool_]) -> RingMeans:
+        """Return the ring means over the valid pixels of images [..., height, width]; a ring without one is 0."""
+        seen = valid[..., self.inside]
+        values = np.where(seen, images[..., self.inside], np.float32(0))
+        of_values, of_seen = self._sums(values), self._sums(seen.astype(np.float32))
+        norm = np.maximum(of_seen[..., :1, :], np.float32(1e-6))
+        mean = of_values[..., :1, :] / norm
+        waves = (2 * (of_values - mean * of_seen) / norm)[..., 1:, :].astype(float)
+        return RingMeans(mean[..., 0, :].astype(float), waves[..., :HARMONICS, :], waves[..., HARMONICS:, :])
+
+    def _sums(self, pixels: Image) -> Image:
+        """Return the sums [..., 5, J] of pixels [..., pixels] by all weights: one matrix product for all images."""
+        return (pixels @ self.weight.T).reshape(*pixels.shape[:-1], 1 + 2 * HARMONICS, RINGS)
 
 
 @lru_cache(maxsize=4)
@@ -69,7 +69,9 @@ def ring_weights(shape: tuple[int, int], scale: PixelScale) -> RingWeights:
     r = np.hypot(x, y)
     inside = r < RINGS * RING_MM
     angle = np.arctan2(y, x)[inside]
-    order = np.arange(1, HARMONICS + 1, dtype=np.float32)[:, None]
+    order = np.arange(1, HARMONICS + 1)[:, None]
     distance = np.abs(r[inside][None, :] - RING_RADII_MM[:, None]) / RING_MM
-    weight = np.maximum(1 - distance, 0).astype(np.float32)
-    return RingWeights(inside, weight, np.cos(order * angle), np.sin(order * angle))
+    ring = np.maximum(1 - distance, 0)
+    waves = np.concatenate([np.ones((1, angle.size)), np.cos(order * angle), np.sin(order * angle)])
+    weight = (waves[:, None] * ring).reshape(-1, angle.size)
+    return RingWeights(inside, weight.astype(np.float32))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Legendre
 
-from device.measurement.ramp_modes.legendre import LegendreSum, terms
+from device.measurement.ramp_modes.legendre import POINTS_AT_ONCE, LegendreSum, LegendreTerms
 
 DEGREES = np.array([(0, 0, 0), (1, 0, 0), (0, 2, 0), (3, 1, 0), (2, 0, 4), (5, 3, 1)], dtype=np.uint8)
 
@@ -23,11 +23,29 @@ def test_terms_are_products_of_legendre_polynomials(points):
     expected = [
         [np.prod([Legendre.basis(k)(x) for k, x in zip(row, at, strict=True)]) for row in DEGREES] for at in points
     ]
-    np.testing.assert_allclose(terms(DEGREES, points), expected, rtol=1e-12)
+    np.testing.assert_allclose(LegendreTerms(DEGREES).values(points), expected, rtol=1e-12)
 
 
 def test_values_are_the_terms_times_the_coefficients(field, points):
-    np.testing.assert_allclose(field.values(points), terms(DEGREES, points) @ field.coefficients, rtol=1e-14)
+    np.testing.assert_allclose(
+        field.values(points), LegendreTerms(DEGREES).values(points) @ field.coefficients, rtol=1e-14
+    )
+
+
+def test_the_values_beside_the_gradient_are_the_values(field, points):
+    np.testing.assert_allclose(field.values_and_gradient(points)[0], field.values(points), rtol=1e-13)
+
+
+def test_points_of_several_passes_come_in_their_order(field):
+    many = np.random.default_rng(3).uniform(-1, 1, (2 * POINTS_AT_ONCE + 5, 3))
+    np.testing.assert_allclose(field.values(many)[::-1], field.values(many[::-1]), rtol=1e-12)
+    assert field.values(many[:0]).shape == (0, 4)
+
+
+def test_a_term_is_counted_as_often_as_it_stands_there(points):
+    twice = LegendreSum(np.array([(1, 0, 2), (1, 0, 2)], np.uint8), np.array([[2.0], [5.0]]))
+    once = LegendreSum(np.array([(1, 0, 2)], np.uint8), np.array([[7.0]]))
+    np.testing.assert_allclose(twice.values(points), once.values(points), rtol=1e-14)
 
 
 def test_every_polynomial_is_one_in_the_corner_of_the_cube(field):
@@ -38,7 +56,7 @@ def test_a_constant_has_no_gradient_and_a_plane_its_slopes(points):
     plane = LegendreSum(np.array([(0, 0, 0), (1, 0, 0), (0, 0, 1)], np.uint8), np.array([[7.0], [2.0], [-3.0]]))
     np.testing.assert_allclose(plane.values(points)[:, 0], 7 + 2 * points[:, 0] - 3 * points[:, 2], rtol=1e-14)
     np.testing.assert_allclose(
-        plane.gradient(points)[:, :, 0], np.tile([[2.0], [0.0], [-3.0]], len(points)), atol=1e-14
+        plane.values_and_gradient(points)[1][:, :, 0], np.tile([[2.0], [0.0], [-3.0]], len(points)), atol=1e-14
     )
 
 
@@ -52,4 +70,4 @@ def test_the_gradient_is_the_limit_of_central_differences(field, points):
 def _error_of_differences(field: LegendreSum, points: np.ndarray, step: float) -> float:
     steps = step * np.eye(3)
     differences = [(field.values(points + away) - field.values(points - away)) / (2 * step) for away in steps]
-    return float(np.linalg.norm(field.gradient(points) - differences))
+    return float(np.linalg.norm(field.values_and_gradient(points)[1] - differences))
