@@ -6,16 +6,12 @@ left out where `ccx` is not installed.
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
-from bench import median_seconds
+from bench_table import Figure, median_seconds, timed
 from joblib import Parallel, delayed
 
 from device.measurement.quantities import Inclusion
@@ -32,6 +28,7 @@ from host_tools.verification.cross_check.revolved_mesh import Sector
 from host_tools.verification.cross_check.section import Sizes
 from host_tools.verification.level_tables import finest_plan
 
+CHAPTER = "forward model"
 SCENE = Scene(Inclusion(10.0, 6.0, 80.0))
 CALCULIX_SIZES = Sizes(bulk_mm=6.0, rim_mm=0.07, growth=0.6, per_quarter_circle=8.0)
 """The coarsest mesh found whose error is within 0.2 % of w and of the force; even refinement spends more elements."""
@@ -51,28 +48,33 @@ def _one_press() -> tuple[float, float]:
     return float(face.w_mm[0, 0]), face.force_n
 
 
-def _against_calculix() -> None:
+def figures() -> Iterator[Figure]:
+    """Yield one press by our elements and by CalculiX's, and what a second process saves."""
+    yield from _against_calculix()
+    yield _two_processes()
+
+
+def _against_calculix() -> Iterator[Figure]:
     truth = solve(SCENE, finest_plan(SCENE))
     exact = truth.w_mm[0], truth.force_n
-    ours_s, ours = median_seconds(_one_press), _one_press()
-    _print("one press, axisymmetric, plan for 0.1 %", ours_s, ours, exact)
-    if not ccx_available():
-        print("CalculiX is not installed (Debian: calculix-ccx): its ratio is left out")
+    ours_s = median_seconds(_one_press)
+    yield timed(CHAPTER, "one press, axisymmetric, plan for 0.1 %", _one_press)
+    yield from _errors("one press", _one_press(), exact)
+    if not ccx_available():  # Debian: calculix-ccx
         return
     began = time.perf_counter()
     calculix = solve_with_calculix(SCENE, [1.0], finite_strain=False, sizes=CALCULIX_SIZES, sector=QUARTER)[0]
     calculix_s = time.perf_counter() - began
-    name = f"the same in CalculiX, quarter, {calculix.elements} elements"
-    _print(name, calculix_s, (calculix.w_at_mm(0.0), calculix.force_n), exact)
-    print(f"{'CalculiX over ours':48} {calculix_s / ours_s:10.0f} x")
+    yield Figure(CHAPTER, f"CalculiX over ours, quarter, {calculix.elements} elements", calculix_s / ours_s, "x")
+    yield from _errors("CalculiX", (calculix.w_at_mm(0.0), calculix.force_n), exact)
 
 
-def _print(name: str, seconds: float, found: tuple[float, float], exact: tuple[float, float]) -> None:
-    w, force = (100 * (a / b - 1) for a, b in zip(found, exact, strict=True))
-    print(f"{name:48} {1e3 * seconds:10.1f} ms here   error of w {w:+.3f} %, of the force {force:+.3f} %")
+def _errors(name: str, found: tuple[float, float], exact: tuple[float, float]) -> Iterator[Figure]:
+    for quantity, value, true in zip(("w", "the force"), found, exact, strict=True):
+        yield Figure(CHAPTER, f"{name}: error of {quantity}", 100 * abs(value / true - 1), "%", bound=0.2)
 
 
-def _two_processes() -> None:
+def _two_processes() -> Figure:
     scenes = [replace(SCENE, inclusion=Inclusion(10.0, 6.0, float(E))) for E in np.linspace(40, 120, BATCH)]
 
     def race(pool: Parallel) -> float:
@@ -82,19 +84,8 @@ def _two_processes() -> None:
         return time.perf_counter() - began
 
     with Parallel(n_jobs=1) as alone, Parallel(n_jobs=2) as pair:
-        print(f"{'one process over two, 24 scenes':48} {race(alone) / race(pair):10.2f} x")
+        return Figure(CHAPTER, f"one process over two, {BATCH} scenes", race(alone) / race(pair), "x")
 
 
 def _force_n(scene: Scene) -> float:
     return solve(scene).force_n
-
-
-def main() -> None:
-    """Print the ratios and the peak memory."""
-    _against_calculix()
-    _two_processes()
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
-
-
-if __name__ == "__main__":
-    main()
