@@ -5,6 +5,7 @@ import math
 import threading
 from queue import Empty, Queue
 
+import numpy as np
 import pytest
 
 from device.errors import LoadCellError, OverloadedCellError, ZeroShiftError
@@ -258,6 +259,23 @@ def test_the_history_does_not_grow_beyond_its_bound(cell, recorder):
     cell.say(*[(5.0 + k / 100, 500.0) for k in range(2 * force_recorder.KEPT_SAMPLES)])
     recorder.at(5.0 + (2 * force_recorder.KEPT_SAMPLES - 1) / 100)
     assert len(recorder._samples) == force_recorder.KEPT_SAMPLES
+
+
+def test_the_history_answers_as_all_its_samples_do_after_it_has_moved(cell, recorder):
+    """By `np.interp` and by hand over the samples that are kept; after two and a half times its length."""
+    rng, kept = np.random.default_rng(1), force_recorder.KEPT_SAMPLES
+    times_s = 5.0 + np.cumsum(rng.uniform(0.0, 0.02, 5 * kept // 2))
+    counts = rng.uniform(0.0, 3000.0, len(times_s)).round()
+    cell.say(*zip(times_s.tolist(), counts.tolist(), strict=True))
+    recorder.at(times_s[-1])
+    times_s, forces_n = times_s[-kept:], (counts[-kept:] - 500.0) / 1000.0
+    for t_s in [times_s[0], *rng.uniform(times_s[0], times_s[-1], 50), times_s[-1]]:
+        assert math.isclose(recorder.at(t_s), np.interp(t_s, times_s, forces_n), abs_tol=1e-12)
+        inside = (times_s > t_s - 0.15) & (times_s <= t_s)
+        assert recorder.peak_n(t_s - 0.15, t_s) == max([recorder.at(t_s), *forces_n[inside]])
+        assert recorder.range_n(t_s, window_s=0.15) == np.ptp(forces_n[(times_s >= t_s - 0.15) & (times_s <= t_s)])
+    with pytest.raises(LoadCellError, match=r"No force is known 1\.000 s before the first sample"):
+        recorder.at(times_s[0] - 1.0)
 
 
 def tare_of_two(read):
