@@ -22,7 +22,7 @@ from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.records.updates import Updates
-from device.web.events import snapshot, status_events
+from device.web.events import StatusFeed, snapshot, status_events
 from device.web.guard import RequestGuard
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
@@ -120,10 +120,12 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
         """Return what the event stream sends."""
         return snapshot(procedure)
 
+    feed = StatusFeed(procedure)
+
     @app.get(f"{API}/events")
     async def events() -> StreamingResponse:
-        """Stream the status as server-sent events."""
-        return StreamingResponse(status_events(procedure), media_type="text/event-stream")
+        """Stream the status as server-sent events, one when something has changed and at least two a second."""
+        return StreamingResponse(status_events(feed), media_type="text/event-stream")
 
 
 def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
