@@ -285,6 +285,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         answers.estimator,
         store,
         modes=answers.modes,
+        worth=answers.worth,
         calibration=watch,
         opened=parts.opened,
         clock=probe.clock,

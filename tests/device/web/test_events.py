@@ -96,8 +96,8 @@ def test_the_state_of_the_press_is_told_by_its_code(told):
 
 
 def test_before_a_press_the_mode_is_that_of_the_settings(told):
-    status = told(ProcedureStatus(press=PressJob("p-1", "standard", "done"), wanted_n=()), Force())
-    assert (status["mode"], status["kind"], status["wanted_n"]) == ("paper", "hold", (0.5,))
+    status = told(ProcedureStatus(press=PressJob("p-1", "paper", "done"), wanted_n=()), Force())
+    assert (status["mode"], status["kind"], len(status["wanted_n"])) == ("standard", "ramp", 10)
 
 
 def test_a_press_that_failed_has_its_code(told):
