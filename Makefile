@@ -93,10 +93,11 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
 
-bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; time the darkness after a stop, a kill, a freeze, a hung bus
+bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; start and rest a daemon; time the darkness after a stop, a kill, a freeze, a hung bus
 	$(PY) tests/bench.py
 	$(PY) tests/bench_forward.py
 	$(PY) tests/bench_acquisition.py
+	$(PY) tests/bench_daemon.py
 	$(PY) tests/bench_darkness.py
 
 verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md

@@ -204,9 +204,16 @@ def _scenario(options: argparse.Namespace) -> Scenario | None:
 
 
 def _opened(config: Config, scenario: Scenario | None) -> Procedure:
-    from device.assembly.probe import open_probe, open_simulated_probe
+    if scenario:
+        from device.assembly.probe import open_simulated_probe
 
-    return open_simulated_probe(config, scenario) if scenario else open_probe(config)
+        return open_simulated_probe(config, scenario)
+    from device.assembly.camera import real_camera
+
+    camera = real_camera(config.camera)  # its process starts while this one imports the rest
+    from device.assembly.probe import open_probe
+
+    return open_probe(config, camera)
 
 
 def _self_test(options: argparse.Namespace) -> int:

@@ -72,14 +72,30 @@ class RawMonoCamera:
         controls["FrameDurationLimits"] = (frame_us, frame_us)
         if "AeEnable" in picam2.camera_controls:
             controls["AeEnable"] = False
+        self._controls, self._is_resting = controls, True
         try:
             self._stride_bytes = self._configure(controls)
-            self._picam2.start()
         except RuntimeError as error:
             raise CameraError(f"Camera cannot be started: {error}.", CABLE_REMEDY) from error
+        self._start()
         self._frames = RawFrames(mode)
         # Once for nothing: loading what scales a frame may take longer than the first frame may.
         self._frames.frame(np.zeros((mode.sensor_px[1], self._stride_bytes), np.uint8))
+
+    def _start(self) -> None:
+        """Start the stream as it was configured: picamera2 forgets its controls with each start."""
+        try:
+            self._picam2.set_controls(self._controls)
+            self._picam2.start()
+        except RuntimeError as error:
+            raise CameraError(f"Camera cannot be started: {error}.", CABLE_REMEDY) from error
+        self._is_resting = False
+
+    def rest(self) -> None:
+        """Stop the stream: sensor and image processor take no power until the next frame is asked for."""
+        if not self._is_resting:
+            self._picam2.stop()
+            self._is_resting = True
 
     def _configure(self, controls: dict[str, Any]) -> int:
         """Configure the raw stream; return its rows' bytes, or raise `CameraError` when anything was adjusted."""
@@ -119,6 +135,8 @@ class RawMonoCamera:
         Raises `CameraError` when none comes within `timeout_s`, or when it is of the wrong shape or type.
         """
         require("timeout_s", timeout_s, Bound(0.0, 3600.0, "s", low_included=False), "give the frame time to arrive")
+        if self._is_resting:
+            self._start()
         try:
             # A flush of 0 would mean "no flush" to picamera2.
             request = self._picam2.capture_request(flush=max(1, math.ceil(begun_after_s * 1e9)), wait=timeout_s)

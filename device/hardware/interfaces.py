@@ -97,6 +97,9 @@ class Camera(Protocol):
     def capture(self, *, begun_after_s: float, timeout_s: float) -> CameraFrame:
         """Return the next frame whose exposure began at or after a time; raise `CameraError` when none comes."""
 
+    def rest(self) -> None:
+        """Stop the stream until the next frame is asked for, which then comes later; raise `CameraError`."""
+
     def close(self) -> None:
         """Stop the stream."""
 

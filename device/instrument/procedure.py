@@ -22,7 +22,7 @@ from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
 from device.instrument.acquisition.light_check import DimmingWatch
-from device.instrument.press.capture import CANCELLED, POLL_S, CalledAway, Capture, PressEnded
+from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Estimator, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
@@ -46,6 +46,10 @@ log = logging.getLogger(__name__)
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
+REST_AFTER_S = 10.0
+"""Nobody has pressed for so long: the camera rests. The next press of a patient finds it awake."""
+LOOK_EVERY_S = 0.1
+"""So soon a request is seen; a touch is seen with the sample that shows it."""
 WRITE_EVERY_S = 20.0
 """So often a write that nobody needs proves the store: seldom enough not to wear the card out."""
 
@@ -93,7 +97,7 @@ class Procedure:
         )
         self._book = PressBook(self.board, store, bench.budget)
         self._worth, self._answer_times = worth, AnswerTimes(config.data / "answer_times.json")
-        self._written_s = -math.inf
+        self._written_s, self._used_s = -math.inf, time.monotonic()
         self.progress.exercise("storage", self._prove_store)
         test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
@@ -230,6 +234,7 @@ class Procedure:
             self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
         if job := self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S):
             self._measure(job, unloaded)
+            self._used_s = time.monotonic()
 
     def _require_no_drift(self, unloaded: list[Frame]) -> None:
         """Compare the untouched face with the certificate's, under the light of then: the loop may have moved ours."""
@@ -242,12 +247,13 @@ class Procedure:
     def _next_job(self, until_s: float) -> PressJob | None:
         away = (self._capture.stopping, self._capture.called_away)
         while time.monotonic() < until_s and not any(event.is_set() for event in away):
-            is_touched = self.bench.force.latest_n >= self.config.press.contact_n
+            is_touched = self.bench.force.reaches(self.config.press.contact_n, timeout_s=LOOK_EVERY_S)
             if job := self._requests.begin(is_touched=is_touched):
                 return job
             self.progress.beat()
             self._warn_of_computer()
-            time.sleep(POLL_S)
+            if time.monotonic() - self._used_s >= REST_AFTER_S:
+                self.bench.rest()
         return None
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:

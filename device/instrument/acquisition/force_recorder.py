@@ -8,6 +8,7 @@ they lie in arrays, sorted by time.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -100,6 +101,7 @@ class ForceRecorder:
         self._timeout_s = FIRST_SAMPLE_S
         self._samples = SampleRing()
         self._news, self._stopping = threading.Condition(), threading.Event()
+        self._has_reached, self._awaited_n = threading.Event(), math.inf
         self.fault: LoadCellError | None = None
         self._progress = progress or ProgressBoard()
         self._thread = threading.Thread(target=self._run, name="force", daemon=True)
@@ -135,11 +137,14 @@ class ForceRecorder:
             self._samples.append(sample)
             self.fault = None
             self._news.notify_all()
+        if self._newtons(sample.counts) >= self._awaited_n:
+            self._has_reached.set()
 
     def _fail(self, error: LoadCellError) -> None:
         with self._news:
             self.fault = error
             self._news.notify_all()
+        self._has_reached.set()
 
     def retare(self) -> Newtons:
         """Take the tare anew, of samples from now on; return by how much (N) the zero has moved.
@@ -183,6 +188,19 @@ class ForceRecorder:
             if self.fault:
                 raise self.fault
             return self._newtons(self._samples.newest.counts)
+
+    def reaches(self, force_n: float, *, timeout_s: float) -> bool:
+        """Return whether the newest force is at least so large (N), or becomes so within a time (s).
+
+        Returns with the sample that says so; raises as `latest_n` does. For one thread alone, which no other sample
+        wakes.
+        """
+        self._has_reached.clear()
+        self._awaited_n = force_n
+        if self.latest_n < force_n:
+            self._has_reached.wait(timeout_s)
+        self._awaited_n = math.inf
+        return self.latest_n >= force_n
 
     def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> Newtons:
         """Return the force at a time on the monotonic clock, waiting until a later sample has come.

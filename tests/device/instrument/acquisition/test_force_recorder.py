@@ -353,3 +353,18 @@ def test_a_cell_that_falls_silent_while_it_is_tared_is_told(first_tared, monkeyp
     monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
     with pytest.raises(LoadCellError):
         recorder.retare()
+
+
+def test_a_touch_is_told_by_the_sample_that_shows_it(cell, recorder):
+    """1 N at first; the wait ends with 1.6 N, long before its time, and not with the 1.4 N before."""
+    cell.say((5.0, 1900.0), (6.0, 2100.0))
+    assert recorder.reaches(1.5, timeout_s=60.0)
+    assert recorder.latest_n == pytest.approx(1.6)
+
+
+def test_a_wait_for_a_touch_ends_with_its_time_and_with_a_fault(cell, recorder):
+    assert not recorder.reaches(1.5, timeout_s=0.001)
+    assert recorder.reaches(0.5, timeout_s=60.0)
+    cell.say(UNPLUGGED)
+    with pytest.raises(LoadCellError, match="gone"):
+        recorder.reaches(1.5, timeout_s=60.0)
