@@ -105,7 +105,12 @@ class Camera(Protocol):
 
 
 class LoadCell(Protocol):
-    """The load cell behind the probe."""
+    """The load cell behind the probe.
+
+    `pause_s`: so long (s) it may let readings gather before it looks at them; each keeps the time that it was taken at.
+    """
+
+    pause_s: float
 
     def read(self, *, timeout_s: float) -> CellSample:
         """Return the next sample; raise `LoadCellError` when none comes in time."""

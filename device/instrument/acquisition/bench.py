@@ -134,7 +134,8 @@ class Bench:
             return self.lights.check_line()
 
     def rest(self) -> None:
-        """Let the camera rest until a frame is needed; raises `CameraError`. Light and force go on as before."""
+        """Let the camera rest, and the load cell's samples gather, until a frame is needed; raises `CameraError`."""
+        self.force.take_time()
         if not self._is_resting:
             with self.progress.inside("camera"):
                 self.camera.rest()

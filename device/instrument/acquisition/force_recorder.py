@@ -25,6 +25,8 @@ KEPT_SAMPLES = 1000
 FIRST_SAMPLE_S = 5.0
 """Opening the port resets an OpenScale: its banner may last three seconds."""
 SILENCE_S = 1.0
+REST_PAUSE_S = 0.04
+"""While nobody presses, three samples of 80 Hz are taken at a time; waking the thread for each is most of its work."""
 RETRY_S = 0.2
 
 Zero = tuple[ForceScale, LoadLimit]
@@ -202,11 +204,16 @@ class ForceRecorder:
         self._awaited_n = math.inf
         return self.latest_n >= force_n
 
+    def take_time(self) -> None:
+        """Let samples gather until the force at a time is asked for: a touch is seen by so much later."""
+        self._cell.pause_s = REST_PAUSE_S
+
     def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> Newtons:
         """Return the force at a time on the monotonic clock, waiting until a later sample has come.
 
         Raises `LoadCellError` when none comes, or when the history does not reach back so far.
         """
+        self._cell.pause_s = 0.0
         deadline_s = time.monotonic() + timeout_s
         with self._news:
             while not self._samples or self._samples.newest.t_s < t_s:

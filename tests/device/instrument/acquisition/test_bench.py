@@ -42,6 +42,9 @@ class FakeHardware:
     def rest(self):
         self.log.append("rest")
 
+    def take_time(self):
+        pass
+
     def at(self, t_s):
         return t_s / 100
 

@@ -30,7 +30,7 @@ class ScriptedCell:
     """Gives what was put into its script; silence and what is put as an error are errors."""
 
     def __init__(self, *samples):
-        self.script, self.is_closed = Queue(), False
+        self.script, self.is_closed, self.pause_s = Queue(), False, 0.0
         self.say(*samples)
 
     def say(self, *samples):
@@ -360,6 +360,15 @@ def test_a_touch_is_told_by_the_sample_that_shows_it(cell, recorder):
     cell.say((5.0, 1900.0), (6.0, 2100.0))
     assert recorder.reaches(1.5, timeout_s=60.0)
     assert recorder.latest_n == pytest.approx(1.6)
+
+
+def test_samples_gather_until_the_force_of_a_frame_is_asked_for(cell, recorder):
+    recorder.take_time()
+    assert cell.pause_s == force_recorder.REST_PAUSE_S
+    assert not recorder.reaches(1.5, timeout_s=0.001)
+    assert cell.pause_s == force_recorder.REST_PAUSE_S
+    recorder.at(4.0)
+    assert cell.pause_s == 0.0
 
 
 def test_a_wait_for_a_touch_ends_with_its_time_and_with_a_fault(cell, recorder):
