@@ -74,7 +74,7 @@ class Check(_Body):
     code: FaultCode | None
 
 
-class ModeOffer(_Body):
+class OfferedMode(_Body):
     """A mode: what one of its two presses takes (frames, s, N), and what its answer takes and is worth.
 
     `answer_s`: from the last frame to the answer, median of `answer_presses` on this probe; when there was none yet,
@@ -103,7 +103,7 @@ class Device(_Body):
     simulated: bool
     light_on_s: float
     default_mode: Mode
-    modes: list[ModeOffer]
+    modes: list[OfferedMode]
 
 
 class SelfTest(_Body):
