@@ -95,7 +95,6 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 
 bench: .venv/all.stamp ## time everything that somebody waits for, in one table that fails where a bound is missed: make bench [ONLY="work darkness"] [JSON=FILE] [COMPARE=FILE]
 	$(PY) tests/bench.py $(ONLY) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE))
-	$(PY) tests/bench_acquisition.py
 
 verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md
 	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md

@@ -1,5 +1,7 @@
 """`python -m device`: start the daemon, analyse or record presses, see settings and faults, test, update, save, darken.
 
+Each verb imports what it needs when it is asked for: a fault is looked up, and the light is off, long before what
+measures has been loaded.
 Exit codes: 0 ok, 1 failed, 2 usage.
 """
 
@@ -8,37 +10,40 @@ from __future__ import annotations
 import argparse
 import faulthandler
 import logging
+import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from device.assembly.opened_parts import StartFailed
-from device.assembly.probe import open_phantom_press, open_probe, open_simulated_probe
-from device.commands.analyse import add_analyse_command, run_analyse_command
-from device.commands.backup import add_backup_command, run_backup_command
-from device.commands.calibration import add_calibration_command, run_calibration_command
-from device.commands.config import add_config_command, run_config_command
-from device.commands.faults import add_faults_command, run_faults_command
-from device.commands.led_off import led_off
-from device.commands.record import add_record_command, run_record_command
-from device.commands.restore import add_restore_command, run_restore_command
-from device.commands.self_test import add_self_test_command, run_self_test_command
-from device.commands.serve import refusal_noted, serve
-from device.commands.support import add_support_command, run_support_command
-from device.commands.update import add_update_command
-from device.config import Config, simulated_config
 from device.errors import DeviceError
-from device.fallback.start_note import clear_note
-from device.instrument.press.phantom_press import PhantomPress
-from device.instrument.procedure import Procedure
-from device.measurement.bundle import BundleRefused
-from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.settings.last_good import StartSettings, start_settings
-from device.settings.layers import ROOT, layer_files, overridden, read_layers
-from device.simulation.scenario import Scenario, read_scenario
-from device.update.__main__ import run_update
+from device.measurement.quantities import InvalidQuantity
+
+if TYPE_CHECKING:
+    from device.config import Config
+    from device.instrument.press.phantom_press import PhantomPress
+    from device.instrument.procedure import Procedure
+    from device.measurement.quantities import Inclusion
+    from device.settings.last_good import StartSettings
+    from device.simulation.scenario import Scenario
+
+VERBS = {
+    "analyse": "print the estimate of each recording as one line of JSON",
+    "record": "record a press on a phantom, also without a certificate",
+    "config": "check or show the settings",
+    "calibration": "list, show or activate certificates",
+    "faults": "list the fault codes",
+    "self-test": "test every part and name the one that fails",
+    "update": "install a signed release, go back",
+    "backup": "save measurements, settings, certificates and own models to a file",
+    "restore": "bring a backup to a card that holds no measurements yet",
+    "support": "write a file for whoever helps, without patients' data",
+    "led-off": "darken the LED chip of the real probe",
+}
+ONE_THREAD = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS")
+"""A frame is small work: more threads of a library would wait for each other. The camera's process inherits this."""
 
 EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
@@ -50,7 +55,8 @@ EXAMPLES = """examples:
 """
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(named: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
+    """Return the parser; only the verbs `named` know their options."""
     parser = argparse.ArgumentParser(
         prog="python -m device", epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
         description="The probe's daemon: screen and REST API of a tactile probe, real or simulated.",
@@ -58,28 +64,25 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--simulate", action="store_true", help="emulate LED chip, load cell and camera")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (TOML) over all others")
     parser.add_argument(
-        "--root", type=Path, metavar="DIR", default=ROOT, help="folder that holds etc/tsis and usr/lib/tsis"
+        "--root", type=Path, metavar="DIR", default=Path("/"), help="folder that holds etc/tsis and usr/lib/tsis"
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="what the simulated probe is pressed on (TOML)")
     parser.add_argument("--port", type=int, help="port of the screen and the API")
     commands = parser.add_subparsers(dest="command", metavar="VERB", title="verbs")
-    add_analyse_command(commands)
-    add_record_command(commands)
-    add_config_command(commands)
-    add_calibration_command(commands)
-    add_faults_command(commands)
-    add_self_test_command(commands)
-    add_update_command(commands)
-    add_backup_command(commands)
-    add_restore_command(commands)
-    add_support_command(commands)
-    commands.add_parser("led-off", help="darken the LED chip of the real probe")
+    for verb, told in VERBS.items():
+        its = commands.add_parser(verb, help=told, formatter_class=argparse.RawDescriptionHelpFormatter)
+        if verb in named:
+            module = import_module(f"device.commands.{verb.replace('-', '_')}")
+            module.add_options(its)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; return its exit code."""
-    parser = _parser()
+    for library in ONE_THREAD:
+        os.environ.setdefault(library, "1")
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = _parser([verb for verb in VERBS if verb in arguments])
     options = parser.parse_args(arguments)
     if options.scene and not options.simulate:
         parser.error("--scene says what the *simulated* probe is pressed on: add --simulate")
@@ -87,37 +90,72 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("led-off darkens the chip of a real probe: leave out --simulate")
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     try:
-        if options.command == "analyse":
+        return _run(options)
+    except (DeviceError, InvalidQuantity) as error:
+        print(error, file=sys.stderr)
+    except _refusals() as error:
+        print(error, file=sys.stderr)
+    return 1
+
+
+def _refusals() -> tuple[type[Exception], ...]:
+    """Return what else may be refused; who raised it has imported where it is from."""
+    from device.assembly.opened_parts import StartFailed
+    from device.measurement.bundle import BundleRefused
+
+    return StartFailed, BundleRefused
+
+
+def _run(options: argparse.Namespace) -> int:
+    match options.command:
+        case "analyse":
+            from device.commands.analyse import run_analyse_command
+
             return run_analyse_command(options)
-        if options.command == "record":
+        case "record":
             return _record(options)
-        if options.command == "config":
+        case "config":
+            from device.commands.config import run_config_command
+
             return run_config_command(options)
-        if options.command == "calibration":
-            scenario = _scenario(options)
-            return run_calibration_command(options, _start_settings(options, scenario).config)
-        if options.command == "faults":
+        case "calibration":
+            from device.commands.calibration import run_calibration_command
+
+            return run_calibration_command(options, _start_settings(options, _scenario(options)).config)
+        case "faults":
+            from device.commands.faults import run_faults_command
+
             return run_faults_command(options)
-        if options.command == "self-test":
+        case "self-test":
             return _self_test(options)
-        if options.command == "update":
+        case "update":
+            from device.update.__main__ import run_update
+
             return run_update(options)
-        if options.command == "backup":
+        case "backup":
+            from device.commands.backup import run_backup_command
+
             return run_backup_command(options, _start_settings(options, _scenario(options)).config)
-        if options.command == "restore":
+        case "restore":
+            from device.commands.restore import run_restore_command
+
             return run_restore_command(options, _stated(options))
-        if options.command == "support":
+        case "support":
+            from device.commands.support import run_support_command
+
             return run_support_command(options)
-        if options.command == "led-off":
+        case "led-off":
+            from device.commands.led_off import led_off
+
             led_off(_start_settings(options, None).config.light)
             return 0
-        return _serve(options)
-    except (DeviceError, StartFailed, InvalidQuantity, BundleRefused) as error:
-        print(error, file=sys.stderr)
-        return 1
+    return _serve(options)
 
 
 def _serve(options: argparse.Namespace) -> int:
+    from device.commands.serve import refusal_noted, serve
+    from device.fallback.start_note import clear_note
+
     with refusal_noted(options.root):
         scenario = _scenario(options)
         settings = _start_settings(options, scenario)
@@ -129,6 +167,10 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
 
     Those of the scene lie over the simulated probe's.
     """
+    from device.config import simulated_config
+    from device.settings.last_good import StartSettings, start_settings
+    from device.settings.layers import layer_files, overridden, read_layers
+
     if not scenario:
         settings = start_settings(read_layers(layer_files(options.root, options.config)))
     elif options.config:
@@ -144,6 +186,9 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
 
 def _stated(options: argparse.Namespace) -> Mapping[str, Any]:
     """Return what this machine's settings files say, by full names; of a simulated probe its own settings."""
+    from device.config import simulated_config
+    from device.settings.layers import layer_files, read_layers
+
     scenario = _scenario(options)
     if scenario and not options.config:
         return vars(simulated_config(scenario.serial))
@@ -153,14 +198,27 @@ def _stated(options: argparse.Namespace) -> Mapping[str, Any]:
 def _scenario(options: argparse.Namespace) -> Scenario | None:
     if not options.simulate:
         return None
+    from device.simulation.scenario import Scenario, read_scenario
+
     return read_scenario(options.scene) if options.scene else Scenario()
 
 
 def _opened(config: Config, scenario: Scenario | None) -> Procedure:
-    return open_simulated_probe(config, scenario) if scenario else open_probe(config)
+    if scenario:
+        from device.assembly.probe import open_simulated_probe
+
+        return open_simulated_probe(config, scenario)
+    from device.assembly.camera import real_camera
+
+    camera = real_camera(config.camera)  # its process starts while this one imports the rest
+    from device.assembly.probe import open_probe
+
+    return open_probe(config, camera)
 
 
 def _self_test(options: argparse.Namespace) -> int:
+    from device.commands.self_test import run_self_test_command
+
     scenario = _scenario(options)
     config = _start_settings(options, scenario).config
     return run_self_test_command(options, lambda: _opened(config, scenario))
@@ -168,6 +226,9 @@ def _self_test(options: argparse.Namespace) -> int:
 
 def _record(options: argparse.Namespace) -> int:
     """Record one press on a phantom: it is what a virtual probe is pressed on, whatever its scene says."""
+    from device.assembly.probe import open_phantom_press
+    from device.commands.record import run_record_command
+
     scenario = _scenario(options)
     settings = _start_settings(options, scenario)
     if settings.warning:

@@ -289,7 +289,7 @@ class CellSection(Section):
 class PressSection(Section):
     """The press: mode unless asked otherwise, target force and its band, what is contact, steady, and too much."""
 
-    mode: Annotated[Mode, Doc("How a press is measured unless it is asked for in another mode.")] = "paper"
+    mode: Annotated[Mode, Doc("How a press is measured unless it is asked for in another mode.")] = "standard"
     target_n: Annotated[float, Bound(0.1, 20.0, "N"), Doc("Force of a hold.")] = 0.5
     band_ratio: Annotated[
         float, Bound(0.005, 0.2, ""), Doc("Frames of a hold are taken this near to the target, as a part of it.")

@@ -29,6 +29,9 @@ class StillCamera:
     def capture(self, *, begun_after_s: float, timeout_s: float) -> CameraFrame:
         return CameraFrame(self._counts.copy(), begun_after_s, 1.0, 1.0)
 
+    def rest(self) -> None:
+        pass
+
     def close(self) -> None:
         pass
 

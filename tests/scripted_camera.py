@@ -41,6 +41,9 @@ class ScriptedCamera:
             raise LateFrameError("Frames are late.", "Wait.")
         return CameraFrame(np.full(SHAPE, self.taken, np.uint8), begun_after_s, 1e6 * timeout_s, 1.0)
 
+    def rest(self) -> None:
+        pass
+
     def close(self) -> None:
         pass
 
@@ -64,7 +67,9 @@ def camera_that_tells_what_is_imported() -> ScriptedCamera:
 
 
 def scripted_process(max_restarts: int = 3, **script: int) -> CameraProcess:
-    return CameraProcess(partial(ScriptedCamera, **script), shape=SHAPE, limit=RestartLimit(max_restarts, 60.0))
+    camera = CameraProcess(partial(ScriptedCamera, **script), shape=SHAPE, limit=RestartLimit(max_restarts, 60.0))
+    camera.require_open()
+    return camera
 
 
 def memory_of(camera: CameraProcess) -> Path:

@@ -102,7 +102,8 @@ class SimulatedTimeProbe:
 
     def range_n(self, t_s, *, window_s, around_line):
         numbers = range(int(np.ceil((t_s - window_s) * CELL_HZ)), int(t_s * CELL_HZ) + 1)
-        return force_range_n([(number / CELL_HZ, self._sample(number)) for number in numbers], around_line=around_line)
+        times_s = np.array(numbers) / CELL_HZ
+        return force_range_n(times_s, np.array([self._sample(one) for one in numbers]), around_line=around_line)
 
     def peak_n(self, since_s, t_s):
         numbers = range(int(since_s * CELL_HZ) + 1, int(t_s * CELL_HZ) + 1)

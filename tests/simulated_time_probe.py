@@ -7,6 +7,7 @@ of a camera's process that hangs or dies, and of a real terminal, is tested in r
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 import pytest
@@ -132,6 +133,8 @@ class Port:
 def simulate_time(monkeypatch: pytest.MonkeyPatch) -> SimulatedTime:
     """Let probes that are opened from now on live in simulated time; the thread that asks has the first turn."""
     clock = SimulatedTime()
+    for verb in ("record", "self_test"):
+        import_module(f"device.commands.{verb}")  # what is imported later keeps the real clock
     clock.replace("device", monkeypatch)
     monkeypatch.setattr(probe, "CameraServer", CameraInProcess)
     monkeypatch.setattr(probe, "emulated_camera", camera_in_process)

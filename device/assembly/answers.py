@@ -7,7 +7,8 @@ The certificate is the active one, once it is for this probe, its model and its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from device.config import Config
@@ -18,7 +19,7 @@ from device.instrument.watch.progress import ProgressBoard
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
-from device.measurement.mode import Mode
+from device.measurement.mode import Mode, ModeWorth
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
@@ -64,17 +65,19 @@ def _nothing_to_prove() -> None:
 
 
 class Answers(NamedTuple):
-    """The modes in which this probe has a model, what answers in them, and what proves that it still does."""
+    """The modes in which this probe has a model, what answers in them, what proves that it still does,
+    and what each mode's answers are worth by its model card."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
     prove: Callable[[], None] = _nothing_to_prove
+    worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
 
     def require(self, mode: Mode) -> None:
         """Raise `ConfigError` when the settings ask for a mode that is not among them."""
         if mode not in self.modes:
             cause = f"press.mode is {mode}, but this probe has models for {', '.join(self.modes)} only."
-            raise ConfigError(cause, "Choose one of those, or install the model.")
+            raise ConfigError(cause, "Set press.mode to one of those, or install the model.")
 
     def watched(self, progress: ProgressBoard, begin: Callable[[], None]) -> Answers:
         """Return the same, each run of it noted as progress of the inference; `begin` is called before each."""
@@ -89,7 +92,7 @@ class Answers(NamedTuple):
                 begin()
                 self.prove()
 
-        return Answers(self.modes, estimator, prove)
+        return Answers(self.modes, estimator, prove, self.worth)
 
 
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
@@ -104,7 +107,8 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
             raise MissingCalibration("The probe is not calibrated.", "Calibrate it and activate the certificate.")
         return models.estimate(recording, mode, calibration)
 
-    return Answers(models.modes, estimate, lambda: _prove(models))
+    worth = {mode: models.worth(mode) for mode in models.modes}
+    return Answers(models.modes, estimate, lambda: _prove(models), worth)
 
 
 def _prove(models: ModeModels) -> None:

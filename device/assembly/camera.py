@@ -13,19 +13,26 @@ from device.errors import DeviceError
 from device.hardware.camera import RawMonoCamera, open_camera
 from device.hardware.camera_process import WINDOW_S, CameraProcess
 from device.hardware.camera_worker import CameraOpener
+from device.hardware.interfaces import Camera
 from device.hardware.restart_limit import RestartLimit
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.chips.remote_camera import RemotePicamera2
 
 
 def real_camera(settings: CameraSection) -> CameraProcess:
-    """Start the board's camera; raise `CameraError` when it cannot be opened or does not do what is asked."""
+    """Start to open the board's camera in its process; `require_open` says how that ends."""
     return _in_its_process(partial(open_camera, settings.index, **_driver_settings(settings)), settings)
 
 
 def emulated_camera(settings: CameraSection, address: str) -> CameraProcess:
-    """Start the camera that a `CameraServer` serves at an address; raise as `real_camera`."""
+    """Start to open the camera that a `CameraServer` serves at an address, as `real_camera` does."""
     return _in_its_process(partial(open_remote_camera, address, **_driver_settings(settings)), settings)
+
+
+def require_open(camera: Camera) -> None:
+    """Wait for a camera that opens in its process; raise what keeps it from that."""
+    if isinstance(camera, CameraProcess):
+        camera.require_open()
 
 
 def open_remote_camera(address: str, **driver_settings: Any) -> RawMonoCamera:

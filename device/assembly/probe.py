@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
 from device.assembly.answers import Answers, active_calibration, answers_for
-from device.assembly.camera import emulated_camera, real_camera
+from device.assembly.camera import emulated_camera, real_camera, require_open
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.light import emulated_line
 from device.assembly.opened_parts import OpenedParts
@@ -151,7 +151,9 @@ class OpenedProbe:
         return self.parts.open(lambda: Store(self.config.data, self.disk))
 
     def bench(self, force: ForceRecorder | None, progress: ProgressBoard) -> Bench:
-        """Return light, camera and force as one, once no part has failed."""
+        """Return light, camera and force as one, once no part has failed; the camera is waited for last."""
+        if camera := self.camera:
+            self.parts.open(lambda: require_open(camera))
         self.parts.require_all()
         # require_all has raised if any of these is missing; the type checker cannot know.
         assert self.lights is not None
@@ -162,9 +164,12 @@ class OpenedProbe:
         return Bench(self.lights, self.camera, force, pace, budget, progress)
 
 
-def open_probe(config: Config) -> Procedure:
-    """Return the procedure of the real probe; raise `StartFailed` with every part that failed."""
-    return open_real(config, _procedure)
+def open_probe(config: Config, camera: Camera | None = None) -> Procedure:
+    """Return the procedure of the real probe; raise `StartFailed` with every part that failed.
+
+    `camera` is the probe's, if it is being opened already.
+    """
+    return open_real(config, _procedure, camera)
 
 
 def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
@@ -172,11 +177,11 @@ def open_simulated_probe(config: Config, scenario: Scenario) -> Procedure:
     return open_simulated(config, scenario, _procedure)
 
 
-def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide]) -> SomeGuide:
+def open_real(config: Config, on_top: Callable[[OpenedProbe], SomeGuide], camera: Camera | None = None) -> SomeGuide:
     """Return what `on_top` makes of the real probe's parts; raise `StartFailed` with every part that failed."""
     parts = OpenedParts()
+    camera = parts.open(lambda: camera or real_camera(config.camera))
     lights = parts.open(lambda: open_enabled_led_driver(config.light))
-    camera = parts.open(lambda: real_camera(config.camera))
     cell = parts.open(lambda: open_cell(config, config.cell.device))
     clock = ClockWatch(config.clock.max_jump_s)
     return on_top(OpenedProbe(config, parts, lights, camera, cell, clock, SysfsComputer()))
@@ -192,13 +197,16 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     parts.open(lambda: _require_own_serial(config, scenario))
     width_px, height_px = config.camera.raw_mode.sensor_px
     shape, scale = (height_px, width_px), config.camera.sensor_scale
-    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale))
-    parts.require_all()
-    assert probe is not None  # require_all has raised otherwise
+    probe: VirtualProbe | None = None
+
+    def render(exposure: ExposureRequest) -> Any:
+        assert probe is not None  # nobody asks for a frame before all is open
+        return _render(probe, faults, exposure)
+
     chip: EmulatedLedChip = Pca9685Chip() if config.light.chip == "pca9685" else Tlc59116Chip(faults=faults)
     open_picam2 = partial(
         VirtualPicamera2,
-        partial(_render, probe, faults),
+        render,
         width_px=width_px,
         height_px=height_px,
         raw_formats=(config.camera.raw_format,),
@@ -207,11 +215,14 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     )
     server = CameraServer(open_picam2)
     parts.opened.callback(server.close)
+    camera = parts.open(lambda: emulated_camera(config.camera, server.address))
+    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale))
+    parts.require_all()
+    assert probe is not None  # require_all has raised otherwise
     line = emulated_amplifier(config, probe, faults)
     parts.opened.callback(line.close)
     bus = EmulatedI2cBus({config.light.chip_address: chip}, faults=faults)
     lights = parts.open(lambda: _emulated_lights(config.light, bus, chip, parts, faults))
-    camera = parts.open(lambda: emulated_camera(config.camera, server.address))
     cell = parts.open(lambda: FreezingCell(open_cell(config, line.device_path), faults))
     clock = ClockWatch(config.clock.max_jump_s, faults.wall_time_s)
     disk = EmulatedDisk(faults)
@@ -285,6 +296,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         answers.estimator,
         store,
         modes=answers.modes,
+        worth=answers.worth,
         calibration=watch,
         opened=parts.opened,
         clock=probe.clock,

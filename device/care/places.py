@@ -16,7 +16,7 @@ from device.files.shipped import MODELS
 DATABASE = "tsis.sqlite"
 RELEASES = Path("/opt/tsis")
 MODEL_SETTINGS = ("paper_model", "quick_model", "standard_model")
-PASSING = {"lock", "restart.json"}
+PASSING = {"lock", "restart.json", "answer_times.json"}
 """Files of the data folder that belong to the daemon that runs."""
 
 

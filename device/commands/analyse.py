@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import Any
 
 from device.assembly.answers import Answers, answers_for
 from device.config import Config, simulated_config
@@ -17,11 +16,10 @@ from device.records.calibrations import Calibrations
 from device.settings.layers import read_config
 
 
-def add_analyse_command(commands: Any) -> None:
-    """Add the verb to the command line's subparsers."""
-    analyse = commands.add_parser("analyse", help="print the estimate of each recording as one line of JSON")
-    analyse.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
-    analyse.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.add_argument("--mode", help="quick, standard, precise or paper; what its frames are for unless given")
+    parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
 
 
 def run_analyse_command(options: argparse.Namespace) -> int:

@@ -9,7 +9,6 @@ import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from device.care.backup import write_backup
 from device.config import Config
@@ -21,14 +20,11 @@ Patients' measurements are inside: keep it as you keep them. It is not encrypted
 """
 
 
-def add_backup_command(commands: Any) -> None:
-    """Add `backup` to the daemon's commands."""
-    backup = commands.add_parser(
-        "backup", help="save measurements, settings, certificates and own models to a file", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    backup.add_argument("file", type=Path, metavar="FILE", help="the backup, a new file")
-    backup.add_argument("--json", action="store_true", help="as one JSON object")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    parser.add_argument("file", type=Path, metavar="FILE", help="the backup, a new file")
+    parser.add_argument("--json", action="store_true", help="as one JSON object")
 
 
 def run_backup_command(options: argparse.Namespace, config: Config) -> int:

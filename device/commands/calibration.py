@@ -24,13 +24,10 @@ EXAMPLES = """examples:
 """
 
 
-def add_calibration_command(commands: Any) -> None:
-    """Add `calibration list`, `show` and `activate` to the daemon's commands."""
-    calibration = commands.add_parser(
-        "calibration", help="list, show or activate certificates", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    verbs = calibration.add_subparsers(dest="verb", metavar="list | show | activate", required=True)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    verbs = parser.add_subparsers(dest="verb", metavar="list | show | activate", required=True)
     listed = verbs.add_parser("list", help="print each certificate with its validity; * is the active one")
     listed.add_argument("--json", action="store_true", help="as one JSON object")
     show = verbs.add_parser("show", help="print what a certificate says, the active one unless another is named")

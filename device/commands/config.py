@@ -24,13 +24,10 @@ EXAMPLES = """examples:
 COLUMNS = ("setting", "value", "unit", "default", "set by")
 
 
-def add_config_command(commands: Any) -> None:
-    """Add `config check` and `config show` to the daemon's commands."""
-    config = commands.add_parser(
-        "config", help="check or show the settings", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    verbs = config.add_subparsers(dest="verb", metavar="check | show", required=True)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    verbs = parser.add_subparsers(dest="verb", metavar="check | show", required=True)
     check = verbs.add_parser("check", help="print every problem of every settings file; exit code 1 if there is one")
     check.add_argument("files", type=Path, nargs="*", metavar="FILE", help="these instead, one over the other")
     check.add_argument("--json", action="store_true", help="as one JSON object")

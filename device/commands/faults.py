@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import json
 from itertools import groupby
-from typing import Any
 
 from device.fault_table import FAULTS, FaultEntry
 from device.files.text_table import aligned
@@ -47,12 +46,10 @@ EXAMPLES = """examples:
 COLUMNS = ("code", "part", "title", "severity", "meaning")
 
 
-def add_faults_command(commands: Any) -> None:
-    """Add `faults` to the daemon's commands."""
-    faults = commands.add_parser(
-        "faults", help="list the fault codes", epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    form = faults.add_mutually_exclusive_group()
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="as one JSON list")
     form.add_argument("--markdown", action="store_true", help="the page docs/faults.md")
 

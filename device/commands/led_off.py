@@ -37,6 +37,10 @@ MOST_FILES = 256
 SPLIT = "\x1f"
 
 
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add nothing: the verb takes the options of the whole command line."""
+
+
 def led_off(light: LightSection) -> None:
     """Darken all sides, by the line and by the bus, and read it back; returns in time also when the bus hangs.
 

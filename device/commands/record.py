@@ -14,7 +14,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
 
 from device.assembly.opened_parts import StartFailed
 from device.errors import DeviceError, StorageError
@@ -31,21 +30,18 @@ A daemon that runs holds the hardware: stop it first. Ctrl-C cancels the press.
 """
 
 
-def add_record_command(commands: Any) -> None:
-    """Add `record` to the daemon's commands."""
-    record = commands.add_parser(
-        "record", help="record a press on a phantom, also without a certificate", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    record.add_argument("--size-mm", type=float, required=True, metavar="D", help="diameter of its inclusion")
-    record.add_argument("--depth-mm", type=float, required=True, metavar="H", help="surface to the inclusion's top")
-    record.add_argument("--modulus-kpa", type=float, required=True, metavar="E", help="the inclusion's Young's modulus")
-    record.add_argument("--mode", choices=MODES, default="paper", help="what is taken; paper, as calibrating needs")
-    record.add_argument("--phantom-serial", default="", metavar="S", help="serial number of the set of phantoms")
-    record.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="the recording, a new folder")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    parser.add_argument("--size-mm", type=float, required=True, metavar="D", help="diameter of its inclusion")
+    parser.add_argument("--depth-mm", type=float, required=True, metavar="H", help="surface to the inclusion's top")
+    parser.add_argument("--modulus-kpa", type=float, required=True, metavar="E", help="the inclusion's Young's modulus")
+    parser.add_argument("--mode", choices=MODES, default="paper", help="what is taken; paper, as calibrating needs")
+    parser.add_argument("--phantom-serial", default="", metavar="S", help="serial number of the set of phantoms")
+    parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="the recording, a new folder")
     # Also before the command: there they are for every command.
-    record.add_argument("--simulate", action="store_true", default=argparse.SUPPRESS, help="on the virtual probe")
-    record.add_argument(
+    parser.add_argument("--simulate", action="store_true", default=argparse.SUPPRESS, help="on the virtual probe")
+    parser.add_argument(
         "--scene", type=Path, default=argparse.SUPPRESS, metavar="FILE", help="its scene (TOML), all but the inclusion"
     )
 

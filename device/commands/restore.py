@@ -22,18 +22,15 @@ EXAMPLES = """examples:
 """
 
 
-def add_restore_command(commands: Any) -> None:
-    """Add `restore` to the daemon's commands."""
-    restore = commands.add_parser(
-        "restore", help="bring a backup to a card that holds no measurements yet", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    restore.add_argument("file", type=Path, metavar="FILE", help="the backup")
-    restore.add_argument("--check", action="store_true", help="only read it, and say what is inside")
-    restore.add_argument(
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    parser.add_argument("file", type=Path, metavar="FILE", help="the backup")
+    parser.add_argument("--check", action="store_true", help="only read it, and say what is inside")
+    parser.add_argument(
         "--records-only", action="store_true", help="measurements and recordings, also of another probe"
     )
-    restore.add_argument("--json", action="store_true", help="as one JSON object")
+    parser.add_argument("--json", action="store_true", help="as one JSON object")
 
 
 def run_restore_command(options: argparse.Namespace, own: Mapping[str, Any]) -> int:

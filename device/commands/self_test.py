@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from device.assembly.opened_parts import StartFailed
 from device.files.text_table import aligned
@@ -31,18 +30,15 @@ OPERATORS = (Guidance.KEEP_FREE, Guidance.HOLD_BLOCK, Guidance.PUT_WEIGHT, Guida
 """What the operator is told; the rest of the guidance is for the screen."""
 
 
-def add_self_test_command(commands: Any) -> None:
-    """Add `self-test` to the daemon's commands."""
-    test = commands.add_parser(
-        "self-test", help="test every part and name the one that fails", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
     # Also before the command: there they are for every command.
-    test.add_argument("--simulate", action="store_true", default=argparse.SUPPRESS, help="of the virtual probe")
-    test.add_argument("--scene", type=Path, default=argparse.SUPPRESS, metavar="FILE", help="its scene (TOML)")
-    test.add_argument("--on-block", action="store_true", help="test the sides, held on the reference block")
-    test.add_argument("--weight-n", type=float, metavar="N", help="test the load cell with a known weight")
-    test.add_argument("--json", action="store_true", help="as one JSON object")
+    parser.add_argument("--simulate", action="store_true", default=argparse.SUPPRESS, help="of the virtual probe")
+    parser.add_argument("--scene", type=Path, default=argparse.SUPPRESS, metavar="FILE", help="its scene (TOML)")
+    parser.add_argument("--on-block", action="store_true", help="test the sides, held on the reference block")
+    parser.add_argument("--weight-n", type=float, metavar="N", help="test the load cell with a known weight")
+    parser.add_argument("--json", action="store_true", help="as one JSON object")
 
 
 def run_self_test_command(options: argparse.Namespace, opener: Callable[[], Procedure]) -> int:

@@ -1,36 +1,32 @@
 """`python -m device` without a verb: the daemon itself.
 
-It takes the port, opens the probe, and serves until it is told to stop; then every part is closed and dark.
+It takes the port, opens the probe, and serves until it is told to stop; then every part is closed and dark. Nothing
+that measures or serves is imported before the port is taken: the camera's process starts meanwhile.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import signal
 import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import FrameType
+from typing import TYPE_CHECKING
 
-import uvicorn
-
-from device.access.known_hosts import ANYWHERE, KnownHosts
-from device.assembly.opened_parts import StartFailed
+from device.access.known_hosts import ANYWHERE
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
 from device.fallback.handover import ask_for_port, is_fallback
 from device.fallback.start_note import write_note
-from device.instrument.procedure import Procedure
 from device.instrument.watch.restart_note import RestartNote
-from device.instrument.watch.watchdog import Watchdog
-from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from device.records.updates import Updates
 from device.settings.last_good import StartSettings
-from device.web.app import create_app
+
+if TYPE_CHECKING:
+    from device.instrument.procedure import Procedure
 
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
 START_AGAIN = "Then start the daemon again."
@@ -45,6 +41,8 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     config = settings.config
     with DaemonPort(config) as port:
         procedure = opened()
+        from device.instrument.watch.watchdog import Watchdog
+
         note = RestartNote(config.data)
         told = settings.warning, note.warning(), Updates(config.updates).warning()
         warnings = tuple(warning for warning in told if warning)
@@ -138,6 +136,9 @@ def refusal_noted(root: Path) -> Iterator[None]:
 
 def faults_of(error: Exception) -> list[DeviceError]:
     """Return what kept a daemon from starting as faults, each with code, cause and remedy."""
+    from device.assembly.opened_parts import StartFailed
+    from device.measurement.bundle import BundleRefused
+
     if isinstance(error, StartFailed):
         return error.faults
     if isinstance(error, DeviceError):
@@ -150,28 +151,10 @@ def faults_of(error: Exception) -> list[DeviceError]:
 
 
 def _run_server(procedure: Procedure, listening: socket.socket) -> None:
+    from device.web.server import run_server
+
     host, port = listening.getsockname()
     kind = "simulated probe" if procedure.is_simulated else "probe"
     reached_at = socket.gethostname() if host in ANYWHERE else host
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{reached_at}:{port}/", flush=True)
-    stated = procedure.config.server
-    hosts = KnownHosts.of_machine(stated.host, *stated.hosts)
-    app = create_app(procedure, procedure.store, hosts=hosts, updates=Updates(procedure.config.updates))
-    # Open event streams never end by themselves; without the limit a stop would wait for them.
-    settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
-    server = DarkeningServer(settings, procedure)
-    signal.signal(signal.SIGTERM, server.handle_exit)  # until the server has its own
-    server.run(sockets=[listening])
-
-
-class DarkeningServer(uvicorn.Server):
-    """The server whose first act at a signal to stop is to darken the probe: its clients are waited for after that."""
-
-    def __init__(self, settings: uvicorn.Config, procedure: Procedure) -> None:
-        super().__init__(settings)
-        self._procedure = procedure
-
-    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Take a signal to stop."""
-        self._procedure.stop()
-        super().handle_exit(sig, frame)
+    run_server(procedure, listening)

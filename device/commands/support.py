@@ -12,7 +12,6 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from device.care.support import write_support
 from device.care.support_sections import SupportContext
@@ -24,16 +23,13 @@ Look into it before you send it: it is a zip of readable files.
 """
 
 
-def add_support_command(commands: Any) -> None:
-    """Add `support` to the daemon's commands."""
-    support = commands.add_parser(
-        "support", help="write a file for whoever helps, without patients' data", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    _add_options(support)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    _add_arguments(parser)
 
 
-def _add_options(parser: argparse.ArgumentParser) -> None:
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="the support file, a zip")
     parser.add_argument("--json", action="store_true", help="print the sections as one JSON object")
 
@@ -61,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m device.commands.support", description="Write a file for whoever helps, without patients' data.",
         epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    _add_options(parser)
+    _add_arguments(parser)
     parser.add_argument("--config", type=Path, metavar="FILE", help="the daemon's settings (TOML)")
     parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="folder that stands for /")
     parser.set_defaults(simulate=False)

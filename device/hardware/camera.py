@@ -72,13 +72,30 @@ class RawMonoCamera:
         controls["FrameDurationLimits"] = (frame_us, frame_us)
         if "AeEnable" in picam2.camera_controls:
             controls["AeEnable"] = False
+        self._controls, self._is_resting = controls, True
         try:
             self._stride_bytes = self._configure(controls)
+        except RuntimeError as error:
+            raise CameraError(f"Camera cannot be started: {error}.", CABLE_REMEDY) from error
+        self._start()
+        self._frames = RawFrames(mode)
+        # Once for nothing: loading what scales a frame may take longer than the first frame may.
+        self._frames.frame(np.zeros((mode.sensor_px[1], self._stride_bytes), np.uint8))
+
+    def _start(self) -> None:
+        """Start the stream as it was configured: picamera2 forgets its controls with each start."""
+        try:
+            self._picam2.set_controls(self._controls)
             self._picam2.start()
         except RuntimeError as error:
             raise CameraError(f"Camera cannot be started: {error}.", CABLE_REMEDY) from error
-        # Once for nothing: loading what scales a frame may take longer than the first frame may.
-        frame_of_rows(np.zeros((mode.sensor_px[1], self._stride_bytes), np.uint8), mode)
+        self._is_resting = False
+
+    def rest(self) -> None:
+        """Stop the stream: sensor and image processor take no power until the next frame is asked for."""
+        if not self._is_resting:
+            self._picam2.stop()
+            self._is_resting = True
 
     def _configure(self, controls: dict[str, Any]) -> int:
         """Configure the raw stream; return its rows' bytes, or raise `CameraError` when anything was adjusted."""
@@ -118,6 +135,8 @@ class RawMonoCamera:
         Raises `CameraError` when none comes within `timeout_s`, or when it is of the wrong shape or type.
         """
         require("timeout_s", timeout_s, Bound(0.0, 3600.0, "s", low_included=False), "give the frame time to arrive")
+        if self._is_resting:
+            self._start()
         try:
             # A flush of 0 would mean "no flush" to picamera2.
             request = self._picam2.capture_request(flush=max(1, math.ceil(begun_after_s * 1e9)), wait=timeout_s)
@@ -141,7 +160,7 @@ class RawMonoCamera:
         rows = request.make_array("raw")
         self._require_rows(rows)
         # The buffer is reused: the counts are a copy.
-        return CameraFrame(frame_of_rows(rows, self._mode), exposure_start_s, exposure_us, gain)
+        return CameraFrame(self._frames.frame(rows), exposure_start_s, exposure_us, gain)
 
     def _require_as_set(self, exposure_us: float, gain: float) -> None:
         """Refuse a frame that was not taken as it was asked for; the sensor's own steps are granted."""
@@ -165,30 +184,37 @@ class RawMonoCamera:
         self._picam2.close()
 
 
-def frame_of_rows(rows: NDArray[np.uint8], mode: RawMode) -> NDArray[np.uint8]:
-    """Return the counts [height_px, width_px] of a frame, a copy, from rows [sensor height, stride in bytes].
+class RawFrames:
+    """Makes frames of the rows of one mode, in memory that is taken once."""
 
-    The middle is cut out, and areas are averaged. A frame has 8 bits whatever the sensor has: more of them only make
-    the mean over an area finer before it is rounded. Rows are padded at their end; unpacked formats of more than 8 bits
-    have two bytes a pixel, the low one first, and their bits at the low end.
-    Source: libcamera formats R8, R10, R12, R16; picamera2 0.3.38 (`helpers.make_array`).
-    """
-    counts = _cropped(rows if mode.bytes_per_px == 1 else rows.view("<u2"), mode)
-    if mode.raw_format == "R8" and mode.crop_px == mode.frame_px:
-        return np.array(counts, np.uint8)
-    light = np.asarray(counts, np.float32) * np.float32(2.0 ** (8 - RAW_BITS[mode.raw_format]))
-    if mode.crop_px != mode.frame_px:
-        light = _area_mean(light, mode.frame_px)
-    return np.asarray(np.minimum(np.rint(light), 255), np.uint8)
+    def __init__(self, mode: RawMode) -> None:
+        self._mode = mode
+        self._is_as_it_comes = mode.raw_format == "R8" and mode.crop_px == mode.frame_px
+        self._per_count = np.float32(2.0 ** (8 - RAW_BITS[mode.raw_format]))
+        self._light = self._scaled = np.empty((0, 0), np.float32)
+        if not self._is_as_it_comes:
+            self._light = self._scaled = np.empty(mode.crop_px[::-1], np.float32)
+        if mode.crop_px != mode.frame_px:
+            self._scaled = np.empty(mode.frame_px[::-1], np.float32)
 
+    def frame(self, rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the counts [height_px, width_px] of a frame, a copy, from rows [sensor height, stride in bytes].
 
-def _cropped(counts: NDArray[np.uint8] | NDArray[np.uint16], mode: RawMode) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    (x, y), (width, height) = mode.crop_from_px, mode.crop_px
-    return counts[y : y + height, x : x + width]
+        The middle is cut out, and areas are averaged. A frame has 8 bits whatever the sensor has: more of them only
+        make the mean over an area finer before it is rounded. Rows are padded at their end; unpacked formats of more
+        than 8 bits have two bytes a pixel, the low one first, and their bits at the low end.
+        Source: libcamera formats R8, R10, R12, R16; picamera2 0.3.38 (`helpers.make_array`).
+        """
+        counts = self._cropped(rows if self._mode.bytes_per_px == 1 else rows.view("<u2"))
+        if self._is_as_it_comes:
+            return np.array(counts, np.uint8)
+        import cv2  # only a camera that converts has to load it
 
+        np.multiply(counts, self._per_count, out=self._light)
+        if self._scaled is not self._light:  # each pixel the mean of the area that it covers
+            cv2.resize(self._light, self._mode.frame_px, dst=self._scaled, interpolation=cv2.INTER_AREA)
+        return np.asarray(cv2.convertScaleAbs(self._scaled), np.uint8)  # rounds, and ends at 255
 
-def _area_mean(light: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np.float32]:
-    """Return an image of (width, height) pixels, each the mean of the area that it covers."""
-    import cv2  # only a camera that scales has to load it
-
-    return np.asarray(cv2.resize(light, size_px, interpolation=cv2.INTER_AREA), np.float32)
+    def _cropped(self, counts: NDArray[Any]) -> NDArray[Any]:
+        (x, y), (width, height) = self._mode.crop_from_px, self._mode.crop_px
+        return counts[y : y + height, x : x + width]

@@ -33,6 +33,11 @@ class CaptureRequest:
 
 
 @dataclass(frozen=True)
+class RestRequest:
+    """`Camera.rest` is asked for."""
+
+
+@dataclass(frozen=True)
 class CaptureReply:
     """A `CameraFrame` whose counts lie in the ring under a number."""
 
@@ -44,7 +49,7 @@ class CaptureReply:
 
 @dataclass(frozen=True)
 class Ready:
-    """The camera is open, and the ring attached."""
+    """The camera is open, and the ring attached; or it rests."""
 
 
 def serve_camera(pipe: Connection, ring_name: str, shape: tuple[int, int], opener: CameraOpener) -> None:
@@ -63,14 +68,19 @@ def serve_camera(pipe: Connection, ring_name: str, shape: tuple[int, int], opene
             pipe.send(_answer(camera, ring, request))
 
 
-def _requests(pipe: Connection) -> Iterator[CaptureRequest]:
+def _requests(pipe: Connection) -> Iterator[CaptureRequest | RestRequest]:
     with suppress(EOFError, ConnectionResetError):
         while True:
             yield pipe.recv()
 
 
-def _answer(camera: Camera, ring: FrameRing, request: CaptureRequest) -> CaptureReply | DeviceError:
+def _answer(
+    camera: Camera, ring: FrameRing, request: CaptureRequest | RestRequest
+) -> CaptureReply | Ready | DeviceError:
     try:
+        if isinstance(request, RestRequest):
+            camera.rest()
+            return Ready()
         frame = camera.capture(begun_after_s=request.begun_after_s, timeout_s=request.timeout_s)
     except DeviceError as error:
         return error

@@ -8,6 +8,7 @@ Source: pyserial 3.5 (SerialException is an OSError; `in_waiting` of a port that
 from __future__ import annotations
 
 import termios
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -53,7 +54,7 @@ class CellLine:
 
     def __init__(self, name: str, open_port: Callable[[], serial.Serial], *, end: bytes = b"\n") -> None:
         """Open the port; one that is missing or in use is for the next call to open. `end` ends a line."""
-        self.name, self._open_port = name, open_port
+        self.name, self._open_port, self.pause_s = name, open_port, 0.0
         self._buffer = LineBuffer(end)
         self._port: serial.Serial | None = None
         with suppress(UnpluggedCellError):
@@ -65,11 +66,13 @@ class CellLine:
         return self._buffer.dropped_lines
 
     def receive(self) -> list[bytes]:
-        """Return the lines that have become complete, waiting at most `POLL_S` for a byte.
+        """Return the lines that have become complete, waiting at most `POLL_S` for a byte after `pause_s`.
 
         Raises `UnpluggedCellError` when the port is missing, in use or gone; the next call then tries to open it again.
         """
         port = self._port = self._port or self._opened()
+        if self.pause_s:
+            time.sleep(self.pause_s)
         try:
             return self._buffer.feed(bytes(port.read(port.in_waiting or 1)))
         except OSError as error:

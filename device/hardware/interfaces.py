@@ -97,12 +97,20 @@ class Camera(Protocol):
     def capture(self, *, begun_after_s: float, timeout_s: float) -> CameraFrame:
         """Return the next frame whose exposure began at or after a time; raise `CameraError` when none comes."""
 
+    def rest(self) -> None:
+        """Stop the stream until the next frame is asked for, which then comes later; raise `CameraError`."""
+
     def close(self) -> None:
         """Stop the stream."""
 
 
 class LoadCell(Protocol):
-    """The load cell behind the probe."""
+    """The load cell behind the probe.
+
+    `pause_s`: so long (s) it may let readings gather before it looks at them; each keeps the time that it was taken at.
+    """
+
+    pause_s: float
 
     def read(self, *, timeout_s: float) -> CellSample:
         """Return the next sample; raise `LoadCellError` when none comes in time."""

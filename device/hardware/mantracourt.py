@@ -31,7 +31,7 @@ class Mantracourt:
     def __init__(self, line: CellLine, station: int) -> None:
         """Take a line whose lines end in CR, and the station (1-999; 0 would be a broadcast, which none answers)."""
         self._line, self._station = line, station
-        self._next_s = time.monotonic()
+        self._next_s, self.pause_s = time.monotonic(), 0.0
         self._skipped, self._last_skipped = 0, b""
 
     @property
@@ -47,7 +47,7 @@ class Mantracourt:
         `UnpluggedCellError` when the line is gone; the next call then tries to open it again.
         """
         time.sleep(max(0.0, self._next_s - time.monotonic()))
-        self._next_s = time.monotonic() + PERIOD_S
+        self._next_s = time.monotonic() + max(PERIOD_S, self.pause_s)
         deadline_s, skipped_before = time.monotonic() + timeout_s, self.skipped_lines
         while (answer := self._bridge_and_flags()) is None:
             if time.monotonic() >= deadline_s:

@@ -43,6 +43,15 @@ class OpenScale:
         self._last_unreadable = b""
 
     @property
+    def pause_s(self) -> float:
+        """How long (s) lines may gather before they are read: they say themselves when they were measured."""
+        return self._line.pause_s
+
+    @pause_s.setter
+    def pause_s(self, pause_s: float) -> None:
+        self._line.pause_s = pause_s
+
+    @property
     def skipped_lines(self) -> int:
         """Lines that held no reading so far: banner, torn, garbage or too long."""
         return self._unreadable_lines + self._line.dropped_lines

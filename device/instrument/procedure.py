@@ -11,9 +11,10 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
+from types import MappingProxyType
 
 from device.config import Config
 from device.errors import DeviceError, LightError, NoContrastError
@@ -21,7 +22,8 @@ from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
 from device.instrument.acquisition.light_check import DimmingWatch
-from device.instrument.press.capture import CANCELLED, POLL_S, CalledAway, Capture, PressEnded
+from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
+from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Estimator, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.states import Guidance, PressState, before_contact
@@ -34,7 +36,7 @@ from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
-from device.measurement.mode import Mode
+from device.measurement.mode import Mode, ModeWorth
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import ENDED, Store
@@ -44,6 +46,10 @@ log = logging.getLogger(__name__)
 UNLOADED_VALID_S = 30.0
 """Dark and unloaded frames older than this are taken again before a press."""
 AFTER_FAULT_S = 1.0
+REST_AFTER_S = 10.0
+"""Nobody has pressed for so long: the camera rests. The next press of a patient finds it awake."""
+LOOK_EVERY_S = 0.1
+"""So soon a request is seen; a touch is seen with the sample that shows it."""
 WRITE_EVERY_S = 20.0
 """So often a write that nobody needs proves the store: seldom enough not to wear the card out."""
 
@@ -59,6 +65,7 @@ class Procedure:
         store: Store,
         *,
         modes: tuple[Mode, ...],
+        worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({}),
         calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
@@ -69,7 +76,7 @@ class Procedure:
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
 
-        `folder_of` says where an installed model lies.
+        `worth` is what their answers are worth by the model cards; `folder_of` says where an installed model lies.
         """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
@@ -89,7 +96,8 @@ class Procedure:
             called_away=self._capture.called_away,
         )
         self._book = PressBook(self.board, store, bench.budget)
-        self._written_s = -math.inf
+        self._worth, self._answer_times = worth, AnswerTimes(config.data / "answer_times.json")
+        self._written_s, self._used_s = -math.inf, time.monotonic()
         self.progress.exercise("storage", self._prove_store)
         test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
@@ -100,6 +108,10 @@ class Procedure:
     def is_simulated(self) -> bool:
         """Whether hand, light and tissue are simulated; everything above the chips is not."""
         return self._answers.is_simulated
+
+    def offers(self) -> list[ModeOffer]:
+        """Return what a press can be asked for, with what each mode costs and is worth as known now."""
+        return self._answer_times.offers([press_cost(mode, self.config) for mode in self.modes], self._worth)
 
     def require_ready(self) -> None:
         """Raise the fault that keeps a press from being measured, if there is one."""
@@ -222,6 +234,7 @@ class Procedure:
             self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
         if job := self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S):
             self._measure(job, unloaded)
+            self._used_s = time.monotonic()
 
     def _require_no_drift(self, unloaded: list[Frame]) -> None:
         """Compare the untouched face with the certificate's, under the light of then: the loop may have moved ours."""
@@ -234,12 +247,13 @@ class Procedure:
     def _next_job(self, until_s: float) -> PressJob | None:
         away = (self._capture.stopping, self._capture.called_away)
         while time.monotonic() < until_s and not any(event.is_set() for event in away):
-            is_touched = self.bench.force.latest_n >= self.config.press.contact_n
+            is_touched = self.bench.force.reaches(self.config.press.contact_n, timeout_s=LOOK_EVERY_S)
             if job := self._requests.begin(is_touched=is_touched):
                 return job
             self.progress.beat()
             self._warn_of_computer()
-            time.sleep(POLL_S)
+            if time.monotonic() - self._used_s >= REST_AFTER_S:
+                self.bench.rest()
         return None
 
     def _measure(self, job: PressJob, unloaded: list[Frame]) -> None:
@@ -264,6 +278,7 @@ class Procedure:
             # The screen first: whoever is told that the press has ended finds its result there.
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
             self._book.note(job, state="done", progress=1.0, measurement_id=measurement["id"])
+            self._answer_times.note(job.mode, time.monotonic() - frames[-1].t_s)
 
     def _press_frames(self, job: PressJob) -> list[Frame]:
         """Lead the hand through the press beside the lesion and the one on it; return the frames of both."""

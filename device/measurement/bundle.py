@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
 
 from device.measurement.arrays import Array
+from device.measurement.mode import Mode, ModeWorth
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
 
 SCHEMA = "tsis.model/1"
@@ -265,6 +266,18 @@ class ModelBundle:
 
     def __reduce__(self) -> tuple[type[ModelBundle], tuple[BundleFiles, Mapping[str, str]]]:
         return ModelBundle, self._made_of  # another process verifies it again
+
+    def worth(self, mode: Mode) -> ModeWorth | None:
+        """Return what the card says the answers of a mode are worth, None when it says nothing; may refuse it."""
+        if "dial" not in self.card.get("modes", {}).get(mode, {}):
+            return None
+        path, fields = f"modes.{mode}.dial", self.fields
+        return ModeWorth(
+            compute_s=fields.of(f"{path}.compute_ms", float) / 1e3,
+            answered_ratio=fields.of(f"{path}.answered", int) / fields.of(f"{path}.presses", int),
+            median_percent={name: fields.of(f"{path}.median_percent.{name}", float) for name in UNKNOWNS},
+            determined_ratio={name: fields.of(f"{path}.determined.{name}", float) for name in UNKNOWNS},
+        )
 
     def estimate(self, features: NDArray[np.floating[Any]]) -> Raw:
         """Return the raw estimate of features [n, F], in the order and units of `feature_names`.

@@ -7,7 +7,7 @@ Measured error and time of each: the model cards, and docs/modes.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -36,6 +36,20 @@ FRAMES: dict[Mode, Frames] = {
     "precise": Frames(40, is_ramp=True),
     "paper": Frames(10, is_ramp=False),
 }
+
+
+@dataclass(frozen=True)
+class ModeWorth:
+    """What a mode's answers are worth, as its model card says: measured on random presses of the simulated probe.
+
+    `compute_s`: the time of an answer on the machine that measured. `answered_ratio`: the share of presses that got
+    numbers; of those, by unknown, the median error in percent and the share that was called determined.
+    """
+
+    compute_s: float
+    answered_ratio: float
+    median_percent: Mapping[str, float]
+    determined_ratio: Mapping[str, float]
 
 
 def mode_of(force_n: Sequence[float]) -> Mode:

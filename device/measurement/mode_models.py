@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
-from device.measurement.mode import Mode, mode_of
+from device.measurement.mode import Mode, ModeWorth, mode_of
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QuickModel, estimate_quick
@@ -33,6 +33,12 @@ class ModeModels(NamedTuple):
         """The modes that have a model."""
         quick: tuple[Mode, ...] = ("quick",) if self.quick else ()
         return (*quick, *(RAMP_MODES if self.ramp else ()), "paper")
+
+    def worth(self, mode: Mode) -> ModeWorth | None:
+        """Return what the answers of a mode are worth by its model card, None when that does not say."""
+        bundles = {"quick": self.quick and self.quick.bundle, "paper": self.paper}
+        bundle = bundles.get(mode, self.ramp and self.ramp.bundle)
+        return bundle.worth(mode) if bundle else None
 
     def for_probe(self, serial: str) -> ModeModels:
         """Return the models that are for one probe."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import zipfile
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +14,17 @@ from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
-from device.instrument.press.cost import press_cost
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
 from device.records.calibrations import Calibrations
 from device.records.store import Store
 from device.records.updates import Updates
-from device.web.events import snapshot, status_events
+from device.web.events import StatusFeed, snapshot, status_events
 from device.web.guard import RequestGuard
 from device.web.picture import tactile_png
 from device.web.problems import install_problems
-from device.web.schema import PROBLEM, PressResource, SelfTest, Status, Tare, answers
+from device.web.schema import PROBLEM, Device, PressResource, SelfTest, Status, Tare, answers
 from device.web.updates import add_updates
 
 API = "/api/v1"
@@ -84,9 +82,9 @@ def create_app(
 
 
 def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
-    @app.get(f"{API}/device")
+    @app.get(f"{API}/device", responses=answers(200, Device))
     def device() -> dict[str, Any]:
-        """Say which probe this is, how long its LEDs have been on, and in which modes it measures at what cost."""
+        """Say which probe this is, how long its LEDs have been on, and what each of its modes costs and is worth."""
         config = procedure.config
         return {
             "serial": config.serial,
@@ -94,7 +92,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
             "simulated": procedure.is_simulated,
             "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
-            "modes": [asdict(press_cost(mode, config)) for mode in procedure.modes],
+            "modes": [offer.as_record() for offer in procedure.offers()],
         }
 
     @app.get(f"{API}/calibrations")
@@ -120,10 +118,12 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
         """Return what the event stream sends."""
         return snapshot(procedure)
 
+    feed = StatusFeed(procedure)
+
     @app.get(f"{API}/events")
     async def events() -> StreamingResponse:
-        """Stream the status as server-sent events."""
-        return StreamingResponse(status_events(procedure), media_type="text/event-stream")
+        """Stream the status as server-sent events, one when something has changed and at least two a second."""
+        return StreamingResponse(status_events(feed), media_type="text/event-stream")
 
 
 def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:

@@ -1,10 +1,15 @@
-"""The status of the procedure as server-sent events, for the screen and for a PC."""
+"""The status of the procedure as server-sent events, for the screen and for a PC.
+
+Sixteen times a second it is looked whether there is anything new, which costs next to nothing while nobody presses.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+import math
+import time
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 from device import __version__
@@ -18,6 +23,10 @@ from device.records.store import ENDED
 from device.records.updates import RUNNING
 
 EVENT_INTERVAL_S = 0.06
+ALIVE_S = 0.5
+"""A status is never older: a client that hears none for 2 s takes the probe for gone (device/web/static/probe.js)."""
+STILL_N = 0.002
+"""A force that has changed by less, some times the cell's noise, is the one that was told: the screen shows 0.01 N."""
 
 
 def snapshot(procedure: Procedure) -> dict[str, Any]:
@@ -28,11 +37,9 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     ramp_n = _ramp_n(mode, status) if FRAMES[mode].is_ramp else None
     faults: list[DeviceError] = [fault for fault in (status.fault, status.stall) if fault]
     step, guidance = ("fault", Guidance.FAULT) if status.stall else (status.step, status.guidance)
-    try:
-        force_n: float | None = round(procedure.bench.force.latest_n, 4)
-    except LoadCellError as error:
-        force_n = None
-        faults = faults or [error]
+    force_n, silent = _latest(procedure)
+    if silent:
+        faults = faults or [silent]
     faults += status.warnings
     return {
         "simulated": procedure.is_simulated,
@@ -42,7 +49,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "step": step,
         "press_state": status.state.code,
         "guidance": {"code": guidance.code, "text": guidance.text},
-        "force_n": force_n,
+        "force_n": None if force_n is None else round(force_n, 4),
         "mode": mode,
         "kind": "ramp" if ramp_n else "hold",
         "target_n": press.target_n,
@@ -58,12 +65,45 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     }
 
 
+def _latest(procedure: Procedure) -> tuple[float | None, LoadCellError | None]:
+    """Return the newest force (N), or None and why there is none."""
+    try:
+        return procedure.bench.force.latest_n, None
+    except LoadCellError as error:
+        return None, error
+
+
 def _ramp_n(mode: Mode, status: ProcedureStatus) -> tuple[float, ...]:
     return ramp_targets_n(FRAMES[mode].count, "reference" if status.step == "reference" else "press")
 
 
-async def status_events(procedure: Procedure) -> AsyncIterator[str]:
-    """Yield the status as `status` events until the client goes."""
+class StatusFeed:
+    """The `status` event of now, built once for all clients, and anew only when there is something to tell."""
+
+    def __init__(self, procedure: Procedure, *, clock: Callable[[], float] = time.monotonic) -> None:
+        self._procedure, self._clock = procedure, clock
+        self._status: ProcedureStatus | None = None
+        self._silent: LoadCellError | None = None
+        self._force_n, self._until_s, self._event = math.inf, -math.inf, ""
+
+    def event(self) -> str:
+        """Return the event; the same one as long as nothing has changed and it is not old."""
+        status, (force_n, silent), now_s = self._procedure.board.now, _latest(self._procedure), self._clock()
+        is_same = status is self._status and silent is self._silent
+        has_moved = force_n is not None and abs(force_n - self._force_n) >= STILL_N
+        if not is_same or has_moved or now_s >= self._until_s:
+            self._status, self._silent, self._until_s = status, silent, now_s + ALIVE_S
+            self._force_n = math.inf if force_n is None else force_n
+            self._event = f"event: status\ndata: {json.dumps(snapshot(self._procedure))}\n\n"
+        return self._event
+
+
+async def status_events(feed: StatusFeed) -> AsyncIterator[str]:
+    """Yield each new `status` event until the client goes."""
+    sent = ""
     while True:
-        yield f"event: status\ndata: {json.dumps(snapshot(procedure))}\n\n"
+        event = feed.event()
+        if event is not sent:
+            sent = event
+            yield event
         await asyncio.sleep(EVENT_INTERVAL_S)

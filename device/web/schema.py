@@ -74,6 +74,38 @@ class Check(_Body):
     code: FaultCode | None
 
 
+class OfferedMode(_Body):
+    """A mode: what one of its two presses takes (frames, s, N), and what its answer takes and is worth.
+
+    `answer_s`: from the last frame to the answer, median of `answer_presses` on this probe; when there was none yet,
+    what is expected by the model card and the other modes' presses. Errors and shares are the model card's, of
+    simulated presses; null where it says nothing.
+    """
+
+    mode: Mode
+    frames: int
+    kind: Literal["hold", "ramp"]
+    from_n: float
+    to_n: float
+    seconds: float
+    answer_s: float | None
+    answer_presses: int
+    typical_error_percent: dict[str, float] | None
+    answered_ratio: float | None
+    determined_ratio: dict[str, float] | None
+
+
+class Device(_Body):
+    """Which probe it is, how long its LEDs have been on, and in which modes it measures."""
+
+    serial: str
+    software: str
+    simulated: bool
+    light_on_s: float
+    default_mode: Mode
+    modes: list[OfferedMode]
+
+
 class SelfTest(_Body):
     """A self-test; `failed` as a state means that it was not brought to its end."""
 

@@ -25,7 +25,7 @@ from device.assembly.probe import open_simulated_probe
 from device.config import CameraSection, simulated_config
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, without_numbers
-from device.measurement.mode import MODES, Mode
+from device.measurement.mode import MODES, Mode, ModeWorth
 from device.measurement.ramp_modes.estimate import REASONS
 from device.measurement.recording.recording import Recording
 from device.records.updates import Updates
@@ -129,7 +129,15 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
         answer = size_mm, replace(depth_mm, low_is_open=True), replace(modulus_kpa, high_is_open=True)
         return Estimate(*answer, "ok", "", mode, "stand-in", "00", "c", True, {})
 
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
+    worth = {
+        mode: ModeWorth(compute_s, 0.9, {"size_mm": size, "depth_mm": depth, "youngs_modulus_kpa": 50.0}, {})
+        for mode, compute_s, size, depth in (
+            ("quick", 0.0046, 4.8, 7.3),
+            ("standard", 0.1, 3.3, 3.0),
+            ("precise", 0.9, 3.1, 2.4),
+        )
+    }
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, worth=worth))
 
 
 @pytest.fixture
@@ -165,6 +173,7 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     expect(page.locator("#simulated-badge")).to_contain_text("simulated", ignore_case=True)
     button = page.locator("#press-button")
     expect(button).to_contain_text("simulated probe")
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
     _shoot(page, "ready")
     button.click()
     expect(page.locator("#instruction")).to_have_text("Press slowly harder")
@@ -191,8 +200,10 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     modes = page.locator("#modes label")
     expect(modes).to_have_count(4)
     expect(page.locator("#modes input:checked")).to_have_value("standard")
-    expect(modes.nth(0)).to_have_text("quick1 frame, 0.2 s")
-    expect(modes.nth(2)).to_have_text("precise40 frames, 3 s")
+    expect(page.locator(".mode-headings")).to_contain_text("press + answersize, depth off byanswered")
+    expect(modes.nth(0)).to_have_text("quick0.2 s + ~0.05 s5 %, 7 %90 %")
+    expect(modes.nth(2)).to_have_text(re.compile(r"precise3 s \+ ~[0-9.]+ s3 %, 2 %90 %"))
+    expect(modes.nth(3)).to_have_text("paper0.5 s + ?not statednot stated")
     _shoot(page, "modes")
     _require_fits(page)
     modes.filter(has_text="paper").click()
@@ -211,6 +222,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#size-value")).to_be_visible()
     expect(page.locator("#image-title")).to_have_text("Measurement 1, standard")
     expect(page.locator("#modes input:checked")).to_have_value("standard")
+    expect(modes.nth(1)).to_contain_text(re.compile(r"3 s \+ (<0.05|[0-9.]+) s"))
     expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
     expect(page.locator("#depth-interval")).to_have_text("7.2 mm or less")
     expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")

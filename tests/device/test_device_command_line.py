@@ -4,6 +4,8 @@ import dataclasses
 import json
 import shutil
 import socket
+import subprocess
+import sys
 
 import pytest
 from daemon_process import ROOT
@@ -55,6 +57,39 @@ def started(monkeypatch):
 def folder(recording, tmp_path):
     write_recording(recording, tmp_path / "press")
     return tmp_path / "press"
+
+
+@pytest.mark.parametrize(
+    "line", ["faults", "config show", "config check", "led-off", "--help", "backup --help", "led-off --help"]
+)
+def test_what_needs_no_measuring_loads_nothing_that_measures(line, tmp_path):
+    """Libraries are nine tenths of the time of a short verb, and of how long a probe stays lit after `led-off`."""
+    program = (
+        "import sys; from device.__main__ import main\n"
+        "try: main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'cv2', 'onnxruntime', 'scipy', 'fastapi', 'uvicorn', 'starlette'} & set(sys.modules)\n"
+        "sys.exit(' '.join(heavy) or 0)"
+    )
+    command = [sys.executable, "-c", program, "--root", str(tmp_path), *line.split()]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout or line == "led-off"
+
+
+def test_a_library_computes_on_one_thread_also_in_the_cameras_process(run, monkeypatch):
+    for name in ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    run("faults")
+    program = "import cv2; print(cv2.getNumThreads())"
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert told.split() == ["1"]
+
+
+def test_an_unknown_verb_is_refused_with_those_there_are(run):
+    code, _, errors = run("fautls")
+    assert code == 2
+    assert "'faults'" in errors[-1]
 
 
 def test_a_port_in_use_is_one_sentence_with_the_port_before_anything_is_opened(run, tmp_path):

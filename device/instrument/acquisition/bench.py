@@ -20,6 +20,8 @@ DARK: LedRatio = (0.0, 0.0, 0.0, 0.0)
 FRAME_TIMEOUT_S = 1.0
 LATE_S = 0.1
 """Three frames of 30 Hz."""
+LOOK_AT_RESTING_EVERY_S = 3.0
+"""Within the 5 s for which a part that was seen working is believed (device/instrument/watch/readiness.py)."""
 LOOK_AT_LIGHT_EVERY_S = 0.2
 """With the 0.75 s after which the keeper of the enable line gives up, a bus that hangs is dark within a second."""
 
@@ -42,6 +44,8 @@ class Bench:
     _is_known: bool = False
     _not_before_s: float = 0.0
     _is_over: bool = False
+    _is_resting: bool = False
+    _frame_s: float = 0.0
     _lock: threading.Lock = field(default_factory=lambda: threading.Lock())
 
     def __post_init__(self) -> None:
@@ -100,14 +104,16 @@ class Bench:
 
     def expose(self) -> CameraFrame:
         """Return the next frame under the present light, whatever the force; raises `CameraError` as `take` does."""
-        asked_s = max(time.monotonic(), self._not_before_s)
+        asked_s, was_resting = max(time.monotonic(), self._not_before_s), self._is_resting
         taken = self._capture()
-        self.pace.saw(asked_s, taken.exposure_start_s)
+        if not was_resting:
+            self.pace.saw(asked_s, taken.exposure_start_s)
         return taken
 
     def _capture(self) -> CameraFrame:
         with self.progress.inside("camera"):
             taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
+        self._is_resting, self._frame_s = False, time.monotonic()
         self._not_before_s = taken.exposure_start_s + 1e-6
         self._go_on()
         return taken
@@ -127,9 +133,21 @@ class Bench:
         with self._lock, self.progress.inside("light"):
             return self.lights.check_line()
 
+    def rest(self) -> None:
+        """Let the camera rest, and the load cell's samples gather, until a frame is needed; raises `CameraError`."""
+        self.force.take_time()
+        if not self._is_resting:
+            with self.progress.inside("camera"):
+                self.camera.rest()
+            self._is_resting = True
+
     def _look(self) -> None:
-        """Take a frame that nobody needs."""
-        self._capture()
+        """Take a frame that nobody needs; a camera that rests is woken for it more seldom, and rests again."""
+        if not self._is_resting:
+            self._capture()
+        elif time.monotonic() - self._frame_s >= LOOK_AT_RESTING_EVERY_S:
+            self._capture()
+            self.rest()
 
     def _acknowledged_s(self, ratio: LedRatio) -> float:
         with self.progress.inside("light"):

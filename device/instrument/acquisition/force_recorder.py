@@ -2,17 +2,19 @@
 
 One thread owns the serial line. It first takes the tare, again and again while that fails, as when the probe is held or
 its cell unplugged. A silent, unplugged or overloaded cell is a fault that is kept until samples come that it can bear.
-What is kept are counts: they become newtons when they are asked for, by the tare of then.
+What is kept are counts: they become newtons when they are asked for, by the tare of then. A frame asks four times, so
+they lie in arrays, sorted by time.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.errors import LoadCellError, OverloadedCellError
 from device.hardware.interfaces import CellCounts, CellSample, ForceScale, LoadCell, Newtons
@@ -23,6 +25,8 @@ KEPT_SAMPLES = 1000
 FIRST_SAMPLE_S = 5.0
 """Opening the port resets an OpenScale: its banner may last three seconds."""
 SILENCE_S = 1.0
+REST_PAUSE_S = 0.04
+"""While nobody presses, three samples of 80 Hz are taken at a time; waking the thread for each is most of its work."""
 RETRY_S = 0.2
 
 Zero = tuple[ForceScale, LoadLimit]
@@ -30,14 +34,60 @@ TareOf = Callable[[Callable[[], CellSample]], Zero]
 """Readings of the cell, one a call, to the scale of this start and the load from the zero of commissioning."""
 
 
-def force_range_n(samples: Sequence[tuple[float, float]], *, around_line: bool) -> Newtons:
-    """Return by how much the forces of one or more samples (s, N) vary, or what their straight line leaves of it."""
+def force_range_n(times_s: NDArray[np.float64], forces_n: NDArray[np.float64], *, around_line: bool) -> Newtons:
+    """Return by how much one or more forces (N) vary, or what a straight line over their times (s) leaves of it."""
     if not around_line:
-        return Newtons(max(force for _, force in samples) - min(force for _, force in samples))
-    times, forces = np.array(samples).T
-    centred = times - times.mean()
-    slope = float(centred @ forces) / max(float(centred @ centred), 1e-12)
-    return Newtons(float(np.ptp(forces - slope * centred)))
+        return Newtons(float(np.ptp(forces_n)))
+    centred = times_s - times_s.mean()
+    slope = float(centred @ forces_n) / max(float(centred @ centred), 1e-12)
+    return Newtons(float(np.ptp(forces_n - slope * centred)))
+
+
+class SampleRing:
+    """The last `KEPT_SAMPLES` samples, as views that hold until the next one: `times_s` (never falling) and `counts`.
+
+    They lie side by side in arrays twice as long, whose end is moved to the front when it is full.
+    """
+
+    def __init__(self) -> None:
+        self._both = np.empty((2, 2 * KEPT_SAMPLES))
+        self._end = 0
+
+    def __len__(self) -> int:
+        return min(self._end, KEPT_SAMPLES)
+
+    def append(self, sample: CellSample) -> None:
+        """Add a sample, in place of the oldest when there are too many."""
+        if self._end == self._both.shape[1]:
+            self._both[:, :KEPT_SAMPLES] = self._both[:, -KEPT_SAMPLES:]
+            self._end = KEPT_SAMPLES
+        self._both[:, self._end] = sample.t_s, sample.counts
+        self._end += 1
+
+    @property
+    def newest(self) -> CellSample:
+        """The last sample; raises `IndexError` when there is none."""
+        if not self._end:
+            raise IndexError("no sample")
+        t_s, counts = self._both[:, self._end - 1].tolist()
+        return CellSample(t_s, CellCounts(counts))
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """When each was measured (s)."""
+        return self._both[0, self._end - len(self) : self._end]
+
+    @property
+    def counts(self) -> NDArray[np.float64]:
+        """What each was, of the cell's own scale."""
+        return self._both[1, self._end - len(self) : self._end]
+
+    def at(self, t_s: float) -> CellCounts:
+        """Return the counts at a time between the first and the last sample, on the line between its two neighbours."""
+        times_s, counts = self.times_s, self.counts
+        after = int(np.searchsorted(times_s, t_s, side="right"))
+        two = slice(max(after - 1, 0), after + 1)
+        return CellCounts(float(np.interp(t_s, times_s[two], counts[two])))
 
 
 class ForceRecorder:
@@ -51,8 +101,9 @@ class ForceRecorder:
         self._cell, self._tare = cell, tare
         self._zero: Zero | None = None
         self._timeout_s = FIRST_SAMPLE_S
-        self._samples: deque[tuple[float, CellCounts]] = deque(maxlen=KEPT_SAMPLES)
+        self._samples = SampleRing()
         self._news, self._stopping = threading.Condition(), threading.Event()
+        self._has_reached, self._awaited_n = threading.Event(), math.inf
         self.fault: LoadCellError | None = None
         self._progress = progress or ProgressBoard()
         self._thread = threading.Thread(target=self._run, name="force", daemon=True)
@@ -85,14 +136,17 @@ class ForceRecorder:
         sample = self._read()
         limit.require_bearable(sample.counts)
         with self._news:
-            self._samples.append((sample.t_s, sample.counts))
+            self._samples.append(sample)
             self.fault = None
             self._news.notify_all()
+        if self._newtons(sample.counts) >= self._awaited_n:
+            self._has_reached.set()
 
     def _fail(self, error: LoadCellError) -> None:
         with self._news:
             self.fault = error
             self._news.notify_all()
+        self._has_reached.set()
 
     def retare(self) -> Newtons:
         """Take the tare anew, of samples from now on; return by how much (N) the zero has moved.
@@ -114,7 +168,7 @@ class ForceRecorder:
         with self._news:
             if not self._news.wait(SILENCE_S) or self.fault:
                 raise self.fault or _no_sample(SILENCE_S)
-            return CellSample(*self._samples[-1])
+            return self._samples.newest
 
     def _tared(self) -> Zero:
         if self._zero is None:
@@ -125,35 +179,58 @@ class ForceRecorder:
         scale, _ = self._tared()
         return scale.newtons(counts)
 
+    def _forces_n(self, counts: NDArray[np.float64]) -> NDArray[np.float64]:
+        scale, _ = self._tared()
+        return (counts - scale.tare_counts) / scale.sensitivity_counts_per_n
+
     @property
     def latest_n(self) -> Newtons:
         """Return the newest force; raise `LoadCellError` when the cell is at fault."""
         with self._news:
             if self.fault:
                 raise self.fault
-            return self._newtons(self._samples[-1][1])
+            return self._newtons(self._samples.newest.counts)
+
+    def reaches(self, force_n: float, *, timeout_s: float) -> bool:
+        """Return whether the newest force is at least so large (N), or becomes so within a time (s).
+
+        Returns with the sample that says so; raises as `latest_n` does. For one thread alone, which no other sample
+        wakes.
+        """
+        self._has_reached.clear()
+        self._awaited_n = force_n
+        if self.latest_n < force_n:
+            self._has_reached.wait(timeout_s)
+        self._awaited_n = math.inf
+        return self.latest_n >= force_n
+
+    def take_time(self) -> None:
+        """Let samples gather until the force at a time is asked for: a touch is seen by so much later."""
+        self._cell.pause_s = REST_PAUSE_S
 
     def at(self, t_s: float, *, timeout_s: float = SILENCE_S) -> Newtons:
         """Return the force at a time on the monotonic clock, waiting until a later sample has come.
 
         Raises `LoadCellError` when none comes, or when the history does not reach back so far.
         """
+        self._cell.pause_s = 0.0
         deadline_s = time.monotonic() + timeout_s
         with self._news:
-            while not self._samples or self._samples[-1][0] < t_s:
+            while not self._samples or self._samples.newest.t_s < t_s:
                 if not self._news.wait(max(0.0, deadline_s - time.monotonic())) and time.monotonic() >= deadline_s:
                     raise self.fault or _no_sample(timeout_s)
-            times, counts = np.array(self._samples).T
-        if t_s < times[0]:
-            raise LoadCellError(f"No force is known {times[0] - t_s:.3f} s before the first sample.", "Press again.")
-        return self._newtons(CellCounts(float(np.interp(t_s, times, counts))))
+            first_s = float(self._samples.times_s[0])
+            if t_s >= first_s:
+                return self._newtons(self._samples.at(t_s))
+        raise LoadCellError(f"No force is known {first_s - t_s:.3f} s before the first sample.", "Press again.")
 
     def mean_n(self, *, window_s: float) -> Newtons:
         """Return the mean force of the last seconds, as far as they are known; raises as `latest_n` does."""
         newest_n, now_s = self.latest_n, time.monotonic()
         with self._news:
-            inside = [self._newtons(counts) for t, counts in self._samples if now_s - window_s <= t]
-        return Newtons(sum(inside) / len(inside)) if inside else newest_n
+            times_s = self._samples.times_s
+            inside = self._samples.counts[np.searchsorted(times_s, now_s - window_s) :]
+            return self._newtons(CellCounts(float(inside.mean()))) if len(inside) else newest_n
 
     @property
     def zero_shift_n(self) -> Newtons:
@@ -164,8 +241,10 @@ class ForceRecorder:
     def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
         """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""
         with self._news:
-            inside = [(t - t_s, self._newtons(counts)) for t, counts in self._samples if t_s - window_s <= t <= t_s]
-        return force_range_n(inside, around_line=around_line) if inside else Newtons(float("inf"))
+            times_s, counts = self._samples.times_s, self._samples.counts
+            inside = slice(np.searchsorted(times_s, t_s - window_s), np.searchsorted(times_s, t_s, side="right"))
+            times_s, forces_n = times_s[inside] - t_s, self._forces_n(counts[inside])
+        return force_range_n(times_s, forces_n, around_line=around_line) if len(times_s) else Newtons(float("inf"))
 
     def peak_n(self, since_s: float, t_s: float) -> Newtons:
         """Return the largest force of the samples after one time and until another, and of that time itself.
@@ -174,7 +253,9 @@ class ForceRecorder:
         """
         at_the_end = self.at(t_s)
         with self._news:
-            return max([at_the_end, *(self._newtons(counts) for t, counts in self._samples if since_s < t <= t_s)])
+            first, last = np.searchsorted(self._samples.times_s, (since_s, t_s), side="right")
+            forces_n = self._forces_n(self._samples.counts[first:last])
+        return Newtons(max(at_the_end, float(np.max(forces_n, initial=-np.inf))))
 
     def close(self) -> None:
         """Stop the thread and release the cell."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +25,9 @@ BAND_ROWS = 4
 """Rows that are averaged above and below a step, against noise."""
 LOOKED_AT_FRAMES, LATE_FRAMES = 8, 4
 LOOKED_AT_PAIRS, TORN_PAIRS = 20, 3
+
+Blocks = NDArray[np.float64]
+"""Mean of each row in each block of columns [height, 8]."""
 
 
 class FramePace:
@@ -50,16 +54,23 @@ class TearWatch:
         """Take the step (counts) above which one of two frames is torn."""
         self._step_counts = step_counts
         self._torn: deque[bool] = deque(maxlen=LOOKED_AT_PAIRS)
+        self._last: tuple[Counts, Blocks] | None = None
 
     def agree(self, one: Frame, other: Frame) -> bool:
         """Return False when one of two frames is torn, nobody can say which; raise `TornFrameError` when it goes on."""
-        step_counts, row = largest_step(one.counts, other.counts)
+        step_counts, row = _largest_step(self._blocks_of(one.counts) - self._blocks_of(other.counts))
         self._torn.append(step_counts > self._step_counts)
         if sum(self._torn) >= TORN_PAIRS:
             self._torn.clear()
             cause = f"Frames are torn again and again, the last at row {row} by {step_counts:.0f} counts."
             raise TornFrameError(cause, REMEDY)
         return step_counts <= self._step_counts
+
+    def _blocks_of(self, counts: Counts) -> Blocks:
+        """Return a frame's blocks; those of the last one are kept, for the next frame is compared with it."""
+        if self._last is None or self._last[0] is not counts:
+            self._last = counts, _blocks(counts)
+        return self._last[1]
 
     def append(self, frames: list[Frame], frame: Frame) -> None:
         """Add a frame of the same light, unless it or the last one is torn: then neither stays."""
@@ -72,10 +83,13 @@ class TearWatch:
 def largest_step(one: Counts, other: Counts) -> tuple[float, int]:
     """Return the largest step (counts) in the difference of two frames that a straight row shows, and its row.
 
-    Frames [height, width] of one shape, at least 8 x 8. The step is that of the third-most affected of eight column
-    blocks, so that the edge of contact, which is round, does not count.
+    Frames [height, width] of one shape, at least 8 x 8, of 8 bits. The step is that of the third-most affected of eight
+    column blocks, so that the edge of contact, which is round, does not count.
     """
-    difference = _blocks(one) - _blocks(other)
+    return _largest_step(_blocks(one) - _blocks(other))
+
+
+def _largest_step(difference: Blocks) -> tuple[float, int]:
     sums = np.cumsum(np.vstack([np.zeros(COLUMN_BLOCKS), difference]), axis=0)
     bands = (sums[BAND_ROWS:] - sums[:-BAND_ROWS]) / BAND_ROWS
     steps = np.sort(np.abs(bands[BAND_ROWS:] - bands[:-BAND_ROWS]), axis=1)[:, -TORN_BLOCKS]
@@ -83,8 +97,12 @@ def largest_step(one: Counts, other: Counts) -> tuple[float, int]:
     return float(steps[row]), row + BAND_ROWS
 
 
-def _blocks(counts: Counts) -> NDArray[np.float64]:
-    """Return each row's mean in eight blocks of columns [height, 8]; columns that are left over are not looked at."""
-    height, width = counts.shape
-    whole = counts[:, : width - width % COLUMN_BLOCKS]
-    return np.asarray(whole.reshape(height, COLUMN_BLOCKS, -1).mean(axis=2))
+def _blocks(counts: Counts) -> Blocks:
+    """Return each row's mean in eight blocks of columns [height, 8]; columns that are left over are not looked at.
+
+    Sums of whole numbers are exact, so these are the means that NumPy gives, in a tenth of the time.
+    """
+    width = counts.shape[1] // COLUMN_BLOCKS
+    blocks = (counts[:, block * width : (block + 1) * width] for block in range(COLUMN_BLOCKS))
+    sums = [cv2.reduce(block, 1, cv2.REDUCE_SUM, dtype=cv2.CV_32S) for block in blocks]
+    return np.asarray(np.hstack(sums) / float(width))

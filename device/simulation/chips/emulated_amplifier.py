@@ -141,6 +141,15 @@ class FreezingCell:
     def __init__(self, cell: Any, faults: FaultTimeline) -> None:
         self._cell, self._faults = cell, faults
 
+    @property
+    def pause_s(self) -> float:
+        """That of the cell."""
+        return float(self._cell.pause_s)
+
+    @pause_s.setter
+    def pause_s(self, pause_s: float) -> None:
+        self._cell.pause_s = pause_s
+
     def read(self, *, timeout_s: float) -> Any:
         """Return the next sample of the cell; while it is frozen, do not return."""
         self._faults.hold_up("cell_frozen")

@@ -133,7 +133,7 @@ class VirtualPicamera2:
         self._controls: dict[str, Any] = {}
         self._changed = threading.Condition()
         self._clock: FrameClock | None = None
-        self._next_number = 0
+        self._next_number, self._taken_before = 0, 0
         self._buffers_held = 0
         self._abandoned_jobs = 0
 
@@ -198,6 +198,8 @@ class VirtualPicamera2:
         """Stop the frame clock; requests that are still out lose their buffer."""
         with self._changed:
             self._clock = None
+            self._taken_before += self._next_number  # no frame has the noise of another one
+            self._next_number = 0
 
     def close(self) -> None:
         """Stop, and give the camera up."""
@@ -267,7 +269,7 @@ class VirtualPicamera2:
             exposure_us=frame.timing.exposure_ns // 1000,
             gain=frame.timing.gain,
             led_ratio=self._led_ratio_at(start_s),
-            frame_number=frame.number,
+            frame_number=self._taken_before + frame.number,
         )
 
     def _timing(self) -> Timing:

@@ -177,6 +177,7 @@ async function loadDevice() {
 async function loadMeasurement() {
   measurement = await fetchMeasurement(status.measurement_id);
   showMeasurement(measurement);
+  offersAreKnown = false; // this press has shown how long an answer takes here
 }
 
 function loadWhatIsMissing() {

@@ -55,6 +55,31 @@ def level(camera: CameraProcess, timeout_s: float = 5.0) -> int:
     return int(camera.capture(begun_after_s=0.0, timeout_s=timeout_s).counts[0, 0])
 
 
+def test_it_opens_while_nobody_waits_and_one_that_is_closed_before_leaves_nothing_behind():
+    begun = CameraProcess(scripted_camera.hanging_opener, shape=SHAPE, limit=RestartLimit(0, 60.0))
+    pid, memory = begun.pid, memory_of(begun)
+    assert is_running(pid)
+    begun.close()
+    assert not is_running(pid)
+    assert not memory.exists()
+
+
+def test_a_camera_that_rests_gives_the_next_frame_when_it_is_asked_for(opened):
+    camera = opened()
+    assert level(camera) == 1
+    camera.rest()
+    camera.rest()
+    assert level(camera) == 2
+
+
+def test_a_process_that_died_while_its_camera_rested_is_told_by_the_next_rest_and_replaced(opened):
+    camera = opened()
+    os.kill(camera.pid, signal.SIGKILL)
+    with pytest.raises(CameraProcessError, match="exit code -9"):
+        camera.rest()
+    assert level(camera) == 1
+
+
 def test_frames_come_from_another_process_with_their_times(opened):
     camera = opened()
     assert camera.pid != os.getpid()
@@ -78,9 +103,9 @@ def test_an_error_of_the_camera_arrives_as_it_was_raised_and_the_process_goes_on
 def test_a_camera_that_cannot_be_opened_says_why_here():
     limit = RestartLimit(3, 60.0)
     with pytest.raises(CameraError, match="There is no camera. Buy one."):
-        CameraProcess(scripted_camera.absent_camera, shape=SHAPE, limit=limit)
+        CameraProcess(scripted_camera.absent_camera, shape=SHAPE, limit=limit).require_open()
     with pytest.raises(InvalidQuantity, match="exposure_us is 3.0, but must be at least 0 and at most 2 us: shorten"):
-        CameraProcess(scripted_camera.misconfigured_camera, shape=SHAPE, limit=limit)
+        CameraProcess(scripted_camera.misconfigured_camera, shape=SHAPE, limit=limit).require_open()
 
 
 def test_a_process_that_hangs_is_ended_and_another_one_started(opened, hurried):
@@ -124,7 +149,7 @@ def test_a_process_that_dies_again_and_again_is_not_started_for_ever(opened):
 def test_a_camera_that_hangs_while_it_is_opened_is_given_up(monkeypatch):
     monkeypatch.setattr(camera_process, "START_TIMEOUT_S", 0.3)
     with pytest.raises(CameraProcessError, match="did not answer within 0.3 s"):
-        CameraProcess(scripted_camera.hanging_opener, shape=SHAPE, limit=RestartLimit(3, 60.0))
+        CameraProcess(scripted_camera.hanging_opener, shape=SHAPE, limit=RestartLimit(3, 60.0)).require_open()
 
 
 def test_a_process_that_does_not_end_by_itself_is_killed_at_the_end(monkeypatch, hurried):
@@ -149,7 +174,9 @@ def test_a_closed_camera_has_no_process_no_memory_and_gives_no_frame(opened):
 
 def test_the_process_imports_neither_web_server_nor_network():
     with pytest.raises(CameraError) as raised:
-        CameraProcess(scripted_camera.camera_that_tells_what_is_imported, shape=SHAPE, limit=RestartLimit(0, 60.0))
+        CameraProcess(
+            scripted_camera.camera_that_tells_what_is_imported, shape=SHAPE, limit=RestartLimit(0, 60.0)
+        ).require_open()
     imported = set(raised.value.cause.split())
     assert "device.hardware.camera_worker" in imported
     assert imported.isdisjoint({"fastapi", "uvicorn", "onnxruntime", "scipy", "cv2", "smbus2"})

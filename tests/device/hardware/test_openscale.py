@@ -6,6 +6,7 @@ import os
 import threading
 import time
 import tty
+import types
 from collections.abc import Iterator
 
 import pytest
@@ -17,6 +18,7 @@ from device.errors import (
     UnpluggedCellError,
     UnreadableCellError,
 )
+from device.hardware import cell_line
 from device.hardware.load_cell import open_load_cell
 from device.hardware.openscale import MOST_ALIKE, OpenScale, parse_reading
 
@@ -82,6 +84,26 @@ def test_samples_that_are_read_late_are_as_far_apart_as_the_amplifier_says(line)
     line.send(b"1012,0.5,kg,2,\r\n1025,0.5,kg,3,\r\n")
     times_s = [first.t_s, *(line.cell.read(timeout_s=10.0).t_s for _ in range(2))]
     assert times_s == pytest.approx([first.t_s, first.t_s + 0.012, first.t_s + 0.025], abs=2e-4)
+
+
+def test_lines_that_gather_are_read_at_once_and_keep_their_own_times(line, monkeypatch):
+    """They come while it pauses, and say themselves when they were measured."""
+    line.send(b"1000,0.5,kg,1,\r\n")
+    first = line.cell.read(timeout_s=10.0)
+    pauses_s = []
+
+    def pause(seconds):
+        if not pauses_s:
+            time.sleep(0.03)
+            line.send(b"1012,0.5,kg,2,\r\n1025,0.5,kg,3,\r\n")
+        pauses_s.append(seconds)  # the terminal may pass the lines on in pieces
+
+    monkeypatch.setattr(cell_line, "time", types.SimpleNamespace(sleep=pause))
+    line.cell.pause_s = 0.04
+    samples = [line.cell.read(timeout_s=10.0) for _ in range(2)]
+    assert set(pauses_s) == {0.04}
+    assert [one.counts for one in samples] == [2.0, 3.0]
+    assert [one.t_s - first.t_s for one in samples] == pytest.approx([0.012, 0.025], abs=2e-4)
 
 
 def test_the_banner_is_skipped_and_counted(line):

@@ -42,7 +42,7 @@ from device.records.store import ENDED, Store
 
 AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
 DARK_FACE = UntouchedFace(4.0, (0.0, 0.0, 0.0, 0.0), 0.0, 60.0, 0.6)
-CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(timeout_s=5.0))
+CONFIG = Config(camera=CameraSection(width_px=64, height_px=64), press=PressSection(mode="paper", timeout_s=5.0))
 ANSWER = Estimate(
     *[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "standard", "m", "00", "c", True, {"total": 1.0}
 )
@@ -56,12 +56,19 @@ class ObedientBench:
     def __init__(self):
         self.force, self.board, self.breaks, self.brightness = self, None, [], 0.5
         self.is_at_work, self.is_closed, self.zero_n = False, False, 0.0
-        self.budget, self.progress = LightBudget(), ProgressBoard()
+        self.budget, self.progress, self.rests = LightBudget(), ProgressBoard(), 0
 
     @property
     def latest_n(self):
         told_to_press = self.board.now.guidance.code.startswith(("press", "hold"))
         return self.zero_n + (0.5 if self.is_at_work and told_to_press else 0.0)
+
+    def reaches(self, force_n, *, timeout_s):
+        threading.Event().wait(timeout_s)
+        return self.latest_n >= force_n
+
+    def rest(self):
+        self.rests += 1
 
     def retare(self):
         moved_n, self.zero_n = self.zero_n, 0.0
@@ -147,7 +154,7 @@ class Rig:
 @pytest.fixture
 def rig(tmp_path, monkeypatch):
     monkeypatch.setattr(procedure_module, "AFTER_FAULT_S", 0.02)
-    monkeypatch.setattr(procedure_module, "POLL_S", 0.002)
+    monkeypatch.setattr(procedure_module, "LOOK_EVERY_S", 0.002)
     rig = Rig(tmp_path)
     yield rig
     rig.close()
@@ -165,6 +172,22 @@ def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
     assert rig.store.recording_folder(kept["recording_id"]).is_dir()
     steps = [Guidance.HOLD_STILL, Guidance.LIFT, Guidance.PRESS_LESION, Guidance.HOLD_STILL, Guidance.LIFT]
     assert [guidance for guidance in told if guidance is not Guidance.PRESS_BESIDE][:6] == [*steps, Guidance.DONE]
+
+
+def test_the_camera_rests_when_nobody_has_pressed_for_a_while_and_only_then(rig, monkeypatch):
+    rig.press()
+    assert rig.bench.rests == 0
+    monkeypatch.setattr(procedure_module, "REST_AFTER_S", 0.0)
+    rig.until(lambda: rig.bench.rests > 0)
+    assert rig.press()["state"] == "done"
+
+
+def test_a_press_that_is_done_tells_how_long_its_answer_took(rig):
+    assert {offer.cost.mode: offer.answer_presses for offer in rig.procedure.offers()} == dict.fromkeys(
+        ("paper", "quick", "standard"), 0
+    )
+    rig.press("quick")
+    rig.until(lambda: [offer.answer_presses for offer in rig.procedure.offers()] == [0, 1, 0])
 
 
 def test_the_board_tells_the_state_of_the_press_until_the_next_one(rig):

@@ -10,12 +10,17 @@ from small_certificate import small_certificate
 
 from device.config import Config
 from device.errors import BusyError, ModeUnavailable, ZeroShiftError
+from device.instrument.press.cost import ModeOffer, press_cost
 from device.instrument.self_test.report import CheckResult, SelfTestJob
 from device.instrument.status import PressJob
 from device.instrument.watch.calibration_watch import CalibrationWatch
+from device.measurement.mode import ModeWorth
 from device.records.calibrations import Calibrations
 from device.web.app import create_app
-from device.web.schema import SelfTest, Tare
+from device.web.schema import Device, SelfTest, Tare
+
+OF_UNKNOWNS = {"size_mm": 3.3, "depth_mm": 3.0, "youngs_modulus_kpa": 47.0}
+WORTH = ModeWorth(0.1, 0.9, OF_UNKNOWNS, dict.fromkeys(OF_UNKNOWNS, 0.5))
 
 
 class Procedure:
@@ -32,6 +37,10 @@ class Procedure:
         if mode not in (None, *self.modes):
             raise ModeUnavailable(f"This probe has no model for the mode {mode}.", "Choose one of those it has.")
         return PressJob("p-1", mode or "paper")
+
+    def offers(self):
+        cost = press_cost("standard", self.config)
+        return [ModeOffer(press_cost("paper", self.config), None, 0, None), ModeOffer(cost, 0.412, 3, WORTH)]
 
     def tare(self):
         if self.refusal:
@@ -95,11 +104,15 @@ def test_a_mode_without_a_model_is_refused_with_its_own_code(ask):
 
 def test_the_device_says_how_long_its_leds_were_on_and_in_which_modes_it_measures_at_what_cost(ask):
     device = ask("GET", "/api/v1/device").json()
-    assert device["default_mode"] == "paper"
+    assert Device.model_validate(device).default_mode == "standard"
     assert device["light_on_s"] == 12.3
     assert device["modes"] == [
-        {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5},
-        {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0},
+        {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5}
+        | {"answer_s": None, "answer_presses": 0}
+        | dict.fromkeys(("typical_error_percent", "answered_ratio", "determined_ratio")),
+        {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0}
+        | {"answer_s": 0.412, "answer_presses": 3, "answered_ratio": 0.9}
+        | {"typical_error_percent": WORTH.median_percent, "determined_ratio": WORTH.determined_ratio},
     ]
 
 

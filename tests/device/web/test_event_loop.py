@@ -14,7 +14,7 @@ from device.config import Config
 from device.instrument.status import StatusBoard
 from device.web import app as app_module
 from device.web.app import create_app
-from device.web.events import status_events
+from device.web.events import StatusFeed, status_events
 
 MEASUREMENT = {"id": "m-1", "recording_id": "r-1", "features": {"total": 1.0}}
 
@@ -87,10 +87,10 @@ def test_only_the_event_stream_and_the_parts_of_an_upload_run_on_the_event_loop(
 
 
 def test_an_event_is_small_and_touches_neither_disk_nor_store(witness):
-    """It is what the board and the cell's newest sample say: some 1 kB, 16 times a second for each client."""
+    """It is what the board and the cell's newest sample say: some 1 kB, built once for all clients."""
 
     async def first_event():
-        return await anext(status_events(witness))
+        return await anext(status_events(StatusFeed(witness)))
 
     event = asyncio.run(first_event())
     assert len(event) < 2000

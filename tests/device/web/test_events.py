@@ -1,5 +1,6 @@
 """The status as the screen gets it: faults and warnings with code, title, severity, cause and remedy."""
 
+import asyncio
 import types
 
 import pytest
@@ -7,9 +8,9 @@ import pytest
 from device.config import PressSection
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
 from device.instrument.press.states import Guidance, PressState
-from device.instrument.status import PressJob, ProcedureStatus
-from device.web import schema
-from device.web.events import snapshot
+from device.instrument.status import PressJob, ProcedureStatus, StatusBoard
+from device.web import events, schema
+from device.web.events import ALIVE_S, EVENT_INTERVAL_S, STILL_N, StatusFeed, snapshot, status_events
 
 
 class Force:
@@ -95,8 +96,8 @@ def test_the_state_of_the_press_is_told_by_its_code(told):
 
 
 def test_before_a_press_the_mode_is_that_of_the_settings(told):
-    status = told(ProcedureStatus(press=PressJob("p-1", "standard", "done"), wanted_n=()), Force())
-    assert (status["mode"], status["kind"], status["wanted_n"]) == ("paper", "hold", (0.5,))
+    status = told(ProcedureStatus(press=PressJob("p-1", "paper", "done"), wanted_n=()), Force())
+    assert (status["mode"], status["kind"], len(status["wanted_n"])) == ("standard", "ramp", 10)
 
 
 def test_a_press_that_failed_has_its_code(told):
@@ -109,3 +110,80 @@ def test_a_part_that_makes_no_progress_is_a_fault_whatever_the_frozen_procedure_
     status = told(ProcedureStatus(step="reference", guidance=Guidance.HOLD_STILL, stall=stall), Force())
     assert (status["step"], status["guidance"]["code"]) == ("fault", "fault")
     assert [fault["code"] for fault in status["faults"]] == ["E901"]
+
+
+class Told:
+    """A procedure whose force and clock are written down here, and how often its status was put together."""
+
+    def __init__(self, monkeypatch):
+        self.config = types.SimpleNamespace(serial="SIM-0001", press=PressSection())
+        self.board, self.is_simulated = StatusBoard(), True
+        self.bench = types.SimpleNamespace(force=types.SimpleNamespace(latest_n=0.25))
+        self.now_s, self.built = 100.0, 0
+        monkeypatch.setattr(events, "snapshot", self._snapshot)
+        self.feed = StatusFeed(self, clock=lambda: self.now_s)
+
+    def _snapshot(self, procedure):
+        self.built += 1
+        return snapshot(procedure)
+
+
+@pytest.fixture
+def procedure(monkeypatch):
+    return Told(monkeypatch)
+
+
+def test_an_event_is_built_anew_only_when_there_is_something_to_tell(procedure):
+    event = procedure.feed.event()
+    procedure.bench.force.latest_n += 0.9 * STILL_N
+    procedure.now_s += 0.9 * ALIVE_S
+    assert procedure.feed.event() is event
+    procedure.bench.force.latest_n += 0.2 * STILL_N
+    moved = procedure.feed.event()
+    assert f'"force_n": {0.25 + 1.1 * STILL_N:.4f}' in moved
+    procedure.board.update(guidance=Guidance.LIFT)
+    assert '"lift"' in procedure.feed.event()
+    assert procedure.built == 3
+
+
+def test_a_silent_load_cell_is_told_at_once_and_once(procedure):
+    procedure.feed.event()
+    procedure.bench.force = Force(UnpluggedCellError("It is gone.", "Plug it in."))
+    event = procedure.feed.event()
+    assert '"force_n": null' in event
+    assert procedure.feed.event() is event
+    procedure.bench.force = Force()
+    assert '"force_n": 0.25' in procedure.feed.event()
+
+
+def test_an_event_is_never_older_than_a_client_bears(procedure):
+    event = procedure.feed.event()
+    procedure.now_s += ALIVE_S
+    assert procedure.feed.event() is not event
+
+
+def test_all_clients_get_the_event_that_was_built_once_and_only_once(procedure, monkeypatch):
+    """Five clients through a hundred looks, of which the third and the tenth find something new."""
+    looks, clients, told = 0, 5, []
+    sleep = asyncio.sleep
+
+    async def next_look(seconds):
+        nonlocal looks
+        assert seconds == EVENT_INTERVAL_S
+        looks += 1
+        if looks in (3 * clients, 10 * clients):
+            procedure.bench.force.latest_n += 0.1
+        await sleep(0)
+
+    async def follow():
+        stream = status_events(procedure.feed)
+        told.append([await anext(stream) for _ in range(3)])
+        await stream.aclose()
+
+    async def all_follow():
+        await asyncio.gather(*(follow() for _ in range(clients)))
+
+    monkeypatch.setattr(asyncio, "sleep", next_look)
+    asyncio.run(all_follow())
+    assert procedure.built == 3
+    assert all(one == told[0] for one in told)

@@ -2,6 +2,7 @@
 
 import itertools
 import threading
+import types
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from device.errors import LateFrameError, LightError, StaleFrameError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.acquisition import bench as bench_module
-from device.instrument.acquisition.bench import DARK, Bench
+from device.instrument.acquisition.bench import DARK, LOOK_AT_RESTING_EVERY_S, Bench
 from device.instrument.acquisition.frame_check import LATE_FRAMES, FramePace
 from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.watch.progress import ProgressBoard
@@ -37,6 +38,12 @@ class FakeHardware:
         start_s = np.ceil(begun_after_s * 10) / 10
         self.log.append(("frame", round(float(start_s), 3)))
         return CameraFrame(np.zeros((16, 16), np.uint8), float(start_s), 4000.0, 1.0)
+
+    def rest(self):
+        self.log.append("rest")
+
+    def take_time(self):
+        pass
 
     def at(self, t_s):
         return t_s / 100
@@ -269,3 +276,32 @@ def test_light_that_went_off_by_itself_is_set_again_whatever_is_asked_for(bench,
             bench.take("press")
     bench.light(LIT)
     assert hardware.log.count(LIT) == 2
+
+
+def test_a_camera_rests_once_until_a_frame_is_asked_for_whose_lateness_is_not_held_against_it(hardware):
+    """Each of these frames begins up to a tenth of a second after it was asked for, and none may."""
+    bench = Bench(hardware, hardware, hardware, pace=FramePace(-1e9))
+    for _ in range(2 * LATE_FRAMES):
+        bench.rest()
+        bench.rest()
+        bench.take("press")
+    assert [one for one in hardware.log if one == "rest" or one[0] == "frame"][:3] == [
+        "rest", ("frame", 0.0), "rest",
+    ]  # fmt: skip
+    for _ in range(LATE_FRAMES - 1):
+        bench.take("press")
+    with pytest.raises(LateFrameError):
+        bench.take("press")
+
+
+def test_a_camera_that_rests_is_looked_at_more_seldom_and_rests_again(hardware, monkeypatch):
+    now_s = [1000.0]
+    monkeypatch.setattr(bench_module, "time", types.SimpleNamespace(monotonic=lambda: now_s[0]))
+    bench = Bench(hardware, hardware, hardware)
+    bench.take("press")
+    bench.rest()
+    hardware.log.clear()
+    for _ in range(12):
+        now_s[0] += LOOK_AT_RESTING_EVERY_S / 4
+        bench._look()
+    assert [one if one == "rest" else one[0] for one in hardware.log] == ["frame", "rest"] * 3

@@ -5,6 +5,7 @@ import math
 import threading
 from queue import Empty, Queue
 
+import numpy as np
 import pytest
 
 from device.errors import LoadCellError, OverloadedCellError, ZeroShiftError
@@ -29,7 +30,7 @@ class ScriptedCell:
     """Gives what was put into its script; silence and what is put as an error are errors."""
 
     def __init__(self, *samples):
-        self.script, self.is_closed = Queue(), False
+        self.script, self.is_closed, self.pause_s = Queue(), False, 0.0
         self.say(*samples)
 
     def say(self, *samples):
@@ -260,6 +261,23 @@ def test_the_history_does_not_grow_beyond_its_bound(cell, recorder):
     assert len(recorder._samples) == force_recorder.KEPT_SAMPLES
 
 
+def test_the_history_answers_as_all_its_samples_do_after_it_has_moved(cell, recorder):
+    """By `np.interp` and by hand over the samples that are kept; after two and a half times its length."""
+    rng, kept = np.random.default_rng(1), force_recorder.KEPT_SAMPLES
+    times_s = 5.0 + np.cumsum(rng.uniform(0.0, 0.02, 5 * kept // 2))
+    counts = rng.uniform(0.0, 3000.0, len(times_s)).round()
+    cell.say(*zip(times_s.tolist(), counts.tolist(), strict=True))
+    recorder.at(times_s[-1])
+    times_s, forces_n = times_s[-kept:], (counts[-kept:] - 500.0) / 1000.0
+    for t_s in [times_s[0], *rng.uniform(times_s[0], times_s[-1], 50), times_s[-1]]:
+        assert math.isclose(recorder.at(t_s), np.interp(t_s, times_s, forces_n), abs_tol=1e-12)
+        inside = (times_s > t_s - 0.15) & (times_s <= t_s)
+        assert recorder.peak_n(t_s - 0.15, t_s) == max([recorder.at(t_s), *forces_n[inside]])
+        assert recorder.range_n(t_s, window_s=0.15) == np.ptp(forces_n[(times_s >= t_s - 0.15) & (times_s <= t_s)])
+    with pytest.raises(LoadCellError, match=r"No force is known 1\.000 s before the first sample"):
+        recorder.at(times_s[0] - 1.0)
+
+
 def tare_of_two(read):
     """The mean of two readings, of a probe that is held when it is above 1000 counts."""
     counts = sum(read().counts for _ in range(2)) / 2
@@ -335,3 +353,27 @@ def test_a_cell_that_falls_silent_while_it_is_tared_is_told(first_tared, monkeyp
     monkeypatch.setattr(force_recorder, "SILENCE_S", 0.05)
     with pytest.raises(LoadCellError):
         recorder.retare()
+
+
+def test_a_touch_is_told_by_the_sample_that_shows_it(cell, recorder):
+    """1 N at first; the wait ends with 1.6 N, long before its time, and not with the 1.4 N before."""
+    cell.say((5.0, 1900.0), (6.0, 2100.0))
+    assert recorder.reaches(1.5, timeout_s=60.0)
+    assert recorder.latest_n == pytest.approx(1.6)
+
+
+def test_samples_gather_until_the_force_of_a_frame_is_asked_for(cell, recorder):
+    recorder.take_time()
+    assert cell.pause_s == force_recorder.REST_PAUSE_S
+    assert not recorder.reaches(1.5, timeout_s=0.001)
+    assert cell.pause_s == force_recorder.REST_PAUSE_S
+    recorder.at(4.0)
+    assert cell.pause_s == 0.0
+
+
+def test_a_wait_for_a_touch_ends_with_its_time_and_with_a_fault(cell, recorder):
+    assert not recorder.reaches(1.5, timeout_s=0.001)
+    assert recorder.reaches(0.5, timeout_s=60.0)
+    cell.say(UNPLUGGED)
+    with pytest.raises(LoadCellError, match="gone"):
+        recorder.reaches(1.5, timeout_s=60.0)

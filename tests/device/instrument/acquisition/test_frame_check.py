@@ -5,12 +5,14 @@ import pytest
 
 from device.config import CameraSection
 from device.errors import LateFrameError, TornFrameError
+from device.instrument.acquisition import frame_check
 from device.instrument.acquisition.frame_check import (
     LATE_FRAMES,
     LOOKED_AT_FRAMES,
     TORN_PAIRS,
     FramePace,
     TearWatch,
+    _blocks,
     largest_step,
 )
 from device.measurement.recording.tactile_image import Frame
@@ -39,6 +41,27 @@ def test_a_tear_between_light_and_dark_is_seen_at_its_row(row):
     step_counts, at = largest_step(torn(image(100), image(0, 2), row), image(100, 3))
     assert step_counts > 10
     assert at == pytest.approx(row, abs=4)
+
+
+@pytest.mark.parametrize("width", [WIDTH, WIDTH + 5])
+def test_blocks_are_the_means_that_numpy_gives_to_the_last_bit(width):
+    counts = np.random.default_rng(1).integers(0, 256, (HEIGHT, width), dtype=np.uint8)
+    expected = counts[:, : width - width % 8].reshape(HEIGHT, 8, -1).mean(axis=2)
+    np.testing.assert_array_equal(_blocks(counts), expected)
+
+
+def test_a_neighbours_blocks_are_kept_for_the_next_frame_and_no_others(monkeypatch):
+    """Each frame is summed once, also after one that was dropped; an image of the same counts is another frame."""
+    looked_at = []
+    monkeypatch.setattr(frame_check, "_blocks", lambda counts: looked_at.append(counts) or _blocks(counts))
+    watch = TearWatch(3.0)
+    one, two, three = (frame(image(100, seed)) for seed in range(3))
+    assert watch.agree(one, two)
+    assert watch.agree(two, three)
+    assert len(looked_at) == 3
+    assert all(seen is taken.counts for seen, taken in zip(looked_at, (one, two, three), strict=True))
+    assert watch.agree(one, frame(one.counts.copy()))
+    assert len(looked_at) == 5
 
 
 def test_noise_and_force_make_no_step():

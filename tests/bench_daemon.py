@@ -1,0 +1,111 @@
+"""Times the daemon of a probe, without its simulation: start to ready, CPU and memory at rest, memory after presses.
+
+The daemon runs as on a probe, without `--simulate`; the world on the other side of its wires is another process
+(tests/rig), so what it costs is not counted. Memory is what the kernel holds for the daemon and its camera's process:
+pages that both have count once (PSS). Ready is when the daemon says READY=1 and answers that it can press; its
+yardstick is an interpreter that imports NumPy.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+sys.path.insert(0, str(Path(__file__).resolve().parent / "rig"))
+
+from bench_table import Figure
+from daemon_process import QUICK_HAND
+from rig import Rig, build_shim
+
+CHAPTER = "daemon of a probe"
+STARTS = 3
+READY_BOUND = 15.0
+"""1.5 s where NumPy takes 0.1."""
+REST_S, SETTLE_S = 20.0, 15.0
+PRESSES = 6
+TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
+
+
+def figures() -> Iterator[Figure]:
+    """Yield the start, the fastest of some, then rest and memory."""
+    with TemporaryDirectory(prefix="tsis-") as folder:
+        shim = build_shim(Path(folder))
+        starts_s = [_start_s(Path(folder) / str(number), shim) for number in range(STARTS)]
+        yardstick_s = min(_yardstick_s() for _ in range(STARTS))
+        here = f"{min(starts_s):.2f} s here"
+        yield Figure(CHAPTER, "ready", min(starts_s) / yardstick_s, "NumPy imports", READY_BOUND, here=here)
+        rig = Rig(_made(Path(folder) / "pressed"), shim, QUICK_HAND)
+        try:
+            yield from _at_rest_and_after_presses(rig)
+        finally:
+            rig.close()
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
+
+
+def _yardstick_s() -> float:
+    begun_s = time.perf_counter()
+    subprocess.run([sys.executable, "-c", "import numpy"], check=True)
+    return time.perf_counter() - begun_s
+
+
+def _start_s(folder: Path, shim: Path) -> float:
+    rig = Rig(_made(folder), shim, QUICK_HAND)
+    try:
+        begun_s = time.perf_counter()
+        rig.start()
+        return time.perf_counter() - begun_s
+    finally:
+        rig.close()
+
+
+def _at_rest_and_after_presses(rig: Rig) -> Iterator[Figure]:
+    daemon = rig.start()
+    family = _family(daemon.process.pid)
+    rig.world.wish(url="")  # nobody looks at the screen
+    time.sleep(SETTLE_S)
+    before_s, begun_s = _cpu_s(family), time.perf_counter()
+    time.sleep(REST_S)
+    busy = (_cpu_s(family) - before_s) / (time.perf_counter() - begun_s)
+    yield Figure(CHAPTER, "at rest", 100 * busy, "% of a core", bound=2.0)
+    yield Figure(CHAPTER, "memory at rest", _memory_mb(family), "MB", bound=150.0)
+    rig.world.wish(url=daemon.url)
+    after_mb = []
+    for _ in range(PRESSES):
+        for mode in ("quick", "standard", "precise"):
+            job = daemon.press(mode)
+            assert job["state"] == "done", job
+        after_mb.append(_memory_mb(family))
+    yield Figure(CHAPTER, "memory after a press of each mode", after_mb[0], "MB")
+    yield Figure(
+        CHAPTER, f"what it grew in {3 * (PRESSES - 1)} presses more", after_mb[-1] - after_mb[0], "MB", bound=10.0
+    )
+
+
+def _family(pid: int) -> list[int]:
+    """Return a process and its children."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [pid, *map(int, children)]
+
+
+def _cpu_s(family: Iterable[int]) -> float:
+    return sum(
+        sum(map(int, Path(f"/proc/{pid}/stat").read_text().rsplit(")")[-1].split()[11:13])) for pid in family
+    ) / (TICKS_A_SECOND)
+
+
+def _memory_mb(family: Iterable[int]) -> float:
+    return sum(_pss_mb(pid) for pid in family)
+
+
+def _pss_mb(pid: int) -> float:
+    lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024
