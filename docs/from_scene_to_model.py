@@ -111,7 +111,7 @@ certificate = calibrate(recordings, bundle, probe.centred, force_n=0.5).certific
 # %%
 press = tsis.phantom_recording(truth, probe, seed=7)
 if not (OUT / "press").exists():
-    tsis.write_recording(press, OUT / "press")  # a folder of PNGs and a JSON, as the probe keeps
+    tsis.write_recording(press, OUT / "press")  # a folder; the probe keeps the same as one .zip
 answer = tsis.analyse(press, models=tsis.ModeModels(bundle), calibration=certificate)
 print(f"status {answer.status}: {answer.reason}")
 print(f"{'':20} {'truth':>8} {'answer':>8}   90 % interval")

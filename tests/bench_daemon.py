@@ -27,7 +27,7 @@ STARTS = 3
 READY_BOUND = 15.0
 """1.5 s where NumPy takes 0.1."""
 REST_S, SETTLE_S = 20.0, 15.0
-PRESSES = 6
+PRESSES = 3
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 

@@ -17,7 +17,7 @@ from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
 from device.config import PressSection, simulated_config
 from device.errors import StorageError
-from device.files.recording_file import read_recording
+from device.files.recording_file import read_picture, read_recording
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N
 from device.records.store import Store
 from device.simulation.scenario import Scenario
@@ -159,9 +159,12 @@ def test_a_kill_loses_no_measurement(tmp_path):
     daemon.process.kill()
     daemon.stop()
     with sqlite3.connect(tmp_path / "var" / "tsis.sqlite") as db:
-        kept = db.execute("SELECT id FROM measurement").fetchall()
+        [(identifier, record)] = db.execute("SELECT id, record FROM measurement").fetchall()
     db.close()
-    assert kept == [(job["measurement_id"],)]
+    assert identifier == job["measurement_id"]
+    recording = tmp_path / "var" / "recordings" / f"{json.loads(record)['recording_id']}.zip"
+    assert len(read_recording(recording).with_role("press")) == 10
+    assert (read_picture(recording) or b"")[1:4] == b"PNG"
 
 
 def test_a_daemon_whose_certificate_has_expired_serves_and_refuses_presses_with_its_code(tmp_path):

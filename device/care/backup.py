@@ -7,6 +7,7 @@ that moment is in the next backup.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -63,7 +64,7 @@ def _written(config: Config, places: Places, root: Path, file: Path, copy: Path)
     files = {f"data/{DATABASE}": copy, **_files(places, root)}
     size_bytes = sum(path.stat().st_size for path in files.values())
     _require_space(file.parent, size_bytes)
-    missing = tuple(one for one in facts.recordings if f"data/recordings/{one}/recording.json" not in files)
+    missing = tuple(one for one in facts.recordings if not _is_in(files, f"data/recordings/{one}"))
     with written_whole(file) as stream:
         writer = ArchiveWriter(stream)
         for name, path in files.items():
@@ -72,6 +73,11 @@ def _written(config: Config, places: Places, root: Path, file: Path, copy: Path)
     return BackupReport(
         str(file), config.serial, len(files), size_bytes, facts.measurements, missing, tuple(links(data))
     )
+
+
+def _is_in(files: Collection[str], recording: str) -> bool:
+    """Return whether a recording is among the files, as a .zip or as a folder."""
+    return f"{recording}.zip" in files or f"{recording}/recording.json" in files
 
 
 def _files(places: Places, root: Path) -> dict[str, Path]:

@@ -6,17 +6,27 @@ Without synchronising file and folder, a renamed file may be empty or gone after
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 READ_ONLY = 0o444
 
 
-def write_and_sync(path: Path, content: bytes) -> None:
-    """Write a file; when this returns its content is on the disk."""
+@contextmanager
+def synced_file(path: Path) -> Iterator[BinaryIO]:
+    """Open a file to be written anew; when the block has ended without an error its content is on the disk."""
     with path.open("wb") as file:
-        file.write(content)
+        yield file
         file.flush()
         os.fsync(file.fileno())
+
+
+def write_and_sync(path: Path, content: bytes) -> None:
+    """Write a file; when this returns its content is on the disk."""
+    with synced_file(path) as file:
+        file.write(content)
 
 
 def write_durably(path: Path, content: bytes) -> None:

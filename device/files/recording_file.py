@@ -1,60 +1,114 @@
-"""A recording to a folder and back: `recording.json` and lossless mono PNGs; a .zip of the folder is read too.
+"""A recording to a .zip or a folder and back: `recording.json` and lossless mono PNGs.
 
 What is missing, not finite or contradictory is refused with the field's name. A recording is written whole or not at
-all. Source: docs/contracts.md.
+all. A .zip is one file to synchronise, where a folder is one for each frame; it is stored, since PNGs are compressed
+already. A picture to look at may lie in it; no number is read from that. Source: docs/contracts.md.
 """
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
 
-from device.files.durable import sync_directory, write_and_sync
+from device.files.durable import sync_directory, synced_file
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.recording import REPAIR, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
 
 SCHEMA = "tsis.recording/1"
+PICTURE = "image.png"
 NUMBER = (int, float)
+READABLE = 0o644
+"""Rights of a file that is unpacked from a .zip; by default nobody may read it."""
 UNREADABLE = (OSError, KeyError, zipfile.BadZipFile, zlib.error)
 """What reading a file of a folder or .zip raises when it is missing or damaged."""
 
-FileWriter = Callable[[Path, bytes], None]
-"""Writes a file; when it returns, the content is on the disk."""
+FileOpener = Callable[[Path], AbstractContextManager[BinaryIO]]
+"""Opens a file to be written anew; when its block has ended, the content is on the disk."""
+FrameEncoder = Callable[[Frame], bytes]
+Files = Iterator[tuple[str, bytes]]
+"""Names and contents; each content is made when it is asked for."""
 
 
-def write_recording(recording: Recording, folder: Path, *, write: FileWriter = write_and_sync) -> None:
-    """Write a recording to a new folder; when this returns, it is on the disk. After an `OSError` nothing is left."""
-    temporary = folder.with_name(folder.name + ".tmp")
-    shutil.rmtree(temporary, ignore_errors=True)
+def png_of(frame: Frame) -> bytes:
+    """Return a frame's counts as a PNG."""
+    return cv2.imencode(".png", frame.counts)[1].tobytes()
+
+
+def write_recording(
+    recording: Recording,
+    path: Path,
+    *,
+    encode: FrameEncoder = png_of,
+    picture: bytes = b"",
+    opened: FileOpener = synced_file,
+) -> None:
+    """Write a recording to a new file, PATH.zip, or by any other name to a new folder.
+
+    When this returns it is on the disk; after an `OSError` nothing is left. `encode` may know PNGs that were made
+    before; `picture` is the PNG that `read_picture` returns, none when it is empty.
+    """
+    temporary = path.with_name(path.name + ".tmp")
+    remove_recording(temporary)
+    write = _write_zip if path.suffix == ".zip" else _write_folder
     try:
-        _write_files(recording, temporary, write)
-        temporary.rename(folder)
+        write(temporary, path.stem, _files_of(recording, encode, picture), opened)
+        if path.is_file():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        temporary.rename(path)
     except OSError:
-        shutil.rmtree(temporary, ignore_errors=True)
+        remove_recording(temporary)
         raise
-    sync_directory(folder.parent)
+    sync_directory(path.parent)
 
 
-def _write_files(recording: Recording, temporary: Path, write: FileWriter) -> None:
-    (temporary / "frames").mkdir(parents=True)
+def remove_recording(path: Path) -> None:
+    """Remove a recording, whole or half written, as far as the disk allows it; there may be none."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def _files_of(recording: Recording, encode: FrameEncoder, picture: bytes) -> Files:
     for i, frame in enumerate(recording.frames):
-        write(temporary / _frame_name(i), cv2.imencode(".png", frame.counts)[1].tobytes())
-    text = json.dumps(_as_json(recording), indent=1)
-    write(temporary / "recording.json", text.encode())
+        yield _frame_name(i), encode(frame)
+    if picture:
+        yield PICTURE, picture
+    yield "recording.json", json.dumps(_as_json(recording), indent=1).encode()
+
+
+def _write_folder(temporary: Path, name: str, files: Files, opened: FileOpener) -> None:
+    (temporary / "frames").mkdir(parents=True)
+    for file_name, content in files:
+        with opened(temporary / file_name) as file:
+            file.write(content)
     for directory in (temporary / "frames", temporary):
         sync_directory(directory)
+
+
+def _write_zip(temporary: Path, name: str, files: Files, opened: FileOpener) -> None:
+    """Write one file with all files in a folder `name`; they have no time of their own, for a clock may be wrong."""
+    temporary.parent.mkdir(parents=True, exist_ok=True)
+    with opened(temporary) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        for file_name, content in files:
+            info = zipfile.ZipInfo(f"{name}/{file_name}")
+            info.external_attr = READABLE << 16
+            archive.writestr(info, content)
 
 
 def read_recording(path: Path) -> Recording:
@@ -65,6 +119,17 @@ def read_recording(path: Path) -> Recording:
         except (*UNREADABLE, ValueError) as error:
             raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
         return _from_json(record, read)
+
+
+def read_picture(path: Path) -> bytes | None:
+    """Return the picture that lies in a recording, None when it has none; raise `InvalidQuantity` for a damaged one."""
+    with _files(path) as read:
+        try:
+            return read(PICTURE)
+        except (KeyError, FileNotFoundError):
+            return None
+        except UNREADABLE as error:
+            raise InvalidQuantity(PICTURE, path, "a readable picture", REPAIR) from error
 
 
 def _frame_name(i: int) -> str:

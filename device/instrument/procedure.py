@@ -24,6 +24,7 @@ from device.instrument.acquisition.brightness_loop import BrightnessLoop
 from device.instrument.acquisition.light_check import DimmingWatch
 from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
+from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Estimator, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.states import Guidance, PressState, before_contact
@@ -81,8 +82,11 @@ class Procedure:
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
-        self._answers = PressAnswers(config, calibration, estimator, store, self.progress, simulated_truth)
-        self._capture = Capture(bench, config, self.board, self.progress)
+        self._encoded = EncodedFrames()
+        self._answers = PressAnswers(
+            config, calibration, estimator, store, self.progress, simulated_truth, self._encoded.png_of
+        )
+        self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._computer = computer
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
@@ -142,6 +146,7 @@ class Procedure:
         self._darkening.join(timeout=1.0)
         if self._computer:
             self._computer.close()
+        self._encoded.close()
         self._opened.close()
 
     def request(self, mode: Mode | None = None) -> PressJob:
@@ -266,7 +271,10 @@ class Procedure:
                 if self._capture.cancelled.is_set():
                     raise PressEnded("cancelled", CANCELLED)
                 self._book.note(job, state="computing", progress=0.9)
-            measurement = self._answers.keep(frames, job.mode, started_at, self.board.now.warnings)
+            answer = self._answers.answer(frames, job.mode, started_at, self.board.now.warnings)
+            self.board.update(answer=answer.shown)  # the operator need not wait for the disk
+            answered_s = time.monotonic() - frames[-1].t_s
+            measurement = self._answers.keep(answer)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
         except NoContrastError as error:
@@ -276,9 +284,14 @@ class Procedure:
         else:
             self._capture.done()
             # The screen first: whoever is told that the press has ended finds its result there.
-            self.board.update(step="result", guidance=Guidance.DONE, measurement_id=measurement["id"])
-            self._book.note(job, state="done", progress=1.0, measurement_id=measurement["id"])
-            self._answer_times.note(job.mode, time.monotonic() - frames[-1].t_s)
+            identifier = measurement["id"]
+            self.board.update(step="result", guidance=Guidance.DONE, measurement_id=identifier, answer=None)
+            self._book.note(job, state="done", progress=1.0, measurement_id=identifier)
+            self._answer_times.note(job.mode, answered_s)
+        finally:
+            self._capture.forget_frames()
+            if self.board.now.answer:  # it could not be kept
+                self.board.update(answer=None)
 
     def _press_frames(self, job: PressJob) -> list[Frame]:
         """Lead the hand through the press beside the lesion and the one on it; return the frames of both."""

@@ -45,7 +45,8 @@ class ProcedureStatus:
 
     `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
     frames. `warnings`: those of the last press, or of the time since, and the lasting ones. `stall`: a part that makes
-    no progress, by the watchdog's thread.
+    no progress, by the watchdog's thread. `answer`: what the press says while that is being kept, without an id; from
+    then on `measurement_id`.
     """
 
     step: Step = "starting"
@@ -54,6 +55,7 @@ class ProcedureStatus:
     frames_taken: int = 0
     wanted_n: tuple[float, ...] = ()
     press: PressJob | None = None
+    answer: dict[str, Any] | None = None
     measurement_id: str | None = None
     self_test: SelfTestJob | None = None
     fault: DeviceError | None = None

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
-from device.files.durable import write_and_sync
+from device.files.durable import synced_file
 
 
 class Disk(Protocol):
@@ -16,8 +17,8 @@ class Disk(Protocol):
     def free_bytes(self, folder: Path) -> int:
         """Return the space that is left for a folder."""
 
-    def write(self, path: Path, content: bytes) -> None:
-        """Write and synchronise a file; raise `OSError` when that fails."""
+    def file(self, path: Path) -> AbstractContextManager[BinaryIO]:
+        """Open a file to be written anew, synchronised when the block ends; what fails raises `OSError`."""
 
 
 class LocalDisk:
@@ -27,9 +28,9 @@ class LocalDisk:
         """Return the space that is left for a folder; raise `OSError` when it cannot be asked."""
         return shutil.disk_usage(folder).free
 
-    def write(self, path: Path, content: bytes) -> None:
-        """Write and synchronise a file; raise `OSError` when that fails."""
-        write_and_sync(path, content)
+    def file(self, path: Path) -> AbstractContextManager[BinaryIO]:
+        """Open a file to be written anew, synchronised when the block ends; what fails raises `OSError`."""
+        return synced_file(path)
 
 
 def read_uncached(path: Path) -> bytes:

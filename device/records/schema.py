@@ -1,4 +1,6 @@
-"""Which form the store's database has, and which forms this code reads: SQLite's `user_version`.
+"""Which form the store has, and which forms this code reads: SQLite's `user_version` of its database.
+
+1: a recording is a folder. 2: a new one is a .zip; the tables are those of 1, and its folders stay as they are.
 
 A release's manifest states both numbers (`data_schemas.store`), so that an update can be refused before it writes what
 the release one back cannot read. Standard library only: the manifest's builder reads them without the daemon's
@@ -9,9 +11,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-STORE_WRITES = 1
-"""The form that this code leaves behind. Whoever changes the tables raises it, and converts what it finds."""
-STORE_READS = (1,)
+STORE_WRITES = 2
+"""The form that this code leaves behind. Whoever changes tables or recordings raises it, and converts what it finds."""
+STORE_READS = (1, 2)
 """The forms that this code can open; one release long it reads and leaves the older one."""
 UNNUMBERED = 1
 """What a database without a number is: the form before it had one."""

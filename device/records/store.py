@@ -1,4 +1,4 @@
-"""Measurements and press jobs in SQLite, recordings in folders beside it.
+"""Measurements and press jobs in SQLite, recordings beside it: a .zip each, or a folder of an earlier release.
 
 A recording is on the disk before its row is, and the row before the press is called done. WAL with synchronous=FULL:
 with NORMAL the last acknowledged row may be gone after a power cut. A job that a restart interrupted says so. The
@@ -11,7 +11,6 @@ import errno
 import fcntl
 import json
 import os
-import shutil
 import sqlite3
 import threading
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import DiskFullError, NewerDataError, StorageError, UnknownResource
-from device.files.recording_file import write_recording
+from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
@@ -91,8 +90,8 @@ class Store:
 
     def _remove_unfinished(self) -> None:
         """Remove recordings that a power cut left half written; nobody was ever told of them."""
-        for folder in (self.folder / "recordings").glob("*.tmp"):
-            shutil.rmtree(folder, ignore_errors=True)
+        for unfinished in (self.folder / "recordings").glob("*.tmp"):
+            remove_recording(unfinished)
 
     def _end_interrupted(self) -> None:
         for job in self._records("SELECT record FROM press WHERE ended = 0"):
@@ -133,7 +132,8 @@ class Store:
         """Write a file as a recording's is written, read it and remove it; raise `StorageError` or `DiskFullError`."""
         path = self.folder / "self-test.tmp"
         try:
-            self._disk.write(path, content)
+            with self._disk.file(path) as file:
+                file.write(content)
             return read_uncached(path)
         except OSError as error:
             kind = DiskFullError if _is_full(error) else StorageError
@@ -167,24 +167,31 @@ class Store:
         """Return a press job; raise `UnknownResource` when there is none of that id."""
         return self._one("press", press_id)
 
-    def add_measurement(self, record: StoredRecord, recording: Recording) -> StoredRecord:
-        """Keep a recording and its measurement; return the record with its sequence number."""
-        folder = self._folder_of(recording.id)
-        self.write_out(recording, folder)
+    def add_measurement(
+        self, record: StoredRecord, recording: Recording, *, encode: FrameEncoder = png_of, picture: bytes = b""
+    ) -> StoredRecord:
+        """Keep a recording, its picture and its measurement; return the record with its sequence number.
+
+        `encode` may know PNGs of the frames that were made before.
+        """
+        path = self._place_of(recording.id)
+        self.write_out(recording, path, encode=encode, picture=picture)
         try:
             with self._transaction() as db:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
                 whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
                 db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
         except StorageError:
-            shutil.rmtree(folder, ignore_errors=True)
+            remove_recording(path)
             raise
         return whole
 
-    def write_out(self, recording: Recording, folder: Path) -> None:
-        """Write a recording to a new folder, durably, and remember nothing of it; raise `StorageError`."""
+    def write_out(
+        self, recording: Recording, path: Path, *, encode: FrameEncoder = png_of, picture: bytes = b""
+    ) -> None:
+        """Write a recording to a new .zip or folder, durably, and remember nothing of it; raise `StorageError`."""
         try:
-            write_recording(recording, folder, write=self._disk.write)
+            write_recording(recording, path, encode=encode, picture=picture, opened=self._disk.file)
         except OSError as error:
             kind = DiskFullError if _is_full(error) else StorageError
             raise kind(f"The recording could not be written: {error}.", "Free space on the disk.") from error
@@ -210,15 +217,18 @@ class Store:
         with self._transaction() as db:
             return float(sum(row[0] for row in db.execute("SELECT value FROM counter WHERE name = 'light_on_s'")))
 
-    def recording_folder(self, recording_id: str) -> Path:
-        """Return where a recording lies; raise `StorageError` when it is not there any more."""
-        folder = self._folder_of(recording_id)
-        if not (folder / "recording.json").is_file():
-            raise StorageError(f"The recording {recording_id} is missing or damaged.", "Restore it from a backup.")
-        return folder
+    def recording_path(self, recording_id: str) -> Path:
+        """Return where a recording lies, a .zip or a folder; raise `StorageError` when it is not there any more."""
+        path = self._place_of(recording_id)
+        folder = path.with_suffix("")
+        if path.is_file():
+            return path
+        if (folder / "recording.json").is_file():
+            return folder
+        raise StorageError(f"The recording {recording_id} is missing or damaged.", "Restore it from a backup.")
 
-    def _folder_of(self, recording_id: str) -> Path:
-        return self.folder / "recordings" / recording_id
+    def _place_of(self, recording_id: str) -> Path:
+        return self.folder / "recordings" / f"{recording_id}.zip"
 
     def _one(self, table: str, identifier: str) -> StoredRecord:
         found = self._records(f"SELECT record FROM {table} WHERE id = ?", identifier)

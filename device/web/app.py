@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from device.records.store import Store
 from device.records.updates import Updates
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.guard import RequestGuard
-from device.web.picture import tactile_png
+from device.web.kept_files import KeptFiles
 from device.web.problems import install_problems
 from device.web.schema import PROBLEM, Device, PressResource, SelfTest, Status, Tare, answers
 from device.web.updates import add_updates
@@ -163,17 +162,17 @@ def _add_measurements(app: FastAPI, store: Store) -> None:
         """Return the features of one measurement."""
         return dict(store.measurement(measurement_id)["features"])
 
+    kept = KeptFiles(store)
+
     @app.get(f"{API}/measurements/{{measurement_id}}/image.png")
-    def image(measurement_id: str) -> Response:
+    async def image(measurement_id: str) -> Response:
         """Return the tactile image as a picture."""
-        folder = store.recording_folder(store.measurement(measurement_id)["recording_id"])
-        return Response(tactile_png(folder), media_type="image/png")
+        return await kept.picture(measurement_id)
 
     @app.get(f"{API}/measurements/{{measurement_id}}/recording.zip")
     def recording(measurement_id: str) -> Response:
         """Return the recording that the measurement was computed from."""
-        folder = store.recording_folder(store.measurement(measurement_id)["recording_id"])
-        return Response(_zipped(folder), media_type="application/zip")
+        return kept.recording(measurement_id)
 
 
 def _add_self_test(app: FastAPI, procedure: Procedure) -> None:
@@ -199,11 +198,3 @@ def _add_tare(app: FastAPI, procedure: Procedure) -> None:
         """Take the load cell's tare anew, with the probe held free; refused when it is held, pressed or at fault."""
         moved_n = procedure.tare()
         return {"moved_n": round(moved_n, 4), "zero_shift_n": round(procedure.bench.force.zero_shift_n, 4)}
-
-
-def _zipped(folder: Path) -> bytes:
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:  # PNG is compressed already
-        for path in sorted(p for p in folder.rglob("*") if p.is_file()):
-            archive.write(path, path.relative_to(folder.parent))
-    return content.getvalue()

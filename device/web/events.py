@@ -59,6 +59,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "frames_taken": status.frames_taken,
         "frames_needed": FRAMES[mode].count,
         "press": status.press.as_record() if status.press else None,
+        "answer": status.answer,
         "measurement_id": status.measurement_id,
         "self_test": status.self_test.summary() if status.self_test else None,
         "faults": [fault.as_record() for fault in faults],

@@ -175,8 +175,20 @@ class GuidanceLine(_Body):
     text: str
 
 
+class ShownAnswer(_Body):
+    """What a press says while it is being kept: the fields of the measurement that it will be."""
+
+    taken_at: str
+    mode: Mode
+    estimate: dict[str, Any]
+    truth: dict[str, float] | None
+
+
 class Status(_Body):
-    """One moment of the probe. Forces in N, the band and what is still wanted included."""
+    """One moment of the probe. Forces in N, the band and what is still wanted included.
+
+    `answer` is not on the disk yet, and may still fail to get there; a measurement is, once there is its id.
+    """
 
     simulated: bool
     serial: str
@@ -195,6 +207,7 @@ class Status(_Body):
     frames_taken: int
     frames_needed: int
     press: PressResource | None
+    answer: ShownAnswer | None
     measurement_id: str | None
     self_test: SelfTestSummary | None
     faults: list[Fault]

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import uvicorn
@@ -23,6 +24,7 @@ from device.assembly import probe as assembly
 from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
 from device.config import CameraSection, simulated_config
+from device.errors import StorageError
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, without_numbers
 from device.measurement.mode import MODES, Mode, ModeWorth
@@ -180,6 +182,7 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     _shoot(page, "press-slowly-harder")
     _require_fits(page)
     probe.hand.go_on()
+    expect(page.locator("#image-title")).to_have_text("Measurement 1, standard")
     expect(page.locator("#size-value")).to_be_visible()
     _shoot(page, "result")
     _require_fits(page)
@@ -228,6 +231,40 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")
     _shoot(page, "result-standard")
     _require_fits(page)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("same_answer_in_every_mode")
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_the_answer_is_on_the_screen_before_the_disk_has_it(
+    page: Page, probe: Served, monkeypatch: pytest.MonkeyPatch, is_kept: bool
+):
+    """It is said to be of no measurement yet; what the disk refuses is not left standing as a result."""
+    disk_answers, add = threading.Event(), probe.procedure.store.add_measurement
+
+    def add_when_the_disk_answers(record: Any, recording: Recording, **how: Any) -> Any:
+        disk_answers.wait()
+        if not is_kept:
+            raise StorageError("The disk is full.", "Free space.")
+        return add(record, recording, **how)
+
+    monkeypatch.setattr(probe.procedure.store, "add_measurement", add_when_the_disk_answers)
+    page.goto(probe.url)
+    page.locator("#press-button").click()
+    probe.hand.go_on()
+    expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
+    expect(page.locator("#size-value")).to_be_visible()
+    expect(page.locator("#image-title")).to_have_text("Measurement being kept, standard")
+    _shoot(page, "result-being-kept")
+    _require_fits(page)
+    disk_answers.set()
+    if is_kept:
+        expect(page.locator("#image-title")).to_have_text("Measurement 1, standard")
+        expect(page.locator("#image")).to_have_js_property("complete", value=True)
+        expect(page.locator("#size-value")).to_be_visible()
+    else:
+        expect(page.locator(".fault-code")).to_have_text("E601")
+        expect(page.locator("#size-value")).to_be_hidden()
 
 
 @pytest.mark.long

@@ -348,7 +348,7 @@ def test_light_that_is_lost_between_two_presses_is_back_in_the_third_and_the_sam
 def recorded(device: Device) -> Recording:
     device.press("paper")
     store, press = device.procedure.store, device.board.now.press
-    return read_recording(store.recording_folder(store.measurement(press.measurement_id)["recording_id"]))
+    return read_recording(store.recording_path(store.measurement(press.measurement_id)["recording_id"]))
 
 
 def reference_counts(press: Recording) -> float:

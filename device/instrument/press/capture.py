@@ -27,6 +27,7 @@ from device.instrument.acquisition.light_check import (
     require_dark,
     require_every_side,
 )
+from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.frame_choice import WantedFrames, wanted_frames
 from device.instrument.press.machine import Ending, FrameSeen, PressRules, PressUnderWay
 from device.instrument.press.states import ACTIVE, Guidance, before_contact
@@ -67,14 +68,23 @@ class CalledAway(Exception):  # noqa: N818 - not an error: something else is to 
 class Capture:
     """The part of the procedure that moves the light and takes frames."""
 
-    def __init__(self, bench: Bench, config: Config, board: StatusBoard, progress: ProgressBoard | None = None) -> None:
-        self._progress = progress or ProgressBoard()
+    def __init__(
+        self,
+        bench: Bench,
+        config: Config,
+        board: StatusBoard,
+        progress: ProgressBoard | None = None,
+        encoded: EncodedFrames | None = None,
+    ) -> None:
+        """Take `encoded`, which is told of every frame that is kept, if they are to be PNGs at the end."""
+        self._progress, self._encoded = progress or ProgressBoard(), encoded
         self.bench, self.config, self.press, self.light, self.board = bench, config, config.press, config.light, board
         self.lit = self.light.ratio
         self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
         self.machine = PressUnderWay()
         self._tears = TearWatch(config.camera.tear_counts)
         self._dark: list[Frame] = []
+        self._untouched: list[Frame] = []
         self._reference: list[Frame] = []
         self._dark_counts = self._before_s = self._untouched_s = 0.0
 
@@ -114,7 +124,8 @@ class Capture:
         self._dark, self._dark_counts = dark, level_counts(dark[-1])
         lit = self._agreeing("reference", self.lit)
         self.bench.light(DARK)
-        return dark + lit
+        self._untouched = dark + lit
+        return self._untouched
 
     def relit(self, unloaded: list[Frame], ratio: LedRatio) -> list[Frame]:
         """Return the same with frames lit at another brightness, taken now; as they are if it is theirs. Ends dark."""
@@ -135,6 +146,8 @@ class Capture:
         wanted = wanted_frames(mode, role, self.press, self._tears)
         rules = PressRules.of(self.press, wanted.window_n, is_ramp=wanted.is_ramp)
         begin = before_contact(role, mode)
+        if role == "reference":
+            self._reference = []
         self._before_s = time.monotonic()
         self._become(self.machine.begin(role, self._before_s))
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
@@ -152,6 +165,7 @@ class Capture:
             if self.machine.is_touching:
                 guidance = wanted.see(frame, self.machine.state)
                 self._drop_outliers(wanted)
+                self._encode(wanted.frames, are_all=wanted.is_complete)
             else:
                 guidance = begin
                 wanted.begin_again()
@@ -176,6 +190,11 @@ class Capture:
             force_n = self.bench.force.latest_n
             lowest_n = min(lowest_n, force_n)
         self._untouched_s = max(self.light.untouched_s - WOKEN_S, 0.0)
+
+    def _encode(self, frames: list[Frame], *, are_all: bool) -> None:
+        """Let the frames that are kept by now be encoded while the hand goes on."""
+        if self._encoded:
+            self._encoded.follow([*self._untouched, *self._reference, *frames], are_all=are_all)
 
     def _drop_outliers(self, wanted: WantedFrames) -> None:
         """Take the frames again that are unlike the others, once all are there."""
@@ -253,6 +272,12 @@ class Capture:
     def clear(self) -> None:
         """Forget the last press: the next may begin."""
         self.machine = PressUnderWay()
+
+    def forget_frames(self) -> None:
+        """Let go of the frames of a press that has ended."""
+        self._reference = []
+        if self._encoded:
+            self._encoded.clear()
 
     def _agreeing(self, role: Role, ratio: LedRatio) -> list[Frame]:
         self.bench.light(ratio)

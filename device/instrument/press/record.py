@@ -10,19 +10,21 @@ from __future__ import annotations
 import logging
 import uuid
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from device import __version__
 from device.config import Config
 from device.errors import DeviceError
+from device.files.recording_file import FrameEncoder, png_of
 from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.press.picture import tactile_png
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode
-from device.measurement.quantities import Inclusion
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import ENDED, Store
@@ -75,6 +77,19 @@ class PressBook:
             self._budget.note_saved(seconds)
 
 
+@dataclass(frozen=True)
+class PressAnswer:
+    """What the frames of a press say: their recording, and the measurement as it will be kept, without a number."""
+
+    recording: Recording
+    record: dict[str, Any]
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """What the screen shows of it before it is kept: nothing by which anybody could ask for it."""
+        return {name: self.record[name] for name in ("taken_at", "mode", "estimate", "truth")}
+
+
 class PressAnswers:
     """Answers one press after the other, each in its mode."""
 
@@ -86,22 +101,23 @@ class PressAnswers:
         store: Store,
         progress: ProgressBoard,
         truth: Inclusion | None,
+        encode: FrameEncoder = png_of,
     ) -> None:
-        """Take the inclusion that a simulated probe presses on as `truth`."""
+        """Take the inclusion that a simulated probe presses on as `truth`; `encode` may know PNGs of the frames."""
         self._config, self._calibration, self._truth = config, calibration, truth
-        self._estimator, self._store, self._progress = estimator, store, progress
+        self._estimator, self._store, self._progress, self._encode = estimator, store, progress, encode
 
     @property
     def is_simulated(self) -> bool:
         """Whether what is pressed on is known, as on the simulated probe alone."""
         return self._truth is not None
 
-    def keep(
+    def answer(
         self, frames: Sequence[Frame], mode: Mode, started_at: str, warnings: Sequence[DeviceError]
-    ) -> dict[str, Any]:
-        """Return the measurement that was made of a press's frames, once it and its recording are on the disk.
+    ) -> PressAnswer:
+        """Return what a press's frames say; it is kept nowhere yet.
 
-        Raises `InvalidQuantity` when an estimate cannot be made of them, `StorageError` when it cannot be kept.
+        Raises `InvalidQuantity` when an estimate cannot be made of them.
         """
         recording = recording_of(
             frames,
@@ -111,9 +127,25 @@ class PressAnswers:
             simulated_truth=self._truth,
         )
         estimate = self._estimator(recording, mode)
-        record = measurement_record(recording, estimate, mode, warnings)
+        return PressAnswer(recording, measurement_record(recording, estimate, mode, warnings))
+
+    def keep(self, answer: PressAnswer) -> dict[str, Any]:
+        """Return the measurement with its number, once it, its recording and its picture are on the disk.
+
+        Raises `StorageError` when it cannot be kept.
+        """
+        picture = _picture_of(answer.recording)
         with self._progress.inside("storage"):
-            return self._store.add_measurement(record, recording)
+            return self._store.add_measurement(answer.record, answer.recording, encode=self._encode, picture=picture)
+
+
+def _picture_of(recording: Recording) -> bytes:
+    """Return the picture, or none: what cannot be shown is measured all the same."""
+    try:
+        return tactile_png(recording)
+    except InvalidQuantity as error:
+        log.warning("no picture of the recording %s: %s", recording.id, error)
+        return b""
 
 
 def recording_of(

@@ -10,9 +10,11 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import BinaryIO
 
-from device.files.durable import write_and_sync
+from device.files.durable import synced_file
 from device.simulation.faults import FaultTimeline
 
 FULL = Path("/dev/full")
@@ -32,12 +34,15 @@ class EmulatedDisk:
         self._faults.hold_up("disk_frozen")
         return 0 if self._faults.is_active("disk_full") else shutil.disk_usage(folder).free
 
-    def write(self, path: Path, content: bytes) -> None:
-        """Write and synchronise a file; raise `OSError` ENOSPC while the disk is full, EROFS while it is read-only."""
+    def file(self, path: Path) -> AbstractContextManager[BinaryIO]:
+        """Open a file to be written anew and synchronised.
+
+        Raises `OSError` EROFS while the disk is read-only; what is written raises ENOSPC if it is full now.
+        """
         self._faults.hold_up("disk_frozen")
         if self._faults.is_active("disk_read_only"):
             raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
-        write_and_sync(FULL if self._faults.is_active("disk_full") else path, content)
+        return synced_file(FULL if self._faults.is_active("disk_full") else path)
 
 
 NETWORK = "model.onnx"

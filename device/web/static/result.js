@@ -73,15 +73,20 @@ function showTile({ name, key, unit }, measurement) {
   else strip.replaceChildren();
 }
 
-/** Fill the result view from a measurement of GET /api/v1/measurements/{id}. */
+function showPicture({ id, seq }) {
+  const image = byId("image");
+  if (id) image.src = imageUrl(id);
+  else image.removeAttribute("src");
+  image.alt = id ? `Tactile image of measurement ${seq}` : "";
+}
+
+/** Fill the result view from a measurement of GET /api/v1/measurements/{id}, or an answer that is being kept. */
 export function showMeasurement(measurement) {
   for (const tile of TILES) showTile(tile, measurement);
   const bounded = TILES.some(({ key }) => Number.isFinite(measurement.estimate[key].low));
   byId("panel").dataset.numbers = bounded ? "some" : "none";
-  const image = byId("image");
-  image.src = imageUrl(measurement.id);
-  image.alt = `Tactile image of measurement ${measurement.seq}`;
-  setText(byId("image-title"), `Measurement ${measurement.seq}, ${measurement.mode}`);
+  showPicture(measurement);
+  setText(byId("image-title"), `Measurement ${measurement.seq ?? "being kept"}, ${measurement.mode}`);
   setText(byId("image-caption"), measurement.taken_at.slice(0, 16).replace("T", " ") + " UTC");
 }
 

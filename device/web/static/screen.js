@@ -42,6 +42,7 @@ const tareButton = byId("tare");
 const LOST_WORDS = [byId("lost-title").textContent, byId("lost-words").textContent];
 let status = null;
 let measurement = null;
+let answer = null; // what the press says while the probe keeps it; from then on the measurement takes its place
 let offersAreKnown = false;
 let loading = false;
 let sending = false;
@@ -51,22 +52,25 @@ let faultsShown = "";
 
 const pressUnderWay = () => UNDER_WAY.has(status?.press?.state);
 
-function resultShown() {
+/** The measurement that is shown, the answer that is still being kept, or null. */
+function shownResult() {
   // A press that came to nothing must not stand above the figures of the one before it.
   const wanted = status.step === "result" || (status.step === "ready" && !PRESS_WORDS[status.press?.state]);
-  return wanted && measurement !== null && measurement.id === status.measurement_id;
+  if (wanted && measurement !== null && measurement.id === status.measurement_id) return measurement;
+  return answer;
 }
 
 function showIdentity() {
   setText(byId("serial"), status.serial);
   setText(byId("software"), `Software ${status.software}`);
-  byId("simulated-badge").hidden = !(status.simulated || (resultShown() && measurement.estimate.simulated));
+  byId("simulated-badge").hidden = !(status.simulated || shownResult()?.estimate.simulated);
 }
 
 function showSteps() {
-  const current = resultShown() ? 2 : STEP_INDEX[status.step] ?? -1;
+  const isShown = shownResult() !== null;
+  const current = isShown ? 2 : STEP_INDEX[status.step] ?? -1;
   [...byId("steps").children].forEach((item, index) => {
-    item.classList.toggle("step-done", index < current || (index === 2 && resultShown()));
+    item.classList.toggle("step-done", index < current || (index === 2 && isShown));
     if (index === current) setAttribute(item, "aria-current", "step");
     else item.removeAttribute("aria-current");
   });
@@ -88,7 +92,7 @@ function describeStatus() {
   if (updateLine()) return updateLine();
   if (tared) return { word: "Tared.", reason: tared, tone: "good" };
   if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
-  if (resultShown()) return describeEstimate(measurement.estimate);
+  if (shownResult()) return describeEstimate(shownResult().estimate);
   return { word: "", reason: hint, tone: "calm" };
 }
 
@@ -141,7 +145,7 @@ function showButton() {
 
 function show() {
   panel.dataset.step = status.step;
-  panel.dataset.view = resultShown() ? "result" : "measure";
+  panel.dataset.view = shownResult() ? "result" : "measure";
   showIdentity();
   showSteps();
   showInstruction();
@@ -178,11 +182,20 @@ async function loadMeasurement() {
   measurement = await fetchMeasurement(status.measurement_id);
   showMeasurement(measurement);
   offersAreKnown = false; // this press has shown how long an answer takes here
+  showAnswer();
+  show();
 }
 
 function loadWhatIsMissing() {
   if (!offersAreKnown) load(loadDevice);
   else if (status.measurement_id !== null && status.measurement_id !== measurement?.id) load(loadMeasurement);
+}
+
+/** An answer stays in sight until its measurement is there; when it could not be kept, it is shown no more. */
+function showAnswer() {
+  if (status.answer && answer === null) showMeasurement(status.answer);
+  const isBeingLoaded = status.step === "result" && measurement?.id !== status.measurement_id;
+  answer = status.answer ?? (isBeingLoaded ? answer : null);
 }
 
 function showConnection(lost) {
@@ -204,6 +217,7 @@ function receive(next) {
   status = next;
   showConnection(false);
   loadWhatIsMissing();
+  showAnswer();
   show();
 }
 

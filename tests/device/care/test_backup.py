@@ -20,7 +20,9 @@ from device.care.archive import Archive
 from device.care.backup import BackupReport, write_backup
 from device.care.restore import check_backup
 from device.errors import DiskFullError, StorageError
+from device.files.recording_file import read_recording, write_recording
 from device.measurement.quantities import InvalidQuantity
+from device.records.schema import STORE_WRITES
 from device.records.store import Store
 from device.settings.layers import layer_files, read_layers
 
@@ -40,9 +42,8 @@ def test_it_holds_records_settings_certificates_and_own_models(root: Path, tmp_p
     assert (report.serial, report.measurements, report.missing) == (SERIAL, 3, ())
     with Archive(tmp_path / "a.backup") as archive:
         names = set(archive.entries)
-        assert archive.manifest["store_schema"] == 1
-    frames = {f"data/recordings/r-{n}/{f}" for n in (1, 2, 3) for f in ("recording.json", "frames/000.png")}
-    assert frames < names
+        assert archive.manifest["store_schema"] == STORE_WRITES
+    assert {f"data/recordings/r-{n}.zip" for n in (1, 2, 3)} < names
     assert {
         "data/tsis.sqlite",
         "data/config.last_good.toml",
@@ -90,13 +91,22 @@ def test_a_card_that_is_mounted_to_be_read_only_is_saved_with_rows_that_were_not
 
 def test_a_recording_that_is_gone_is_named_and_a_link_is_not_followed(root: Path, tmp_path: Path) -> None:
     data = data_of(root)
-    (data / "recordings/r-2/recording.json").unlink()
+    (data / "recordings/r-2.zip").unlink()
     (data / "recordings/elsewhere").symlink_to("/etc")
     report = saved(root, tmp_path / "a.backup")
     assert report.missing == ("r-2",)
     assert report.left_out == ("recordings/elsewhere",)
     with Archive(tmp_path / "a.backup") as archive:
         assert not [name for name in archive.entries if "elsewhere" in name]
+
+
+def test_a_recording_that_an_earlier_release_kept_as_a_folder_is_saved_too(root: Path, tmp_path: Path) -> None:
+    recordings = data_of(root) / "recordings"
+    write_recording(read_recording(recordings / "r-2.zip"), recordings / "r-2")
+    (recordings / "r-2.zip").unlink()
+    assert saved(root, tmp_path / "a.backup").missing == ()
+    with Archive(tmp_path / "a.backup") as archive:
+        assert {f"data/recordings/r-2/{name}" for name in ("recording.json", "frames/000.png")} < set(archive.entries)
 
 
 def test_a_file_that_is_there_is_not_written_over(root: Path, tmp_path: Path) -> None:

@@ -156,9 +156,10 @@ def test_no_patients_data_are_in_it_wherever_they_stand(root: Path) -> None:
     store.save_press({"id": ID, "mode": NAME, "state": "rejected", "reason": STORY, "code": NUMBER, "warnings": []})
     store.close()
     for number in (1, 2):
-        path = data / f"recordings/r-{number}/recording.json"
-        path.write_text(json.dumps(json.loads(path.read_text()) | {"patient": STORY, "phantom_serial": NAME}))
-    (data / "recordings/r-1").rename(data / "recordings" / STORY.replace("/", "-"))
+        path = data / f"recordings/r-{number}.zip"
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr("patient.json", json.dumps({"patient": STORY, "phantom_serial": NAME}))
+    (data / "recordings/r-1.zip").rename(data / "recordings" / STORY.replace("/", "-"))
     put(data / f"{STORY}.txt", STORY)
     put(data / "restart.json", json.dumps({"cause": STORY, "times": 1}))
     certificate = {"id": ID, "operator": STORY, "serial": NAME, "validity": {"expires_at": STORY}}

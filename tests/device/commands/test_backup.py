@@ -10,6 +10,7 @@ import pytest
 from probe_card import SERIAL, data_of, records, write_card, write_settings
 
 from device.__main__ import main
+from device.records.schema import STORE_WRITES
 
 Run = Callable[..., tuple[int, list[str], list[str]]]
 
@@ -34,7 +35,7 @@ def test_a_backup_is_made_checked_and_restored(run: Run, card: Path, tmp_path: P
     file, fresh = tmp_path / "a.backup", tmp_path / "fresh"
     code, [first, last], _ = run(card, "backup", file)
     assert code == 0
-    assert first.startswith(f"{file}: 3 measurements of {SERIAL}, 16 files")
+    assert first.startswith(f"{file}: 3 measurements of {SERIAL}, 10 files")
     assert "keep it as you keep them" in last
     code, lines, _ = run(fresh, "restore", "--check", file)
     assert (code, lines[-1]) == (0, "Every file in it is whole.")
@@ -49,7 +50,7 @@ def test_both_are_data_for_a_program(run: Run, card: Path, tmp_path: Path) -> No
     file = tmp_path / "a.backup"
     assert json.loads(run(card, "backup", "--json", file)[1][0])["measurements"] == 3
     checked = json.loads(run(tmp_path, "restore", "--check", "--json", file)[1][0])
-    assert (checked["schema"], checked["serial"], checked["store_schema"]) == ("tsis.backup/1", SERIAL, 1)
+    assert (checked["schema"], checked["serial"], checked["store_schema"]) == ("tsis.backup/1", SERIAL, STORE_WRITES)
     assert json.loads(run(tmp_path / "fresh", "restore", "--json", file)[1][0])["presses"] == 3
 
 

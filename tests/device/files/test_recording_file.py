@@ -2,15 +2,20 @@
 
 import json
 import shutil
+import subprocess
+import sys
+import time
 import zipfile
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from device.files.durable import write_and_sync
-from device.files.recording_file import read_recording, write_recording
+from device.files.durable import synced_file
+from device.files.recording_file import png_of, read_picture, read_recording, write_recording
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -264,24 +269,97 @@ def test_a_zip_with_a_damaged_file_is_refused(folder, file, quantity):
 
 
 def fail_at(call):
-    """Return a stand-in for the durable write that fails at its n-th call, as a full disk does."""
+    """Return a stand-in for the durable file that fails at the end of its n-th block, as a full disk does."""
     calls = []
 
-    def write(path, content):
+    @contextmanager
+    def opened(path):
         calls.append(path)
-        if len(calls) == call:
-            raise OSError(28, "No space left on device")
-        write_and_sync(path, content)
+        with synced_file(path) as file:
+            yield file
+            if len(calls) == call:
+                raise OSError(28, "No space left on device")
 
-    return write
+    return opened
 
 
 @pytest.mark.parametrize("call", [1, 3, 5])
 def test_a_failing_disk_leaves_nothing_half_written(tmp_path, call):
     """The first frame, a later one, and the description after all four frames."""
     with pytest.raises(OSError, match="No space left"):
-        write_recording(small_recording(), tmp_path / "press", write=fail_at(call))
+        write_recording(small_recording(), tmp_path / "press", opened=fail_at(call))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failing_disk_leaves_no_half_zip(tmp_path):
+    with pytest.raises(OSError, match="No space left"):
+        write_recording(small_recording(), tmp_path / "press.zip", opened=fail_at(1))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_fills_up_in_the_middle_of_a_zip_leaves_nothing(tmp_path):
+    """The kernel's own "no space left", with more than any buffer holds."""
+    noise = np.random.default_rng(1).integers(0, 256, (600, 800), np.uint8)
+    camera = replace(CAMERA, width_px=800, height_px=600)
+    large = replace(small_recording(), camera=camera, frames=(Frame(noise, "press", 0.0, 0.5, (0.6,) * 4),) * 3)
+    with pytest.raises(OSError, match="No space left"):
+        write_recording(large, tmp_path / "press.zip", opened=lambda path: synced_file(Path("/dev/full")))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_zip_comes_back_as_it_was_written_and_is_one_file(tmp_path, bits):
+    write_recording(small_recording(bits), tmp_path / "press.zip")
+    assert_same(read_recording(tmp_path / "press.zip"), small_recording(bits))
+    assert [path.name for path in tmp_path.iterdir()] == ["press.zip"]
+
+
+def test_a_zip_holds_the_folder_of_the_contract_uncompressed_and_unpacks_to_it(tmp_path):
+    write_recording(small_recording(), tmp_path / "press.zip")
+    write_recording(small_recording(), tmp_path / "folder")
+    subprocess.run([sys.executable, "-m", "zipfile", "-e", "press.zip", "."], cwd=tmp_path, check=True)
+    files = {
+        str(path.relative_to(tmp_path / "folder")): path.read_bytes() for path in (tmp_path / "folder").rglob("*.*")
+    }
+    assert files == {
+        str(path.relative_to(tmp_path / "press")): path.read_bytes() for path in (tmp_path / "press").rglob("*.*")
+    }
+    with zipfile.ZipFile(tmp_path / "press.zip") as archive:
+        assert {one.compress_type for one in archive.infolist()} == {zipfile.ZIP_STORED}
+        assert {one.external_attr >> 16 for one in archive.infolist()} == {0o644}
+
+
+def test_the_clock_of_a_probe_may_be_wrong_and_the_same_recording_is_the_same_bytes(tmp_path, monkeypatch):
+    write_recording(small_recording(), tmp_path / "now" / "press.zip")
+    monkeypatch.setattr(time, "time", lambda: 0.0)  # 1970, which a .zip cannot say
+    write_recording(small_recording(), tmp_path / "then" / "press.zip")
+    assert (tmp_path / "now/press.zip").read_bytes() == (tmp_path / "then/press.zip").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["press", "press.zip"])
+def test_a_picture_lies_in_a_recording_or_there_is_none(tmp_path, name):
+    write_recording(small_recording(), tmp_path / "with" / name, picture=b"picture")
+    write_recording(small_recording(), tmp_path / "without" / name)
+    assert read_picture(tmp_path / "with" / name) == b"picture"
+    assert read_picture(tmp_path / "without" / name) is None
+    assert_same(read_recording(tmp_path / "with" / name), small_recording())
+
+
+def test_a_damaged_picture_is_refused(tmp_path):
+    path = tmp_path / "press.zip"
+    write_recording(small_recording(), path, picture=b"a picture that is damaged")
+    path.write_bytes(path.read_bytes().replace(b"that is damaged", b"that is mangled"))
+    with pytest.raises(InvalidQuantity, match=r"image\.png is .*press\.zip, but must be a readable picture"):
+        read_picture(path)
+
+
+def test_frames_are_encoded_by_what_was_asked_for(tmp_path):
+    asked = []
+    write_recording(
+        small_recording(), tmp_path / "press.zip", encode=lambda frame: asked.append(frame) or png_of(frame)
+    )
+    assert [frame.role for frame in asked] == list(ROLES)
+    assert_same(read_recording(tmp_path / "press.zip"), small_recording())
 
 
 def test_what_an_earlier_crash_left_behind_does_not_get_into_the_recording(tmp_path):
@@ -297,3 +375,11 @@ def test_a_recording_is_never_written_over(folder):
     with pytest.raises(OSError, match="not empty"):
         write_recording(replace(small_recording(), serial="another"), folder)
     assert_same(read_recording(folder), small_recording())
+
+
+def test_a_zip_is_never_written_over(tmp_path):
+    write_recording(small_recording(), tmp_path / "press.zip")
+    with pytest.raises(FileExistsError):
+        write_recording(replace(small_recording(), serial="another"), tmp_path / "press.zip")
+    assert_same(read_recording(tmp_path / "press.zip"), small_recording())
+    assert [path.name for path in tmp_path.iterdir()] == ["press.zip"]

@@ -169,7 +169,7 @@ def test_a_press_goes_through_its_steps_and_its_measurement_is_kept(rig):
     assert (kept["frames"], kept["force_n"]) == (10, 0.5)
     assert kept["truth"] == {"size_mm": 10.0, "depth_mm": 5.0, "youngs_modulus_kpa": 80.0}
     assert kept["estimate"]["reason"] == "A stand-in."
-    assert rig.store.recording_folder(kept["recording_id"]).is_dir()
+    assert rig.store.recording_path(kept["recording_id"]).is_file()
     steps = [Guidance.HOLD_STILL, Guidance.LIFT, Guidance.PRESS_LESION, Guidance.HOLD_STILL, Guidance.LIFT]
     assert [guidance for guidance in told if guidance is not Guidance.PRESS_BESIDE][:6] == [*steps, Guidance.DONE]
 
@@ -395,13 +395,40 @@ def test_an_error_that_nobody_foresaw_fails_the_press_and_the_next_one_is_taken(
 
 
 def test_a_measurement_that_the_disk_does_not_take_fails_the_press(rig, monkeypatch):
-    def full(record, recording):
+    def full(record, recording, **how):
         raise StorageError("The disk is full.", "Free space.")
 
     monkeypatch.setattr(rig.store, "add_measurement", full)
     job = rig.press()
     assert (job["state"], job["measurement_id"], job["code"]) == ("failed", None, "E601")
     assert "The disk is full" in job["reason"]
+    assert rig.board.now.answer is None
+
+
+def test_the_answer_is_shown_before_the_disk_has_it_and_has_its_id_only_after(rig, monkeypatch):
+    seen, add = [], rig.store.add_measurement
+
+    def look_and_add(record, recording, **how):
+        seen.append(rig.board.now)
+        return add(record, recording, **how)
+
+    monkeypatch.setattr(rig.store, "add_measurement", look_and_add)
+    job = rig.press()
+    [status] = seen
+    assert (status.step, status.press.state, status.measurement_id) == ("computing", "computing", None)
+    assert status.answer["estimate"] == ANSWER.as_record()
+    assert rig.board.now.answer is None
+    kept = rig.store.measurement(job["measurement_id"])
+    assert {name: kept[name] for name in status.answer} == status.answer
+
+
+def test_frames_are_encoded_before_the_answer_and_forgotten_after_it(rig):
+    held = []
+    rig.estimator = lambda recording: held.append((rig.procedure._encoded.held, len(recording.frames))) or ANSWER
+    rig.press()
+    [(encoded, kept)] = held
+    assert encoded == kept == 28
+    rig.until(lambda: rig.procedure._encoded.held == 0)
 
 
 def test_a_store_at_fault_does_not_leave_the_press_under_way_for_ever(rig, monkeypatch):
@@ -662,7 +689,7 @@ def test_the_untouched_face_of_a_press_after_a_tare_is_taken_anew(rig, monkeypat
     rig.until(lambda: taken)
     rig.procedure.tare()
     job = rig.press()
-    recording = read_recording(rig.store.recording_folder(rig.store.measurement(job["measurement_id"])["recording_id"]))
+    recording = read_recording(rig.store.recording_path(rig.store.measurement(job["measurement_id"])["recording_id"]))
     assert {frame.force_n for frame in recording.with_role("dark")} == {0.0}
 
 

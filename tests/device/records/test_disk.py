@@ -8,7 +8,8 @@ from device.records.disk import LocalDisk
 
 
 def test_what_is_written_is_there_and_what_is_left_is_what_the_system_says(tmp_path):
-    LocalDisk().write(tmp_path / "frame", b"counts")
+    with LocalDisk().file(tmp_path / "frame") as file:
+        file.write(b"counts")
     assert (tmp_path / "frame").read_bytes() == b"counts"
     assert LocalDisk().free_bytes(tmp_path) == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
 

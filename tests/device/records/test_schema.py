@@ -48,7 +48,7 @@ def test_what_a_newer_release_wrote_is_refused_and_left_as_it_is(tmp_path):
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "half.tmp").mkdir()
     before = file.read_bytes()
-    with pytest.raises(NewerDataError, match=r"have schema 2, and this release reads 1\.") as refusal:
+    with pytest.raises(NewerDataError, match=r"have schema 3, and this release reads 1 and 2\.") as refusal:
         Store(tmp_path)
     assert (refusal.value.code, isinstance(refusal.value, StorageError)) == ("E014", True)
     assert file.read_bytes() == before

@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 
 from device.config import Config
 from device.instrument.status import StatusBoard
-from device.web import app as app_module
+from device.web import kept_files
 from device.web.app import create_app
 from device.web.events import StatusFeed, status_events
 
@@ -38,7 +38,7 @@ class Witness:
     def measurements(self, *, before_seq, limit):
         return self.note("measurements", [MEASUREMENT])
 
-    def recording_folder(self, recording_id):
+    def recording_path(self, recording_id):
         return self.note("recording", self.folder)
 
     def press(self, press_id):
@@ -52,7 +52,8 @@ class Witness:
 def witness(tmp_path, monkeypatch):
     (tmp_path / "recording.json").write_text("{}")
     witness = Witness(tmp_path)
-    monkeypatch.setattr(app_module, "tactile_png", lambda folder: witness.note("picture", b"png"))
+    monkeypatch.setattr(kept_files, "read_recording", lambda folder: witness.note("reading", None))
+    monkeypatch.setattr(kept_files, "tactile_png", lambda recording: witness.note("picture", b"png"))
     return witness
 
 
@@ -80,10 +81,11 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
     assert witness.threads[HEAVY[path]] != loop_thread
 
 
-def test_only_the_event_stream_and_the_parts_of_an_upload_run_on_the_event_loop(witness):
+def test_only_what_waits_runs_on_the_event_loop(witness):
+    """The event stream, a picture that waits for its turn to be made, and the parts of an upload."""
     routes = [route for route in create_app(witness, witness).routes if isinstance(route, APIRoute)]
     on_the_loop = [route.path for route in routes if inspect.iscoroutinefunction(route.endpoint)]
-    assert on_the_loop == ["/api/v1/events", "/api/v1/updates"]
+    assert on_the_loop == ["/api/v1/events", "/api/v1/measurements/{measurement_id}/image.png", "/api/v1/updates"]
 
 
 def test_an_event_is_small_and_touches_neither_disk_nor_store(witness):

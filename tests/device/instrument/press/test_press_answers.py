@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from small_certificate import small_certificate
 
 from device.config import CameraSection, Config
-from device.errors import DimLightError
-from device.files.recording_file import read_recording
+from device.errors import DeviceError, DimLightError
+from device.files.recording_file import read_picture, read_recording
 from device.instrument.press.record import Estimator, PressAnswers
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
@@ -29,14 +31,38 @@ def answers(store: Store, estimator: Estimator, truth: Inclusion | None = None) 
     return PressAnswers(CONFIG, CalibrationWatch(small_certificate()), estimator, store, ProgressBoard(), truth)
 
 
+def kept_by(probe: PressAnswers, *warnings: DeviceError) -> dict[str, Any]:
+    return probe.keep(probe.answer(FRAMES, "quick", STARTED_AT, warnings))
+
+
 def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Path) -> None:
     store, warning = Store(tmp_path), DimLightError("Side +x is dim.", "Look at it.")
-    kept = answers(store, lambda recording, mode: ANSWER).keep(FRAMES, "quick", STARTED_AT, [warning])
+    kept = kept_by(answers(store, lambda recording, mode: ANSWER), warning)
     assert store.measurement(kept["id"]) == kept
     assert (kept["mode"], kept["taken_at"], kept["warnings"]) == ("quick", STARTED_AT, [warning.as_record()])
-    recording = read_recording(store.recording_folder(kept["recording_id"]))
+    recording = read_recording(store.recording_path(kept["recording_id"]))
     assert [frame.role for frame in recording.frames] == ["dark", "reference", "press"]
     assert recording.calibration_id == small_certificate().id
+    store.close()
+
+
+def test_an_answer_is_kept_nowhere_and_has_nothing_to_ask_for_it_by(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    answer = answers(store, lambda recording, mode: ANSWER).answer(FRAMES, "quick", STARTED_AT, [])
+    assert answer.shown == {"taken_at": STARTED_AT, "mode": "quick", "estimate": ANSWER.as_record(), "truth": None}
+    assert store.measurements(before_seq=1000, limit=10) == []
+    assert list((tmp_path / "recordings").iterdir()) == []
+    store.close()
+
+
+def test_the_picture_is_kept_with_the_measurement_and_a_press_without_one_is_kept_all_the_same(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    probe = answers(store, lambda recording, mode: ANSWER)
+    paths = [store.recording_path(kept_by(probe)["recording_id"])]
+    untouched = [replace(frame, force_n=0.0) for frame in FRAMES]
+    kept = probe.keep(probe.answer(untouched, "quick", STARTED_AT, []))
+    paths.append(store.recording_path(kept["recording_id"]))
+    assert [(read_picture(path) or b"")[1:4] for path in paths] == [b"PNG", b""]
     store.close()
 
 
@@ -46,7 +72,7 @@ def test_frames_that_an_estimator_refuses_leave_nothing_behind(tmp_path: Path) -
 
     store = Store(tmp_path)
     with pytest.raises(InvalidQuantity, match="press harder"):
-        answers(store, refuse).keep(FRAMES, "quick", STARTED_AT, [])
+        kept_by(answers(store, refuse))
     assert store.measurements(before_seq=1000, limit=10) == []
     store.close()
 
@@ -55,6 +81,6 @@ def test_a_probe_whose_truth_is_known_is_a_simulated_one(tmp_path: Path) -> None
     store, found = Store(tmp_path), []
     for truth in (None, Inclusion(10.0, 5.0, 80.0)):
         probe = answers(store, lambda recording, mode: found.append(recording) or ANSWER, truth)
-        probe.keep(FRAMES, "quick", STARTED_AT, [])
+        kept_by(probe)
         assert (probe.is_simulated, found[-1].simulated, found[-1].truth) == (truth is not None,) * 2 + (truth,)
     store.close()

@@ -1,6 +1,7 @@
 """A file is written, synchronised and read; a disk that is full, read-only or changes bytes fails."""
 
 import errno
+from contextlib import contextmanager
 
 import pytest
 
@@ -18,10 +19,15 @@ class TroubledDisk(LocalDisk):
     def free_bytes(self, folder):
         return self.left
 
-    def write(self, path, content):
+    @contextmanager
+    def file(self, path):
         if self.number:
             raise OSError(self.number, "refused")
-        super().write(path, content[:-1] + bytes([content[-1] ^ 1]) if self.is_forgetful else content)
+        with super().file(path) as file:
+            yield file
+            if self.is_forgetful:
+                file.seek(file.tell() - 1)
+                file.write(b"?")
 
 
 @pytest.fixture

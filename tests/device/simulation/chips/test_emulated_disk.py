@@ -9,16 +9,21 @@ from device.simulation.chips.emulated_storage import EmulatedDisk
 from device.simulation.faults import FaultTimeline, ScriptedFault
 
 
+def write(disk, path):
+    with disk.file(path) as file:
+        file.write(b"counts")
+
+
 def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_again(tmp_path):
     now_s = [0.0]
     disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_full", until_s=1.0)], clock=lambda: now_s[0]))
     assert disk.free_bytes(tmp_path) == 0
     with pytest.raises(OSError, match="No space left") as full:
-        disk.write(tmp_path / "frame", b"counts")
+        write(disk, tmp_path / "frame")
     assert full.value.errno == errno.ENOSPC
     assert list(tmp_path.iterdir()) == []
     now_s[0] = 1.0
-    disk.write(tmp_path / "frame", b"counts")
+    write(disk, tmp_path / "frame")
     assert (tmp_path / "frame").read_bytes() == b"counts"
     assert disk.free_bytes(tmp_path) > 0
 
@@ -26,7 +31,7 @@ def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_aga
 def test_a_read_only_disk_takes_nothing_and_still_has_space(tmp_path):
     disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_read_only")]))
     with pytest.raises(OSError, match="Read-only file system") as refused:
-        disk.write(tmp_path / "frame", b"counts")
+        write(disk, tmp_path / "frame")
     assert refused.value.errno == errno.EROFS
     assert list(tmp_path.iterdir()) == []
     assert disk.free_bytes(tmp_path) > 0
@@ -43,7 +48,7 @@ def test_a_frozen_disk_answers_when_it_thaws_and_not_before(call, tmp_path, monk
     monkeypatch.setattr(faults.time, "sleep", wait)
     disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_frozen", until_s=3.0)], clock=lambda: now_s[0]))
     if call == "write":
-        disk.write(tmp_path / "frame", b"counts")
+        write(disk, tmp_path / "frame")
         assert (tmp_path / "frame").read_bytes() == b"counts"
     else:
         assert disk.free_bytes(tmp_path) > 0
