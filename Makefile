@@ -96,6 +96,7 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 bench: .venv/all.stamp ## time a frame's and a press's work, as ratios to something run in the same minute; take 60 frames a second; time the darkness after a stop, a kill, a freeze, a hung bus
 	$(PY) tests/bench.py
 	$(PY) tests/bench_forward.py
+	$(PY) tests/bench_toolkit.py
 	$(PY) tests/bench_acquisition.py
 	$(PY) tests/bench_darkness.py
 
