@@ -39,7 +39,7 @@ KEPT = _kept_folder()
 
 
 def compiled(function: Function) -> Function:
-    """Return the function that numba compiles at its first call ever, for its types; strict floating point, one thread."""
+    """Return the function, compiled at its first call ever for its types; strict floating point, one thread."""
     before, config.CACHE_DIR = config.CACHE_DIR, str(KEPT or "")
     try:
         return cast(Function, njit(cache=KEPT is not None)(function))
