@@ -6,7 +6,6 @@ import sys
 
 import typer
 
-from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.calibrate import calibrate
 from host_tools.commands.evaluate import evaluate
@@ -23,7 +22,6 @@ from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
-from host_tools.forward.press_model import PressFailed
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -53,9 +51,19 @@ def main() -> None:
     """Run the command line; what cannot be used is one sentence and exit code 1."""
     try:
         app()
-    except (InvalidQuantity, BundleRefused, PressFailed, OSError) as error:
+    except SystemExit:
+        raise
+    except _refusals() as error:
         note.print(str(error), markup=False, soft_wrap=True)
         sys.exit(1)
+
+
+def _refusals() -> tuple[type[Exception], ...]:
+    """Return what is told in one sentence; asked for when something was raised, since its homes load NumPy."""
+    from device.measurement.bundle import BundleRefused
+    from host_tools.forward.press_model import PressFailed
+
+    return InvalidQuantity, BundleRefused, PressFailed, OSError
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Which tests of a parallel run (`-n`) share a worker: those of a file, all in real time, and all that trace rays.
 
 Two daemons with a hand in real time at once would each see frames come late; the tests of a file share what is set up
-once for them; the tracer of rays is compiled for ten seconds in each process that runs it.
+once for them; in a fresh clone the tracer of rays is compiled for ten seconds, by each process that then begins it.
 Here because of https://github.com/pytest-dev/pytest-xdist/issues/1386: pytest 9.2 no longer reads the `item._nodeid`
 by which xdist 3.8 hands a group on, so `--dist loadgroup` spreads groups over the workers. tests/test_schedule.py fails
 when that works again. Then drop both files: run with `--dist loadgroup`, and let conftest.py give each test an

@@ -8,19 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from device.files.bundle_file import read_paper_model
 from device.files.durable import write_once
-from device.files.recording_file import read_recording
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.paper_mode.estimate import PAPER_UNITS
-from device.measurement.paper_mode.features import FEATURE_NAMES
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.physics.surface_table import load_surface_table
-from host_tools.calibration.gates import CalibrationRejected, Gate
 from host_tools.commands.output import note
 
 if TYPE_CHECKING:
     from host_tools.calibration.calibrate import Calibrated
+    from host_tools.calibration.gates import Gate
 
 MODEL = MODELS / "paper"
 
@@ -46,8 +41,12 @@ def calibrate(
     Gates of number, spread and age of the phantoms, R2, leave-one-out error, dark level and saturation must all be
     passed; otherwise nothing is written and the exit code is 1. An existing file is never replaced.
     """
+    from device.files.bundle_file import read_paper_model
+    from device.files.recording_file import read_recording
+    from device.simulation.physics.surface_table import load_surface_table
     from host_tools.calibration.calibrate import Provenance
     from host_tools.calibration.calibrate import calibrate as run_calibration
+    from host_tools.calibration.gates import CalibrationRejected
 
     _require_new(out)
     try:
@@ -100,6 +99,9 @@ def _record(done: Calibrated, path: Path) -> dict[str, Any]:
 
 
 def _show(done: Calibrated, path: Path) -> None:
+    from device.measurement.paper_mode.estimate import PAPER_UNITS
+    from device.measurement.paper_mode.features import FEATURE_NAMES
+
     certificate = done.certificate
     for image, line, name in zip(FEATURE_NAMES, certificate.regressions, PAPER_UNITS, strict=True):
         law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"

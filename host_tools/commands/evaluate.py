@@ -6,76 +6,27 @@ With --noise-free and --posterior it prints modes standard and precise beside th
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.console import Console
 
-from device.files.bundle_file import read_models, read_paper_model, read_ramp_model
-from device.files.certificate_file import read_calibration
-from device.files.recording_file import read_recording
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.bundle import ModelBundle
-from device.measurement.calibration import Calibration
-from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode, mode_named
-from device.measurement.mode_models import ModeModels, analysed
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RAMP_MODES
-from device.measurement.recording.recording import Recording
-from device.simulation.scenario import Scenario
-from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table
 from host_tools.commands.model import phantoms_of
-from host_tools.commands.output import note
+from host_tools.commands.output import Scheduler, note
+from host_tools.workers import workers
 
 if TYPE_CHECKING:
+    from device.measurement.mode_models import ModeModels
     from host_tools.pages.benchmark import Chapter
-
-
-def print_reference(
-    model: Path, table: Path, mode: Mode | None, *, noise_free: bool, posterior: bool, scenes: int | None, seed: int
-) -> None:
-    """Print the chapters that are asked for, on `scenes` presses or as many as `host_tools modes` takes.
-
-    Both modes unless one is given. Raises `InvalidQuantity` for one that fits no forward model; exits with code 1 when
-    a figure misses its bound.
-    """
-    from host_tools.scores.noise_free import PRESSES, noise_free_chapter
-    from host_tools.scores.posterior import SCENES, posterior_chapter
-
-    modes = _ramp_modes(mode)
-    trained, tables = read_ramp_model(model), ProbeTables.load(table)
-    chapters: dict[str, Callable[[], Chapter]] = {}
-    if noise_free:
-        presses = PRESSES if scenes is None else scenes
-        chapters["noise-free"] = lambda: noise_free_chapter(trained.answers, tables, presses=presses, seed=seed)
-    if posterior:
-        count = SCENES if scenes is None else scenes
-        chapters["posterior"] = lambda: posterior_chapter(trained, modes=modes, scenes=count, seed=seed)
-    missed, out = 0, Console(width=160, highlight=False)
-    for timed in measure_chapters(chapters).values():
-        missed += print_chapter(timed)
-        out.print(timed.chapter.claim, markup=False)
-        for shown in timed.chapter.tables:
-            print_table(shown)
-    if missed:
-        raise typer.Exit(1)
-
-
-def _ramp_modes(mode: Mode | None) -> tuple[Mode, ...]:
-    if mode is None:
-        return RAMP_MODES
-    if mode not in RAMP_MODES:
-        raise InvalidQuantity("mode", mode, " or ".join(RAMP_MODES), "only they have a forward model to compare with")
-    return (mode,)
-
-
-if TYPE_CHECKING:
+    from host_tools.pages.page import Timed
     from host_tools.scores.score_recordings import LeastErrors, Sample
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
@@ -102,6 +53,8 @@ def evaluate(
     posterior: Annotated[
         bool, typer.Option("--posterior", help="Instead: errors over those of the reference posterior; minutes.")
     ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print every number as one JSON object.")] = False,
+    scheduler: Scheduler = None,
 ) -> None:
     """Score what the device answers: on recordings, or on random presses with every drift.
 
@@ -110,30 +63,97 @@ def evaluate(
 
     Example: host_tools evaluate --mode precise --scenes 50
     """
-    from host_tools.scores.score_recordings import print_score, score
-
-    out = Console(width=110, highlight=False)
     asked = mode_named(mode) if mode else None
-    if noise_free or posterior:
-        if recordings:
-            raise InvalidQuantity("recordings", len(recordings), "none", "leave out --noise-free and --posterior")
-        print_reference(
-            standard_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed
-        )
-        return
-    scenes = SCENES if scenes is None else scenes
-    certificate = read_calibration(table / _certificate(light))
-    if not recordings and asked in (None, "paper"):
-        _print_paper(read_paper_model(model), certificate, table, light, scenes, seed, out)
-        return
-    models = read_models(read_paper_model(model), quick_model, standard_model)
+    with workers(scheduler):
+        if noise_free or posterior:
+            if recordings:
+                raise InvalidQuantity("recordings", len(recordings), "none", "leave out --noise-free and --posterior")
+            chapters = _reference(
+                standard_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed
+            )
+            _show_reference(measure_chapters(chapters), as_json=as_json)
+            return
+        count = SCENES if scenes is None else scenes
+        if not recordings and asked in (None, "paper"):
+            _paper(model, table, light, count, seed, as_json=as_json)
+            return
+        samples = _named(recordings) if recordings or not asked else _random_presses(asked, table, count, seed)
+        _score((model, quick_model, standard_model), table / _certificate(light), asked, samples, as_json=as_json)
 
-    def answer(recording: Recording) -> Estimate:
-        return analysed(recording, models, certificate, asked)
 
-    samples = _named(recordings) if recordings or not asked else _random_presses(asked, table, scenes, seed)
+def _reference(
+    model: Path, table: Path, mode: Mode | None, *, noise_free: bool, posterior: bool, scenes: int | None, seed: int
+) -> dict[str, Callable[[], Chapter]]:
+    """Return the chapters that are asked for, on `scenes` presses or as many as `host_tools modes` takes.
+
+    Both modes unless one is given. Raises `InvalidQuantity` for one that fits no forward model.
+    """
+    from device.files.bundle_file import read_ramp_model
+    from device.simulation.virtual_probe import ProbeTables
+    from host_tools.scores.noise_free import PRESSES, noise_free_chapter
+    from host_tools.scores.posterior import SCENES, posterior_chapter
+
+    modes = _ramp_modes(mode)
+    trained, tables = read_ramp_model(model), ProbeTables.load(table)
+    chapters: dict[str, Callable[[], Chapter]] = {}
+    if noise_free:
+        presses = PRESSES if scenes is None else scenes
+        chapters["noise-free"] = lambda: noise_free_chapter(trained.answers, tables, presses=presses, seed=seed)
+    if posterior:
+        count = SCENES if scenes is None else scenes
+        chapters["posterior"] = lambda: posterior_chapter(trained, modes=modes, scenes=count, seed=seed)
+    return chapters
+
+
+def _ramp_modes(mode: Mode | None) -> tuple[Mode, ...]:
+    from device.measurement.ramp_modes.model import RAMP_MODES
+
+    if mode is None:
+        return RAMP_MODES
+    if mode not in RAMP_MODES:
+        raise InvalidQuantity("mode", mode, " or ".join(RAMP_MODES), "only they have a forward model to compare with")
+    return (mode,)
+
+
+def _show_reference(measured: dict[str, Timed], *, as_json: bool) -> None:
+    """Print chapters; exit with code 1 when a figure misses its bound."""
+    if as_json:
+        from host_tools.pages.page import chapter_record
+
+        print(json.dumps({"chapters": {name: chapter_record(timed) for name, timed in measured.items()}}))
+    else:
+        out = Console(width=160, highlight=False)
+        for timed in measured.values():
+            print_chapter(timed)
+            out.print(timed.chapter.claim, markup=False)
+            for shown in timed.chapter.tables:
+                print_table(shown)
+    if not all(timed.chapter.passed for timed in measured.values()):
+        raise typer.Exit(1)
+
+
+def _score(
+    bundles: tuple[Path, Path, Path], certificate: Path, mode: Mode | None, samples: Iterator[Sample], *, as_json: bool
+) -> None:
+    """Print the score of recordings by bundles of mode paper, quick and standard."""
+    from device.files.bundle_file import read_models, read_paper_model
+    from device.files.certificate_file import read_calibration
+    from device.measurement.mode_models import analysed
+    from host_tools.scores.score_recordings import print_score, score, score_record
+
+    paper, quick, standard = bundles
+    models, calibration = read_models(read_paper_model(paper), quick, standard), read_calibration(certificate)
     say = partial(note.print, markup=False, soft_wrap=True)
-    print_score(score(samples, answer, say, _bound_of(models)), out)
+    answer = partial(analysed, models=models, calibration=calibration, mode=mode)
+    scored = score(samples, answer, say, _bound_of(models))
+    if as_json:
+        print(json.dumps(score_record(scored)))
+    else:
+        print_score(scored, _screen())
+
+
+def _screen() -> Console:
+    return Console(width=110, highlight=False)
 
 
 def _bound_of(models: ModeModels) -> LeastErrors:
@@ -150,18 +170,35 @@ def _certificate(light: str) -> str:
     return CERTIFICATES[light]
 
 
-def _print_paper(
-    bundle: ModelBundle, certificate: Calibration, table: Path, light: str, scenes: int, seed: int, out: Console
-) -> None:
-    from host_tools.scores.paper_scores import Rig, print_intervals, print_phantoms
+def _paper(model: Path, table: Path, light: str, scenes: int, seed: int, *, as_json: bool) -> None:
+    """Print the scores of mode paper: its nine phantoms, and random scenes unless there are to be none."""
+    from device.files.bundle_file import read_paper_model
+    from device.files.certificate_file import read_calibration
+    from device.simulation.scenario import Scenario
+    from device.simulation.virtual_probe import ProbeTables
+    from host_tools.scores.paper_scores import (
+        Rig,
+        paper_record,
+        phantom_errors,
+        print_intervals,
+        print_phantoms,
+        random_intervals,
+    )
 
-    rig = Rig(bundle, certificate, ProbeTables.load(table), Scenario(light=light))
-    print_phantoms(rig, phantoms_of(bundle), seed=seed, out=out)
-    if scenes:
-        print_intervals(rig, scenes=scenes, seed=seed, out=out)
+    certificate = read_calibration(table / _certificate(light))
+    rig = Rig(read_paper_model(model), certificate, ProbeTables.load(table), Scenario(light=light))
+    errors = phantom_errors(rig, phantoms_of(rig.bundle), seed=seed)
+    intervals = random_intervals(rig, scenes=scenes, seed=seed) if scenes else None
+    if as_json:
+        print(json.dumps(paper_record(errors, intervals)))
+        return
+    print_phantoms(errors, _screen())
+    if intervals:
+        print_intervals(intervals, _screen())
 
 
 def _named(paths: list[Path] | None) -> Iterator[Sample]:
+    from device.files.recording_file import read_recording
     from host_tools.scores.score_recordings import Sample
 
     return (Sample(str(path), partial(read_recording, path)) for path in paths or [])
@@ -169,8 +206,11 @@ def _named(paths: list[Path] | None) -> Iterator[Sample]:
 
 def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[Sample]:
     """Yield presses over the trained ranges that no training has seen, with every drift."""
+    import numpy as np
+
     from device.measurement.parameters import PARAMETERS
     from device.measurement.ramp_modes.noise import ErrorLevels
+    from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.press_samples import draw_parameters
     from host_tools.press_models.recorded_presses import recorded_press
     from host_tools.press_models.seeds import press_seed

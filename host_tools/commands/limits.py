@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, PROTOCOLS
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from host_tools.commands.measured_chapters import shown
-from host_tools.commands.output import note, progress, require_writable
+from host_tools.commands.output import Scheduler, note, progress, require_writable
+from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from host_tools.cramer_rao.bounds import Limits
@@ -33,11 +33,13 @@ def limits(
     out: Annotated[
         Path | None, typer.Option(help="With --map: Markdown file; results and figure go beside it.")
     ] = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Print the Cramer-Rao bound: the least error of size, depth and modulus that any method can have."""
     given = (size_mm, depth_mm, modulus_kpa)
     if whole_map:
-        _write_map(out, [scene, *given])
+        with workers(scheduler):
+            _write_map(out, [scene, *given])
         return
     if out is not None:
         raise InvalidQuantity("out", out, "given with --map", "add --map, or print with --json")
@@ -121,8 +123,11 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     if out is None or any(value is not None for value in given):
         raise InvalidQuantity("map", "asked for", "asked for with --out and no scene", "add --out docs/accuracy.md")
     require_writable(out, (".md",))
+    from joblib import Parallel, delayed
+
+    from device.files.bundle_file import read_ramp_model
     from host_tools.cramer_rao.accuracy_figure import draw_map
-    from host_tools.cramer_rao.accuracy_map import inclusions, mapped_scene
+    from host_tools.cramer_rao.accuracy_map import MODULI_KPA, inclusions, mapped_scene
     from host_tools.cramer_rao.accuracy_page import FIGURE, accuracy_facts
     from host_tools.cramer_rao.press_bound import beside_over_axis
     from host_tools.pages.page import FIGURES, Results, write_page
@@ -131,8 +136,10 @@ def _write_map(out: Path | None, given: list[object]) -> None:
     chosen, mapped = inclusions(), []
     with progress("scenes") as bar:
         task = bar.add_task("", total=len(chosen))
-        for inclusion in chosen:
-            mapped.append(mapped_scene(inclusion))
+        # A batch shares the solve of its baseline.
+        solving = Parallel(n_jobs=-1, return_as="generator", batch_size=len(MODULI_KPA))
+        for solved in solving(delayed(mapped_scene)(inclusion) for inclusion in chosen):
+            mapped.append(solved)
             bar.advance(task)
     figures = out.parent / FIGURES
     figures.mkdir(exist_ok=True)

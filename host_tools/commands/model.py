@@ -8,17 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from device.files.bundle_file import read_paper_model
-from device.files.recording_file import write_recording
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.bundle import ModelBundle
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from device.simulation.physics.pressed_face import ProbePlacement
-from device.simulation.scenario import Scenario, read_scenario
-from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.output import note, own_models, progress
+from host_tools.commands.output import Scheduler, note, own_models, progress
+from host_tools.workers import workers
 
 if TYPE_CHECKING:
+    from device.measurement.bundle import ModelBundle
     from host_tools.calibration.phantom_sets import Phantom
 
 WIDE = Path("build/wide_table")
@@ -30,12 +26,14 @@ def table(
         typer.Option(help="Folder of the tables: models/simulated_probe, or build/wide_table of part wide."),
     ] = None,
     part: Annotated[str, typer.Option(help="centred, off-axis or all, which are both; or wide.")] = "all",
+    scheduler: Scheduler = None,
 ) -> None:
     """Build the virtual probe's tables of the pressed face: force ramps of centred inclusions, and inclusions off the
     axis.
 
-    The first hold tissue of 4-6.25 kPa and 27-36 mm, the second is carried over to it. Half an hour on two cores.
-    Part wide, another half an hour, is of inclusions around the trained ranges: `train --mode standard` needs it.
+    The first hold tissue of 4-6.25 kPa and 27-36 mm, the second is carried over to it. A quarter of an hour on two
+    cores.
+    Part wide, some ten minutes, is of inclusions around the trained ranges: `train --mode standard` needs it.
     """
     from host_tools.probe_tables.off_axis_table import build_off_axis_table, write_off_axis_table
     from host_tools.probe_tables.out_of_range_table import build_wide_table
@@ -44,7 +42,7 @@ def table(
     if part not in ("centred", "off-axis", "all", "wide"):
         raise InvalidQuantity("part", part, "centred, off-axis, all or wide", "name one of them")
     out = out or (WIDE if part == "wide" else own_models("simulated_probe"))
-    with progress("solves") as bar:
+    with workers(scheduler), progress("solves") as bar:
         task = bar.add_task("")
 
         def on_point(done: int, n: int) -> None:
@@ -73,6 +71,10 @@ def phantom(
 
     Example: host_tools phantom --set random --scenes 5 --force-n 0.2 --force-n 0.4 --out build/random
     """
+    from device.files.recording_file import write_recording
+    from device.simulation.physics.pressed_face import ProbePlacement
+    from device.simulation.scenario import Scenario, read_scenario
+    from device.simulation.virtual_probe import ProbeTables
     from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 
     made_of = read_scenario(scenario) if scenario else Scenario()
@@ -88,6 +90,7 @@ def phantom(
 
 
 def _phantom_set(which: str, model: Path, scenes: int, seed: int) -> Iterator[Phantom]:
+    from device.files.bundle_file import read_paper_model
     from host_tools.calibration.phantom_sets import Phantom, breast_imager, random_set
 
     require("scenes", scenes, Bound(1, 100_000, "phantoms"), "record at least one")

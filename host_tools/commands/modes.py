@@ -8,15 +8,11 @@ from typing import Annotated
 
 import typer
 
-from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
-from device.files.certificate_file import read_calibration
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RAMP_MODES
-from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
-from host_tools.commands.output import note, require_writable
+from host_tools.commands.output import Scheduler, note, require_writable
+from host_tools.workers import workers
 
 
 def modes(
@@ -26,11 +22,17 @@ def modes(
     model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
     only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Measure error, time, coverage and refusals of the modes against bounds; about an hour on two cores.
 
     Exit code 1 when a figure misses its bound: the page says by how much.
     """
+    from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
+    from device.files.certificate_file import read_calibration
+    from device.measurement.mode_models import ModeModels
+    from device.measurement.ramp_modes.model import RAMP_MODES
+    from device.simulation.virtual_probe import ProbeTables
     from host_tools.pages.page import Results, write_page
     from host_tools.press_models.seeds import derived_seed
     from host_tools.scores.breast_imager import breast_imager_chapter
@@ -63,7 +65,8 @@ def modes(
         "just-outside": lambda: just_outside_chapter(trained, calibration, tables),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip
-    measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})
+    with workers(scheduler):
+        measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})
     missed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         chosen = "".join(f" --only {name}" for name in only or [])

@@ -1,15 +1,21 @@
-"""What the verbs share: messages on the error stream, progress bars, files that are refused before work begins."""
+"""What the verbs share: messages on the error stream, progress bars, the option of a cluster, refusals of files."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
+import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from device.files.shipped import MODELS, SOURCE_TREE
 from device.measurement.quantities import InvalidQuantity
 
+Scheduler = Annotated[
+    str | None,
+    typer.Option(help="Dask cluster to compute on, tcp://HOST:PORT; a worker uses one thread."),
+]
 note = Console(stderr=True, highlight=False)
 
 

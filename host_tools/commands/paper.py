@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from device.files.shipped import SIMULATED_PROBE, SOURCE_TREE
-from device.simulation.virtual_probe import ProbeTables
 from host_tools.commands.measured_chapters import print_table, shown
-from host_tools.commands.output import note, note_left_out, progress, require_writable
+from host_tools.commands.output import Scheduler, note, note_left_out, progress, require_writable
+from host_tools.workers import workers
 
 DEFAULT_DATA = (SOURCE_TREE or Path()) / "build" / "sweep.nc"
 DEFAULT_SEEDS = 100
@@ -21,12 +21,14 @@ def paper(
     data: Annotated[Path, typer.Option(help="Data set of `host_tools sweep`.")] = DEFAULT_DATA,
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
     seeds: Annotated[int, typer.Option(help="Trials of each network; the page is meant for 100.")] = DEFAULT_SEEDS,
+    scheduler: Scheduler = None,
 ) -> None:
     """Repeat the paper's protocol, take its assumptions away, and set two algorithms side by side.
 
     Some five minutes on one core for 100 seeds.
     """
     require_writable(out, (".md",))
+    from device.simulation.virtual_probe import ProbeTables
     from host_tools.data.dataset import require_enough, training_rows
     from host_tools.replication.page import paper_facts, paper_tables
     from host_tools.replication.study import PaperStudy
@@ -36,7 +38,7 @@ def paper(
     require_enough(rows, data)
     study = PaperStudy(rows, ProbeTables.load(table), seeds=seeds)
     parts, tables = paper_tables(study), {}
-    with progress("tables") as bar:
+    with workers(scheduler), progress("tables") as bar:
         task = bar.add_task("", total=len(parts))
         for name, compute in parts.items():
             tables[name] = compute()

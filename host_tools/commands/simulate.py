@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import cv2
 import typer
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
@@ -144,6 +143,8 @@ def _plot(solution: Solution, path: Path) -> None:
 
 def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int) -> None:
     """Write the frame that the camera would take of the deformed face."""
+    import cv2
+
     from host_tools.optics.frame import simulated_frame
 
     cv2.imwrite(str(path), simulated_frame(solution, exposure_us=exposure_us, seed=seed))

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from host_tools.commands.output import note, progress
+from host_tools.commands.output import Scheduler, note, progress
 
 SweepStrain = Literal["small", "finite"]
 
@@ -21,10 +21,7 @@ def sweep(
     ] = None,
     strain: Annotated[SweepStrain, typer.Option(help="small (linear) or finite.")] = "small",
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Dask cluster to solve on, tcp://HOST:PORT; a worker uses one thread."),
-    ] = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Solve random scenes of the paper's box on all cores or a cluster; interrupted, the same command goes on."""
     from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan

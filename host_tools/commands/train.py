@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from device import __version__
-from device.files.bundle_file import read_paper_model, read_quick_model, read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.bundle import ModelBundle
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from host_tools.commands.output import note, note_left_out, own_models, progress
+from host_tools.commands.output import Scheduler, note, note_left_out, own_models, progress
+from host_tools.workers import workers
+
+if TYPE_CHECKING:
+    from device.measurement.bundle import ModelBundle
 
 CERTIFICATE = "calibration.json"
 SWEPT = Path("build/sweep.nc")
@@ -37,6 +39,7 @@ def train(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Of standard: a tenth of the presses, to try the chain, not to use.")
     ] = False,
+    scheduler: Scheduler = None,
 ) -> None:
     """Train a model and export its bundle.
 
@@ -50,12 +53,15 @@ def train(
             raise InvalidQuantity("option", option, f"one of mode {mode}", "leave it out")
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models(mode)
-    if mode == "paper":
-        _paper(data or _swept(), folder, TRIALS if trials is None else trials, seed, command)
-    elif mode == "standard":
-        _standard(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
-    else:
-        _quick(table or SIMULATED_PROBE, folder, seed, command)
+    if mode == "paper" and data is None:
+        data = _swept(scheduler)
+    with workers(scheduler):
+        if data is not None:
+            _paper(data, folder, TRIALS if trials is None else trials, seed, command)
+        elif mode == "standard":
+            _standard(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
+        else:
+            _quick(table or SIMULATED_PROBE, folder, seed, command)
 
 
 def _command(options: Mapping[str, object]) -> str:
@@ -64,13 +70,13 @@ def _command(options: Mapping[str, object]) -> str:
     return " ".join(["host_tools train", *words])
 
 
-def _swept() -> Path:
+def _swept(scheduler: str | None) -> Path:
     """Return the paper's data set, swept anew when it is not there."""
     from host_tools.commands.sweep import sweep
 
     if not SWEPT.exists():
         note.print(f"{SWEPT} is missing: sweeping {PAPER_SCENES} scenes.")
-        sweep(out=SWEPT, scenes=PAPER_SCENES, seed=1)
+        sweep(out=SWEPT, scenes=PAPER_SCENES, seed=1, scheduler=scheduler)
     return SWEPT
 
 
@@ -86,6 +92,7 @@ def _wide() -> Path:
 
 
 def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
+    from device.files.bundle_file import read_paper_model
     from host_tools.data.dataset import require_enough, training_rows
     from host_tools.paper_network.export import export
     from host_tools.paper_network.train import require_trials
@@ -110,6 +117,7 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
 
 
 def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: bool, command: str) -> None:
+    from device.files.bundle_file import read_ramp_model
     from device.files.certificate_file import read_calibration
     from device.measurement.ramp_modes.estimate import estimate_ramp
     from device.measurement.ramp_modes.model import RAMP_MODES
@@ -139,6 +147,7 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
 
 
 def _quick(table: Path, out: Path, seed: int, command: str) -> None:
+    from device.files.bundle_file import read_quick_model, read_ramp_model
     from device.files.certificate_file import read_calibration
     from device.measurement.quick_mode.model import estimate_quick
     from device.simulation.scenario import SERIALS

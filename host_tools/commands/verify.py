@@ -11,7 +11,8 @@ import typer
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
-from host_tools.commands.output import note, require_writable, source_tree
+from host_tools.commands.output import Scheduler, note, require_writable, source_tree
+from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from host_tools.pages.benchmark import Chapter
@@ -24,14 +25,16 @@ def verify(
     extremes: Annotated[bool, typer.Option(help="Add scenes at the ends of every range.")] = False,
     effectivity: Annotated[bool, typer.Option(help="Add how often stated errors hold the true ones.")] = False,
     tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
+    scheduler: Scheduler = None,
 ) -> None:
     """Check the forward model against answers known on paper; exit code 1 when one misses its bound."""
     require_writable(out, (".md",))
     extra = [name for name, wanted in (("extremes", extremes), ("effectivity", effectivity)) if wanted]
     chapters = _chapters(only or [], extra, short=short)
-    if tables:
-        _measure_tables()
-    measured = measure_chapters(chapters)
+    with workers(scheduler):
+        if tables:
+            _measure_tables()
+        measured = measure_chapters(chapters)
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         from host_tools.pages.page import Results, write_page

@@ -7,7 +7,6 @@ a case is given up only after it has killed workers while it was alone in the cl
 
 from __future__ import annotations
 
-import asyncio
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -21,6 +20,7 @@ from joblib import Parallel, delayed
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Row
 from host_tools.data.rows import Truth, empty_row
+from host_tools.workers import connected
 
 if TYPE_CHECKING:
     from distributed import Client, Future, KilledWorker
@@ -29,7 +29,6 @@ Case = tuple[int, Truth]
 """Index of a scene in its sweep, and its truth [3]."""
 Solve = Callable[[int, Truth], Row]
 
-REACHED_WITHIN_S = 3.0
 CASES_UNDER_WAY = 256
 """Two for each of a hundred workers; a million cases at once would fill the scheduler."""
 _SOLVING = Lock()
@@ -68,30 +67,8 @@ def _on_cluster(address: str) -> Iterator[Executor]:
 
     More threads than one (`dask worker --nthreads`) are therefore idle: start a worker for each core.
     """
-    _require_scheduler(address)
-    from distributed import Client
-
-    client = Client(address, timeout=REACHED_WITHIN_S, set_as_default=False)  # type: ignore[no-untyped-call]
-    with client:
+    with connected(address) as client:
         yield partial(solve_on_cluster, client)
-
-
-def _require_scheduler(address: str) -> None:
-    """Refuse an address where nothing speaks Dask's protocol: the client itself would wait there for ever."""
-    from distributed.comm.core import connect
-
-    async def shake_hands() -> None:
-        comm = await connect(address, timeout=REACHED_WITHIN_S)  # type: ignore[no-untyped-call]
-        await comm.close()
-
-    action = "start one with `dask scheduler`, or give its address"
-    refusal = InvalidQuantity("scheduler", address, "tcp://host:port of a running Dask scheduler", action)
-    if not address.startswith("tcp://"):
-        raise refusal
-    try:
-        asyncio.run(asyncio.wait_for(shake_hands(), 2 * REACHED_WITHIN_S))
-    except (OSError, ValueError, TimeoutError) as error:
-        raise refusal from error
 
 
 def solve_on_cluster(

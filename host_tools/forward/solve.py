@@ -17,6 +17,7 @@ from dataclasses import replace
 
 from ngsolve import SetNumThreads, ngsglobals
 
+from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.plan import ModelPlan, aligned, model_plan
 from host_tools.forward.solution import Solution
@@ -41,23 +42,48 @@ def solve_ramp(
     In small strain one solve serves all; in finite strain one load path does. Raise `PressFailed` when a press is
     beyond what the model can reach.
     """
+    return solve_ramps([scene], presses, plan, estimate_error=estimate_error)[0]
+
+
+def solve_ramps(
+    scenes: Sequence[Scene], presses: Sequence[Press], plan: ModelPlan | None = None, *, estimate_error: bool = False
+) -> tuple[tuple[Solution, ...], ...]:
+    """Solve scenes that differ in nothing but the modulus of the inclusion: on one mesh, beside one baseline.
+
+    Each as `solve_ramp`, whose plan for the first one serves all. Raise `InvalidQuantity` for other differences.
+    """
+    scene = scenes[0]
+    if any(_but_for_modulus(one, scene) != scene for one in scenes):
+        raise InvalidQuantity("scenes", len(scenes), "alike but for the inclusion's modulus", "solve them one by one")
     plan = plan or model_plan(scene.with_press(presses[-1]))
     turned, angle_rad = aligned(scene)
     meshed = build(turned, plan)
     inclusion_free = meshed.model.press(baseline(turned), presses, estimate_error=estimate_error)
-    pressed = inclusion_free
-    if turned.has_inclusion:
-        pressed = meshed.model.press(with_inclusion(turned), presses, estimate_error=estimate_error)
     rays = replace(meshed.rays, angle_rad=meshed.rays.angle_rad + angle_rad)
-    return tuple(
-        Solution(
-            rays,
-            one.state,
-            without.state,
-            plan,
-            meshed.elements,
-            stated_error(plan, meshed.rays, one, without),
-            scene.with_press(press),
+
+    def solutions(one: Scene) -> tuple[Solution, ...]:
+        pressed = inclusion_free
+        if one.has_inclusion:
+            materials = with_inclusion(aligned(one)[0])
+            pressed = meshed.model.press(materials, presses, estimate_error=estimate_error)
+        return tuple(
+            Solution(
+                rays,
+                found.state,
+                without.state,
+                plan,
+                meshed.elements,
+                stated_error(plan, meshed.rays, found, without),
+                one.with_press(press),
+            )
+            for press, found, without in zip(presses, pressed, inclusion_free, strict=True)
         )
-        for press, one, without in zip(presses, pressed, inclusion_free, strict=True)
-    )
+
+    return tuple(solutions(one) for one in scenes)
+
+
+def _but_for_modulus(scene: Scene, other: Scene) -> Scene:
+    if scene.inclusion is None or other.inclusion is None:
+        return scene
+    modulus_kpa = other.inclusion.youngs_modulus_kpa
+    return replace(scene, inclusion=replace(scene.inclusion, youngs_modulus_kpa=modulus_kpa))

@@ -66,7 +66,7 @@ class Results:
             "date": self.date,
             "facts": dict(self.facts),
             "tables": {name: _table_record(table) for name, table in self.tables.items()},
-            "chapters": {name: _chapter_record(timed) for name, timed in self.chapters.items()},
+            "chapters": {name: chapter_record(timed) for name, timed in self.chapters.items()},
         }
 
 
@@ -157,7 +157,8 @@ def _share(benchmark: Benchmark) -> float:
     return 0.0 if benchmark.passed else float("inf")
 
 
-def _chapter_record(timed: Timed) -> dict[str, Any]:
+def chapter_record(timed: Timed) -> dict[str, Any]:
+    """Return a chapter as JSON."""
     chapter = timed.chapter
     return {
         "title": chapter.title,

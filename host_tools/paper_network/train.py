@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
@@ -31,6 +31,7 @@ from host_tools.paper_network.network import (
     loss_and_gradient,
 )
 from host_tools.paper_network.scaled_conjugate_gradient import Minimum, Stop
+from host_tools.workers import one_core_each
 
 MIN_TRAINING_ROWS = 60
 HELD_OUT_RATIO = 0.2
@@ -96,7 +97,7 @@ def train(
     scaling = Scaling.fit(features)
     inputs, targets = scaling.inputs(features), scaling.targets(truth)
     parameters = np.empty((trials, PARAMETER_COUNT))
-    with parallel_config(backend="loky", inner_max_num_threads=1):
+    with one_core_each():
         running = Parallel(n_jobs=jobs, return_as="generator")(
             delayed(train_one)(inputs, targets, np.random.default_rng([seed, trial])) for trial in range(trials)
         )

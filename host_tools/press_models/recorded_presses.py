@@ -38,6 +38,7 @@ from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_re
 from host_tools.press_models.seeds import press_seed
 
 ReadValue = TypeVar("ReadValue")
+SMALLEST_BATCH, BATCHES = 4, 128
 HELD_STRAY_N = 0.0125
 """Frames of a hold may lie within 5 % of 0.5 N (`press.band_ratio`): spread over that band, twice this each way."""
 EXACT = ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
@@ -122,9 +123,13 @@ def scenario_of(parameters: Array, neighbour: Neighbour | None = None, wet_ratio
 
 
 def in_parallel(work: Callable[[int], ReadValue], count: int, jobs: int) -> list[ReadValue]:
-    """Return the results of `work` on 0 to `count` - 1, one thread a process."""
+    """Return the results of `work` on 0 to `count` - 1, one thread a process.
+
+    What `work` holds, often tables and models, goes along with every batch: so batches grow with the count.
+    """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    return list(Parallel(n_jobs=jobs, batch_size=4)(delayed(work)(number) for number in range(count)))
+    batch = max(SMALLEST_BATCH, count // BATCHES)
+    return list(Parallel(n_jobs=jobs, batch_size=batch)(delayed(work)(number) for number in range(count)))
 
 
 def drifted(recording: Recording, rng: np.random.Generator, levels: ErrorLevels) -> Recording:

@@ -15,12 +15,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
+from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array, Single
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, initial_layers, loss_and_gradient, predict
 from host_tools.press_models.noisy_presses import Presses
+from host_tools.workers import one_core_each
 
 DECAY_MEAN, DECAY_SQUARE, TINY = 0.9, 0.999, np.float32(1e-8)
 BATCH, RATE = 1024, 3e-3
@@ -111,7 +112,7 @@ def train_members(
     some = training_set.noisy(rng.integers(len(training_set.rows), size=min(SCALED_ON, len(training_set.rows))), rng)
     typical = training_set.typical_noise()[columns, columns]
     scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical)
-    with parallel_config(backend="loky", inner_max_num_threads=1):
+    with one_core_each():
         trained = Parallel(n_jobs=jobs)(
             delayed(_member)(training_set, task, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
             for member in range(members)

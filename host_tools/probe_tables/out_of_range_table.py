@@ -31,7 +31,8 @@ from device.simulation.physics.surface_table import Ramp, SurfaceTable
 from device.simulation.physics.table_file import load_table, save_table
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.probe_tables.off_axis_table import OFFSETS_MM, inclusions_per_n_mm3
-from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES, lump_per_n_mm3, scene_in
+from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES, scene_in
+from host_tools.probe_tables.surface_table import inclusions_per_n_mm3 as centred_per_n_mm3
 from host_tools.scenes.scene import Press, Scene
 
 NAME, SCHEMA = "wide_table", "tsis.wide_table/1"
@@ -190,23 +191,24 @@ def build_wide_table(
     """Solve every point of the table (half an hour on two cores); `on_point` hears done and total."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     centred, aside = axes(points, SIZES_MM[0]), axes(aside_points, SMALLEST_ASIDE_MM)
-    work = [delayed(_centred)(*place) for place in product(*centred)]
+    work = [delayed(_centred)(*place, centred.elastic_mismatch) for place in product(*centred[:2])]
     work += [delayed(_aside)(*place, aside.elastic_mismatch) for place in product(*aside[:2])]
     fields = []
     for field in Parallel(n_jobs=jobs, return_as="generator")(work):
         fields.append(field)
         on_point(len(fields), len(work))
-    first, second = np.array(fields[: np.prod(points)]), np.array(fields[np.prod(points) :])
+    places = int(np.prod(points[:2]))
+    first, second = np.array(fields[:places]), np.array(fields[places:])
     return WideTable(
-        np.moveaxis(first.reshape(*points, *first.shape[1:]), 3, 0),
+        np.moveaxis(first.reshape(*points, *first.shape[2:]), 3, 0),
         np.moveaxis(second.reshape(*aside_points, *second.shape[2:]), 3, 0),
     )
 
 
-def _centred(size_mm: float, share: float, mismatch: float) -> Array:
-    """Return what an inclusion adds [2, F, R] over force, strength and mismatch."""
+def _centred(size_mm: float, share: float, mismatches: Array) -> Array:
+    """Return what an inclusion adds at all mismatches [M, 2, F, R] over force, strength and mismatch."""
     place = float(size_mm), depth_at(size_mm, share)
-    return lump_per_n_mm3(scene_in, NOMINAL, *place, float(mismatch)) * _volume_over_strength(*place)
+    return centred_per_n_mm3(scene_in, NOMINAL, *place, mismatches) * _volume_over_strength(*place)
 
 
 def _aside(size_mm: float, share: float, mismatches: Array) -> Array:

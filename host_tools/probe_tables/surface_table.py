@@ -28,7 +28,7 @@ from device.simulation.physics.surface_table import COARSE, PressRamps, Ramp, Su
 from host_tools.forward.accuracy import Level
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solution import Solution
-from host_tools.forward.solve import solve_ramp
+from host_tools.forward.solve import solve_ramps
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Tissue, TissueLayer
 
 POINTS = (7, 7, 3)
@@ -55,11 +55,18 @@ BASELINE = Level("blunt_fine", 3)
 
 def ramp(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Solution, ...]:
     """Return the scene's solutions at ascending forces, in finite strain with true sliding."""
+    return _ramps([scene], forces_n, level)[0]
+
+
+def _ramps(
+    scenes: Sequence[Scene], forces_n: Array = FORCES_N, level: Level | None = None
+) -> tuple[tuple[Solution, ...], ...]:
+    """Return the ramps of scenes that differ in the modulus of the inclusion alone."""
     presses = [Press(force_n=float(force)) for force in forces_n]
-    plan = model_plan(scene.with_press(presses[-1]), strain="finite")
+    plan = model_plan(scenes[0].with_press(presses[-1]), strain="finite")
     if level:
         plan = replace(plan, grading=level.grading, order=level.order)
-    return solve_ramp(scene, presses, plan)
+    return solve_ramps(scenes, presses, plan)
 
 
 def fields(solution: Solution) -> tuple[Array, Array]:
@@ -79,16 +86,16 @@ def ring_means(r_mm: Array, p_kpa: Array) -> Array:
     return np.asarray((np.interp(outer, r_mm, force) - np.interp(inner, r_mm, force)) * 2 / (outer**2 - inner**2))
 
 
-def _ramps_per_n(scene: Scene, forces_n: Array = FORCES_N, level: Level | None = None) -> tuple[Array, Array]:
-    """Return both kinds of fields over the force, each [2, F, R]."""
-    baseline, inclusion_field = zip(*(fields(solution) for solution in ramp(scene, forces_n, level)), strict=True)
+def _per_n(solutions: Sequence[Solution], forces_n: Array = FORCES_N) -> tuple[Array, Array]:
+    """Return both kinds of fields of a ramp over the force, each [2, F, R]."""
+    baseline, inclusion_field = zip(*(fields(solution) for solution in solutions), strict=True)
     over = forces_n[None, :, None]
     return np.stack(baseline, axis=1) / over, np.stack(inclusion_field, axis=1) / over
 
 
 def press_ramps(scene: Scene) -> PressRamps:
     """Return the ramps of one scene, solved for it alone: for what the table does not hold."""
-    baseline, inclusion_field = _ramps_per_n(scene)
+    baseline, inclusion_field = _per_n(ramp(scene))
     r_mm = np.linspace(0.0, scene.waveguide.radius_mm, baseline.shape[-1])
     return PressRamps(r_mm, Ramp(FORCES_N, baseline), Ramp(FORCES_N, inclusion_field))
 
@@ -134,13 +141,22 @@ SceneOf = Callable[[Slab, Inclusion | None], Scene]
 
 
 def _baseline_per_n(scene_of: SceneOf, slab: Slab) -> Array:
-    return _ramps_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, BASELINE)[0]
+    forces_n = FORCES_N * slab.stiffness_ratio
+    return _per_n(ramp(scene_of(slab, None), forces_n, BASELINE), forces_n)[0]
 
 
-def lump_per_n_mm3(scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, mismatch: float) -> Array:
-    """Return what an inclusion adds [2, F, R] over force, size cubed and mismatch, at forces that indent alike."""
-    scene = scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(mismatch)))
-    return _ramps_per_n(scene, FORCES_N * slab.stiffness_ratio)[1] / size_mm**3 / mismatch
+def inclusions_per_n_mm3(
+    scene_of: SceneOf, slab: Slab, size_mm: float, depth_mm: float, mismatches: Sequence[float] | Array
+) -> Array:
+    """Return what an inclusion adds at all mismatches [M, 2, F, R], over force, size cubed and mismatch.
+
+    At forces that indent alike in every slab; one mesh and one baseline serve all mismatches.
+    """
+    forces_n = FORCES_N * slab.stiffness_ratio
+    scenes = [scene_of(slab, Inclusion(size_mm, depth_mm, slab.modulus_kpa(float(one)))) for one in mismatches]
+    ramps = _ramps(scenes, forces_n)
+    found = [_per_n(of_one, forces_n)[1] / one for of_one, one in zip(ramps, mismatches, strict=True)]
+    return np.array(found) / size_mm**3
 
 
 def inclusion_axes(points: tuple[int, int, int], smallest_size_mm: float) -> InclusionAxes:
@@ -159,16 +175,19 @@ def build_surface_table(
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> SurfaceTable:
-    """Solve every point of the table (about half an hour on two cores); `on_point` hears done and total."""
+    """Solve every point of the table (about five minutes on two cores); `on_point` hears done and total."""
     axes = inclusion_axes(points, SMALLEST_SIZE_MM)
-    places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid)]
+    mismatches = axes.elastic_mismatch
+    places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid[:2])]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     baseline = Parallel(n_jobs=jobs)(delayed(_baseline_per_n)(*one) for one in SOLVED)
-    solving = Parallel(n_jobs=jobs, return_as="generator")(delayed(lump_per_n_mm3)(*place) for place in places)
-    inclusion_field = []
-    for field in solving:
-        inclusion_field.append(field)
-        on_point(len(inclusion_field), len(places))
+    solving = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(inclusions_per_n_mm3)(*place, mismatches) for place in places
+    )
+    inclusion_field: list[Array] = []
+    for done, of_place in enumerate(solving, start=1):
+        inclusion_field += list(of_place)
+        on_point(done, len(places))
     return assembled(axes, baseline, inclusion_field)
 
 

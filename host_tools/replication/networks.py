@@ -13,12 +13,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from host_tools.paper_network.network import MEAN_SQUARE, MISFIT, Loss, Scaling, forward
 from host_tools.paper_network.train import SCG, Method, Trial, run_trial
+from host_tools.workers import one_core_each
 
+WORTH_SHARING = 20
+"""Trials from which other processes, which take seconds to start, are worth it."""
 Inputs = Callable[[Array], Array]
 """Features [n, 3] in mm, mm3, mm2 to network inputs [n, 3]."""
 
@@ -84,7 +88,11 @@ class Networks:
 
     def __init__(self, scenes: Scenes, recipe: Recipe, *, trials: int, seed: int = 1) -> None:
         self.problem = TrainingProblem(scenes, recipe)
-        self.parameters = np.array([self.problem.trial(seed, number).parameters for number in range(trials)])
+        with one_core_each():
+            found = Parallel(n_jobs=-1 if trials >= WORTH_SHARING else 1)(
+                delayed(self.problem.trial)(seed, number) for number in range(trials)
+            )
+        self.parameters = np.array([trial.parameters for trial in found])
 
     def answers(self, features: Array) -> Array:
         """Return every network's answer [trials, n, 3] to features [n, 3]."""

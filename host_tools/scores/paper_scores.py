@@ -6,10 +6,12 @@ regressions and averaging. The intervals are counted on scenes that neither netw
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -28,6 +30,8 @@ from host_tools.forward.solve import solve
 from host_tools.paper_network.evaluate import ErrorTable, render
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene
 
+NOISE_FREE = "noise-free finite-element features"
+THROUGH_CAMERA = "through the simulated camera, each with the regressions of the other eight"
 SCORED_LOW = (2.0, PAPER_BOX_LOW[1], PAPER_BOX_LOW[2])
 """Below 2 mm the inclusion's contrast drowns in the camera's noise and a relative error of the size means nothing."""
 
@@ -64,15 +68,21 @@ def values(estimates: Sequence[Estimate], part: str = "value") -> Array:
     return np.array([[np.nan if value is None else value for value in row] for row in rows])
 
 
-def print_phantoms(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int, out: Console) -> None:
-    """Print the errors on the model's phantoms, noise-free and through the camera, beside the paper's."""
+def phantom_errors(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) -> dict[str, ErrorTable]:
+    """Return the errors on the model's phantoms, by how they are seen."""
     truth = np.array([phantom.as_tuple() for phantom in phantoms])
-    out.print("\n[bold]Nine phantoms, noise-free finite-element features[/bold]")
-    out.print(render(ErrorTable(truth, np.array([rig.noise_free(phantom) for phantom in phantoms]))))
-    out.print(
-        "\n[bold]Nine phantoms, through the simulated camera, each with the regressions of the other eight[/bold]"
-    )
-    out.print(render(ErrorTable(truth, left_out_estimates(rig, phantoms, seed=seed))))
+    exact = np.array([rig.noise_free(phantom) for phantom in phantoms])
+    return {
+        NOISE_FREE: ErrorTable(truth, exact),
+        THROUGH_CAMERA: ErrorTable(truth, left_out_estimates(rig, phantoms, seed=seed)),
+    }
+
+
+def print_phantoms(errors: Mapping[str, ErrorTable], out: Console) -> None:
+    """Print the errors on the model's phantoms beside the paper's."""
+    for seen, table in errors.items():
+        out.print(f"\n[bold]Nine phantoms, {seen}[/bold]")
+        out.print(render(table))
 
 
 def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) -> Array:
@@ -96,26 +106,77 @@ def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) ->
     return np.array(estimates)
 
 
-def print_intervals(rig: Rig, *, scenes: int, seed: int, out: Console) -> None:
-    """Print, for random scenes through the camera, errors, coverage and width of the 90 % intervals."""
+@dataclass(frozen=True)
+class Intervals:
+    """Random scenes through the camera: truths [n, 3], and whether each is answered [n].
+
+    Of each unknown [n, 3]: whether the truth is inside the interval, whether it is called identifiable, and the
+    relative error.
+    """
+
+    truth: Array
+    answered: NDArray[np.bool_]
+    inside: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+    error_ratio: Array
+
+    def ratios(self) -> dict[str, Sequence[float]]:
+        """Return what is said of the scenes, for each unknown."""
+        error, known = self.error_ratio, self.known
+        guess = np.abs(self.truth.mean(axis=0) - self.truth) / self.truth
+        return {
+            "truth inside the 90 % interval": self.inside[self.answered].mean(axis=0).tolist(),
+            "called identifiable": known[self.answered].mean(axis=0).tolist(),
+            "median error": np.median(error[self.answered], axis=0).tolist(),
+            "median error where identifiable": [_median(error[:, i][known[:, i]]) for i in range(len(UNKNOWNS))],
+            "median error of a constant guess": np.median(guess, axis=0).tolist(),
+        }
+
+
+def random_intervals(rig: Rig, *, scenes: int, seed: int) -> Intervals:
+    """Return what random scenes through the camera are answered."""
     truths = np.random.default_rng(seed).uniform(SCORED_LOW, PAPER_BOX_HIGH, (scenes, 3))
     seen = [rig.through_camera(Inclusion(*map(float, row)), seed + 100 + i) for i, row in enumerate(truths)]
     low, high = values(seen, "low"), values(seen, "high")
     known = np.array([[getattr(e, name).identifiable for name in UNKNOWNS] for e in seen])
-    answered = np.isfinite(low).all(axis=1)
-    inside = (low <= truths) & (truths <= high)
     error = np.abs(values(seen) - truths) / truths
-    table = Table(
-        "", *(SPOKEN[name] for name in UNKNOWNS), title=f"{answered.sum()} of {scenes} random scenes answered"
-    )
-    table.add_row("truth inside the 90 % interval", *_percent(inside[answered].mean(axis=0)))
-    table.add_row("called identifiable", *_percent(known[answered].mean(axis=0)))
-    table.add_row("median error", *_percent(np.median(error[answered], axis=0)))
-    table.add_row("median error where identifiable", *_percent([_median(error[:, i][known[:, i]]) for i in range(3)]))
-    guess = np.abs(truths.mean(axis=0) - truths) / truths
-    table.add_row("median error of a constant guess", *_percent(np.median(guess, axis=0)))
+    inside = np.asarray((low <= truths) & (truths <= high))
+    return Intervals(truths, np.asarray(np.isfinite(low).all(axis=1)), inside, known, error)
+
+
+def print_intervals(found: Intervals, out: Console) -> None:
+    """Print errors, coverage and width of the 90 % intervals of random scenes."""
+    title = f"{found.answered.sum()} of {len(found.answered)} random scenes answered"
+    table = Table("", *(SPOKEN[name] for name in UNKNOWNS), title=title)
+    for name, ratios in found.ratios().items():
+        table.add_row(name, *_percent(ratios))
     out.print("\n[bold]Random scenes (2-15 mm), through the simulated camera with noise[/bold]")
     out.print(table)
+
+
+def paper_record(errors: Mapping[str, ErrorTable], intervals: Intervals | None) -> dict[str, Any]:
+    """Return the scores of mode paper as JSON; null stands for a number that is none."""
+    record: dict[str, Any] = {
+        "phantoms": {
+            seen: {
+                "truth": table.truth.tolist(),
+                "estimate": table.estimate.tolist(),
+                "percent": {name: _by_unknown(total) for name, total in table.totals().items()},
+            }
+            for seen, table in errors.items()
+        }
+    }
+    if intervals:
+        record["random_scenes"] = {
+            "scenes": len(intervals.answered),
+            "answered": int(intervals.answered.sum()),
+            "ratios": {name: _by_unknown(ratios) for name, ratios in intervals.ratios().items()},
+        }
+    return record
+
+
+def _by_unknown(numbers: Sequence[float] | Array) -> dict[str, float | None]:
+    return {name: float(x) if np.isfinite(x) else None for name, x in zip(UNKNOWNS, numbers, strict=True)}
 
 
 def _median(errors: Array) -> float:

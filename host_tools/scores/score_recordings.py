@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import asdict, dataclass
+from math import nan
+from typing import Any, NamedTuple
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
@@ -24,8 +26,11 @@ from device.measurement.parameters import NOMINAL, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from host_tools.press_models.mode_statistics import OCTILES, octile_ends, octile_of
+from host_tools.workers import one_core_each
 
 FEWEST_A_OCTILE = 5
+WORTH_SHARING, SHARED_AT_ONCE = 24, 4
+"""Recordings from which other processes, which take seconds to start, are worth it; and how many go to one at once."""
 
 
 class Sample(NamedTuple):
@@ -47,11 +52,15 @@ def unbounded(mode: Mode, truth: Inclusion, nuisances: Mapping[str, float]) -> A
 
 @dataclass(frozen=True, eq=False)
 class ScoredPress:
-    """What a press was of, what the device said, and the least errors [3] of any estimate, as `LeastErrors`."""
+    """What a press was of, what the device said, and the least errors [3] of any estimate, as `LeastErrors`.
+
+    `name` is what messages call it.
+    """
 
     truth: Inclusion
     estimate: Estimate
     least_errors: Array
+    name: str = ""
 
     def coordinate_errors(self) -> Array:
         """Return the errors [3] in coordinates of a press that is answered."""
@@ -73,15 +82,32 @@ def score(
     on_excluded: Callable[[str], None] = lambda sentence: None,
     least_errors: LeastErrors = unbounded,
 ) -> Score:
-    """Return the score of recordings; `on_excluded` hears of every one that is left out, and why."""
-    presses, left_out = [], 0
-    for sample in samples:
-        try:
-            presses.append(_scored(sample, estimate, least_errors))
-        except InvalidQuantity as error:
-            on_excluded(f"{sample.name} is left out: {error}")
-            left_out += 1
+    """Return the score of recordings; `on_excluded` hears of every one that is left out, and why.
+
+    Many are scored on all cores, or where `host_tools.workers` says.
+    """
+    named = list(samples)
+    with one_core_each():
+        jobs = -1 if len(named) >= WORTH_SHARING else 1
+        scoring = Parallel(n_jobs=jobs, return_as="generator", batch_size=SHARED_AT_ONCE)
+        found = scoring(delayed(_scored_or_why)(sample, estimate, least_errors) for sample in named)
+        presses, left_out = [], 0
+        for sample, one in zip(named, found, strict=True):
+            if isinstance(one, ScoredPress):
+                presses.append(one)
+            else:
+                on_excluded(f"{sample.name} is left out: {one}")
+                left_out += 1
     return Score(tuple(presses), left_out)
+
+
+def _scored_or_why(
+    sample: Sample, estimate: Callable[[Recording], Estimate], least_errors: LeastErrors
+) -> ScoredPress | str:
+    try:
+        return _scored(sample, estimate, least_errors)
+    except InvalidQuantity as error:
+        return str(error)
 
 
 def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_errors: LeastErrors) -> ScoredPress:
@@ -89,18 +115,41 @@ def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_err
     if recording.truth is None:
         raise InvalidQuantity("truth", "missing", "that of a phantom", "score recordings of phantoms")
     found = estimate(recording)
-    return ScoredPress(recording.truth, found, least_errors(mode_named(found.mode), recording.truth, sample.nuisances))
+    bound = least_errors(mode_named(found.mode), recording.truth, sample.nuisances)
+    return ScoredPress(recording.truth, found, bound, sample.name)
+
+
+def score_record(scored: Score) -> dict[str, Any]:
+    """Return the score as JSON: counts by status, numbers of each unknown over answered presses, and every press.
+
+    Null stands for a number that is none. Raises `InvalidQuantity` when there is no press to score.
+    """
+    answered = _answered(scored)
+    return {
+        "presses": len(scored.presses),
+        "left_out": scored.left_out,
+        "status": dict(Counter(press.estimate.status for press in scored.presses).most_common()),
+        "answered": len(answered),
+        "unknowns": {name: _Column(answered, name).as_record() for name in UNKNOWNS} if answered else {},
+        "each": [
+            {"name": press.name, "truth": asdict(press.truth), "estimate": press.estimate.as_record()}
+            for press in scored.presses
+        ],
+    }
+
+
+def _answered(scored: Score) -> list[ScoredPress]:
+    if not scored.presses:
+        raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
+    return [press for press in scored.presses if press.estimate.size_mm.value is not None]
 
 
 def print_score(scored: Score, out: Console) -> None:
     """Print the score; raises `InvalidQuantity` when there is no press to score."""
-    presses = scored.presses
-    if not presses:
-        raise InvalidQuantity("presses with truth", 0, "at least one", "give recordings of phantoms")
+    presses, answered = scored.presses, _answered(scored)
     status = Counter(press.estimate.status for press in presses)
     headline = f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common())
     out.print(headline + (f"; {scored.left_out} left out" if scored.left_out else ""))
-    answered = [press for press in presses if press.estimate.size_mm.value is not None]
     if answered:
         out.print(_overall(answered))
         octiles = _by_octiles(answered)
@@ -183,6 +232,25 @@ class _Column:
         self._coordinate_error = np.array([press.coordinate_errors()[unknown] for press in presses])
         self._least = np.array([press.least_errors[unknown] for press in presses])
         self.bounded = np.isfinite(self._least)
+
+    def as_record(self) -> dict[str, float | int | None]:
+        """Return the numbers of the unknown as JSON; `covered_ratio` is of the determined presses alone."""
+        known, has_bound = self.known, bool(self.bounded.any())
+        rms, least = self.rms() if has_bound else (nan, nan)
+        numbers = {
+            "mean_percent": self.percent.mean(),
+            "std_percent": self.percent.std(),
+            "smallest_percent": self.percent.min(),
+            "largest_percent": self.percent.max(),
+            "error_over_spread": self.error_over_spread,
+            "skill": self.skill,
+            "determined_ratio": known.mean(),
+            "covered_ratio": self.covered[known].mean() if known.any() else nan,
+            "rms_error": rms,
+            "least_rms_error": least,
+        }
+        found = {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
+        return {**found, "determined": int(known.sum()), "bounded": int(self.bounded.sum())}
 
     @property
     def error_over_spread(self) -> float:

@@ -54,7 +54,7 @@ def measure_effectivity(
     """Return the share of random scenes whose true error lies within the stated one, for every kind and feature."""
     rng = np.random.default_rng(seed)
     found: list[Effectivity] = []
-    for kind, cases, workers in (
+    for kind, cases, processes in (
         ("small strain", [_small(rng) for _ in range(scenes)], jobs),
         ("finite strain", [_finite(rng) for _ in range(finite_scenes)], jobs),
         ("3-D", [_solid(rng) for _ in range(solid_scenes)], 1),
@@ -62,7 +62,7 @@ def measure_effectivity(
         if not cases:
             continue
         on_step(kind)
-        rows = Parallel(n_jobs=workers)(delayed(_stated_and_true)(case) for case in cases)
+        rows = Parallel(n_jobs=processes)(delayed(_stated_and_true)(case) for case in cases)
         features = dict.fromkeys(feature for row in rows for feature in row)
         found += [_summary(kind, name, [row[name] for row in rows if name in row]) for name in features]
     return found

@@ -1,6 +1,8 @@
 """The toolkit's commands as a researcher types them: output, exit codes, and one sentence for what cannot be done."""
 
 import json
+import subprocess
+import sys
 
 import cv2
 import numpy as np
@@ -67,6 +69,23 @@ def test_what_cannot_be_done_is_one_sentence_and_exit_code_1(arguments, words, t
     assert done.returncode == 1
     assert words in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+HELP = """
+import sys
+sys.argv = ["host_tools", "--help"]
+from host_tools.__main__ import main
+try:
+    main()
+finally:
+    print("loaded:", *{"numpy", "cv2", "ngsolve", "onnxruntime", "joblib", "xarray"} & set(sys.modules))
+"""
+
+
+def test_help_loads_nothing_that_computes():
+    done = subprocess.run([sys.executable, "-c", HELP], check=True, capture_output=True, text=True)
+    assert "simulate" in done.stdout
+    assert done.stdout.splitlines()[-1] == "loaded:"
 
 
 def test_a_wrong_option_is_a_usage_error():

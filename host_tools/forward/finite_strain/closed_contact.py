@@ -31,6 +31,8 @@ class ClosedContact(Protocol):
     """Bit array of the dofs to be solved for."""
     energy: Any
     """Stored energy of both bodies (uJ) as a bilinear form."""
+    fast_energy: Any
+    """The same, as fast as it can be; for the mesh as it was when the contact was made."""
     probe_energy: Any
     """Stored energy of the probe alone; its gradient on the face is the contact force."""
     push: Any
@@ -39,6 +41,9 @@ class ClosedContact(Protocol):
     @property
     def memory(self) -> tuple[Any, ...]:
         """The vectors that make up the state: writing them back restores it."""
+
+    def hold(self, indentation_mm: float) -> None:
+        """Set the held unknowns to those of an indentation, where the state of other materials was taken over."""
 
     def relabel(self) -> bool:
         """Choose the tissue's labels afresh, which changes no physics; return whether they are still in order."""

@@ -8,7 +8,7 @@ sliding.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from math import inf
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.finite_strain.closed_contact import ClosedContact
-from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath
+from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath, State
 from host_tools.forward.finite_strain.loaded_face import LoadedFace, face_state, reaction_n
 from host_tools.forward.finite_strain.newton import EnergyNewton, NewtonStatus
 from host_tools.forward.finite_strain.sliding import SlidingContact
@@ -57,11 +57,18 @@ def press_to_forces(
     order: int,
     rays: Rays,
     estimate_error: bool = False,
+    arrivals: dict[float, State] | None = None,
 ) -> tuple[LoadedFace, ...]:
-    """Return the face at every one of ascending forces (N), met to 1e-8; otherwise as `press_along`."""
+    """Return the face at every one of ascending forces (N), met to 1e-8; otherwise as `press_along`.
+
+    `arrivals` are states of other materials on the same mesh, near which these are sought, and take in these.
+    """
     _require_ascending("forces_n", forces_n)
-    press = _Press(SlidingContact(mesh, elasticity, order), rays, estimate_error)
-    return tuple(press.face_after(press.path.push_to, load) for load in forces_n)
+    press = _Press(SlidingContact(mesh, elasticity, order), rays, estimate_error, arrivals)
+    faces = tuple(press.face_after(press.path.push_to, load) for load in forces_n)
+    if arrivals is not None:
+        arrivals.update(press.path.arrivals)
+    return faces
 
 
 def _require_ascending(quantity: str, loads: Sequence[float]) -> None:
@@ -74,8 +81,14 @@ def _require_ascending(quantity: str, loads: Sequence[float]) -> None:
 class _Press:
     """Drives one path from load to load and reads the face at each."""
 
-    def __init__(self, contact: ClosedContact, rays: Rays, estimate_error: bool) -> None:
-        self.path = EquilibriumPath(contact)
+    def __init__(
+        self,
+        contact: ClosedContact,
+        rays: Rays,
+        estimate_error: bool,
+        arrivals: Mapping[float, State] | None = None,
+    ) -> None:
+        self.path = EquilibriumPath(contact, arrivals)
         self.sampler = FaceSampler(contact.mesh, rays, "axisymmetric")
         self.finer = contact.at_order(contact.order + 1) if estimate_error else None
 
@@ -88,7 +101,7 @@ class _Press:
             face=face,
             slip_mm=self.sampler(contact.slip_mm()),
             base_force_n=-reaction_n(contact, "base"),
-            energy_uj=float(contact.energy.Energy(contact.u.vec)),
+            energy_uj=float(contact.fast_energy.Energy(contact.u.vec)),
             newton_iterations=self.path.newton_iterations - iterations,
             seconds=time.perf_counter() - began,
             refined=refined,
@@ -99,29 +112,39 @@ class _Press:
         if self.finer is None:
             return None
         self.finer.copy_from(self.path.contact)
-        descent = EnergyNewton(self.finer.energy, self.finer.u, self.finer.free).descend(REFINING_ITERATIONS)
+        descent = EnergyNewton(self.finer.fast_energy, self.finer.u, self.finer.free).descend(REFINING_ITERATIONS)
         if descent.status in (NewtonStatus.FOLDED, NewtonStatus.STALLED):
             raise self.path.failed(f"its error at order {self.finer.order} is asked for", descent.status)
         return face_state(self.finer, self.path.indentation_mm, self.sampler)
 
 
 class FiniteStrainModel:
-    """Neo-Hookean probe and tissue in axisymmetry; every press on the way is kept."""
+    """Neo-Hookean probe and tissue in axisymmetry; every press on the way is kept.
+
+    What was pressed first, usually the tissue without its inclusion, leads whatever is pressed after it.
+    """
 
     def __init__(self, mesh: Any, order: int, rays: Rays) -> None:
         self.mesh, self.order, self.rays = mesh, order, rays
+        self._arrivals: dict[float, State] = {}
 
     def press(self, elasticity: Elasticity, presses: Sequence[Press], *, estimate_error: bool) -> tuple[Loaded, ...]:
         """Return the face at every press; raise `PressFailed` for one that is out of reach."""
         indentations_mm = [press.indentation_mm for press in presses if press.indentation_mm is not None]
         forces_n = [press.force_n for press in presses if press.force_n is not None]
-        along, loads = (press_along, indentations_mm) if indentations_mm else (press_to_forces, forces_n)
-        faces = along(
-            self.mesh,
-            elasticity,
-            loads,
-            order=self.order,
-            rays=self.rays,
-            estimate_error=estimate_error,
-        )
+        mesh, order, rays = self.mesh, self.order, self.rays
+        if indentations_mm:
+            faces = press_along(
+                mesh, elasticity, indentations_mm, order=order, rays=rays, estimate_error=estimate_error
+            )
+        else:
+            faces = press_to_forces(
+                mesh,
+                elasticity,
+                forces_n,
+                order=order,
+                rays=rays,
+                estimate_error=estimate_error,
+                arrivals=self._arrivals,
+            )
         return tuple(Loaded(face.face, face.refined) for face in faces)

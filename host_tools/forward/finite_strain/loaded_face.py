@@ -41,7 +41,7 @@ def reaction_n(contact: ClosedContact, boundary: str) -> float:
     """Return the force (N) with which a held boundary pushes its body down (the back) or, negative, up (the base)."""
     push = GridFunction(contact.u.space)
     push.components[AXIAL].Set(-1.0, definedon=contact.mesh.Boundaries(boundary))
-    return float(InnerProduct(_gradient(contact.energy, contact.u), push.vec)) / MN_PER_N
+    return float(InnerProduct(_gradient(contact.fast_energy, contact.u), push.vec)) / MN_PER_N
 
 
 def face_state(contact: ClosedContact, indentation_mm: float, sampler: FaceSampler) -> FaceState:

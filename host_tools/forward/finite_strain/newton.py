@@ -14,10 +14,10 @@ from typing import Any
 
 from ngsolve import InnerProduct
 
-TOLERANCE_RATIO = 1e-16
-"""Converged when the energy still to gain, over the energy, is below this: displacements to some 1e-8."""
+TOLERANCE_RATIO = 1e-18
+"""Converged when the energy still to gain, over the energy, is below this: displacements to some 1e-9."""
 QUADRATIC_RATIO = 1e-6
-"""Below this the energy differences drown in rounding; a full step is safe and is taken if it stays finite."""
+"""Below this the energy differences drown in rounding, and a full step is safe."""
 CHORD_RATIO = 1e-2
 """A tangent is kept while every step with it lowers the energy still to gain at least so much."""
 STIFFENING = (0.1, 1.0, 10.0)
@@ -71,13 +71,13 @@ class EnergyNewton:
         answer.data = self.inverse * right_side
         return answer
 
-    def descend(self, max_iterations: int = MAX_ITERATIONS) -> Descent:
+    def descend(self, max_iterations: int = MAX_ITERATIONS, tolerance_ratio: float = TOLERANCE_RATIO) -> Descent:
         """Move the grid function to the minimum; whatever the status, it is left at the lowest state found."""
         level, decrement = float(self.energy.Energy(self.u.vec)), inf
         if not isfinite(level):
             return Descent(NewtonStatus.FOLDED, 0, decrement)
         for iteration in range(1, max_iterations + 1):
-            previous, decrement = decrement, self._newton_step()
+            previous, decrement = decrement, self.newton_step()
             if not 0 <= decrement <= CHORD_RATIO * previous:
                 decrement = self._renewed_step()
             if not decrement >= 0:
@@ -88,11 +88,11 @@ class EnergyNewton:
             if lower is None:
                 return Descent(NewtonStatus.STALLED, iteration, decrement)
             level = lower
-            if decrement <= TOLERANCE_RATIO * abs(level):
+            if decrement <= tolerance_ratio * abs(level):
                 return Descent(NewtonStatus.CONVERGED, iteration, decrement)
         return Descent(NewtonStatus.UNFINISHED, max_iterations, decrement)
 
-    def _newton_step(self) -> float:
+    def newton_step(self) -> float:
         """Compute the step with the tangent at hand; return its decrement g . K^-1 g, twice the energy to gain."""
         self.energy.Apply(self.u.vec, self.gradient)
         self.step.data = self.inverse * self.gradient
@@ -101,23 +101,25 @@ class EnergyNewton:
     def _renewed_step(self) -> float:
         """Compute the step with a fresh tangent; where that is not positive, with enough of the first one added."""
         self.assemble()
-        decrement = self._newton_step()
+        decrement = self.newton_step()
         for share in STIFFENING:
             if decrement >= 0:
                 break
             self.energy.mat.AsVector().data += share * self.first_tangent
             self.inverse.Update()
-            decrement = self._newton_step()
+            decrement = self.newton_step()
         return decrement
 
     def _line_search(self, level: float, decrement: float) -> float | None:
         """Take the longest halved step that lowers the energy; return the new energy, None if there is none."""
         self.start.data = self.u.vec
-        is_quadratic = decrement <= QUADRATIC_RATIO * abs(level)
+        if decrement <= QUADRATIC_RATIO * abs(level):
+            self.u.vec.data -= self.step
+            return level
         for halving in range(MAX_HALVINGS):
             self.u.vec.data = self.start - 0.5**halving * self.step
             lower = float(self.energy.Energy(self.u.vec))
-            if isfinite(lower) and (is_quadratic or lower <= level):
+            if isfinite(lower) and lower <= level:
                 return lower
         self.u.vec.data = self.start
         return None

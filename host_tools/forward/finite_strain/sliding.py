@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from ngsolve import (
     CF,
     H1,
@@ -34,6 +35,7 @@ from ngsolve import (
     x,
 )
 
+from host_tools.forward.finite_strain.body_energy import BodyEnergy
 from host_tools.forward.finite_strain.closed_contact import AXIAL, RADIAL, push_of_back
 from host_tools.forward.finite_strain.hyperelasticity import DeformationGradient, NeoHookean, deformation_gradient
 from host_tools.forward.materials import FLESH, INCLUSION, LAYERS, Elasticity
@@ -94,10 +96,11 @@ class SlidingContact:
         self.space = u_r * u_z * self.labels
         self.u, self.spread = GridFunction(self.space), GridFunction(self.labels)
         self.free = self._free_dofs()
-        self.energy, self.probe_energy = self._energies(NeoHookean.of(elasticity, mesh))
+        self.energy, self.probe_energy, self.fast_energy = self._energies(NeoHookean.of(elasticity, mesh))
         self.harmonic = LabelSpread(self.labels)
         inner_flesh = u_r.GetDofs(flesh) & ~u_r.GetDofs(mesh.Materials(LAYERS))
         self.push = push_of_back(self.space)
+        self._rim: tuple[int, int] | None = None
         if not edge_force:
             self._hold_rim()
         self.inner = {i: Projector(s.FreeDofs() & inner_flesh, True) for i, s in ((RADIAL, u_r), (AXIAL, u_z))}
@@ -118,11 +121,13 @@ class SlidingContact:
         rate.data = self.push.vec - self.energy.mat.Inverse(self.free, "sparsecholesky") * force
         face = {vertex for element in self.mesh.Boundaries("face").Elements() for vertex in element.vertices}
         rim = max(face, key=lambda vertex: self.mesh[vertex].point[0])
-        dof = self.space.Range(SLIP).start + self.labels.GetDofNrs(rim)[0]
+        label = self.labels.GetDofNrs(rim)[0]
+        dof = self.space.Range(SLIP).start + label
+        self._rim = dof, label
         self.push.vec[dof] = rate[dof]
         self.free.Clear(dof)
 
-    def _energies(self, law: NeoHookean) -> tuple[Any, Any]:
+    def _energies(self, law: NeoHookean) -> tuple[Any, Any, BodyEnergy]:
         u_r, u_z, m = self.space.TrialFunction()
         F = deformation_gradient(u_r, u_z)
 
@@ -141,7 +146,10 @@ class SlidingContact:
         energy += term(law.energy_density_kpa(F), probe)
         energy += term(tissue(m + self.spread, grad(m) + grad(self.spread)), at_face)
         energy += term(tissue(self.spread, grad(self.spread)), beyond)  # m vanishes there: half the work
-        return energy, probe_energy
+        face_energy = BilinearForm(self.space, symmetric=True)
+        face_energy += term(tissue(m + self.spread, grad(m) + grad(self.spread)), at_face)
+        others = np.flatnonzero(list(probe | beyond))
+        return energy, probe_energy, BodyEnergy(energy, face_energy, others, law, self.spread)
 
     def _regions(self) -> tuple[Any, Any, Any]:
         """Return bit arrays of elements: the probe's, the tissue's that touch the face, the tissue's that do not."""
@@ -161,6 +169,12 @@ class SlidingContact:
     def memory(self) -> tuple[Any, ...]:
         """The vectors that make up the state."""
         return self.u.vec, self.spread.vec
+
+    def hold(self, indentation_mm: float) -> None:
+        """Give the rim the slip that it has in these materials at an indentation."""
+        if self._rim is not None:
+            held, label = self._rim
+            self.u.vec[held] = indentation_mm * self.push.vec[held] - self.spread.vec[label]
 
     def relabel(self) -> bool:
         """Spread the slip of the face into the tissue, and move the displacement along: y += grad y (grad X)^-1 dX.

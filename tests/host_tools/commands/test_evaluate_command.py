@@ -1,10 +1,12 @@
 """`host_tools evaluate` on recordings of phantoms, each read by the mode that its frames are for."""
 
+import json
 import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from toolkit_process import run_toolkit
 from typer.testing import CliRunner
 
 from device.files.recording_file import write_recording
@@ -30,6 +32,28 @@ def test_recordings_are_scored_and_one_without_truth_is_named(folder):
     assert "2 presses" in done.output
     assert "nameless is left out: truth is missing" in done.output
     assert "truth inside 90 % intervals" in done.output
+
+
+def test_json_holds_the_score_and_every_press(folder):
+    named = [str(folder / name) for name in ("standard", "quick", "nameless")]
+    found = json.loads(run_toolkit("evaluate", *named, "--json").stdout)
+    assert (found["presses"], found["left_out"], found["answered"]) == (2, 1, 2)
+    assert [one["name"] for one in found["each"]] == named[:2]
+    size = found["unknowns"]["size_mm"]
+    errors = [100 * abs(one["estimate"]["size_mm"]["value"] / 12.0 - 1) for one in found["each"]]
+    assert size["mean_percent"] == pytest.approx(np.mean(errors))
+    assert size["largest_percent"] == pytest.approx(max(errors))
+    assert size["bounded"] == 1
+
+
+def test_json_of_mode_paper_holds_its_phantoms_and_random_scenes():
+    found = json.loads(run_toolkit("evaluate", "--scenes", 3, "--json").stdout)
+    for table in found["phantoms"].values():
+        truth, estimate = np.array(table["truth"]), np.array(table["estimate"])
+        assert truth.shape == (9, 3)
+        mean = 100 * np.abs(estimate / truth - 1).mean(axis=0)
+        assert list(table["percent"]["mean"].values()) == pytest.approx(mean)
+    assert found["random_scenes"]["scenes"] == 3
 
 
 def test_a_truth_that_is_no_number_leaves_only_its_recording_out_and_names_it(folder, tmp_path):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
+from toolkit_process import run_toolkit
 from typer.testing import CliRunner
 
 from device.measurement.quantities import InvalidQuantity
@@ -55,6 +58,12 @@ def test_both_chapters_are_printed_with_their_benchmarks_and_tables(asked):
         ("noise-free", {"presses": 160, "seed": 1000}),
         ("posterior", {"modes": ("standard", "precise"), "scenes": 50, "seed": 1000}),
     ]
+
+
+def test_json_holds_the_chapters(asked):
+    done = run_toolkit("evaluate", "--noise-free", "--json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["chapters"]["noise-free"]["benchmarks"][0]["measured"] == 0.4
 
 
 def test_mode_scenes_and_seed_are_those_asked_for(asked):

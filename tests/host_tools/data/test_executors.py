@@ -16,7 +16,7 @@ import xarray as xr
 from distributed import Client, LocalCluster
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.data import executors
+from host_tools import workers
 from host_tools.data.dataset import read_dataset
 from host_tools.data.executors import executor, solve_on_cluster
 from host_tools.data.journal import Journal
@@ -147,7 +147,7 @@ def test_a_lost_scheduler_is_one_sentence(tmp_path):
     "address", ["", "localhost:8786", "tcp://127.0.0.1", "http://127.0.0.1:1", "tcp://127.0.0.1:1"]
 )
 def test_an_unreachable_scheduler_is_refused_before_the_journal_is_touched(tmp_path, monkeypatch, address):
-    monkeypatch.setattr(executors, "REACHED_WITHIN_S", 0.2)
+    monkeypatch.setattr(workers, "REACHED_WITHIN_S", 0.2)
     Journal(tmp_path / "s.nc.partial", SweepPlan(3, 1).as_record()).close()
     with pytest.raises(InvalidQuantity, match="of a running Dask scheduler") as refused:
         sweep(SweepPlan(3, 2), tmp_path / "s.nc", scheduler=address)
@@ -156,7 +156,7 @@ def test_an_unreachable_scheduler_is_refused_before_the_journal_is_touched(tmp_p
 
 
 def test_a_server_that_does_not_answer_is_refused(monkeypatch):
-    monkeypatch.setattr(executors, "REACHED_WITHIN_S", 0.2)
+    monkeypatch.setattr(workers, "REACHED_WITHIN_S", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as mute:
         address = f"tcp://127.0.0.1:{mute.getsockname()[1]}"
         with pytest.raises(InvalidQuantity, match=address), executor(scheduler=address):

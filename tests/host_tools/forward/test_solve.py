@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from device.measurement.quantities import Inclusion
-from host_tools.forward.solve import solve
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from host_tools.forward.plan import model_plan
+from host_tools.forward.solve import solve, solve_ramp, solve_ramps
 from host_tools.scenes.scene import Press, Scene, Tissue, Waveguide
 
 
@@ -81,3 +82,19 @@ def test_the_inclusion_field_rises_with_size_and_modulus_and_falls_with_depth(de
     less, more = (solve(Scene(Inclusion(*map(float, truth)))).inclusion_field for truth in (deeper, shallower))
     assert less.max_deformation_mm < more.max_deformation_mm
     assert less.total_deformation_mm3 < more.total_deformation_mm3
+
+
+@pytest.mark.parametrize("strain", ["small", pytest.param("finite", marks=pytest.mark.long)])
+def test_scenes_of_one_mesh_solved_together_are_those_solved_alone(strain):
+    scenes, presses = [Scene(Inclusion(10.0, 6.0, E)) for E in (40.0, 120.0)], [Press(force_n=0.3)]
+    plan = model_plan(scenes[0].with_press(presses[0]), strain=strain)
+    for scene, (together,) in zip(scenes, solve_ramps(scenes, presses, plan), strict=True):
+        (alone,) = solve_ramp(scene, presses, plan)
+        assert together.scene == alone.scene
+        difference = (together.w_mm - together.w_baseline_mm) - (alone.w_mm - alone.w_baseline_mm)
+        assert np.abs(difference).max() < 1e-5 * np.abs(alone.w_mm - alone.w_baseline_mm).max()
+
+
+def test_scenes_that_need_meshes_of_their_own_are_refused():
+    with pytest.raises(InvalidQuantity, match="alike but for the inclusion's modulus"):
+        solve_ramps([Scene(Inclusion(10.0, 6.0, 80.0)), Scene(Inclusion(10.0, 7.0, 80.0))], [Press(force_n=0.3)])

@@ -45,16 +45,17 @@ def built(monkeypatch, tables) -> WideTable:
     forces, radii = tables.centred.lump_per_n_mm3.shape[-2:]
     modes, aside_radii = tables.off_axis.lump_per_n_mm3.shape[-2:]
 
-    def centred(scene_of, slab, size_mm, depth_mm, mismatch):
+    def centred(scene_of, slab, size_mm, depth_mm, mismatches):
         assert slab == NOMINAL
-        return np.multiply.outer([1.0, 2.0], np.full((forces, radii), over_volume(size_mm, depth_mm, mismatch)))
+        ones = np.multiply.outer([1.0, 2.0], np.ones((forces, radii)))
+        return np.array([over_volume(size_mm, depth_mm, mismatch) * ones for mismatch in mismatches])
 
     def aside(size_mm, depth_mm, offset_mm, mismatches):
         assert offset_mm == ASIDE_MM
         ones = np.multiply.outer([1.0, 2.0], np.ones((modes, aside_radii)))
         return np.array([over_volume(size_mm, depth_mm, mismatch) * ones for mismatch in mismatches])
 
-    monkeypatch.setattr(out_of_range_table, "lump_per_n_mm3", centred)
+    monkeypatch.setattr(out_of_range_table, "centred_per_n_mm3", centred)
     monkeypatch.setattr(out_of_range_table, "inclusions_per_n_mm3", aside)
     monkeypatch.setattr(out_of_range_table, "POINTS", FEW)
     monkeypatch.setattr(out_of_range_table, "ASIDE_POINTS", FEW_ASIDE)

@@ -128,3 +128,18 @@ def test_a_mesh_that_is_deformed_inside_is_pressed_as_before():
 def test_loads_that_do_not_ascend_are_refused(press, loads):
     with pytest.raises(InvalidQuantity, match="indentations_mm is .* but must be ascending"):
         press(loads)
+
+
+def test_a_ramp_led_by_that_of_other_materials_ends_where_it_would_alone_and_sooner(mesh):
+    forces_n, options = (0.15, 0.3, 0.5), {"order": 3, "rays": RAYS}
+    arrivals = {}
+    press_to_forces(mesh, baseline(SCENE), forces_n, **options, arrivals=arrivals)
+    assert tuple(arrivals) == forces_n
+    led = press_to_forces(mesh, with_inclusion(SCENE), forces_n, **options, arrivals=arrivals)
+    alone = press_to_forces(mesh, with_inclusion(SCENE), forces_n, **options)
+    for one, other in zip(led, alone, strict=True):
+        assert one.face.force_n == pytest.approx(other.face.force_n, rel=1e-8)
+        assert one.face.indentation_mm == pytest.approx(other.face.indentation_mm, rel=1e-7)
+        np.testing.assert_allclose(one.face.w_mm, other.face.w_mm, rtol=0, atol=1e-6 * other.face.w_mm.max())
+        np.testing.assert_allclose(one.face.p_kpa, other.face.p_kpa, rtol=0, atol=1e-6 * other.face.p_kpa.max())
+    assert led[-1].newton_iterations < alone[-1].newton_iterations
