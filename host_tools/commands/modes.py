@@ -12,10 +12,9 @@ from device.files.bundle_file import read_paper_model, read_quick_model, read_ra
 from device.files.certificate_file import read_calibration
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.mode_models import ModeModels
-from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.model import RAMP_MODES
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import chosen_chapters, measure_chapters, print_chapter, shown
 from host_tools.commands.output import note, require_writable
 
 
@@ -63,7 +62,7 @@ def modes(
         "just-outside": lambda: just_outside_chapter(trained, calibration, tables),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip
-    measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})
+    measured = measure_chapters(chosen_chapters(only, chapters))
     missed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         chosen = "".join(f" --only {name}" for name in only or [])
@@ -71,10 +70,3 @@ def modes(
         note.print(f"{out} written.")
     if missed:
         raise typer.Exit(1)
-
-
-def _chosen(only: list[str] | None, known: tuple[str, ...]) -> tuple[str, ...]:
-    for name in only or []:
-        if name not in known:
-            raise InvalidQuantity("only", repr(name), f"one of {', '.join(known)}", "name a chapter")
-    return tuple(only) if only else known

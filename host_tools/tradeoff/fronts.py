@@ -1,0 +1,84 @@
+"""Panels of choices as a table and as a figure: every point, the front through them, the chosen one ringed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from host_tools.pages.benchmark import Figure, Table
+from host_tools.tradeoff.pareto import Choice, front, needless
+
+COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
+"""Colours told apart by colour-blind eyes (Okabe & Ito, 2008)."""
+MARKERS = "osD^v*"
+COST = "time (yardsticks)"
+LABEL_STEPS = ((4, 4), (4, -9), (4, 13), (4, -18))
+"""Where labels of consecutive points of a front go, in points: neighbours do not cover each other."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Choices that compete with each other, under a title; `error` names the axis with its unit."""
+
+    title: str
+    error: str
+    choices: tuple[Choice, ...]
+
+
+def front_table(caption: str, panels: Sequence[Panel], digits: int = 3) -> Table:
+    """Return every choice of every panel, by rising cost."""
+    rows = []
+    for panel in panels:
+        best, beaten = front(panel.choices), needless(panel.choices)
+        for one in sorted(panel.choices, key=lambda choice: choice.cost):
+            place = "front" if one in best else "beaten" if one in beaten else "near"
+            name = f"**{one.name}**" if one.chosen else one.name
+            rows.append((panel.title, one.family, name, _short(one.cost, digits), _short(one.error, digits), place))
+    return Table(caption, ("", "family", "choice", COST, "error", ""), tuple(rows))
+
+
+def _short(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}" if value < 10**digits else f"{value:.0f}"
+
+
+def front_figure(name: str, caption: str, panels: Sequence[Panel], columns: int = 3) -> Figure:
+    """Return the panels side by side, both axes logarithmic."""
+    rows = -(-len(panels) // columns)
+    size_in = (3.6 * min(columns, len(panels)) + 0.4, 3.1 * rows + 0.5)
+    return Figure(name, caption, lambda canvas: _draw(canvas, panels, rows, min(columns, len(panels))), size_in)
+
+
+def _draw(figure: Any, panels: Sequence[Panel], rows: int, columns: int) -> None:
+    families = list(dict.fromkeys(one.family for panel in panels for one in panel.choices))
+    styles = dict(zip(families, zip(COLOURS, MARKERS, strict=True), strict=False))
+    cells = figure.subplots(rows, columns, squeeze=False).flat
+    for axes, panel in zip(cells, panels, strict=False):
+        _draw_panel(axes, panel, styles)
+    for axes in list(cells)[len(panels) :]:
+        axes.set_visible(False)
+    handles = {label: handle for axes in figure.axes for handle, label in zip(*axes.get_legend_handles_labels())}  # noqa: B905
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+
+
+def _draw_panel(axes: Any, panel: Panel, styles: Mapping[str, tuple[str, str]]) -> None:
+    for family in dict.fromkeys(one.family for one in panel.choices):
+        of_family = [one for one in panel.choices if one.family == family]
+        colour, marker = styles[family]
+        axes.plot([p.cost for p in of_family], [p.error for p in of_family], marker, color=colour, ms=5, label=family)
+    best = front(panel.choices)
+    axes.step([p.cost for p in best], [p.error for p in best], where="post", color="#000000", lw=0.9, label="front")
+    chosen = [one for one in panel.choices if one.chosen]
+    ring = {"mfc": "none", "mec": "#d00000", "ms": 12, "mew": 1.6}
+    axes.plot([p.cost for p in chosen], [p.error for p in chosen], "o", label="chosen", **ring)
+    for number, one in enumerate(best):
+        step = LABEL_STEPS[number % len(LABEL_STEPS)]
+        axes.annotate(one.name, (one.cost, one.error), xytext=step, textcoords="offset points", fontsize=6.5)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.margins(0.15)
+    axes.set_title(panel.title, fontsize=9)
+    axes.set_xlabel(COST, fontsize=8)
+    axes.set_ylabel(panel.error, fontsize=8)
+    axes.tick_params(labelsize=7)
+    axes.grid(alpha=0.3, which="both", lw=0.4)
