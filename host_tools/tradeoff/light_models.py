@@ -37,7 +37,7 @@ COMMITTED_RAYS, FEWEST_RAYS = 100_000_000, 1_000
 SEED, TRUTH_SEED = 5, 50
 
 
-class LightBudget(NamedTuple):
+class ImageBudget(NamedTuple):
     """Rays of the truth, of the images that compete, and of the tables that are made; dimples and presses looked at."""
 
     truth_rays: int = 10_000_000
@@ -46,26 +46,26 @@ class LightBudget(NamedTuple):
     scenes: int = 2
 
 
-SHORT = LightBudget(truth_rays=20_000, rays=(1_000, 4_000), table_rays=(2_000, 20_000), scenes=1)
+SHORT = ImageBudget(truth_rays=20_000, rays=(1_000, 4_000), table_rays=(2_000, 20_000), scenes=1)
 """Enough to try the chain."""
 
 
-class LitScene(NamedTuple):
+class SeenFace(NamedTuple):
     """A face with the image [y, x] that it truly gives, over cells of half a millimetre."""
 
     scene: HeldOutScene
     truth: Traced
 
 
-def light_chapter(table: LightTable, faces: SurfaceTable, budget: LightBudget | None = None) -> Chapter:
+def light_chapter(table: LightTable, faces: SurfaceTable, budget: ImageBudget | None = None) -> Chapter:
     """Return the fronts of one image and of the table behind it."""
-    asked = budget or LightBudget()
+    asked = budget or ImageBudget()
     block, lookup = LightBlock(**table.block), LookupOptics(table)  # type: ignore[arg-type]
     some = [
         *islice(dimple_scenes(lookup), asked.scenes),
         *islice(pressed_scenes(lookup, faces), 1, 1 + asked.scenes),
     ]
-    scenes = [LitScene(one, _traced(block, one, asked.truth_rays, TRUTH_SEED + k)) for k, one in enumerate(some)]
+    scenes = [SeenFace(one, _traced(block, one, asked.truth_rays, TRUTH_SEED + k)) for k, one in enumerate(some)]
     panels = [_images(table, block, scenes, asked), _tables(table, block, scenes, asked)]
     return Chapter(
         "Light",
@@ -79,7 +79,7 @@ def light_chapter(table: LightTable, faces: SurfaceTable, budget: LightBudget | 
     )
 
 
-def _images(table: LightTable, block: LightBlock, scenes: Sequence[LitScene], asked: LightBudget) -> Panel:
+def _images(table: LightTable, block: LightBlock, scenes: Sequence[SeenFace], asked: ImageBudget) -> Panel:
     points = [_point(_spoken(rays), "ray tracer", _tracing(block, scenes, rays), scenes) for rays in asked.rays]
     for times in COARSER:
         coarse = coarser(table, times)
@@ -93,7 +93,7 @@ def _images(table: LightTable, block: LightBlock, scenes: Sequence[LitScene], as
     return Panel("One image", "rms error / peak", tuple(points))
 
 
-def _tables(table: LightTable, block: LightBlock, scenes: Sequence[LitScene], asked: LightBudget) -> Panel:
+def _tables(table: LightTable, block: LightBlock, scenes: Sequence[SeenFace], asked: ImageBudget) -> Panel:
     """Return the cost of a table by the rays it is made of; the committed one's is that of the same rays a piece."""
     make_light_table(block, FEWEST_RAYS, SEED, lambda step: None)  # compiles
     points, dearest = [], 0.0
@@ -120,18 +120,18 @@ Imaging = tuple[float, list[Array]]
 """Cost of one image in yardsticks, and the image of each scene."""
 
 
-def _tracing(block: LightBlock, scenes: Sequence[LitScene], rays: int) -> Imaging:
+def _tracing(block: LightBlock, scenes: Sequence[SeenFace], rays: int) -> Imaging:
     found: list[Traced] = []
     takes = cost(lambda: found.append(_traced(block, scenes[0].scene, rays, SEED)), 1)
     found[1:] = [_traced(block, one.scene, rays, SEED + k) for k, one in enumerate(scenes[1:], 1)]
     return takes.yardsticks, [one.radiance * _lit(of.scene) for one, of in zip(found, scenes, strict=True)]
 
 
-def _looking_up(table: LightTable, scenes: Sequence[LitScene]) -> Imaging:
+def _looking_up(table: LightTable, scenes: Sequence[SeenFace]) -> Imaging:
     lookup, half = LookupOptics(table), table.number("half_width_mm")
     means = cell_means(lookup.x_mm.astype(float), half, round(2 * half / CELL_MM))
 
-    def image(one: LitScene) -> Single:
+    def image(one: SeenFace) -> Single:
         w, p = (_on_grid(field, len(lookup.x_mm)) for field in (one.scene.w_mm, one.scene.p_kpa))
         return lookup.radiance(w, p, one.scene.led_ratio, one.scene.skin, touching=True)
 
@@ -139,11 +139,11 @@ def _looking_up(table: LightTable, scenes: Sequence[LitScene]) -> Imaging:
     return cost(lambda: image(scenes[0])).yardsticks, images
 
 
-def _point(name: str, family: str, imaging: Imaging, scenes: Sequence[LitScene], *, chosen: bool = False) -> Choice:
+def _point(name: str, family: str, imaging: Imaging, scenes: Sequence[SeenFace], *, chosen: bool = False) -> Choice:
     return Choice(name, family, imaging[0], _error(imaging[1], scenes), chosen=chosen)
 
 
-def _error(images: Sequence[Array], scenes: Sequence[LitScene]) -> float:
+def _error(images: Sequence[Array], scenes: Sequence[SeenFace]) -> float:
     """Return the mean over the scenes of the rms error over the peak, without the truth's own noise."""
     errors = []
     for image, (scene, traced) in zip(images, scenes, strict=True):
