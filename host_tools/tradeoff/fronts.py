@@ -13,8 +13,10 @@ COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
 """Colours told apart by colour-blind eyes (Okabe & Ito, 2008)."""
 MARKERS = "osD^v*"
 COST = "time (yardsticks)"
-LABEL_STEPS = ((4, 4), (4, -9), (4, 13), (4, -18))
-"""Where labels of consecutive points of a front go, in points: neighbours do not cover each other."""
+LETTER = 0.016
+"""Width of a name's letter in widths of a panel: so much room is left of the first point."""
+DECADES = 2.0
+"""An axis that spans fewer has more than one number a decade."""
 
 
 @dataclass(frozen=True)
@@ -71,14 +73,25 @@ def _draw_panel(axes: Any, panel: Panel, styles: Mapping[str, tuple[str, str]]) 
     chosen = [one for one in panel.choices if one.chosen]
     ring = {"mfc": "none", "mec": "#d00000", "ms": 12, "mew": 1.6}
     axes.plot([p.cost for p in chosen], [p.error for p in chosen], "o", label="chosen", **ring)
-    for number, one in enumerate(best):
-        step = LABEL_STEPS[number % len(LABEL_STEPS)]
-        axes.annotate(one.name, (one.cost, one.error), xytext=step, textcoords="offset points", fontsize=6.5)
+    for one in best:  # no point lies below and left of one of the front: there is room for its name
+        below_left = {"xytext": (-4, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
+        axes.annotate(one.name, (one.cost, one.error), fontsize=6.5, **below_left)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.margins(0.15)
+    axes.margins(x=0.1 + LETTER * max(len(one.name) for one in best), y=0.2)
+    for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        _number(axis, low, high)
     axes.set_title(panel.title, fontsize=9)
     axes.set_xlabel(COST, fontsize=8)
     axes.set_ylabel(panel.error, fontsize=8)
     axes.tick_params(labelsize=7)
     axes.grid(alpha=0.3, which="both", lw=0.4)
+
+
+def _number(axis: Any, low: float, high: float) -> None:
+    """Write plain numbers at decades, and between them where an axis spans few."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0,) if high > 10**DECADES * low else (1.0, 2.0, 5.0), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Result = TypeVar("Result")
+Worked = TypeVar("Worked")
 WIDTH_PX, HEIGHT_PX = 768, 492
 REPEATS = 5
 YARDSTICK_CALLS = 40
@@ -63,7 +63,7 @@ def cost(work: Callable[[], object], repeats: int = REPEATS, clock: Callable[[],
     return Cost(float(seconds / yardstick_s), float(seconds))
 
 
-def timed(work: Callable[[], Result]) -> tuple[Result, Cost]:
+def timed(work: Callable[[], Worked]) -> tuple[Worked, Cost]:
     """Return what one call of `work` gives, and its cost."""
     yardstick_s, began = _seconds(exp_and_sum, YARDSTICK_CALLS, processor_s), processor_s()
     result = work()
