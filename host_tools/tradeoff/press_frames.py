@@ -73,12 +73,12 @@ class FrameChoice:
 CHOICES = (
     *(FrameChoice(HELD, frames) for frames in (1, 4, 16, 64)),
     *(FrameChoice(NETWORKS, frames) for frames in (8, 10, 16, 40, 64)),
-    *(FrameChoice(FITTED, frames) for frames in (8, 10, 16, 40, 64)),
+    *(FrameChoice(FITTED, frames) for frames in (8, 10, 40, 64)),
     *(FrameChoice(BINNED, 40, binned=binned) for binned in (2, 4, 8)),
-    *(FrameChoice(BINNED, 10, binned=binned) for binned in (4, 8)),
+    FrameChoice(BINNED, 10, binned=8),
     *(FrameChoice(TEN_BITS, frames, bits=10) for frames in (8, 40)),
 )
-PRESSES = 32
+PRESSES = 24
 SHORT: dict[str, Any] = {"presses": 2, "choices": (CHOICES[0], CHOICES[5], CHOICES[10], CHOICES[-1])}
 """Enough to try the chain."""
 
