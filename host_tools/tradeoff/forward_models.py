@@ -162,7 +162,11 @@ def _face(found: CalculixSolution, rays: Rays) -> FaceState:
     return FaceState(found.indentation_mm, w_mm[None], 0 * w_mm[None], total_mm3, found.force_n, found.force_n)
 
 
-def equal_errors(panels: Sequence[Panel]) -> list[tuple[str, float, float, float]]:
+EqualError = tuple[str, float, float, float]
+"""Scene, error, and the least costs of ours and of CalculiX that hold it."""
+
+
+def equal_errors(panels: Sequence[Panel]) -> list[EqualError]:
     """Return title, error, and the least cost of ours and of CalculiX that holds it, where both can."""
     rows = []
     for panel in panels:
@@ -178,23 +182,26 @@ def forward_chapter(asked: Sequence[ForwardCase] | None = None, repeats: int = R
     """Return the fronts of the six or other cases, and whether the plan's choices hold what they promise."""
     panels, benchmarks = zip(*(measured(case, repeats) for case in asked or cases()), strict=True)
     equal = equal_errors(panels)
-    rows = tuple(
-        (title, f"{100 * error:g} %", f"{ours:.0f}", f"{theirs:.0f}", f"{theirs / ours:.1f}")
-        for title, error, ours, theirs in equal
-    )
-    header = ("scene", "error at most", "ours (yardsticks)", f"{CALCULIX} (yardsticks)", "CalculiX over ours")
-    ratios = [theirs / ours for *_, ours, theirs in equal]
     return Chapter(
         "Forward models",
         "Six scenes, each solved with its inclusion and without it, meshing included; CalculiX at equal true error.",
         "host_tools/tradeoff/forward_models.py; truth: the finest plan of each scene",
         benchmarks,
-        (front_table("Every model", panels), *([Table("CalculiX at equal true error", header, rows)] if rows else [])),
+        (front_table("Every model", panels), *([_equal_table(equal)] if equal else [])),
         (front_figure("tradeoff_forward_models.svg", "Time and error of the forward models", panels),),
         facts={
             "needless": needless_everywhere([panel.choices for panel in panels]),
-            "calculix_over_ours": [round(ratio, 1) for ratio in ratios],
-            "calculix": ccx_version() if ccx_available() else "",
+            "calculix_over_ours": [round(theirs / ours, 1) for *_, ours, theirs in equal],
+            "calculix": ccx_version() if equal else "",
             "tolerance": DEFAULT_TOLERANCE,
         },
     )
+
+
+def _equal_table(equal: Sequence[EqualError]) -> Table:
+    header = ("scene", "error at most", "ours (yardsticks)", f"{CALCULIX} (yardsticks)", "CalculiX over ours")
+    rows = (
+        (title, f"{100 * error:g} %", f"{ours:.0f}", f"{theirs:.0f}", f"{theirs / ours:.1f}")
+        for title, error, ours, theirs in equal
+    )
+    return Table("CalculiX at equal true error", header, tuple(rows))

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from device.measurement.estimate import SPOKEN
+from device.measurement.quantities import UNKNOWNS
 from host_tools.pages.benchmark import Figure, Table
 from host_tools.tradeoff.pareto import Choice, front, needless
 
@@ -26,6 +28,12 @@ class Panel:
     title: str
     error: str
     choices: tuple[Choice, ...]
+
+
+def unknown_panels(points: Sequence[Sequence[Choice]], kind: str = "") -> list[Panel]:
+    """Return a panel for each unknown; every way to do a thing has a point [3] for each of them."""
+    titles = (f"{SPOKEN[name]}{kind}" for name in UNKNOWNS)
+    return [Panel(title, "median error (%)", tuple(one[i] for one in points)) for i, title in enumerate(titles)]
 
 
 def front_table(caption: str, panels: Sequence[Panel], digits: int = 3) -> Table:

@@ -16,7 +16,6 @@ import cv2
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.estimate import SPOKEN
 from device.measurement.mode import FRAMES, RAMP_FROM_N, RAMP_TO_N
 from device.measurement.parameters import denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS, Inclusion
@@ -34,7 +33,7 @@ from host_tools.pages.benchmark import Chapter
 from host_tools.press_models.press_samples import draw_parameters, profile_rows
 from host_tools.press_models.recorded_presses import HELD_STRAY_N, drifted, in_parallel, scenario_of
 from host_tools.press_models.seeds import derived_seed, press_seed
-from host_tools.tradeoff.fronts import Panel, front_figure, front_table
+from host_tools.tradeoff.fronts import Panel, front_figure, front_table, unknown_panels
 from host_tools.tradeoff.pareto import Choice, needless_everywhere
 from host_tools.tradeoff.yardstick import cost
 
@@ -104,29 +103,32 @@ def frames_chapter(
     parameters = draw_parameters(presses, np.random.default_rng(seed))
     read = in_parallel(lambda i: _read(tables, parameters[i], press_seed(seed, i), choices), presses, jobs)
     exact = np.array(in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], presses, jobs))
-    truth = parameters[:, : len(UNKNOWNS)]
-    timing = _Recordings(tables, parameters[0], press_seed(seed, 0))
+    timing, truth = _Recordings(tables, parameters[0], press_seed(seed, 0)), parameters[:, : len(UNKNOWNS)]
     points = []
-    for number, choice in enumerate(choices):
-        of_choice = [of_press[number] for of_press in read]
+    for choice, of_choice in zip(choices, zip(*read, strict=True), strict=True):
         answers = _answers(choice, of_choice, exact, model, quick)
-        found = np.array(in_parallel(lambda i, answers=answers, of=of_choice: answers(of[i].row), presses, jobs))  # type: ignore[misc]
-        percent = 100 * np.median(np.abs(found / truth - 1), axis=0)
+        percent = _percent(answers, of_choice, truth, jobs)
         takes = _time(choice, timing, answers)
         points.append([Choice(choice.name, choice.family, takes, float(p), chosen=choice.chosen) for p in percent])
-    panels = [
-        Panel(SPOKEN[name], "median error (%)", tuple(one[i] for one in points)) for i, name in enumerate(UNKNOWNS)
-    ]
-    families = [[replace(one, name=f"{one.family}: {one.name}") for one in panel.choices] for panel in panels]
+    return _chapter(unknown_panels(points), presses)
+
+
+def _percent(answers: _Answers, read: Sequence[ReadPress], truth: Array, jobs: int) -> Array:
+    """Return the median errors [3] in % of answers to presses, truth [n, 3]."""
+    found = np.array(in_parallel(lambda i: answers(read[i].row), len(read), jobs))
+    return np.asarray(100 * np.median(np.abs(found / truth - 1), axis=0))
+
+
+def _chapter(panels: Sequence[Panel], presses: int) -> Chapter:
+    named = [[replace(one, name=f"{one.family}: {one.name}") for one in panel.choices] for panel in panels]
+    caption = "Time to the answer and error by frames, bits and binning"
     return Chapter(
         "Frames, bits and binning",
         f"{presses} random presses over the trained ranges, the same ones for every choice, with every drift.",
         "host_tools/tradeoff/press_frames.py",
         tables=(front_table("Every choice", panels),),
-        figures=(
-            front_figure("tradeoff_frames.svg", "Time to the answer and error by frames, bits and binning", panels),
-        ),
-        facts={"needless": needless_everywhere(families), "presses": presses, "most_frames": MOST_FRAMES},
+        figures=(front_figure("tradeoff_frames.svg", caption, panels),),
+        facts={"needless": needless_everywhere(named), "presses": presses, "most_frames": MOST_FRAMES},
     )
 
 

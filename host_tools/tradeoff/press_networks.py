@@ -18,7 +18,6 @@ from onnx import numpy_helper
 
 from device.measurement.arrays import Array, Single
 from device.measurement.bundle import open_session
-from device.measurement.estimate import SPOKEN
 from device.measurement.parameters import denormalise
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.model import RampModel
@@ -27,7 +26,7 @@ from host_tools.press_models.noisy_presses import PressSet, random_press_set
 from host_tools.press_models.onnx_networks import build_network
 from host_tools.press_models.seeds import derived_seed
 from host_tools.press_models.train_ensemble import train_ensemble
-from host_tools.tradeoff.fronts import Panel, front_figure, front_table
+from host_tools.tradeoff.fronts import front_figure, front_table, unknown_panels
 from host_tools.tradeoff.pareto import Choice, needless_everywhere
 from host_tools.tradeoff.yardstick import cost
 
@@ -64,21 +63,9 @@ def networks_chapter(
 ) -> Chapter:
     """Return the fronts of the standard mode's networks; `network` is the ONNX file of `model`."""
     asked = budget or NetworkBudget()
-    surrogate, noise = model.answers.surrogate, model.answers.noise["standard"]
-    scored = _scored(random_press_set(surrogate, noise, asked.presses, derived_seed(2, "trade-off of the networks")))
-    whole = members_of(network)
-    points = [
-        _points(f"{n}", COMMITTED, with_members(network, n), scored, chosen=n == whole) for n in range(1, whole + 1)
-    ]
-    points += [_points(f"{n} int8", INTEGERS, in_integers(with_members(network, n)), scored) for n in (1, whole)]
-    training_set = random_press_set(surrogate, noise, asked.trained_on, derived_seed(2, "short training"))
-    trained_points = []
-    for width in asked.widths:
-        trained = train_ensemble(
-            training_set, seed=2, members=asked.members, steps=asked.steps, hidden=width, jobs=jobs
-        )
-        trained_points.append(_points(f"{asked.members} of {width}", WIDTHS, build_network(trained), scored))
-    panels = _panels("", points) + _panels(", short training", trained_points)
+    scored = _scored(_press_set(model, asked.presses, "trade-off of the networks"))
+    trained = _trained(_press_set(model, asked.trained_on, "short training"), asked, scored, jobs)
+    panels = unknown_panels(_committed(network, scored)) + unknown_panels(trained, ", short training")
     return Chapter(
         "Networks of mode standard",
         f"{asked.presses} random presses of the surrogate with every drift; one call of the networks for one press.",
@@ -87,16 +74,39 @@ def networks_chapter(
         figures=(front_figure("tradeoff_networks.svg", "Time and error of the standard mode's networks", panels),),
         facts={
             "needless": needless_everywhere([panel.choices for panel in panels]),
-            "members": whole,
+            "members": members_of(network),
             "steps": asked.steps,
             "trained_on": asked.trained_on,
         },
     )
 
 
-def _panels(kind: str, points: Sequence[Sequence[Choice]]) -> list[Panel]:
-    titles = (f"{SPOKEN[name]}{kind}" for name in UNKNOWNS)
-    return [Panel(title, "median error (%)", tuple(one[i] for one in points)) for i, title in enumerate(titles)]
+Points = Sequence[Choice]
+"""One network's point for each unknown."""
+
+
+def _committed(network: bytes, scored: ScoredPresses) -> list[Points]:
+    """Return the committed ensemble, by its members and in integers."""
+    whole = members_of(network)
+    fewer = {n: with_members(network, n) for n in range(1, whole + 1)}
+    exact = [_points(f"{n}", COMMITTED, some, scored, chosen=n == whole) for n, some in fewer.items()]
+    return exact + [_points(f"{n} int8", INTEGERS, in_integers(fewer[n]), scored) for n in (1, whole)]
+
+
+def _trained(training_set: PressSet, asked: NetworkBudget, scored: ScoredPresses, jobs: int) -> list[Points]:
+    """Return networks of every width, trained for a short while."""
+    networks = {
+        width: train_ensemble(training_set, seed=2, members=asked.members, steps=asked.steps, hidden=width, jobs=jobs)
+        for width in asked.widths
+    }
+    return [
+        _points(f"{asked.members} of {width}", WIDTHS, build_network(trained), scored)
+        for width, trained in networks.items()
+    ]
+
+
+def _press_set(model: RampModel, count: int, purpose: str) -> PressSet:
+    return random_press_set(model.answers.surrogate, model.answers.noise["standard"], count, derived_seed(2, purpose))
 
 
 def _scored(presses: PressSet) -> ScoredPresses:
@@ -105,7 +115,7 @@ def _scored(presses: PressSet) -> ScoredPresses:
     return ScoredPresses(rows, denormalise(presses.normalised.astype(np.float64))[:, : len(UNKNOWNS)])
 
 
-def _points(name: str, family: str, network: bytes, scored: ScoredPresses, *, chosen: bool = False) -> Sequence[Choice]:
+def _points(name: str, family: str, network: bytes, scored: ScoredPresses, *, chosen: bool = False) -> Points:
     """Return a network's point for each unknown."""
     session = open_session(network)
     (found,) = session.run(["estimate"], {"features": scored.rows})
