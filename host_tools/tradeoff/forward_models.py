@@ -47,7 +47,6 @@ CALCULIX_SIZES = {
     "rim 0.1": Sizes(bulk_mm=6.0, face_mm=1.5, rim_mm=0.1, growth=0.6, per_quarter_circle=5.0),
     "rim 0.05": Sizes(bulk_mm=5.0, face_mm=1.0, rim_mm=0.05, growth=0.5, per_quarter_circle=6.0),
     "rim 0.02": Sizes(bulk_mm=4.0, face_mm=0.8, rim_mm=0.02, growth=0.4, per_quarter_circle=8.0),
-    "rim 0.01": Sizes(bulk_mm=3.0, face_mm=0.5, rim_mm=0.01, growth=0.3, per_quarter_circle=10.0),
 }
 """From coarse to fine; even refinement spends more elements for the same error."""
 EQUAL_ERRORS = (0.02, 0.01, 0.005)

@@ -22,7 +22,9 @@ YARDSTICK_CALLS = 40
 SHORTEST_S = 0.05
 """Work shorter than this is repeated until it takes as long: clocks and caches would decide."""
 MOST_CALLS = 10_000
-LONG_S = 3.0
+MAYBE_SHORT_S = 0.2
+"""Work whose first call takes less is called again before its calls are counted: the first one may make much ready."""
+LONG_S = 1.0
 """Work longer than this is timed once, at its first call: what it makes ready counts little."""
 
 
@@ -55,7 +57,8 @@ def cost(work: Callable[[], object], repeats: int = REPEATS, clock: Callable[[],
     first_s, yardstick_s = _seconds(work, 1, of_work), _seconds(exp_and_sum, YARDSTICK_CALLS, processor_s)
     if first_s > LONG_S:
         return Cost(first_s / yardstick_s, first_s)
-    calls = int(np.clip(np.ceil(SHORTEST_S / max(_seconds(work, 1, of_work), 1e-9)), 1, MOST_CALLS))
+    again_s = _seconds(work, 1, of_work) if first_s < MAYBE_SHORT_S else first_s
+    calls = int(np.clip(np.ceil(SHORTEST_S / max(again_s, 1e-9)), 1, MOST_CALLS))
     turns = np.array([
         (_seconds(exp_and_sum, YARDSTICK_CALLS, processor_s), _seconds(work, calls, of_work)) for _ in range(repeats)
     ])  # fmt: skip
