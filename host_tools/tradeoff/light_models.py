@@ -40,7 +40,7 @@ SEED, TRUTH_SEED = 5, 50
 class ImageBudget(NamedTuple):
     """Rays of the truth, of the images that compete, and of the tables that are made; dimples and presses looked at."""
 
-    truth_rays: int = 10_000_000
+    truth_rays: int = 4_000_000
     rays: tuple[int, ...] = (10_000, 100_000, 1_000_000)
     table_rays: tuple[int, ...] = (100_000, 1_000_000, 10_000_000)
     scenes: int = 2

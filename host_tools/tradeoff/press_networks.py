@@ -41,9 +41,9 @@ class NetworkBudget(NamedTuple):
     """Presses scored; widths that are trained, with their members, steps and presses."""
 
     presses: int = 20_000
-    widths: tuple[int, ...] = (12, 24, 48, 96, 192)
+    widths: tuple[int, ...] = (12, 48, 96, 192)
     members: int = 2
-    steps: int = 2_000
+    steps: int = 1_500
     trained_on: int = 40_000
 
 

@@ -18,7 +18,7 @@ def test_the_yardstick_is_the_sum_of_the_exponential_of_one_image() -> None:
 
 
 def test_a_cost_is_the_ratio_of_the_least_times_taken_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock that each call of the yardstick moves by 1 s, and each call of the work by some 20 s after a first one."""
+    """A clock that each call of the yardstick moves by 1 s, and each call of the work by some 20 s after the first."""
     now = [0.0]
     work_s = iter([10.0, 20.0, 15.0, 18.0])
 
