@@ -15,6 +15,8 @@ COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
 """Colours told apart by colour-blind eyes (Okabe & Ito, 2008)."""
 MARKERS = "osD^v*"
 COST = "time (yardsticks)"
+CLOSE = 1.15
+"""Of two points no further apart than this in both, one is named."""
 LETTER = 0.016
 """Width of a name's letter in widths of a panel: so much room is left of the first point."""
 DECADES = 2.0
@@ -80,8 +82,9 @@ def _draw_panel(axes: Any, panel: Panel, styles: Mapping[str, tuple[str, str]]) 
     axes.step([p.cost for p in best], [p.error for p in best], where="post", color="#000000", lw=0.9, label="front")
     chosen = [one for one in panel.choices if one.chosen]
     ring = {"mfc": "none", "mec": "#d00000", "ms": 12, "mew": 1.6}
-    axes.plot([p.cost for p in chosen], [p.error for p in chosen], "o", label="chosen", **ring)
-    for one in best:  # no point lies below and left of one of the front: there is room for its name
+    if chosen:
+        axes.plot([p.cost for p in chosen], [p.error for p in chosen], "o", label="chosen", **ring)
+    for one in _named(best):  # no point lies below and left of one of the front: there is room for its name
         below_left = {"xytext": (-4, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
         axes.annotate(one.name, (one.cost, one.error), fontsize=6.5, **below_left)
     axes.set_xscale("log")
@@ -94,6 +97,19 @@ def _draw_panel(axes: Any, panel: Panel, styles: Mapping[str, tuple[str, str]]) 
     axes.set_ylabel(panel.error, fontsize=8)
     axes.tick_params(labelsize=7)
     axes.grid(alpha=0.3, which="both", lw=0.4)
+
+
+def _named(best: Sequence[Choice]) -> list[Choice]:
+    """Return the points of a front that are named: of neighbours the chosen one, else the first."""
+    named: list[Choice] = []
+    for one in sorted(best, key=lambda choice: not choice.chosen):
+        if not any(_ratio(one.cost, other.cost) < CLOSE and _ratio(one.error, other.error) < CLOSE for other in named):
+            named.append(one)
+    return named
+
+
+def _ratio(one: float, other: float) -> float:
+    return max(one / other, other / one)
 
 
 def _number(axis: Any, low: float, high: float) -> None:

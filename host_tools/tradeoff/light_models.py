@@ -75,8 +75,12 @@ def light_chapter(table: LightTable, faces: SurfaceTable, budget: ImageBudget | 
         figures=(
             front_figure("tradeoff_light.svg", "Time and error of an image, and of the table behind it", panels, 2),
         ),
-        facts={"needless": needless_everywhere([panels[0].choices])},
+        facts={"needless": needless_everywhere(_with_families(panels))},
     )
+
+
+def _with_families(panels: Sequence[Panel]) -> list[list[Choice]]:
+    return [[replace(one, name=f"{one.family}: {one.name}") for one in panel.choices] for panel in panels]
 
 
 def _images(table: LightTable, block: LightBlock, scenes: Sequence[SeenFace], asked: ImageBudget) -> Panel:
@@ -106,7 +110,11 @@ def _tables(table: LightTable, block: LightBlock, scenes: Sequence[SeenFace], as
     committed = _error(_looking_up(table, scenes)[1], scenes)
     points.append(
         Choice(
-            _spoken(COMMITTED_RAYS), "committed (time by its rays)", dearest * COMMITTED_RAYS, committed, chosen=True
+            _spoken(COMMITTED_RAYS),
+            "committed table, time by its rays",
+            dearest * COMMITTED_RAYS,
+            committed,
+            chosen=True,
         )
     )
     return Panel("The table behind it", "rms error / peak of an image", tuple(points))

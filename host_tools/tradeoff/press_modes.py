@@ -46,7 +46,7 @@ def modes_chapter(
         "host_tools/tradeoff/press_modes.py; presses: host_tools/scores/dial.py",
         tables=(Table("What each mode takes and gives", HEADER, rows), front_table("Every mode", panels)),
         figures=(front_figure("tradeoff_modes.svg", "Computing and error of the modes", panels),),
-        facts={"needless": [name.split(",")[0] for name in needless_everywhere([panel.choices for panel in panels])]},
+        facts={"needless": [name.split()[0] for name in needless_everywhere([panel.choices for panel in panels])]},
     )
 
 
@@ -65,5 +65,5 @@ def _measured(
     cost, share = float(np.median(yardsticks)), f"{entry['answered'] / entry['presses']:.0%}"
     errors, known = entry["median_percent"], entry["determined"]
     row = (mode, f"{FRAMES[mode].count}", f"{cost:.0f}", share, *(f"{errors[name]:.1f} %" for name in UNKNOWNS))
-    points = [Choice(f"{mode}, {share} answered", mode, cost, max(errors[name], LEAST_PERCENT)) for name in UNKNOWNS]
+    points = [Choice(f"{mode} ({share})", mode, cost, max(errors[name], LEAST_PERCENT)) for name in UNKNOWNS]
     return (*row, *(f"{known[name]:.0%}" for name in UNKNOWNS)), points
