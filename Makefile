@@ -123,7 +123,7 @@ train: sweep ## regenerate everything in models/ from nothing
 modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
 	$(HOST_TOOLS) modes --out docs/modes.md
 
-tradeoff: .venv/all.stamp ## measure what accuracy costs, as Pareto fronts; write docs/tradeoff.md (half an hour)
+tradeoff: .venv/all.stamp ## measure what accuracy costs, as Pareto fronts; write docs/tradeoff.md (under half an hour)
 	$(HOST_TOOLS) tradeoff --out docs/tradeoff.md
 
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera

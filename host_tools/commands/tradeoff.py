@@ -34,7 +34,7 @@ def tradeoff(
     only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
     short: Annotated[bool, typer.Option(help="The smallest of everything: does it run, not what is it worth.")] = False,
 ) -> None:
-    """Measure time and error of what can be chosen: forward model, light, frames, networks, mode; about 25 minutes.
+    """Measure time and error of what can be chosen: forward model, light, frames, networks, mode; under half an hour.
 
     Times are processor time over that of one exp-and-sum of an image, measured in turns. Exit code 1 when a model that
     the plan chooses errs more than it promises.

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from device.measurement.estimate import SPOKEN
 from device.measurement.quantities import UNKNOWNS
 from host_tools.pages.benchmark import Figure, Table
@@ -15,12 +17,12 @@ COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
 """Colours told apart by colour-blind eyes (Okabe & Ito, 2008)."""
 MARKERS = "osD^v*"
 COST = "time (yardsticks)"
-CLOSE = 1.15
-"""Of two points no further apart than this in both, one is named."""
+CLOSE = 0.07
+"""Of two points no further apart than this share of a panel, either way, one is named."""
 LETTER = 0.016
 """Width of a name's letter in widths of a panel: so much room is left of the first point."""
-DECADES = 2.0
-"""An axis that spans fewer has more than one number a decade."""
+SUBDIVISIONS = ((5.0, tuple(map(float, range(1, 10)))), (100.0, (1.0, 2.0, 5.0)))
+"""Numbers a decade of an axis that spans at most this ratio; one of any other."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def _draw_panel(axes: Any, panel: Panel, styles: Mapping[str, tuple[str, str]]) 
     ring = {"mfc": "none", "mec": "#d00000", "ms": 12, "mew": 1.6}
     if chosen:
         axes.plot([p.cost for p in chosen], [p.error for p in chosen], "o", label="chosen", **ring)
-    for one in _named(best):  # no point lies below and left of one of the front: there is room for its name
+    for one in _named(panel):  # no point lies below and left of one of the front: there is room for its name
         below_left = {"xytext": (-4, -3), "textcoords": "offset points", "ha": "right", "va": "top"}
         axes.annotate(one.name, (one.cost, one.error), fontsize=6.5, **below_left)
     axes.set_xscale("log")
@@ -99,23 +101,26 @@ def _draw_panel(axes: Any, panel: Panel, styles: Mapping[str, tuple[str, str]]) 
     axes.grid(alpha=0.3, which="both", lw=0.4)
 
 
-def _named(best: Sequence[Choice]) -> list[Choice]:
-    """Return the points of a front that are named: of neighbours the chosen one, else the first."""
+def _named(panel: Panel) -> list[Choice]:
+    """Return the points of a panel's front that are named: of neighbours the chosen one, else the first."""
     named: list[Choice] = []
-    for one in sorted(best, key=lambda choice: not choice.chosen):
-        if not any(_ratio(one.cost, other.cost) < CLOSE and _ratio(one.error, other.error) < CLOSE for other in named):
+    spans = [max(np.ptp(np.log([_place(one)[i] for one in panel.choices])), 1e-9) for i in range(2)]
+    for one in sorted(front(panel.choices), key=lambda choice: not choice.chosen):
+        apart = [np.abs(np.log(_place(one)) - np.log(_place(other))) / spans for other in named]
+        if all(distance.max() > CLOSE for distance in apart):
             named.append(one)
     return named
 
 
-def _ratio(one: float, other: float) -> float:
-    return max(one / other, other / one)
+def _place(one: Choice) -> tuple[float, float]:
+    return one.cost, one.error
 
 
 def _number(axis: Any, low: float, high: float) -> None:
     """Write plain numbers at decades, and between them where an axis spans few."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axis.set_major_locator(LogLocator(subs=(1.0,) if high > 10**DECADES * low else (1.0, 2.0, 5.0), numticks=12))
+    subdivisions = next((parts for ratio, parts in SUBDIVISIONS if high <= ratio * low), (1.0,))
+    axis.set_major_locator(LogLocator(subs=subdivisions, numticks=12))
     axis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
