@@ -19,7 +19,7 @@ PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes tradeoff pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -119,6 +119,9 @@ train: sweep ## regenerate everything in models/ from nothing
 
 modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
 	$(HOST_TOOLS) modes --out docs/modes.md
+
+tradeoff: .venv/all.stamp ## measure what accuracy costs, as Pareto fronts; write docs/tradeoff.md (under half an hour)
+	$(HOST_TOOLS) tradeoff --out docs/tradeoff.md
 
 evaluate: .venv/all.stamp ## score the committed model, noise-free and through the camera
 	$(HOST_TOOLS) evaluate

@@ -18,8 +18,9 @@
 Modules in reading order: `door`, `workers`.
 
 Rooms in the order of a scene: `scenes`, `forward`, `data`, `optics`, `probe_tables`, `calibration`, `paper_network`,
-`press_models`, `cramer_rao`, `scores`, `verification`, `replication`; `pages` writes documents, `release` builds what
-a probe installs, `commands` holds the verbs. From the device it takes `measurement`, `simulation` and `files`.
+`press_models`, `cramer_rao`, `scores`, `verification`, `replication`, `tradeoff`; `pages` writes documents, `release`
+builds what a probe installs, `commands` holds the verbs. From the device it takes `measurement`, `simulation` and
+`files`.
 
 Everything is loaded when it is first asked for, so that the import costs nothing. All else of the toolkit is reached by
 its module's path; what is listed here keeps its name.

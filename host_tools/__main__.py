@@ -20,6 +20,7 @@ from host_tools.commands.probe_by_ssh import deploy, provision
 from host_tools.commands.release import release
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
+from host_tools.commands.tradeoff import tradeoff
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
 
@@ -38,6 +39,7 @@ app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)
+app.command(epilog="Example: host_tools tradeoff --out docs/tradeoff.md")(tradeoff)
 app.command(epilog="Example: host_tools paper --out docs/paper_protocol.md")(paper)
 app.command(epilog="Example: host_tools pages --check")(pages)
 app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/precise.toml")(limits)

@@ -1,7 +1,6 @@
 """One table of everything that is timed: each figure with its unit, its bound, and the change since another run.
 
-Machines are noisy and differ. So a time is stated as a ratio to a fixed piece of NumPy work of the same minute: one
-768 x 492 float32 image put through exp and sum, about what any step over the pixels costs.
+Machines are noisy and differ. So a time is stated as a ratio to the yardstick of `host_tools tradeoff`, timed in turns.
 """
 
 from __future__ import annotations
@@ -15,13 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from host_tools.tradeoff.yardstick import cost, processor_s
+
 YARDSTICKS = "yardsticks"
 """The unit of a time over the yardstick's."""
-REPEATS = 15
+REPEATS = 9
 Clock = Callable[[], float]
-PROCESSOR, WALL = time.process_time, time.perf_counter
+PROCESSOR, WALL = processor_s, time.perf_counter
 """The processor's clock stands still while others are busy on it; what waits for another process needs the wall's."""
-_PICTURE = np.random.default_rng(1).random((492, 768), dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -66,15 +66,9 @@ def median_seconds(work: Callable[[], object], repeats: int = REPEATS, clock: Cl
 
 def timed(chapter: str, name: str, work: Callable[[], object], bound: float | None = None, clock: Clock = PROCESSOR,
           repeats: int = REPEATS) -> Figure:  # fmt: skip
-    """Return the figure of a call's median time, as a ratio to the yardstick's before and after it."""
-    before_s = _yardstick_s(clock)
-    seconds = median_seconds(work, repeats, clock)
-    value = seconds / ((before_s + _yardstick_s(clock)) / 2)
-    return Figure(chapter, name, value, bound=bound, here=f"{1e3 * seconds:.3g} ms here")
-
-
-def _yardstick_s(clock: Clock) -> float:
-    return median_seconds(lambda: np.exp(_PICTURE).sum(), 3 * REPEATS, clock)
+    """Return the figure of what one call costs: the least of some turns over the yardstick's."""
+    takes = cost(work, repeats, clock)
+    return Figure(chapter, name, takes.yardsticks, bound=bound, here=f"{1e3 * takes.seconds:.3g} ms here")
 
 
 def print_table(figures: Iterable[Figure], before: Path | None = None) -> list[Figure]:

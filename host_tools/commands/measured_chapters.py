@@ -12,11 +12,22 @@ from rich.markup import escape
 from rich.table import Table
 
 from device.files.shipped import SOURCE_TREE
+from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.output import progress
 
 if TYPE_CHECKING:
     from host_tools.pages import benchmark
     from host_tools.pages.page import Timed
+
+
+def chosen_chapters(
+    only: list[str] | None, known: Mapping[str, Callable[[], benchmark.Chapter]]
+) -> dict[str, Callable[[], benchmark.Chapter]]:
+    """Return the chapters asked for by name, all without a name; raise `InvalidQuantity` for an unknown one."""
+    for name in only or []:
+        if name not in known:
+            raise InvalidQuantity("only", repr(name), f"one of {', '.join(known)}", "name a chapter")
+    return {name: known[name] for name in only or known}
 
 
 def measure_chapters(chapters: Mapping[str, Callable[[], benchmark.Chapter]]) -> dict[str, Timed]:

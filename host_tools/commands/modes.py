@@ -9,8 +9,7 @@ from typing import Annotated
 import typer
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
+from host_tools.commands.measured_chapters import chosen_chapters, measure_chapters, print_chapter, shown
 from host_tools.commands.output import Scheduler, note, require_writable
 from host_tools.workers import workers
 
@@ -66,7 +65,7 @@ def modes(
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables, RAMP_MODES),
     }  # fmt: skip
     with workers(scheduler):
-        measured = measure_chapters({name: chapters[name] for name in _chosen(only, tuple(chapters))})
+        measured = measure_chapters(chosen_chapters(only, chapters))
     missed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         chosen = "".join(f" --only {name}" for name in only or [])
@@ -74,10 +73,3 @@ def modes(
         note.print(f"{out} written.")
     if missed:
         raise typer.Exit(1)
-
-
-def _chosen(only: list[str] | None, known: tuple[str, ...]) -> tuple[str, ...]:
-    for name in only or []:
-        if name not in known:
-            raise InvalidQuantity("only", repr(name), f"one of {', '.join(known)}", "name a chapter")
-    return tuple(only) if only else known

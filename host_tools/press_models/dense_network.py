@@ -62,9 +62,11 @@ class Prediction(NamedTuple):
     log_variance: Single
 
 
-def initial_layers(inputs: int, rng: np.random.Generator, outputs: int = 2 * len(UNKNOWNS)) -> list[DenseLayer]:
-    """Return layers of random weights (Glorot & Bengio 2010) for so many inputs and outputs."""
-    widths = (inputs, HIDDEN, HIDDEN, outputs)
+def initial_layers(
+    inputs: int, rng: np.random.Generator, outputs: int = 2 * len(UNKNOWNS), hidden: int = HIDDEN
+) -> list[DenseLayer]:
+    """Return layers of random weights (Glorot & Bengio 2010) for so many inputs, outputs and hidden units a layer."""
+    widths = (inputs, hidden, hidden, outputs)
     layers = []
     for fan_in, fan_out in pairwise(widths):
         spread = np.sqrt(2 / (fan_in + fan_out))

@@ -19,7 +19,14 @@ from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array, Single
 from device.measurement.quantities import UNKNOWNS, Bound, require
-from host_tools.press_models.dense_network import DenseLayer, InputScaling, initial_layers, loss_and_gradient, predict
+from host_tools.press_models.dense_network import (
+    HIDDEN,
+    DenseLayer,
+    InputScaling,
+    initial_layers,
+    loss_and_gradient,
+    predict,
+)
 from host_tools.press_models.noisy_presses import Presses
 from host_tools.workers import one_core_each
 
@@ -83,16 +90,16 @@ def train_ensemble(
     members: int,
     steps: int,
     columns: slice = slice(None),
+    hidden: int = HIDDEN,
     jobs: int = -1,
 ) -> DenseEnsemble:
-    """Return the ensemble trained on a training set's rows, or on some of their columns.
+    """Return the ensemble trained on a training set's rows, or on some of their columns, its hidden layers so wide.
 
     The same seed gives the same ensemble whatever `jobs` (-1: all cores). Raises `InvalidQuantity` for too few presses.
     """
     task = Task(2 * len(UNKNOWNS), training_set.normalised[:, : len(UNKNOWNS)], loss_and_gradient)
-    return DenseEnsemble(
-        *train_members(training_set, task, seed=seed, members=members, steps=steps, columns=columns, jobs=jobs)
-    )
+    budget = {"members": members, "steps": steps, "hidden": hidden}
+    return DenseEnsemble(*train_members(training_set, task, seed=seed, columns=columns, jobs=jobs, **budget))
 
 
 def train_members(
@@ -103,6 +110,7 @@ def train_members(
     members: int,
     steps: int,
     columns: slice = slice(None),
+    hidden: int = HIDDEN,
     jobs: int = -1,
 ) -> tuple[InputScaling, tuple[list[DenseLayer], ...]]:
     """Return the scaling that networks share and the layers of each, trained on a task; as `train_ensemble`."""
@@ -114,17 +122,25 @@ def train_members(
     scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical)
     with one_core_each():
         trained = Parallel(n_jobs=jobs)(
-            delayed(_member)(training_set, task, scaling, np.random.default_rng([seed, 1 + member]), steps, columns)
+            delayed(_member)(
+                training_set, task, scaling, np.random.default_rng([seed, 1 + member]), steps, columns, hidden
+            )
             for member in range(members)
         )
     return scaling, tuple(trained)
 
 
 def _member(
-    training_set: Presses, task: Task, scaling: InputScaling, rng: np.random.Generator, steps: int, columns: slice
+    training_set: Presses,
+    task: Task,
+    scaling: InputScaling,
+    rng: np.random.Generator,
+    steps: int,
+    columns: slice,
+    hidden: int,
 ) -> list[DenseLayer]:
     """Return the layers of one network after `steps` batches of fresh noise."""
-    layers = initial_layers(2 * scaling.projection.shape[1], rng, task.outputs)
+    layers = initial_layers(2 * scaling.projection.shape[1], rng, task.outputs, hidden)
     adam = Adam(layers, rate=RATE, steps=steps)
     for _ in range(steps):
         index = rng.integers(len(training_set.rows), size=BATCH)

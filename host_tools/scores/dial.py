@@ -75,11 +75,19 @@ def dial_chapter(
 
 
 def timed_presses(
-    answer: Callable[[Recording, Mode], Estimate], mode: Mode, tables: ProbeTables, *, seed: int = 1
+    answer: Callable[[Recording, Mode], Estimate],
+    mode: Mode,
+    tables: ProbeTables,
+    *,
+    seed: int = 1,
+    presses: int | None = None,
 ) -> list[TimedAnswers]:
-    """Return the answers of a mode to recordings of random presses, one after the other; alike for every mode."""
+    """Return the answers of a mode to recordings of random presses, one after the other; alike for every mode.
+
+    `PRESSES` of them, or as many as asked for.
+    """
     of_presses = derived_seed(seed, "dial")
-    parameters = draw_parameters(PRESSES, np.random.default_rng(of_presses))
+    parameters = draw_parameters(presses or PRESSES, np.random.default_rng(of_presses))
     timed = []
     for number, at in enumerate(parameters):
         recording = recorded_press(tables, at, mode, press_seed(of_presses, number), levels=ErrorLevels())

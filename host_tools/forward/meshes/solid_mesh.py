@@ -93,7 +93,7 @@ def solid_mesh(scene: Scene, *, symmetry: SolidSymmetry, order: int, resolution:
     """
     _require_symmetry(scene, symmetry)
     resolution = resolution or SolidResolution()
-    body = Glue(list(_cut(_parts(scene), scene, symmetry)))
+    body = _body(scene, symmetry)
     _name_faces(body, scene, symmetry)
     for _ in range(ATTEMPTS):
         mesh = _graded_mesh(body, scene, resolution)
@@ -157,14 +157,27 @@ def _ellipsoid(scene: Scene, inclusion: Inclusion) -> Shape:
     return gp_GTrsf(stretch, centre_mm)(Sphere(Pnt(0, 0, 0), 1))
 
 
-def _cut(parts: Iterator[Shape], scene: Scene, symmetry: SolidSymmetry) -> Iterator[Shape]:
-    """Yield what the symmetry and the slab's edge leave of each part."""
+def _body(scene: Scene, symmetry: SolidSymmetry) -> Shape:
+    """Return what the symmetry and the slab's edge leave of the parts, glued together.
+
+    A stretched inclusion is glued before it is cut: cut first, it shares no surface with the tissue around and lies
+    loose in its hole. A sphere that touches a tissue layer is cut first: glued first, it is lost.
+    """
+    parts, kept = list(_parts(scene)), _kept(scene, symmetry)
+    if kept is None:
+        return Glue(parts)
+    if scene.has_inclusion and not scene.placement.is_sphere:
+        return Glue(parts) * kept
+    return Glue([part * kept for part in parts])
+
+
+def _kept(scene: Scene, symmetry: SolidSymmetry) -> Shape | None:
+    """Return the box that symmetry and the slab's edge leave; None for all of the body."""
     far_mm = 2 * scene.tissue.half_width_mm
     high_mm, low_mm = 2 * sum(scene.waveguide.layer_thicknesses_mm), -2 * scene.tissue.thickness_mm
     corner = Pnt(0 if symmetry == "quarter" else -far_mm, -far_mm if symmetry == "full" else 0, low_mm)
-    kept = Box(corner, Pnt(scene.tissue.edge_mm or far_mm, far_mm, high_mm))
     whole = symmetry == "full" and scene.tissue.edge_mm is None
-    yield from (part if whole else part * kept for part in parts)
+    return None if whole else Box(corner, Pnt(scene.tissue.edge_mm or far_mm, far_mm, high_mm))
 
 
 def _name_faces(body: Shape, scene: Scene, symmetry: SolidSymmetry) -> None:

@@ -1,4 +1,4 @@
-"""A revolved mesh to the text of a CalculiX input deck: press to each indentation, settle, print.
+"""A mesh to the text of a CalculiX input deck: press to each indentation, settle, print.
 
 CalculiX pairs contact points only at the start of an increment, so after a press the tissue has slipped away from its
 partners by one increment's slip, an error of first order. In finite strain every press is therefore followed by a
@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from host_tools.scenes.scene import Scene
-from host_tools.verification.cross_check.revolved_mesh import RevolvedMesh
+from host_tools.verification.cross_check.revolved_mesh import ContactMesh
 from host_tools.verification.cross_check.section import INCLUSION, TISSUE
 
 MOST_INCREMENTS = 1000
@@ -72,7 +72,7 @@ def materials(scene: Scene, *, homogeneous: bool) -> dict[str, Elastic]:
 
 
 def deck(
-    mesh: RevolvedMesh,
+    mesh: ContactMesh,
     stuff: dict[str, Elastic],
     indentations_mm: Sequence[float],
     process: Process,
@@ -81,19 +81,20 @@ def deck(
 ) -> str:
     """Write the deck for rising indentations, all above 0. In small strain give one: a second would pair anew."""
     lines = [*_mesh_lines(mesh, reduced=process.reduced_integration), *_material_lines(stuff, finite_strain)]
-    lines += [*_contact_lines(process), *_support_lines(mesh)]
+    lines += [*_contact_lines(process), *mesh.supports()]
+    axis = mesh.axis + 1
     if not finite_strain:
-        return "\n".join([*lines, *_linear_step(indentations_mm[-1])]) + "\n"
+        return "\n".join([*lines, *_linear_step(axis, indentations_mm[-1])]) + "\n"
     for before_mm, after_mm in pairwise([0.0, *indentations_mm]):
-        lines += [*_press_step(before_mm, after_mm, process), *_settle_step(after_mm, process)]
+        lines += [*_press_step(axis, before_mm, after_mm, process), *_settle_step(axis, after_mm, process)]
     return "\n".join(lines) + "\n"
 
 
-def _mesh_lines(mesh: RevolvedMesh, *, reduced: bool) -> list[str]:
+def _mesh_lines(mesh: ContactMesh, *, reduced: bool) -> list[str]:
     lines = ["*NODE, NSET=ALL"]
     lines += [f"{i}, {x:.12g}, {y:.12g}, {z:.12g}" for i, (x, y, z) in enumerate(mesh.nodes_mm, start=1)]
     first = 1
-    for kind, elements in (("C3D20R" if reduced else "C3D20", mesh.hexahedra), ("C3D15", mesh.wedges)):
+    for kind, elements in mesh.element_blocks(reduced=reduced):
         names = np.array(mesh.materials[first - 1 : first - 1 + len(elements)])
         for name in dict.fromkeys(names):
             lines += [f"*ELEMENT, TYPE={kind}, ELSET={name}"]
@@ -133,28 +134,12 @@ def _contact_lines(process: Process) -> list[str]:
     ]
 
 
-def _support_lines(mesh: RevolvedMesh) -> list[str]:
-    """Hold base and axis; keep the two planes of the sector in their planes. The slab's side is free."""
-    angle = np.radians(mesh.sector.angle_deg)
-    c, s = np.cos(angle), np.sin(angle)
-    return [
-        "*TRANSFORM, NSET=FAR, TYPE=R",
-        f"{c:.12g}, {s:.12g}, 0, {-s:.12g}, {c:.12g}, 0",
-        "*BOUNDARY",
-        "BASE, 1, 3",
-        "AXIS, 1, 2",
-        "NEAR, 2, 2",
-        "FAR, 2, 2",
-        "BACK, 1, 2",
-    ]
-
-
-def _linear_step(indentation_mm: float) -> list[str]:
+def _linear_step(axis: int, indentation_mm: float) -> list[str]:
     """Press in a single increment, so that contact points keep the partners of the undeformed bodies."""
-    return ["*STEP", "*STATIC", "1, 1", *_back_lines(indentation_mm), *OUTPUT, "*END STEP"]
+    return ["*STEP", "*STATIC", "1, 1", *_back_lines(axis, indentation_mm), *OUTPUT, "*END STEP"]
 
 
-def _press_step(before_mm: float, after_mm: float, process: Process) -> list[str]:
+def _press_step(axis: int, before_mm: float, after_mm: float, process: Process) -> list[str]:
     """Move the back on to the next indentation without printing; step time is indentation in mm."""
     length_mm = after_mm - before_mm
     longest_mm = min(process.increment_mm, length_mm)
@@ -162,24 +147,24 @@ def _press_step(before_mm: float, after_mm: float, process: Process) -> list[str
         f"*STEP, NLGEOM, INC={MOST_INCREMENTS}",
         "*STATIC",
         f"{longest_mm:.9g}, {length_mm:.9g}, {longest_mm / 1000:.9g}, {longest_mm:.9g}",
-        *_back_lines(after_mm),
+        *_back_lines(axis, after_mm),
         # An output request lives on in later steps until it is withdrawn.
         "*NODE PRINT, NSET=RAY, FREQUENCY=0",
         "*END STEP",
     ]
 
 
-def _settle_step(indentation_mm: float, process: Process) -> list[str]:
+def _settle_step(axis: int, indentation_mm: float, process: Process) -> list[str]:
     """Hold the back still while contact points are paired anew, once in each increment; print the last."""
     return [
         f"*STEP, NLGEOM, INC={MOST_INCREMENTS}",
         "*STATIC",
         f"1, {process.repairings}, 1e-3, 1",
-        *_back_lines(indentation_mm),
+        *_back_lines(axis, indentation_mm),
         *OUTPUT,
         "*END STEP",
     ]
 
 
-def _back_lines(indentation_mm: float) -> list[str]:
-    return ["*BOUNDARY", f"BACK, 3, 3, {-indentation_mm:.9g}"]
+def _back_lines(axis: int, indentation_mm: float) -> list[str]:
+    return ["*BOUNDARY", f"BACK, {axis}, {axis}, {-indentation_mm:.9g}"]

@@ -68,6 +68,17 @@ def test_every_part_of_the_body_has_the_volumes_and_areas_of_the_drawing(symmetr
     assert cut == pytest.approx(expected[symmetry], rel=1e-6)
 
 
+@pytest.mark.parametrize("symmetry", ["quarter", "half", "full"])
+def test_an_ellipsoid_is_bonded_to_the_tissue_whatever_part_of_the_body_is_meshed(symmetry):
+    """One surface between both: it lay loose in its hole in a quarter, and halved the inclusion field."""
+    volumes, areas = drawn(Scene(INCLUSION, placement=Placement(width_ratio_x=1.5)), symmetry)
+    eccentricity = math.sqrt(1 - 1 / 1.5**2)  # of a prolate spheroid: 2 pi a2 (1 + c / (a e) arcsin e)
+    surface = 2 * math.pi * 5.0**2 * (1 + 1.5 / eccentricity * math.asin(eccentricity))
+    assert areas["sphere"] == pytest.approx(surface, rel=1e-3)
+    assert areas["side"] == pytest.approx(2 * math.pi * 60.0 * 30.0, rel=1e-4)
+    assert volumes["inclusion0"] == pytest.approx(1.5 * math.pi / 6 * 10.0**3, rel=1e-3)
+
+
 def test_without_an_inclusion_there_is_no_volume_of_it():
     volumes, areas = drawn(Scene(Inclusion(10.0, 6.0, 5.0)))
     assert set(volumes) == {"layer0", "layer1", "layer2", "tissue0"}

@@ -41,6 +41,17 @@ def test_the_reference_problem_is_reproduced_and_scales_with_the_indentation() -
 
 
 @needs_ccx
+@pytest.mark.parametrize("reduced_integration", [False, True])
+def test_axisymmetric_elements_reproduce_it_too(reduced_integration: bool) -> None:
+    """The same reference; CalculiX's own wedge has 2 degrees, so a force that is not of the full circle shows."""
+    process = Process(reduced_integration=reduced_integration)
+    (found,) = solve_with_calculix(REFERENCE, [3.0], finite_strain=False, sector="axisymmetric", process=process)
+    assert found.w_mm[0] == pytest.approx(0.34664, rel=0.005)
+    assert found.force_n == pytest.approx(0.56850, rel=0.01)
+    assert found.w_mm[0] == pytest.approx(found.w_mm[1], rel=0.005)  # also in the element at the axis
+
+
+@needs_ccx
 def test_finite_strain_with_true_sliding_tends_to_small_strain_as_the_press_vanishes() -> None:
     settings = {"refinement": 0.4, "timeout_s": 120.0, "process": Process(repairings=1)}
     (small,) = solve_with_calculix(REFERENCE, [0.01], finite_strain=False, **settings)

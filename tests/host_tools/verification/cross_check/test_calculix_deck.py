@@ -7,7 +7,7 @@ import pytest
 from device.measurement.quantities import Inclusion
 from host_tools.scenes.scene import Scene
 from host_tools.verification.cross_check.calculix_deck import Elastic, Process, deck, materials
-from host_tools.verification.cross_check.revolved_mesh import Sector, revolve
+from host_tools.verification.cross_check.revolved_mesh import Sector, axisymmetric, revolve
 from host_tools.verification.cross_check.section import Sizes, half_section
 
 SCENE = Scene(Inclusion(10.0, 6.0, 120.0))
@@ -67,3 +67,13 @@ def test_no_line_is_longer_than_the_solver_reads(finite_strain: bool) -> None:
     lines = written(finite_strain=finite_strain).splitlines()
     assert max(map(len, lines)) < 200
     assert max(line.count(",") for line in lines) <= 16
+
+
+def test_axisymmetric_elements_are_held_and_pressed_along_the_second_coordinate() -> None:
+    mesh = axisymmetric(half_section(SCENE, Sizes().refined(0.5)))
+    stuff = materials(SCENE, homogeneous=False)
+    text = deck(mesh, stuff, [1.0], Process(reduced_integration=True), finite_strain=False)
+    assert "TYPE=CAX8R," in text
+    assert "*BOUNDARY\nBASE, 1, 2\nAXIS, 1, 1\nBACK, 1, 1\n" in text
+    assert "*BOUNDARY\nBACK, 2, 2, -1\n" in text
+    assert "*TRANSFORM" not in text
