@@ -81,11 +81,11 @@ def networks_chapter(
     )
 
 
-Points = Sequence[Choice]
+Choices = Sequence[Choice]
 """One network's point for each unknown."""
 
 
-def _committed(network: bytes, scored: ScoredPresses) -> list[Points]:
+def _committed(network: bytes, scored: ScoredPresses) -> list[Choices]:
     """Return the committed ensemble, by its members and in integers."""
     whole = members_of(network)
     fewer = {n: with_members(network, n) for n in range(1, whole + 1)}
@@ -93,7 +93,7 @@ def _committed(network: bytes, scored: ScoredPresses) -> list[Points]:
     return exact + [_points(f"{n} int8", INTEGERS, in_integers(fewer[n]), scored) for n in (1, whole)]
 
 
-def _trained(training_set: PressSet, asked: NetworkBudget, scored: ScoredPresses, jobs: int) -> list[Points]:
+def _trained(training_set: PressSet, asked: NetworkBudget, scored: ScoredPresses, jobs: int) -> list[Choices]:
     """Return networks of every width, trained for a short while."""
     networks = {
         width: train_ensemble(training_set, seed=2, members=asked.members, steps=asked.steps, hidden=width, jobs=jobs)
@@ -115,7 +115,7 @@ def _scored(presses: PressSet) -> ScoredPresses:
     return ScoredPresses(rows, denormalise(presses.normalised.astype(np.float64))[:, : len(UNKNOWNS)])
 
 
-def _points(name: str, family: str, network: bytes, scored: ScoredPresses, *, chosen: bool = False) -> Points:
+def _points(name: str, family: str, network: bytes, scored: ScoredPresses, *, chosen: bool = False) -> Choices:
     """Return a network's point for each unknown."""
     session = open_session(network)
     (found,) = session.run(["estimate"], {"features": scored.rows})
