@@ -114,7 +114,8 @@ def figures() -> Iterator[Figure]:
             run = _run(capture, hand, SECONDS)
             allocated_kb = _allocated_kb(capture)
         yield from (replace(figure, name=f"{words}: {figure.name}") for figure in _of_run(run))
-        yield Figure(CHAPTER, f"{words}: allocated for a frame, beside itself", allocated_kb, "kB", bound=100.0)
+        name = f"{words}: live at once for a frame, in arrays of 32 kB"
+        yield Figure(CHAPTER, name, allocated_kb, "kB", bound=250.0)
 
 
 def _open(opened: ExitStack, config: Config, hand: VirtualHand) -> Bench:
