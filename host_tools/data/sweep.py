@@ -6,9 +6,13 @@ all are there. Memory does not grow with the number of scenes, except for a trut
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from types import FrameType
 
 from host_tools.data.dataset_file import write_dataset
 from host_tools.data.executors import executor
@@ -30,13 +34,15 @@ def sweep(
     `scheduler` is the address tcp://host:port of a Dask cluster; without it `jobs` processes of this machine solve.
     `on_row` hears each new row and how many there are. Interrupted, it leaves the journal and no `out`.
     """
-    with executor(jobs=jobs, scheduler=scheduler) as rows_of:
+    with executor(jobs=jobs, scheduler=scheduler) as rows_of, _remembered_interrupt() as interrupted:
         out.parent.mkdir(parents=True, exist_ok=True)
         journal = Journal(out.with_suffix(out.suffix + ".partial"), plan.as_record())
         truths = plan.truths()
         missing = [index for index in range(plan.scenes) if index not in journal]
         try:
             for row in rows_of(partial(solve_row, plan), ((index, truths[index]) for index in missing)):
+                if interrupted.is_set():
+                    raise KeyboardInterrupt
                 if journal.append(row):
                     on_row(row, len(journal))
         finally:
@@ -44,3 +50,22 @@ def sweep(
     write_dataset(journal, out)
     journal.remove()
     return out
+
+
+@contextmanager
+def _remembered_interrupt() -> Iterator[threading.Event]:
+    """Yield what is set once SIGINT came: a solver may swallow the exception, or call its scene failed by it."""
+    interrupted = threading.Event()
+    if threading.current_thread() is not threading.main_thread():  # signals are another thread's
+        yield interrupted
+        return
+
+    def remember(number: int, frame: FrameType | None) -> None:
+        interrupted.set()
+        signal.default_int_handler(number, frame)
+
+    before = signal.signal(signal.SIGINT, remember)
+    try:
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)

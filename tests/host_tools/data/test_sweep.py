@@ -4,12 +4,12 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 
 import numpy as np
 import pytest
 from daemon_process import ROOT, WAIT_S, wait_for
-from sweep_rows import SCENES, synthetic_rows
+from sweep_rows import SCENES, synthetic_row, synthetic_rows
 from typer.testing import CliRunner
 
 from device.measurement.quantities import InvalidQuantity
@@ -69,6 +69,30 @@ def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterr
     for name, values in read_dataset(out).items():
         if name != "reason":
             np.testing.assert_allclose(values, uninterrupted[name], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("swallow", ["ignored", "called_a_failure"])
+def test_an_interrupt_that_a_solver_swallows_stops_the_sweep_and_no_scene_has_failed_by_it(
+    tmp_path, monkeypatch, swallow
+):
+    """NGSolve's callbacks hand exceptions over as errors of their own, and a destructor drops them."""
+    plan, out = SweepPlan(3, 4), tmp_path / "s.nc"
+
+    def solve(plan, index, truth):
+        if index == 1:
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        return synthetic_row(index, truth) | ({"reason": "RuntimeError"} if swallow == "called_a_failure" and index == 1 else {})
+
+    monkeypatch.setattr(sweep_module, "solve_row", solve)
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        sweep(plan, out, jobs=1)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert not out.exists()
+    kept = (tmp_path / "s.nc.partial").read_text(encoding="utf-8")
+    assert '"index": 0' in kept
+    assert '"index": 1' not in kept
 
 
 def test_a_failed_scene_is_kept_with_its_reason_and_left_out_of_training(tmp_path, monkeypatch):
