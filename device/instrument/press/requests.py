@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
 from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
+from device.instrument.press.states import before_contact
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.mode import Mode
 from device.records.store import ENDED, Store
@@ -96,12 +97,16 @@ class PressRequests:
         return self._lock
 
     def begin(self, *, is_touched: bool) -> PressJob | None:
-        """Put the press that was asked for, or that the touched probe begins, on the board and return it."""
+        """Put the press that was asked for, or that the touched probe begins, on the board and return it.
+
+        How it begins is shown with it: whoever looks never finds it beside the `done` of the press before.
+        """
         with self._lock:
             if self._called_away.is_set() or not (self._waiting or is_touched):
                 return None
             job, self._waiting = self._waiting or self._new_job(self._mode), None
-            self._board.update(press=job, warnings=self._warnings_since_last_press())
+            guidance = before_contact("reference", job.mode)
+            self._board.update(press=job, guidance=guidance, warnings=self._warnings_since_last_press())
             return job
 
     def withdraw(self) -> PressJob | None:

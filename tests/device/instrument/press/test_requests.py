@@ -7,6 +7,7 @@ import pytest
 
 from device.errors import BusyError, CameraError, ClockJumpError, LastGoodConfigError, ModeUnavailable, UnknownResource
 from device.instrument.press.requests import PressRequests
+from device.instrument.press.states import Guidance
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.status import StatusBoard
 from device.records.store import Store
@@ -51,6 +52,15 @@ def test_a_press_that_was_asked_for_waits_in_the_store_and_begins_untouched(requ
 def test_a_press_that_nobody_asked_for_begins_at_a_touch_in_the_mode_of_the_settings(requests):
     assert requests.begin(is_touched=False) is None
     assert requests.begin(is_touched=True).mode == "paper"
+
+
+def test_a_press_is_on_the_board_together_with_how_it_begins(requests, board):
+    board.update(guidance=Guidance.DONE)  # of the press before
+    shown = []
+    board.on_guidance(lambda guidance: shown.append((guidance, board.now.press)))
+    job = requests.ask("quick")
+    requests.begin(is_touched=False)
+    assert shown == [(Guidance.PRESS_BESIDE, job)]
 
 
 def test_a_second_press_is_refused_while_one_waits_and_while_one_is_under_way(requests):
