@@ -7,11 +7,13 @@ not fed, and the command that darkens the LEDs after its end.
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -85,6 +87,35 @@ class WorldProcess:
         self.process.stdout.close()
 
 
+class Notified:
+    """systemd's end of the notifications: all are read as they come, for a full socket makes the daemon wait."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._told, self._told_s = path, threading.Condition(), dict[str, float]()
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(str(path))
+        self._thread = threading.Thread(target=self._read, name="systemd")
+        self._thread.start()
+
+    def is_told(self, what: str, since_s: float, timeout_s: float) -> bool:
+        """Return whether something has been told since a time (monotonic), or is within another from now."""
+        with self._told:
+            return self._told.wait_for(lambda: self._told_s.get(what, -math.inf) >= since_s, timeout_s)
+
+    def close(self) -> None:
+        """Read no more."""
+        with closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as last:
+            last.sendto(b"", str(self._path))
+        self._thread.join()
+        self._socket.close()
+
+    def _read(self) -> None:
+        while message := self._socket.recv(4096).decode():
+            with self._told:
+                self._told_s |= dict.fromkeys(message.split("\n"), time.monotonic())
+                self._told.notify_all()
+
+
 class Rig:
     """A world and, when it is started, the daemon in it."""
 
@@ -106,16 +137,16 @@ class Rig:
             "NOTIFY_SOCKET": str(folder / "notify"),
             "WATCHDOG_USEC": str(round(1e6 * watchdog_s)) if watchdog_s else "",
         }
-        self._notified = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self._notified.bind(str(folder / "notify"))
+        self._systemd = Notified(folder / "notify")
         self.daemon: Daemon | None = None
 
     def start(self) -> Daemon:
         """Start the daemon as its unit does; return it when it can be pressed and the hand reads its screen."""
+        since_s = time.monotonic()
         self.daemon = daemon = Daemon(
             self._folder, arguments=("--config", "config.toml", "--port", "0"), environment=self.environment
         )
-        assert self._is_told("READY=1", START_S)
+        assert self._systemd.is_told("READY=1", since_s, START_S)
         self.world.wish(url=daemon.url)
         wait_for(lambda: daemon.ask("/api/v1/health/ready").status, lambda status: status == 200)
         return daemon
@@ -132,7 +163,7 @@ class Rig:
         assert self._watchdog_s
         fed_s = time.monotonic()
         while not condition():
-            if self._is_told("WATCHDOG=1", 0.05):
+            if self._systemd.is_told("WATCHDOG=1", fed_s, 0.05):
                 fed_s = time.monotonic()
             if time.monotonic() - fed_s > self._watchdog_s:
                 return False
@@ -157,20 +188,7 @@ class Rig:
 
     def close(self) -> None:
         """End the daemon, if it still runs, and the world."""
-        with closing(self._notified):
+        with closing(self.world), closing(self._systemd):
             if self.daemon:
                 self.daemon.process.send_signal(signal.SIGCONT)
                 self.daemon.stop()
-            self.world.close()
-
-    def _is_told(self, what: str, timeout_s: float) -> bool:
-        """Return whether the daemon says something within a time."""
-        until_s = time.monotonic() + timeout_s
-        while (left_s := until_s - time.monotonic()) > 0:
-            self._notified.settimeout(left_s)
-            try:
-                if what in self._notified.recv(4096).decode().split("\n"):
-                    return True
-            except TimeoutError:
-                return False
-        return False

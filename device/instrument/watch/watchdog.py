@@ -25,6 +25,8 @@ WITHOUT_SYSTEMD_S = 15.0
 """What systemd/tsis.service asks for; without systemd a part that stops is shown, and nothing restarts."""
 LOOKS = 4
 """Looks in the watchdog's time: at least two are fed, and a fault is on the screen for half of it."""
+NOTIFY_TIMEOUT_S = 2.0
+"""A systemd that does not read for so long is not waited for: screen, log and stop need this thread."""
 MOST_RESTARTS = 3
 """So many in a row have not helped: a part that still comes back with its fault stays on the screen instead."""
 
@@ -40,6 +42,7 @@ def notify(*assignments: str) -> bool:
     if address.startswith("@"):
         address = "\0" + address[1:]
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as notifying:
+        notifying.settimeout(NOTIFY_TIMEOUT_S)
         notifying.sendto("\n".join(assignments).encode(), address)
     return True
 

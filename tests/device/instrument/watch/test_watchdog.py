@@ -1,5 +1,8 @@
 """When the watchdog is fed, and what screen, log and disk say when it is not. No thread: a test looks itself."""
 
+import socket
+from contextlib import closing, suppress
+
 import pytest
 
 from device.instrument.status import StatusBoard
@@ -107,3 +110,27 @@ def test_a_systemd_that_is_gone_ends_nothing(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "gone"))
     Rig(tmp_path).looks_at(None)
     assert "systemd cannot be notified" in caplog.text
+
+
+def test_a_systemd_that_does_not_read_keeps_neither_the_screen_nor_a_stop_waiting(tmp_path, monkeypatch, caplog):
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+    monkeypatch.setattr(watchdog_module, "NOTIFY_TIMEOUT_S", 0.01)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as unread, closing(fill(tmp_path / "notify", unread)):
+        rig = Rig(tmp_path)
+        rig.looks_at(None)
+        assert "systemd cannot be notified: timed out" in caplog.text
+        rig.looks_at(FROZEN)
+        assert rig.board.now.hindrance.code == "E901"
+        rig.watchdog.start()
+        rig.watchdog.close()
+
+
+def fill(path, unread):
+    """Bind a socket there and send to it until it takes no more; return what sends."""
+    unread.bind(str(path))
+    sending = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    sending.setblocking(False)
+    with suppress(BlockingIOError):
+        while True:
+            sending.sendto(b"WATCHDOG=1", str(path))
+    return sending
