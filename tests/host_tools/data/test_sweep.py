@@ -82,7 +82,8 @@ def test_an_interrupt_that_a_solver_swallows_stops_the_sweep_and_no_scene_has_fa
         if index == 1:
             with suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
-        return synthetic_row(index, truth) | ({"reason": "RuntimeError"} if swallow == "called_a_failure" and index == 1 else {})
+        reason = "RuntimeError" if swallow == "called_a_failure" and index == 1 else ""
+        return synthetic_row(index, truth) | {"reason": reason}
 
     monkeypatch.setattr(sweep_module, "solve_row", solve)
     before = signal.getsignal(signal.SIGINT)
