@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 REACHED_WITHIN_S = 3.0
 LARGEST_BATCH = "100 MB"
 """Tables and models go along with a batch, so that any worker can take it over; Dask warns above this."""
-_AT_WORK = Lock()
+AT_WORK = Lock()
 """Two threads of one worker that solve at once crash it: NGSolve's task manager belongs to the process."""
 
 
@@ -95,7 +95,7 @@ def _work_off(batch: bytes) -> Any:
     """Return the results of a batch, on a worker: one after the other, whatever its threads."""
     from distributed.protocol.pickle import loads
 
-    with _AT_WORK:
+    with AT_WORK:
         return loads(batch)()  # type: ignore[no-untyped-call]
 
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from itertools import islice
-from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
 
 from joblib import Parallel, delayed
@@ -20,7 +19,7 @@ from joblib import Parallel, delayed
 from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Row
 from host_tools.data.rows import Truth, empty_row
-from host_tools.workers import connected
+from host_tools.workers import AT_WORK, connected
 
 if TYPE_CHECKING:
     from distributed import Client, Future, KilledWorker
@@ -31,8 +30,6 @@ Solve = Callable[[int, Truth], Row]
 
 CASES_UNDER_WAY = 256
 """Two for each of a hundred workers; a million cases at once would fill the scheduler."""
-_SOLVING = Lock()
-"""Two threads of one worker that solve at once crash it: NGSolve's task manager belongs to the process."""
 
 
 class Executor(Protocol):
@@ -118,7 +115,7 @@ def _outcomes(
 
 
 def _solve_one_at_a_time(solve: Solve, index: int, truth: Truth) -> Row:
-    with _SOLVING:
+    with AT_WORK:
         return solve(index, truth)
 
 

@@ -5,9 +5,9 @@ import signal
 import time
 from itertools import pairwise
 
-import dask
 import numpy as np
 import pytest
+from dask_cluster import NO_DASHBOARD, two_workers
 from distributed import Client, LocalCluster
 from joblib import Parallel, delayed
 from joblib.parallel import get_active_backend
@@ -18,22 +18,12 @@ from host_tools.paper_network.train import train
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.workers import one_core_each, workers
 
-NO_DASHBOARD = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
 TRIALS = 12
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Two workers, one core each, started again however often they die; work is given up after two died of it."""
-    patience = {
-        "distributed.scheduler.allowed-failures": 1,
-        "distributed.deploy.lost-worker-timeout": "1h",
-        "distributed.comm.timeouts.connect": "5s",  # how long a result is asked of a worker that is dead
-    }
-    with (
-        dask.config.set(patience),
-        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **NO_DASHBOARD) as running,
-    ):
+    with two_workers() as running:
         yield running
 
 

@@ -9,10 +9,10 @@ import time
 from itertools import pairwise
 from operator import itemgetter
 
-import dask
 import numpy as np
 import pytest
 import xarray as xr
+from dask_cluster import NO_DASHBOARD, two_workers
 from distributed import Client, LocalCluster
 
 from device.measurement.quantities import InvalidQuantity
@@ -24,22 +24,12 @@ from host_tools.data.plan import SweepPlan
 from host_tools.data.sweep import sweep
 
 SCENES = 8
-NO_DASHBOARD = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
 NO_TRUTH = np.zeros(3)
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Two workers, one core each, started again however often they die; a case is suspect after two died at it."""
-    patience = {
-        "distributed.scheduler.allowed-failures": 1,
-        "distributed.deploy.lost-worker-timeout": "1h",
-        "distributed.comm.timeouts.connect": "5s",  # how long a row is asked of a worker that is dead
-    }
-    with (
-        dask.config.set(patience),
-        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **NO_DASHBOARD) as running,
-    ):
+    with two_workers() as running:
         yield running
 
 
