@@ -9,8 +9,9 @@ are assumed.
 from __future__ import annotations
 
 import math
+import random
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 
 from device.measurement.mode import RAMP_TO_N
@@ -26,6 +27,10 @@ TAKEN_UP_FOR = ("hold_block", "put_weight")
 TREMOR_HZ = 9.3
 TREMOR_BEAT = 11.1 / 9.3
 """A second sine makes tremor swell and fade: its frequency over that of the first, and half its size."""
+USUAL_ASIDE_MM = 4.0
+"""How far this hand goes when it is to move aside and nobody says how far."""
+ASIDE_TURN_DEG = 90.0
+"""Each further place of a scan lies in another direction from the lesion's middle."""
 OVERSHOOT_S = 0.15
 """How long after the hand has arrived an overshoot is largest."""
 REMEMBERED_MOVES = 8
@@ -42,6 +47,8 @@ class HandSettings:
     not at all without. `overshoot_ratio`: how far it first goes beyond its aim. `fade_n_per_s`: how fast a force that
     it means to hold changes. `early_lifts`: so often it lifts a press `lifts_after_s` after it has begun it.
     `held_n`: the force with which it holds the probe on something from the start on, until the screen shows a fault.
+    `aside_error_mm`: how far it places the probe from where a scan wants it next, standard deviation in x and in y;
+    `seed` of these errors.
     """
 
     rate_n_per_s: float = 0.45
@@ -62,6 +69,8 @@ class HandSettings:
     miss_y_mm: float = 0.0
     tilt_x_deg: float = 0.0
     tilt_y_deg: float = 0.0
+    aside_error_mm: float = 1.0
+    seed: int = 1
 
     def __post_init__(self) -> None:
         require("hand.rate_n_per_s", self.rate_n_per_s, Bound(0.01, 10.0, "N/s"), ACTION)
@@ -82,6 +91,8 @@ class HandSettings:
             require(f"hand.{name}", getattr(self, name), Bound(-30.0, 30.0, "mm"), ACTION)
         for name in ("tilt_x_deg", "tilt_y_deg"):
             require(f"hand.{name}", getattr(self, name), Bound(-10.0, 10.0, "deg"), ACTION)
+        require("hand.aside_error_mm", self.aside_error_mm, Bound(0.0, 10.0, "mm"), ACTION)
+        require("hand.seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
 
     @property
     def on_lesion_mm(self) -> tuple[float, float]:
@@ -93,7 +104,8 @@ class HandSettings:
 class Move:
     """One motion of the hand: from when, from which force to which, how fast, and where.
 
-    `overshoot_n` is how far it first goes beyond, `fade_n_per_s` how the force changes once it is there.
+    `overshoot_n` is how far it first goes beyond, `fade_n_per_s` how the force changes once it is there;
+    `pressed_since_s`: when the press began, where that is before this motion.
     """
 
     since_s: float
@@ -103,6 +115,7 @@ class Move:
     position_mm: tuple[float, float]
     overshoot_n: float = 0.0
     fade_n_per_s: float = 0.0
+    pressed_since_s: float | None = None
 
     def steady_n(self, t_s: float) -> float:
         """Return the force on the way from one to the other, at a limited rate, and after that."""
@@ -113,6 +126,11 @@ class Move:
             return self.from_n + math.copysign(min(step_n, abs(gap_n)), gap_n)
         beyond_n = self.overshoot_n * held_s / OVERSHOOT_S * math.exp(1 - held_s / OVERSHOOT_S)
         return self.aim_n + math.copysign(beyond_n, gap_n) + self.fade_n_per_s * held_s
+
+    @property
+    def press_began_s(self) -> float:
+        """When the press began that this motion is part of."""
+        return self.since_s if self.pressed_since_s is None else self.pressed_since_s
 
 
 class VirtualHand:
@@ -126,14 +144,18 @@ class VirtualHand:
         self._following, self._is_ramp = settings.held_n > 0.0, False
         self._lifts_left = settings.early_lifts
         self._ramp_rate_n_per_s = settings.ramp_rate_n_per_s
+        self._random, self._asides = random.Random(settings.seed), 0
 
     def begin(self) -> None:
         """Take up the probe: from now on the hand follows the guidance."""
         self._following = True
         self._ramp_rate_n_per_s = self.settings.ramp_rate_n_per_s
 
-    def follow(self, guidance: str, now_s: float) -> None:
-        """Read one line of guidance (its code) and act on it after the reaction time."""
+    def follow(self, guidance: str, now_s: float, aside_mm: float | None = None) -> None:
+        """Read one line of guidance (its code) and act on it after the reaction time.
+
+        `aside_mm`: how far beside the lesion's middle the screen wants the next press of a scan.
+        """
         self._following |= guidance in TAKEN_UP_FOR
         if not self._following:
             return
@@ -146,7 +168,10 @@ class VirtualHand:
             case "touch_beside":
                 self._ramp(act_s, TOUCH_N, BESIDE_MM)
             case "touch_lesion":
+                self._asides = 0
                 self._ramp(act_s, TOUCH_N, self.settings.on_lesion_mm)
+            case "move_aside":
+                self._ramp(act_s, TOUCH_N, self._aside(USUAL_ASIDE_MM if aside_mm is None else aside_mm))
             case "press_harder" | "press_lighter" if not self._is_ramp and self.settings.corrects_to_n is not None:
                 self._hold(act_s, self.settings.corrects_to_n, None)
             case "press_slowly" | "press_lighter" | "slower" | "hold_still" if self._is_ramp:
@@ -157,6 +182,16 @@ class VirtualHand:
             case "done" | "rejected" | "fault":
                 self._hold(act_s, 0.0, None)
                 self._following = False
+
+    def _aside(self, aside_mm: float) -> tuple[float, float]:
+        """Return the next place of a scan: so far from where it takes the middle to be, each time to another side."""
+        angle_rad = math.radians(ASIDE_TURN_DEG * self._asides)
+        self._asides += 1
+        (x_mm, y_mm), error_mm = self.settings.on_lesion_mm, self.settings.aside_error_mm
+        return (
+            x_mm + aside_mm * math.cos(angle_rad) + self._random.gauss(0.0, error_mm),
+            y_mm + aside_mm * math.sin(angle_rad) + self._random.gauss(0.0, error_mm),
+        )
 
     def _go_on(self, act_s: float, guidance: str) -> None:
         """Follow a ramp's guidance: whoever was too fast once stays slower; to hold still is to stay at the force."""
@@ -182,7 +217,8 @@ class VirtualHand:
         overshoot_n = self.settings.overshoot_ratio * abs(aim_n - force_n) if holds else 0.0
         fade_n_per_s = self.settings.fade_n_per_s if holds else 0.0
         with self._lock:
-            self._moves.append(Move(act_s, force_n, aim_n, rate_n_per_s, place, overshoot_n, fade_n_per_s))
+            since_s = before.press_began_s if force_n > 0.0 else None
+            self._moves.append(Move(act_s, force_n, aim_n, rate_n_per_s, place, overshoot_n, fade_n_per_s, since_s))
             if self._lifts_left and aim_n > TOUCH_N:
                 self._lift_early(self._moves[-1])
 
@@ -190,7 +226,8 @@ class VirtualHand:
         """Append that this hand lifts by itself in the middle of a move; needs the lock."""
         self._lifts_left -= 1
         at_s = move.since_s + self.settings.lifts_after_s
-        self._moves.append(Move(at_s, move.steady_n(at_s), 0.0, self.settings.rate_n_per_s, move.position_mm))
+        lifting = Move(at_s, move.steady_n(at_s), 0.0, self.settings.rate_n_per_s, move.position_mm)
+        self._moves.append(replace(lifting, pressed_since_s=move.press_began_s))
 
     def _move_at(self, t_s: float) -> Move:
         """Return the motion under way at a time: until the reaction time is over, that is still the one before."""
@@ -207,6 +244,10 @@ class VirtualHand:
         tremor = math.sin(2 * math.pi * hz * t_s) + 0.5 * math.sin(2 * math.pi * TREMOR_BEAT * hz * t_s + 1.0)
         drift = math.sin(2 * math.pi * 0.4 * t_s) + 0.4 * math.sin(2 * math.pi * 1.1 * t_s + 2.0)
         return max(0.0, steady_n + held * (self.settings.tremor_n * tremor + self.settings.drift_n * drift))
+
+    def pressed_s(self, t_s: float) -> float:
+        """Return how long the probe is pressed by now."""
+        return t_s - self._move_at(t_s).press_began_s
 
     def place(self, t_s: float) -> ProbePlacement:
         """Return where the probe stands relative to the lesion and how it leans; it moves only while it is lifted."""

@@ -19,6 +19,7 @@ from device.simulation.physics.neighbour import Neighbour
 from device.simulation.physics.sensor import Sensor
 from device.simulation.physics.skin import Skin
 from device.simulation.physics.slab import Slab
+from device.simulation.physics.world import AS_BELIEVED, World
 
 SERIALS = {"physical": "SIM-0001", "linear": "SIM-LINEAR"}
 DEFAULT_INCLUSION = Inclusion(size_mm=12.0, depth_mm=6.0, youngs_modulus_kpa=60.0)
@@ -48,6 +49,7 @@ class Scenario:
     An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 4-6.25 kPa, 27-36 mm.
     `expects` is the fault code it must raise, `self_test_fails` the check of its self-test that must fail.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
+    `world` is what probe and presses are where that is not what skin, lens, cell and tables say.
     `settings` are those of the daemon, as in its file, that the scene needs otherwise than they are.
     """
 
@@ -63,6 +65,7 @@ class Scenario:
     slab_thickness_mm: float = 30.0
     seed: int = 1
     neighbour: Neighbour | None = None
+    world: World = AS_BELIEVED
     faults: tuple[ScriptedFault, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     expects: str = ""
@@ -71,7 +74,10 @@ class Scenario:
     def __post_init__(self) -> None:
         if self.light not in SERIALS:
             raise InvalidQuantity("light", repr(self.light), "physical or linear", "choose one of them")
+        if self.light == "linear" and self.world != AS_BELIEVED:
+            raise InvalidQuantity("world", "given", "absent with linear light", "remove it, or take physical light")
         _ = self.slab  # refuses tissue that the tables do not hold
+        _ = self.world.lesion.skin(self.skin, 1.0)  # refuses an albedo above 1
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
 
     @property

@@ -40,7 +40,6 @@ from device.measurement.recording.tactile_image import Frame
 from device.measurement.recording.untouched_face import UntouchedFace, lit_counts, mean_led_ratio, side_levels, split
 from device.simulation.physics.surface_table import SurfaceTable
 from host_tools.calibration.gates import (
-    PHANTOMS_NEEDED,
     Gate,
     age_gate,
     fit_gates,
@@ -49,9 +48,11 @@ from host_tools.calibration.gates import (
     require_all,
     unusable,
 )
+from host_tools.calibration.known_bench import KnownBench
 from host_tools.forward.deformation import Deformation, deformation
 from host_tools.forward.solve import solve
-from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
+from host_tools.scenes.phantom_set import INCLUSIONS_NEEDED
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("device", "host_tools")
@@ -148,15 +149,17 @@ def calibrate(
     *,
     force_n: float,
     provenance: Provenance | None = None,
+    bench: KnownBench | None = None,
     seed: int = 1,
 ) -> Calibrated:
     """Return the certificate of the probe that made the recordings.
 
+    `bench` says what pressed on which tissue: the simulated probe's waveguide on the default tissue unless given.
     Raises `CalibrationRejected`, an `InvalidQuantity`, with everything that the recordings do not hold.
     """
-    stated = provenance or Provenance()
-    settings = FeatureSettings(window_radius_mm=Waveguide().central_radius_mm)
-    measured = _measured(recordings, settings, force_n, stated)
+    stated, known = provenance or Provenance(), bench or KnownBench()
+    settings = FeatureSettings(window_radius_mm=known.waveguide.central_radius_mm)
+    measured = _measured(recordings, settings, force_n, stated, known)
     errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
     first = recordings[0]
     assert first.cell is not None  # `unusable` has refused it otherwise
@@ -185,16 +188,16 @@ def calibrate(
 
 
 def _measured(
-    recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, stated: Provenance
+    recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, stated: Provenance, bench: KnownBench
 ) -> Measured:
     """Return what the recordings measure; raise `CalibrationRejected` when that is not good enough."""
-    problems = unusable(recordings, force_n)
-    if problems or len(recordings) < PHANTOMS_NEEDED:
+    problems = [*unusable(recordings, force_n), *bench.contradictions]
+    if problems or len(recordings) < INCLUSIONS_NEEDED:
         require_all([number_gate(recordings)], problems)
     made_at = stated.made_at or written(datetime.now(UTC))
     validity = _validity(recordings, stated.valid_days)
     untouched = untouched_face(recordings)
-    fit = _fit(recordings, settings, force_n)
+    fit = _fit(recordings, settings, force_n, bench)
     of_recordings = recording_gates(recordings, untouched)
     gates = (*of_recordings, age_gate(validity, made_at), *fit_gates(fit.lines, fit.features))
     require_all(gates)
@@ -209,10 +212,11 @@ def _validity(recordings: Sequence[Recording], valid_days: float | None) -> Vali
     return Validity.of(written(min(started)), usual_days if valid_days is None else valid_days)
 
 
-def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: float) -> Fit:
+def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, bench: KnownBench) -> Fit:
     image = np.array([image_features(recording, settings).mean(axis=0) for recording in recordings])
     truths = [recording.truth for recording in recordings if recording.truth]
-    features = np.array([as_row(solve(Scene(truth, Press(force_n=force_n))).inclusion_field) for truth in truths])
+    scenes = [bench.scene(place, truth, force_n) for place, truth in enumerate(truths)]
+    features = np.array([as_row(solve(scene).inclusion_field) for scene in scenes])
     lines, residuals = zip(*(fit_line(image[:, i], features[:, i]) for i in range(features.shape[1])), strict=True)
     return Fit(lines, np.column_stack(residuals), features)
 

@@ -18,11 +18,9 @@ from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQua
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import saturated_ratio
 from device.measurement.recording.untouched_face import UntouchedFace
+from host_tools.scenes.phantom_set import INCLUSIONS_NEEDED
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
-PHANTOMS_NEEDED = 6
-"""The standard deviation of n residuals is itself uncertain by 1 / sqrt(2 (n - 1)): a third with six, a quarter with
-the paper's nine."""
 LEAST_R_SQUARED = dict(zip(PAPER_UNITS, (0.95, 0.95, 0.85), strict=True))
 LARGEST_LEFT_OUT_RATIO = dict(zip(PAPER_UNITS, (0.30, 0.30, 0.50), strict=True))
 """Leave-one-out standard deviation over that of the phantoms' feature.
@@ -125,7 +123,7 @@ def _must_agree(recordings: Sequence[Recording]) -> Iterable[tuple[str, list[obj
 
 def number_gate(recordings: Sequence[Recording]) -> Gate:
     """Return the gate of how many phantoms there are."""
-    bound = Bound(PHANTOMS_NEEDED, 10_000, "recordings")
+    bound = Bound(INCLUSIONS_NEEDED, 10_000, "recordings")
     return Gate("phantom recordings", len(recordings), bound, "record more phantoms")
 
 

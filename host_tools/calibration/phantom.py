@@ -14,6 +14,7 @@ import numpy as np
 
 from device import __version__
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame, Role
 from device.simulation.hand import BESIDE_MM
@@ -21,10 +22,27 @@ from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
+from host_tools.scenes.probe import Probe
+from host_tools.scenes.probe_file import simulated_probe
 
-CAMERA = CameraSettings(
-    width_px=768, height_px=492, bits=8, mm_per_px_x=0.03125, mm_per_px_y=0.03646, exposure_us=4000.0, gain=1.0
-)
+EXPOSURE_US, GAIN = 4000.0, 1.0
+
+
+def camera_settings(probe: Probe) -> CameraSettings:
+    """Return the settings under which a probe's camera is simulated: its frame and scale, 8 bits."""
+    scale = probe.scale
+    return CameraSettings(
+        width_px=probe.camera.width_px,
+        height_px=probe.camera.height_px,
+        bits=8,
+        mm_per_px_x=scale.mm_per_px_x,
+        mm_per_px_y=scale.mm_per_px_y,
+        exposure_us=EXPOSURE_US,
+        gain=GAIN,
+    )
+
+
+CAMERA = camera_settings(simulated_probe())
 LIT, DARK = (0.6, 0.6, 0.6, 0.6), (0.0, 0.0, 0.0, 0.0)
 UNLOADED_FRAMES, PRESS_FRAMES = 4, 10
 TARGET_N, HOLD_STD_N = 0.5, 0.006
@@ -33,12 +51,16 @@ TARGET_N, HOLD_STD_N = 0.5, 0.006
 
 @dataclass(frozen=True)
 class PhantomProtocol:
-    """How a phantom is pressed: `frames` at each of the forces, how far they stray, and where beside the lesion."""
+    """How a phantom is pressed: `frames` at each of the forces, how far they stray, and where beside the lesion.
+
+    A scan presses it at `further_places`, too.
+    """
 
     forces_n: Sequence[float] = (TARGET_N,)
     frames: int = PRESS_FRAMES
     place: ProbePlacement = field(default_factory=ProbePlacement)
     stray_n: float = HOLD_STD_N
+    further_places: Sequence[ProbePlacement] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         action = "press a phantom as one would a patient"
@@ -53,8 +75,9 @@ class PhantomProtocol:
 class _Recorder:
     """Takes frames one after the other, each with its true force and the force that the cell reports."""
 
-    def __init__(self, probe: VirtualProbe, camera: CameraSettings, seed: int) -> None:
+    def __init__(self, probe: VirtualProbe, camera: CameraSettings, seed: int, imbalance_ratio: LedRatio) -> None:
         self.probe, self.camera, self.rng, self.number = probe, camera, np.random.default_rng(seed), 0
+        self.imbalance_ratio = imbalance_ratio
         cell = probe.scenario.cell
         self.force_noise_n = cell.noise_counts / cell.counts_per_n
 
@@ -72,13 +95,19 @@ class _Recorder:
         counts = self.probe.frame_counts(
             force_n=force_n,
             place=place,
-            led_ratio=light,
+            led_ratio=self._shining(light),
             exposure_us=self.camera.exposure_us,
             gain=self.camera.gain,
             frame_number=self.number,
         )
-        reported_n = force_n + float(self.rng.normal(0.0, self.force_noise_n))
+        span_ratio = self.probe.scenario.world.cell_span_ratio
+        reported_n = span_ratio * force_n + float(self.rng.normal(0.0, self.force_noise_n))
         return Frame(counts, role, self.number / 30.0, reported_n, light)
+
+    def _shining(self, light: LedRatio) -> LedRatio:
+        """Return how bright the LEDs are where the chip was told `light`, which is what a recording says."""
+        x, y, minus_x, minus_y = (ratio * (1 + by) for ratio, by in zip(light, self.imbalance_ratio, strict=True))
+        return x, y, minus_x, minus_y
 
 
 def phantom_recording(
@@ -89,26 +118,32 @@ def phantom_recording(
     protocol: PhantomProtocol | None = None,
     scenario: Scenario | None = None,
     ramps: PressRamps | None = None,
+    probe: Probe | None = None,
 ) -> Recording:
     """Return the recording of one phantom: dark, unloaded, reference press and press, with its truth.
 
     `scenario` says what the probe is made of (its inclusion and seed are not used), `ramps` how the face deforms where
-    the table does not say.
+    the table does not say. A `probe`, of which the tables must be, brings its own camera, lens, load cell, serial
+    number and imbalance of the LEDs; axis and distortion of its camera are left out.
     """
-    asked = protocol or PhantomProtocol()
+    asked, stated = protocol or PhantomProtocol(), probe or simulated_probe()
     made_of = replace(scenario or Scenario(), inclusion=inclusion, seed=seed)
-    camera = replace(CAMERA, bits=8 if made_of.sensor.bits == 8 else 16)
-    probe = VirtualProbe(made_of, tables, (camera.height_px, camera.width_px), camera.scale, ramps=ramps)
-    recorder = _Recorder(probe, camera, seed)
+    made_of = _with_parts_of(probe, made_of) if probe else made_of
+    camera = replace(camera_settings(stated), bits=8 if made_of.sensor.bits == 8 else 16)
+    pressed = VirtualProbe(made_of, tables, (camera.height_px, camera.width_px), camera.scale, ramps=ramps)
+    recorder = _Recorder(pressed, camera, seed, stated.leds.imbalance_ratio)
     frames = [
         *recorder.unloaded("dark"),
         *recorder.unloaded("reference"),
         *recorder.pressed("reference", asked, ProbePlacement(*BESIDE_MM)),
         *recorder.pressed("press", asked, asked.place),
     ]
+    for ramp, place in enumerate(asked.further_places, start=1):
+        frames += [replace(frame, ramp=ramp) for frame in recorder.pressed("press", asked, place)]
+    places = f" {asked.further_places}" if asked.further_places else ""
     return Recording(
-        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"phantom {made_of} {asked} {ramps is None}")),
-        serial=made_of.serial,
+        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"phantom {made_of} {asked} {ramps is None}{places}{probe or ''}")),
+        serial=probe.serial if probe else made_of.serial,
         software=__version__,
         started_at="1970-01-01T00:00:00.000Z",
         camera=camera,
@@ -117,4 +152,15 @@ def phantom_recording(
         truth=inclusion,
         simulated=True,
         cell=RecordedCell(made_of.cell.counts_per_n, made_of.cell.zero_counts),
+    )
+
+
+def _with_parts_of(probe: Probe, scenario: Scenario) -> Scenario:
+    """Return a scenario with the lens, the sensor's bits and the load cell of a probe."""
+    camera = probe.camera
+    return replace(
+        scenario,
+        lens=replace(scenario.lens, blur_px=camera.blur_px, distance_mm=camera.lens_distance_mm),
+        sensor=replace(scenario.sensor, bits=camera.bits),
+        cell=replace(scenario.cell, counts_per_n=probe.cell.counts_per_n),
     )

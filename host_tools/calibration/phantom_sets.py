@@ -13,25 +13,52 @@ import numpy as np
 
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.surface_table import PressRamps
+from device.simulation.scenario import Scenario
 from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.scenes.phantom_set import PhantomSet
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Scene, Tissue
 
 BREAST_IMAGER_SIZE_KPA = ((5, 20), (5, 80), (10, 10), (10, 40), (14, 40), (14, 156), (18, 20), (18, 80))
 BREAST_IMAGER_DEPTH_MM, BREAST_IMAGER_SLAB_MM = 10.0, 35.0
 SMALLEST_RANDOM_MM = 2.0
+NO_INCLUSION = Inclusion(0.0, 5.0, 80.0)
+"""What stands for the inclusion of a bare block, wherever one must be named."""
 
 
 @dataclass(frozen=True)
 class Phantom:
-    """One phantom by name; `scene` only where the table of the virtual probe does not hold it."""
+    """One phantom by name, a bare block where its inclusion is of 0 mm; in its own `tissue`, or in the scenario's.
+
+    `scene` only where the table of the virtual probe does not hold it, `set_serial` only of a set that has one.
+    """
 
     name: str
     inclusion: Inclusion
     scene: Scene | None = None
+    tissue: Tissue | None = None
+    set_serial: str = ""
 
     def ramps(self) -> PressRamps | None:
         """Return how the face deforms, solved for this phantom alone, or None where the table says it."""
         return press_ramps(self.scene) if self.scene else None
+
+    @property
+    def truth(self) -> Inclusion | None:
+        """Its inclusion, None in a bare block."""
+        return self.inclusion if self.inclusion.size_mm else None
+
+    def in_its_tissue(self, scenario: Scenario) -> Scenario:
+        """Return a scenario on its tissue; raise `InvalidQuantity` for one that the tables do not hold."""
+        if self.tissue is None:
+            return scenario
+        modulus_kpa, thickness_mm = self.tissue.youngs_modulus_kpa, self.tissue.thickness_mm
+        return replace(scenario, tissue_modulus_kpa=modulus_kpa, slab_thickness_mm=thickness_mm)
+
+
+def of_file(phantoms: PhantomSet) -> Iterator[Phantom]:
+    """Yield the phantoms of a file, bare blocks among them, each in its tissue."""
+    for one in phantoms.phantoms:
+        yield Phantom(one.name, one.inclusion or NO_INCLUSION, tissue=one.tissue, set_serial=phantoms.serial)
 
 
 def breast_imager() -> Iterator[Phantom]:

@@ -11,11 +11,13 @@ import typer
 from device.files.durable import write_once
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.output import note
+from host_tools.commands.output import note, problem_record
+from host_tools.commands.probe import ProbeOption, probe_with_tables
 
 if TYPE_CHECKING:
     from host_tools.calibration.calibrate import Calibrated
     from host_tools.calibration.gates import Gate
+    from host_tools.calibration.known_bench import OnBench
 
 MODEL = MODELS / "paper"
 
@@ -34,6 +36,11 @@ def calibrate(
     model: Annotated[Path, typer.Option(help="Bundle the certificate is for.")] = MODEL,
     table: Annotated[Path, typer.Option(help="Folder of the surface table.")] = SIMULATED_PROBE,
     force_n: Annotated[float, typer.Option(help="Force the probe is pressed with.")] = 0.5,
+    probe: ProbeOption = None,
+    phantoms: Annotated[
+        Path | None,
+        typer.Option(help="File of the phantoms, phantoms.toml: their truths and tissue. Without it, tissue of 5 kPa."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
 ) -> None:
     """Fit the three regressions from image to deformation features and write the certificate, once.
@@ -42,31 +49,45 @@ def calibrate(
     passed; otherwise nothing is written and the exit code is 1. An existing file is never replaced.
     """
     from device.files.bundle_file import read_paper_model
-    from device.files.recording_file import read_recording
     from device.simulation.physics.surface_table import load_surface_table
     from host_tools.calibration.calibrate import Provenance
     from host_tools.calibration.calibrate import calibrate as run_calibration
     from host_tools.calibration.gates import CalibrationRejected
 
     _require_new(out)
+    surface = load_surface_table(table)
+    made, bench = _on_bench(recordings, probe, phantoms, table)
     try:
         done = run_calibration(
-            [read_recording(path) for path in recordings],
+            made,
             read_paper_model(model),
-            load_surface_table(table),
+            surface,
             force_n=force_n,
             provenance=Provenance(operator, phantom_serial, valid_days=valid_days),
+            bench=bench,
         )
     except CalibrationRejected as rejection:
         if not as_json:
             raise
-        print(json.dumps({"accepted": False, "problems": [_problem(one) for one in rejection.problems]}))
+        print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in rejection.problems]}))
         raise typer.Exit(1) from rejection
     path = _issue(done, out)
     if as_json:
         print(json.dumps(_record(done, path)))
     else:
         _show(done, path)
+
+
+def _on_bench(recordings: list[Path], probe: Path | None, phantoms: Path | None, table: Path) -> OnBench:
+    """Return the recordings and what is known beside them; refuse a table that is of another probe than the file."""
+    from device.files.recording_file import read_recording
+    from host_tools.calibration.known_bench import on_bench
+    from host_tools.scenes.phantom_set import read_phantoms
+
+    made_by = probe_with_tables(probe, table)
+    names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
+    known = read_phantoms(phantoms) if phantoms else None
+    return on_bench([read_recording(path) for path in recordings], names, made_by, known)
 
 
 def _issue(done: Calibrated, out: Path) -> Path:
@@ -80,11 +101,6 @@ def _issue(done: Calibrated, out: Path) -> Path:
 def _require_new(path: Path) -> None:
     if path.suffix == ".json" and path.exists():
         raise InvalidQuantity("certificate", path, "a new file", "a certificate is written once: give another name")
-
-
-def _problem(problem: InvalidQuantity) -> dict[str, str]:
-    value = str(problem.value)
-    return {"quantity": problem.quantity, "value": value, "bound": problem.bound, "action": problem.action}
 
 
 def _record(done: Calibrated, path: Path) -> dict[str, Any]:

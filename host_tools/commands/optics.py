@@ -9,7 +9,8 @@ import typer
 
 from device.measurement.quantities import Bound, require
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
-from host_tools.commands.output import note, own_models, progress, require_writable
+from host_tools.commands.output import note, progress, require_writable
+from host_tools.commands.probe import ProbeOption, own_folder
 
 DEFAULT_RAYS = 2_000_000
 optics = typer.Typer(no_args_is_help=True, help="The light in the block: its table, and its verification.")
@@ -20,15 +21,21 @@ def build(
     out: Annotated[Path | None, typer.Option(help="Folder of the table; models/simulated_probe unless given.")] = None,
     rays: Annotated[int, typer.Option(help="Rays for the light of one LED; minutes for the default.")] = 100_000_000,
     seed: Annotated[int, typer.Option(help="Seed of the rays; the same seed gives the same table.")] = 1,
+    probe: ProbeOption = None,
 ) -> None:
     """Trace the light of the block and write the table that the virtual probe's images come from."""
     from host_tools.optics.build_lookup import STEPS, write_light_table
+    from host_tools.scenes.probe_file import probe_of
 
-    folder = out or own_models("simulated_probe")
+    made_of, folder = probe_of(probe), own_folder(probe, out)
     with progress("parts") as bar:
         task = bar.add_task("", total=len(STEPS))
         write_light_table(
-            folder, rays=rays, seed=seed, on_step=lambda step: bar.update(task, completed=STEPS.index(step))
+            folder,
+            rays=rays,
+            seed=seed,
+            on_step=lambda step: bar.update(task, completed=STEPS.index(step)),
+            probe=made_of,
         )
         bar.update(task, completed=len(STEPS))
     print(f"{folder}: light of {rays} rays.")

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from host_tools.commands.output import require_writable
+from host_tools.commands.probe import ProbeOption, with_probe
 from host_tools.scenes.scene import Press, Scene
 
 if TYPE_CHECKING:
@@ -40,19 +42,21 @@ def simulate(
     save_scene: Annotated[Path | None, typer.Option(help="Write the scene, with every key of it (TOML).")] = None,
     exposure_us: Annotated[float, typer.Option(help="Exposure of the frame.")] = 4000.0,
     seed: Annotated[int, typer.Option(help="Seed of the frame's noise.")] = 1,
+    probe: ProbeOption = None,
+    light: Annotated[Path, typer.Option(help="Folder of the probe's table of light, for a frame.")] = SIMULATED_PROBE,
 ) -> None:
     """Solve one scene: deformation of the sensing face, contact pressure, force, and O1-O3 with their errors."""
     _require_outputs(plot, frame, save_scene, exposure_us, seed)
-    asked = _scene(
-        scene, (size_mm, depth_mm, modulus_kpa), tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n)
-    )
+    base = with_probe(_read(scene), probe)
+    inclusion = _inclusion(base.inclusion, (size_mm, depth_mm, modulus_kpa), scene)
+    asked = _scene(base, inclusion, tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n))
     if save_scene:
         _save(asked, save_scene)
     solution = _solution(asked, _ratio(tolerance), strain)
     if plot:
         _plot(solution, plot)
     if frame:
-        _take_frame(solution, frame, exposure_us, seed)
+        _take_frame(solution, frame, exposure_us, seed, probe, light)
     _print(solution.as_record(), as_json=as_json, explain=explain)
 
 
@@ -78,19 +82,22 @@ def _ratio(text: str) -> float:
     return value
 
 
+def _read(path: Path | None) -> Scene:
+    """Return the file's scene, or the default one."""
+    from host_tools.scenes.scene_file import read_scene
+
+    return read_scene(path) if path else Scene()
+
+
 def _scene(
-    path: Path | None,
-    unknowns: tuple[float | None, float | None, float | None],
+    base: Scene,
+    inclusion: Inclusion | None,
     tissue_modulus_kpa: float | None,
     poisson: float | None,
     offset_mm: float | None,
     press: tuple[float | None, float | None],
 ) -> Scene:
-    """Return the file's scene, or the default one, with what the options say instead."""
-    from host_tools.scenes.scene_file import read_scene
-
-    base = read_scene(path) if path else Scene()
-    inclusion = _inclusion(base.inclusion, unknowns, path)
+    """Return a scene with what the options say instead."""
     tissue, place, probe = base.tissue, base.placement, base.waveguide
     if tissue_modulus_kpa is not None:
         tissue = replace(tissue, youngs_modulus_kpa=tissue_modulus_kpa)
@@ -141,13 +148,15 @@ def _plot(solution: Solution, path: Path) -> None:
     write_plot(solution, path)
 
 
-def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int) -> None:
+def _take_frame(solution: Solution, path: Path, exposure_us: float, seed: int, probe: Path | None, light: Path) -> None:
     """Write the frame that the camera would take of the deformed face."""
     import cv2
 
     from host_tools.optics.frame import simulated_frame
+    from host_tools.scenes.probe_file import probe_of
 
-    cv2.imwrite(str(path), simulated_frame(solution, exposure_us=exposure_us, seed=seed))
+    frame = simulated_frame(solution, exposure_us=exposure_us, seed=seed, probe=probe_of(probe), light=light)
+    cv2.imwrite(str(path), frame)
 
 
 def _print(record: dict[str, Any], *, as_json: bool, explain: bool) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from host_tools.commands.output import Scheduler, note, progress
+from host_tools.commands.probe import ProbeOption
 
 SweepStrain = Literal["small", "finite"]
 
@@ -21,14 +22,16 @@ def sweep(
     ] = None,
     strain: Annotated[SweepStrain, typer.Option(help="small (linear) or finite.")] = "small",
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
+    probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Solve random scenes of the paper's box on all cores or a cluster; interrupted, the same command goes on."""
     from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan
     from host_tools.data.sweep import sweep as run_sweep
+    from host_tools.scenes.probe_file import probe_of
 
     forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N
-    plan = SweepPlan(scenes, seed, forces_n, strain)
+    plan = SweepPlan(scenes, seed, forces_n, strain, probe_of(probe).waveguide)
     failed = 0
     with progress("scenes") as bar:
         task = bar.add_task("", total=scenes)

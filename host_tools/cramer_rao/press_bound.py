@@ -1,9 +1,9 @@
 """The least errors of size, depth and modulus: of one press of known truth, and of inclusions beside the axis.
 
-The bound is Cramer and Rao's, for the very mode of the press. Forward model and noise are those that the mode's own
-bundle believes in, linear about the truth; what is not known of tissue, skin and place is estimated too. The box counts
-as Gaussian prior, in all coordinates, as it does in the fits of mode precise: an estimate that knows where the box ends
-may err a little less. Source: Kay (1993), as `information`.
+The bound is Cramer and Rao's, for one ramp: of mode standard. Forward model and noise are those that its own bundle
+believes in, linear about the truth; what is not known of tissue, skin and place is estimated too. The box counts as
+Gaussian prior, in all coordinates, as it does in the mode's fits: an estimate that knows where the box ends may err a
+little less. Source: Kay (1993), as `information`.
 
 Beside the axis one side of the face is brighter. That first harmonic falls off with the radius as the contrast's slope
 does, but its smooth errors are not those of the ring means: a second look, which may tell more than the unknown place
@@ -34,14 +34,14 @@ def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: 
     """Return the least standard deviations [3] in coordinates, which run from -1 to 1 (`parameters.normalise`).
 
     nuisances: the true ones by their names in `PARAMETERS`; one that is not given is taken to be nominal. nan for a
-    press outside the trained ranges, where the forward model says nothing, and for a mode whose bundle has no noise.
+    press outside the trained ranges, where the forward model says nothing, and for modes that are not of one ramp.
     """
     at = {**NOMINAL, **nuisances, **vars(truth)}
     parameters = np.array([at[name] for name in PARAMETERS])
-    if mode not in answers.noise or not np.all((parameters >= LOW) & (parameters <= HIGH)):
+    if mode != "standard" or not np.all((parameters >= LOW) & (parameters <= HIGH)):
         return np.full(COUNT, np.nan)
     (row,), (jacobian,) = answers.surrogate.rows_and_jacobian(normalise(parameters)[None])
-    return cramer_rao(jacobian, answers.noise[mode].covariance(row), BOX_STD).std[:COUNT]
+    return cramer_rao(jacobian, answers.noise.covariance(row), BOX_STD).std[:COUNT]
 
 
 def spread_of_modulus(answers: RampAnswers, inclusion: Triple, offset_mm: float) -> float:

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from scipy.special import ive
 
 from device.measurement.arrays import Array
+from host_tools.scenes.probe_file import simulated_probe
 
 RING_MM = 0.3
-PICTURE_PX, PIXEL_MM = (768, 492), (0.03125, 0.03646)
-"""Columns and rows of the camera's picture, and the size of a pixel on the face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,9 @@ class Rings:
     @property
     def pixels(self) -> Array:
         """Number of pixels that see each ring [K]; a fraction where the picture cuts the ring."""
-        x, y = ((np.arange(n) + 0.5 - n / 2) * step for n, step in zip(PICTURE_PX, PIXEL_MM, strict=True))
+        camera = simulated_probe().camera
+        sides = (camera.width_px, camera.mm_per_px_x), (camera.height_px, camera.mm_per_px_y)
+        x, y = ((np.arange(n) + 0.5 - n / 2) * step for n, step in sides)
         from_axis_mm = np.hypot(x[None, :], y[:, None])
         return np.histogram(from_axis_mm, self.edges_mm)[0].astype(float)
 

@@ -6,7 +6,7 @@ is two thirds of what it is at equal indentation. Source of the box: Lee & Won 2
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, get_args
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from host_tools.forward.plan import StrainModel
-from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
 
 DEFAULT_FORCES_N = (0.5,)
 SCHEMA = "tsis.sweep/1"
@@ -24,12 +24,16 @@ SCHEMA_OF_LOADS = "tsis.sweep/2"
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What is swept: `scenes` draws from the box with a seed, each pressed with every one of `forces_n`, rising."""
+    """What is swept: `scenes` draws from the box with a seed, each pressed with every one of `forces_n`, rising.
+
+    By one probe's `waveguide`, the simulated one's unless given.
+    """
 
     scenes: int
     seed: int
     forces_n: tuple[float, ...] = DEFAULT_FORCES_N
     strain: StrainModel = "small"
+    waveguide: Waveguide = field(default_factory=Waveguide)
 
     def __post_init__(self) -> None:
         require("scenes", self.scenes, Bound(1, 1_000_000, "scenes"), "ask for at least one scene")
@@ -52,11 +56,11 @@ class SweepPlan:
 
     def scene(self, truth: NDArray[np.float64]) -> Scene:
         """Return the scene of one draw, under the largest load."""
-        return Scene(Inclusion(*map(float, truth)), Press(force_n=self.forces_n[-1]))
+        return Scene(Inclusion(*map(float, truth)), Press(force_n=self.forces_n[-1]), self.waveguide)
 
     def as_record(self) -> dict[str, Any]:
         """Return what the journal and the data set say of their origin."""
-        surroundings = Scene(None, Press(force_n=self.forces_n[-1])).surroundings()
+        surroundings = Scene(None, Press(force_n=self.forces_n[-1]), self.waveguide).surroundings()
         loads: dict[str, Any] = {"force_n": self.forces_n[-1]}
         if self.has_load_axis:
             loads = {"forces_n": list(self.forces_n), "strain": self.strain}

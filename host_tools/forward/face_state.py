@@ -49,6 +49,7 @@ class FaceState:
     `w_mm` is the displacement of the face relative to the probe's own undeformed shape, `p_kpa` the axial force on the
     face per undeformed area (positive in compression), `total_mm3` the integral of w over the face, `force_n` the
     reaction of the back and `contact_force_n` the integral of the pressure, which must equal it.
+    `outward_mm` is how far a point of the face has moved away from the axis, where the model says it.
     """
 
     indentation_mm: float
@@ -57,6 +58,7 @@ class FaceState:
     total_mm3: float
     force_n: float
     contact_force_n: float
+    outward_mm: Array | None = None
 
     def scaled(self, factor: float) -> FaceState:
         """Return the state of a linear body at another load."""
@@ -67,4 +69,5 @@ class FaceState:
             self.total_mm3 * factor,
             self.force_n * factor,
             self.contact_force_n * factor,
+            None if self.outward_mm is None else self.outward_mm * factor,
         )

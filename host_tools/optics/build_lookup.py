@@ -24,10 +24,12 @@ from device.simulation.physics.light_table import LightTable
 from device.simulation.physics.skin import Skin
 from host_tools.optics.block_events import add, at_bottom, distance_to_wall, emit
 from host_tools.optics.compiled import compiled
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.ray import BOOKS, COUNTERS, Medium, Ray, medium, moved
 from host_tools.optics.traced import Traced, TracedFace
 from host_tools.optics.tracer import trace
+from host_tools.scenes.light_block import LightBlock
+from host_tools.scenes.probe import Probe
+from host_tools.scenes.probe_file import simulated_probe
 
 MOMENTS = 5
 CLASSES = 2
@@ -113,19 +115,20 @@ def write_light_table(
     rays: int = 100_000_000,
     seed: int = 1,
     on_step: Callable[[str], None] = lambda step: None,
-    block: LightBlock | None = None,
+    probe: Probe | None = None,
 ) -> LightTable:
-    """Trace the light of a block (the default one unless given), write light_table.npz and .json, return the table.
+    """Trace the light of a probe (the simulated one unless given), write light_table.npz and .json, return the table.
 
     `rays` for the light of the LED; the three smaller parts take a tenth each. `on_step` is told each of `STEPS` as it
     begins. The same rays and seed give the same table.
     """
     require("rays", rays, Bound(1000, 1e12, ""), "trace enough rays to fill the table")
-    block = block or LightBlock()
+    probe = probe or simulated_probe()
+    block = probe.light_block
     walls = Bound(0.0, WHITEST_WALL, ": beyond it the stray light depends on the press, which no table holds")
     require("wall_reflectance", block.wall_reflectance, walls, "blacken the walls, or trace each scene")
     table = make_light_table(block, rays, seed, on_step)
-    table.save(folder, {"rays": rays, "seed": seed})
+    table.save(folder, {"rays": rays, "seed": seed, **probe.origin()})
     return table
 
 

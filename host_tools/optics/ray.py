@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from device.simulation.physics.skin import Skin
 from host_tools.optics.compiled import compiled
-from host_tools.optics.light_block import LightBlock
+from host_tools.scenes.light_block import LightBlock
 
 BOOKS = ("window", "walls", "skin", "beyond_face", "through_face", "bottom", "roulette", "cut")
 WINDOW, WALLS, SKIN, BEYOND_FACE, THROUGH_FACE, BOTTOM, ROULETTE, CUT = range(len(BOOKS))

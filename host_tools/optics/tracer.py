@@ -19,9 +19,9 @@ from host_tools.optics.block_events import at_bottom, at_wall, distance_to_wall,
 from host_tools.optics.compiled import compiled
 from host_tools.optics.face_events import at_face
 from host_tools.optics.height_field import HeightField, distance_to_face
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.ray import BOOKS, COUNTERS, CUT, ROULETTE, TALLIES, Medium, Ray, medium, moved, weighing
 from host_tools.optics.traced import Traced, TracedFace, summed_up
+from host_tools.scenes.light_block import LightBlock
 
 __all__ = ["Traced", "TracedFace", "trace"]
 

@@ -36,8 +36,10 @@ from host_tools.forward.small_strain.contact import contact_pressure_kpa
 from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.symmetry import SOLID
 from host_tools.forward.tiers import build
-from host_tools.probe_tables.surface_table import inclusion_axes, ring_means
-from host_tools.scenes.scene import Placement, Press, Scene
+from host_tools.probe_tables.surface_table import inclusion_axes, require_tabulated, ring_means, solved_for
+from host_tools.scenes.probe import Probe
+from host_tools.scenes.probe_file import simulated_probe
+from host_tools.scenes.scene import Placement, Press, Scene, Waveguide
 
 ORDER = 3
 POINTS = (5, 4, 2, 6)
@@ -65,9 +67,12 @@ def tilt_per_degree(
     return rays.r_mm[0], sampler(probe.u[-1] + sinking_mm)[0], sampler(pressure)[0]
 
 
-def off_axis_scene(inclusion: Inclusion, offset_mm: float, *, force_n: float = 1.0) -> Scene:
-    """Return the default scene with the inclusion off the axis, along +x."""
-    return Scene(inclusion, Press(force_n=force_n), placement=Placement(offset_x_mm=offset_mm))
+def off_axis_scene(
+    inclusion: Inclusion, offset_mm: float, *, force_n: float = 1.0, waveguide: Waveguide | None = None
+) -> Scene:
+    """Return the default scene with the inclusion off the axis, along +x; the waveguide is the default one, too."""
+    place = Placement(offset_x_mm=offset_mm)
+    return Scene(inclusion, Press(force_n=force_n), waveguide or Waveguide(), placement=place)
 
 
 def cosine_modes(field: Array) -> Array:
@@ -77,10 +82,12 @@ def cosine_modes(field: Array) -> Array:
     return np.asarray(series[:MODES])
 
 
-def inclusions_per_n_mm3(size_mm: float, depth_mm: float, offset_mm: float, mismatches: Array) -> Array:
+def inclusions_per_n_mm3(
+    size_mm: float, depth_mm: float, offset_mm: float, mismatches: Array, waveguide: Waveguide | None = None
+) -> Array:
     """Return the modes [M, 2, K, R] of one geometry at all mismatches, over these too, on one mesh."""
     moduli_kpa = [NOMINAL.modulus_kpa(float(mismatch)) for mismatch in mismatches]
-    scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm)
+    scene = off_axis_scene(Inclusion(size_mm, depth_mm, moduli_kpa[-1]), offset_mm, waveguide=waveguide)
     meshed = build(scene, replace(model_plan(scene), grading="coarse"))
     inclusion_free, *pressed = (
         meshed.model.press(materials, [scene.press], estimate_error=False)[0].state
@@ -103,20 +110,26 @@ def face_modes(r_mm: Array, face: FaceState, inclusion_free: FaceState) -> Array
 
 def build_off_axis_table(
     *,
+    waveguide: Waveguide | None = None,
     points: tuple[int, int, int, int] = POINTS,
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> OffAxisTable:
-    """Solve every point of the table (about twenty minutes on two cores); `on_point` hears done and total."""
+    """Solve every point of the table (about twenty minutes on two cores); `on_point` hears done and total.
+
+    Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.
+    """
+    waveguide = waveguide or Waveguide()
+    require_tabulated(waveguide)
     axes = inclusion_axes(points[:3], SMALLEST_SIZE_MM)
     offset = points_with_ends(*OFFSETS_MM, points[3])
-    r_mm, tilt_w_mm, tilt_p_kpa = tilt_per_degree(Scene(None))
+    r_mm, tilt_w_mm, tilt_p_kpa = tilt_per_degree(Scene(None, waveguide=waveguide))
     tilt = np.stack([tilt_w_mm, ring_means(r_mm, tilt_p_kpa)])[:, ::EVERY]
     inclusion_field = np.zeros((*points, 2, MODES, tilt.shape[-1]))
     grid = list(product(range(points[0]), range(points[1]), range(points[3])))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     solved = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.elastic_mismatch)
+        delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.elastic_mismatch, waveguide)
         for i, j, m in grid
     )
     for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
@@ -125,6 +138,6 @@ def build_off_axis_table(
     return OffAxisTable(*axes, offset, r_mm[::EVERY], np.moveaxis(inclusion_field, 4, 0), tilt)
 
 
-def write_off_axis_table(table: OffAxisTable, folder: Path) -> None:
-    """Write the table with the surroundings it was solved for."""
-    table.save(folder, {"scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(), "strain": "small"})
+def write_off_axis_table(table: OffAxisTable, folder: Path, probe: Probe | None = None) -> None:
+    """Write the table with the surroundings and the probe that it was solved for."""
+    table.save(folder, {**solved_for(probe or simulated_probe()), "strain": "small"})

@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -20,7 +21,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array
-from device.measurement.quantities import Inclusion
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.physics.chebyshev import points_inside, points_with_ends
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL, Slab
@@ -29,7 +30,9 @@ from host_tools.forward.accuracy import Level
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramps
-from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Tissue, TissueLayer
+from host_tools.scenes.probe import Probe
+from host_tools.scenes.probe_file import simulated_probe
+from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Tissue, TissueLayer, Waveguide
 
 POINTS = (7, 7, 3)
 """Points in size, depth and mismatch."""
@@ -100,14 +103,18 @@ def press_ramps(scene: Scene) -> PressRamps:
     return PressRamps(r_mm, Ramp(FORCES_N, baseline), Ramp(FORCES_N, inclusion_field))
 
 
-def scene_in(slab: Slab, inclusion: Inclusion | None = None) -> Scene:
-    """Return the default scene in another slab."""
+def scene_in(slab: Slab, inclusion: Inclusion | None = None, *, waveguide: Waveguide | None = None) -> Scene:
+    """Return the default scene in another slab, pressed by a waveguide: the simulated probe's unless given."""
     tissue = replace(Tissue(), youngs_modulus_kpa=slab.youngs_modulus_kpa, thickness_mm=slab.thickness_mm)
-    return Scene(inclusion, tissue=tissue)
+    return Scene(inclusion, tissue=tissue, waveguide=waveguide or Waveguide())
 
 
 def scene_on_one_mesh(
-    slab: Slab, inclusion: Inclusion | None = None, thicknesses_mm: Sequence[float] = SLAB_THICKNESSES_MM
+    slab: Slab,
+    inclusion: Inclusion | None = None,
+    thicknesses_mm: Sequence[float] = SLAB_THICKNESSES_MM,
+    *,
+    waveguide: Waveguide | None = None,
 ) -> Scene:
     """Return the scene in the layers of a slab that is as thick as the last of the ascending `thicknesses_mm`.
 
@@ -122,7 +129,7 @@ def scene_on_one_mesh(
     ]
     bulk_kpa = layers.pop().youngs_modulus_kpa
     tissue = replace(Tissue(), youngs_modulus_kpa=bulk_kpa, thickness_mm=depths_mm[-1], layers=tuple(layers))
-    return Scene(inclusion, tissue=tissue)
+    return Scene(inclusion, tissue=tissue, waveguide=waveguide or Waveguide())
 
 
 SOFT, STIFF = (Slab(youngs_modulus_kpa=modulus) for modulus in SLAB_MODULI_KPA[::2])
@@ -140,9 +147,10 @@ thickness from the fourth."""
 SceneOf = Callable[[Slab, Inclusion | None], Scene]
 
 
-def _baseline_per_n(scene_of: SceneOf, slab: Slab) -> Array:
+def baseline_per_n(scene_of: SceneOf, slab: Slab, level: Level | None = BASELINE) -> Array:
+    """Return the fields [2, F, R] without an inclusion over the force, at forces that indent alike in every slab."""
     forces_n = FORCES_N * slab.stiffness_ratio
-    return _per_n(ramp(scene_of(slab, None), forces_n, BASELINE), forces_n)[0]
+    return _per_n(ramp(scene_of(slab, None), forces_n, level), forces_n)[0]
 
 
 def inclusions_per_n_mm3(
@@ -169,18 +177,34 @@ def inclusion_axes(points: tuple[int, int, int], smallest_size_mm: float) -> Inc
     )
 
 
+def require_tabulated(waveguide: Waveguide) -> None:
+    """Refuse a face that no table can hold: fields over the radius are those of a round, flat one."""
+    action = "build a round and flat face, or solve each scene on its own"
+    if waveguide.face != "round":
+        raise InvalidQuantity("face.shape of the tables' probe", waveguide.face, "round", action)
+    if waveguide.dome_mm:
+        raise InvalidQuantity("face.dome_mm of the tables' probe", waveguide.dome_mm, "0 mm", action)
+
+
 def build_surface_table(
     *,
+    waveguide: Waveguide | None = None,
     points: tuple[int, int, int] = POINTS,
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> SurfaceTable:
-    """Solve every point of the table (about five minutes on two cores); `on_point` hears done and total."""
+    """Solve every point of the table (about five minutes on two cores); `on_point` hears done and total.
+
+    Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.
+    """
+    waveguide = waveguide or Waveguide()
+    require_tabulated(waveguide)
     axes = inclusion_axes(points, SMALLEST_SIZE_MM)
     mismatches = axes.elastic_mismatch
-    places = [(*one, *place) for one, grid in zip(SOLVED, _grids(axes), strict=True) for place in product(*grid[:2])]
+    solved = [(partial(scene_of, waveguide=waveguide), slab) for scene_of, slab in SOLVED]
+    places = [(*one, *place) for one, grid in zip(solved, _grids(axes), strict=True) for place in product(*grid[:2])]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    baseline = Parallel(n_jobs=jobs)(delayed(_baseline_per_n)(*one) for one in SOLVED)
+    baseline = Parallel(n_jobs=jobs)(delayed(baseline_per_n)(*one) for one in solved)
     solving = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(inclusions_per_n_mm3)(*place, mismatches) for place in places
     )
@@ -188,7 +212,7 @@ def build_surface_table(
     for done, of_place in enumerate(solving, start=1):
         inclusion_field += list(of_place)
         on_point(done, len(places))
-    return assembled(axes, baseline, inclusion_field)
+    return assembled(axes, baseline, inclusion_field, radius_mm=waveguide.radius_mm)
 
 
 def _grids(axes: InclusionAxes) -> list[InclusionAxes]:
@@ -197,7 +221,9 @@ def _grids(axes: InclusionAxes) -> list[InclusionAxes]:
     return [axes, *[coarse] * (len(SOLVED) - 1)]
 
 
-def assembled(axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array]) -> SurfaceTable:
+def assembled(
+    axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array], *, radius_mm: float
+) -> SurfaceTable:
     """Return the table of the fields [2, F, R] in the order of `SOLVED`; each grid with the mismatch fastest."""
     remaining, inclusions = iter(lump_per_n_mm3), []
     for grid in _grids(axes):
@@ -209,7 +235,7 @@ def assembled(axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: 
         slab_modulus_kpa=np.array(SLAB_MODULI_KPA),
         slab_thickness_mm=np.array(SLAB_THICKNESSES_MM),
         force_n=FORCES_N,
-        r_mm=np.linspace(0.0, Scene(None).waveguide.radius_mm, inclusions[0].shape[-1]),
+        r_mm=np.linspace(0.0, radius_mm, inclusions[0].shape[-1]),
         bare_per_n=bare_per_n[0],
         lump_per_n_mm3=inclusions[0],
         bare_change_per_n=_changes(*bare_per_n),
@@ -221,6 +247,12 @@ def _changes(nominal: Array, soft: Array, stiff: Array, layered: Array, thin: Ar
     return np.stack([soft - nominal, stiff - nominal, thin - layered, thick - layered])
 
 
-def write_surface_table(table: SurfaceTable, folder: Path) -> None:
-    """Write the table with the surroundings it was solved for."""
-    table.save(folder, {"scene_defaults": Scene(None, Press(force_n=1.0)).surroundings(), "strain": "finite"})
+def write_surface_table(table: SurfaceTable, folder: Path, probe: Probe | None = None) -> None:
+    """Write the table with the surroundings and the probe that it was solved for."""
+    table.save(folder, {**solved_for(probe or simulated_probe()), "strain": "finite"})
+
+
+def solved_for(probe: Probe) -> dict[str, object]:
+    """Return what a table of pressed faces says of its origin."""
+    scene = Scene(None, Press(force_n=1.0), probe.waveguide)
+    return {"scene_defaults": scene.surroundings(), **probe.origin()}

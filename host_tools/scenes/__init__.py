@@ -1,6 +1,6 @@
-"""A scene: probe, tissue, inclusion and press, in memory and as a TOML file.
+"""What there is: scene, probe and phantoms, in memory and as TOML files.
 
-Modules in reading order: `scene`, `scene_file`.
+Modules in reading order: `scene`, `scene_file`, `light_block`, `stated`, `probe`, `probe_file`, `phantom_set`.
 
 No solver: a scene says what there is, not how it is modelled.
 """

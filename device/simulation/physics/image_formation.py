@@ -12,6 +12,7 @@ Source: Lee & Won 2013, section III.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -23,9 +24,12 @@ from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Image
 from device.simulation.physics.lens import Lens, Projection
 from device.simulation.physics.lookup_optics import LookupOptics
+from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.physics.skin import Skin
+from device.simulation.physics.world import AS_BELIEVED, World
 
 ACTION = "use physical optics"
+CENTRED = ProbePlacement()
 
 
 @dataclass(frozen=True)
@@ -71,8 +75,19 @@ class ImageFormation(Protocol):
     x_mm: Image
     y_mm: Image
 
-    def intensity(self, w_mm: Image, p_kpa: Image, led_ratio: LedRatio, *, wet_ratio: float = 0.0) -> Image:
-        """Return the intensity of every pixel [height, width]; `wet_ratio` of the face is coupled by gel."""
+    def intensity(
+        self,
+        w_mm: Image,
+        p_kpa: Image,
+        led_ratio: LedRatio,
+        *,
+        wet_ratio: float = 0.0,
+        place: ProbePlacement = CENTRED,
+    ) -> Image:
+        """Return the intensity of every pixel [height, width]; `wet_ratio` of the face is coupled by gel.
+
+        `place` says which skin is pressed, in a world where that differs.
+        """
 
 
 class LinearImage:
@@ -82,7 +97,15 @@ class LinearImage:
         self.x_mm, self.y_mm = scale.coordinates_mm(shape)
         self._optics, self._led_fields = optics, optics.led_fields(shape, scale)
 
-    def intensity(self, w_mm: Image, p_kpa: Image, led_ratio: LedRatio, *, wet_ratio: float = 0.0) -> Image:
+    def intensity(
+        self,
+        w_mm: Image,
+        p_kpa: Image,
+        led_ratio: LedRatio,
+        *,
+        wet_ratio: float = 0.0,
+        place: ProbePlacement = CENTRED,
+    ) -> Image:
         """Return light field x (slope w + intercept)."""
         seen_mm = w_mm + np.float32(wet_ratio) * (np.float32(WET_FACE_MM) - w_mm) if wet_ratio else w_mm
         return self._optics.intensity(self._led_fields, led_ratio, seen_mm)
@@ -91,13 +114,41 @@ class LinearImage:
 class ScatteredImage:
     """Light that the touched skin takes out of the block and gives back, through the lens to the pixels."""
 
-    def __init__(self, lookup: LookupOptics, skin: Skin, lens: Lens, shape: tuple[int, int], scale: PixelScale) -> None:
+    def __init__(
+        self,
+        lookup: LookupOptics,
+        skin: Skin,
+        lens: Lens,
+        shape: tuple[int, int],
+        scale: PixelScale,
+        world: World = AS_BELIEVED,
+    ) -> None:
+        """Skin, lens and scale are as believed; `world` says how far off that is."""
         self.x_mm, self.y_mm = lookup.x_mm[None, :], lookup.y_mm[:, None]
-        self._lookup, self._skin = lookup, skin
-        self._projection = Projection(lens, lookup.x_mm, lookup.y_mm, shape, scale)
+        self._lookup, self._world = lookup, world
+        self._projection = Projection(lens, lookup.x_mm, lookup.y_mm, shape, scale, world.camera)
+        self._skin = lru_cache(maxsize=8)(lambda share: world.lesion.skin(skin, share))
+        self._skin_light = lru_cache(maxsize=8)(self._skin_light_at)
 
-    def intensity(self, w_mm: Image, p_kpa: Image, led_ratio: LedRatio, *, wet_ratio: float = 0.0) -> Image:
+    def intensity(
+        self,
+        w_mm: Image,
+        p_kpa: Image,
+        led_ratio: LedRatio,
+        *,
+        wet_ratio: float = 0.0,
+        place: ProbePlacement = CENTRED,
+    ) -> Image:
         """Return the radiance on the pixels, in units of `UNIT_RADIANCE`."""
-        skin = replace(self._skin, wet_ratio=max(self._skin.wet_ratio, wet_ratio)) if wet_ratio else self._skin
-        radiance = self._lookup.radiance(w_mm, p_kpa, led_ratio, skin, bool(p_kpa.any()))
+        world, share, touching = self._world, self._world.lesion_share(place), bool(p_kpa.any())
+        skin = self._skin(share)
+        if wet_ratio:
+            skin = replace(skin, wet_ratio=max(skin.wet_ratio, wet_ratio))
+        lit = world.light.lit(led_ratio, share)
+        radiance = self._lookup.radiance(w_mm, p_kpa, lit, skin, touching, world.contact)
+        if touching and world.texture.level_percent:
+            radiance *= self._skin_light(place.x_mm, place.y_mm)
         return self._projection(radiance / np.float32(UNIT_RADIANCE))
+
+    def _skin_light_at(self, x_mm: float, y_mm: float) -> Image:
+        return self._world.texture.light_ratio(self.x_mm + x_mm, self.y_mm + y_mm)

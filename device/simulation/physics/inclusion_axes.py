@@ -25,10 +25,10 @@ class InclusionAxes(NamedTuple):
     def inclusion_per_n(self, fields_per_n_mm3: Array, inclusion: Inclusion, slab: Slab) -> Array:
         """Return an inclusion's field per newton from fields [2, S, D, M, ...] over force, cubed size and mismatch.
 
-        Raises `InvalidQuantity` for an inclusion outside the axes, whose mismatch is that in `slab`.
+        Raises `InvalidQuantity` for an inclusion outside the axes, whose mismatch is that in the stated `slab`.
         """
         size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
-        softest, stiffest = (slab.modulus_kpa(float(end)) for end in self.elastic_mismatch[[0, -1]])
+        softest, stiffest = (slab.stated.modulus_kpa(float(end)) for end in self.elastic_mismatch[[0, -1]])
         require("size_mm", size_mm, Bound(0.0, float(self.size_mm[-1]), "mm"), ACTION)
         require("depth_mm", depth_mm, Bound(float(self.depth_mm[0]), float(self.depth_mm[-1]), "mm"), ACTION)
         require("youngs_modulus_kpa", modulus_kpa, Bound(softest, stiffest, "kPa"), ACTION)

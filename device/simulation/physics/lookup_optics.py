@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Single
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.light_table import LightTable, load_light_table
-from device.simulation.physics.skin import Skin
+from device.simulation.physics.skin import AS_ASSUMED, ContactLaw, Skin
 
 LEDS = 4
 FINER = 2
@@ -78,12 +78,19 @@ class LookupOptics:
         return self._x_mm
 
     def radiance(
-        self, w_mm: Single, p_kpa: Single, led_ratio: Sequence[float], skin: Skin, touching: bool = True
+        self,
+        w_mm: Single,
+        p_kpa: Single,
+        led_ratio: Sequence[float],
+        skin: Skin,
+        touching: bool = True,
+        law: ContactLaw = AS_ASSUMED,
     ) -> Single:
         """Return the radiance towards the camera [ny, nx], 1/(sr mm2) per unit of light of all four LEDs at ratio 1.
 
         `w_mm` and `p_kpa` [ny, nx] on the render grid; `led_ratio` of the sides +x, +y, -x, -y, and exactly linear in
-        it. Without `touching` there is no skin behind the face. A face deeper than the table counts as its deepest.
+        it. Without `touching` there is no skin behind the face; `law` is how its contact grows. A face deeper than the
+        table counts as its deepest.
         Raises `InvalidQuantity` for fields of another shape, a deformation that is no number, or no four LEDs.
         """
         ratio = self._require(w_mm, p_kpa, led_ratio) / np.float32(LEDS)
@@ -92,7 +99,7 @@ class LookupOptics:
             return haze
         if skin != self._skin:
             self._prepare(skin)
-        contact, w = skin.contact_ratio(p_kpa), np.asarray(w_mm, dtype=np.float32)
+        contact, w = skin.contact_ratio(p_kpa, law), np.asarray(w_mm, dtype=np.float32)
         given_back = _finer(self._given_back(_coarser(w), _coarser(contact), ratio, skin))
         slope_y, slope_x = _slopes(w, self._cell_mm / FINER)
         seen = self._seen_dry + (self._seen_wet - self._seen_dry) * contact

@@ -44,7 +44,40 @@ class Slab:
         """Return the inclusion that has the same mismatch in the nominal slab: its modulus over `stiffness_ratio`."""
         return replace(inclusion, youngs_modulus_kpa=inclusion.youngs_modulus_kpa / self.stiffness_ratio)
 
+    @property
+    def stated(self) -> Slab:
+        """The slab whose inclusions a table is asked for."""
+        return self
+
+    def changed(self, modulus_ratio: float) -> Slab:
+        """Return the slab where its tissue is so much stiffer or softer (0.8-1.1), with the inclusions of this one."""
+        if modulus_ratio == 1.0:
+            return self
+        return ChangedSlab(self.youngs_modulus_kpa * modulus_ratio, self.thickness_mm, self)
+
 
 NOMINAL_KPA = 5.0
 """Young's modulus of normal tissue in Lee & Won, IEEE JBHI 17(2), 2013, section III."""
 NOMINAL = Slab()
+
+
+@dataclass(frozen=True)
+class ChangedSlab(Slab):
+    """Tissue softer or stiffer than that of the slab it is part of: the tables' quadratics go on a little there.
+
+    Which inclusions it may hold, and of which one the field off the axis has the shape, is as in that slab.
+    """
+
+    part_of: Slab = NOMINAL
+
+    def __post_init__(self) -> None:
+        """Leave the bounds to the slab that it is part of."""
+
+    @property
+    def stated(self) -> Slab:
+        """The slab that it is part of."""
+        return self.part_of
+
+    def nominal_equivalent(self, inclusion: Inclusion) -> Inclusion:
+        """Return the inclusion that has the mismatch of the stated slab in the nominal one."""
+        return self.part_of.nominal_equivalent(inclusion)

@@ -12,7 +12,7 @@ from ngsolve import H1, GridFunction, InnerProduct
 
 from device.measurement.arrays import Array
 from host_tools.forward.face_state import MN_PER_N, FaceState
-from host_tools.forward.finite_strain.closed_contact import AXIAL, ClosedContact
+from host_tools.forward.finite_strain.closed_contact import AXIAL, RADIAL, ClosedContact
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import integral_over_face, pressure_of_forces
 from host_tools.forward.symmetry import AXISYMMETRIC
@@ -55,6 +55,7 @@ def face_state(contact: ClosedContact, indentation_mm: float, sampler: FaceSampl
         total_mm3=integral_over_face(contact.mesh, AXISYMMETRIC, w_mm),
         force_n=reaction_n(contact, "back"),
         contact_force_n=integral_over_face(contact.mesh, AXISYMMETRIC, pressure) / MN_PER_N,
+        outward_mm=sampler(contact.u.components[RADIAL]),
     )
 
 

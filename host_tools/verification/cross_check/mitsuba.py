@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.cross_check.mitsuba_scene import MitsubaCamera, write_mitsuba_scene
 
 RENDERER = Path(__file__).with_name("mitsuba_render.py")

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import SIDES, LightBlock
 from host_tools.optics.traced import TracedFace
+from host_tools.scenes.light_block import SIDES, LightBlock
 
 SCENE_FILE, FACE_FILE = "scene.xml", "face.ply"
 LED_CLEARANCE_MM = 1e-3

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.light.scenes import centre, face, whole_face
 
 CONTACT_RATIO = 0.48

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_least, at_most, relative
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.cross_check.mitsuba import (
     MitsubaFailed,
     mitsuba_python,

@@ -24,10 +24,10 @@ from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.pressed_face import RadialProfiles
 from device.simulation.physics.skin import Skin
 from device.simulation.physics.surface_table import SurfaceTable, load_surface_table
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_most
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.light.pictures import LINES
 
 CELL_MM = 0.5

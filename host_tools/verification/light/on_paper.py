@@ -16,10 +16,10 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.simulation.physics.skin import Skin
 from host_tools.optics.fresnel import plate_transmission, reflectance
-from host_tools.optics.light_block import SIDES, LightBlock
 from host_tools.optics.traced import Traced
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, relative
+from host_tools.scenes.light_block import SIDES, LightBlock
 from host_tools.verification.light.scenes import FACE_RADIUS_MM, face
 
 BLOCK = LightBlock(wall_reflectance=0.0, glass_refractive_index=1.41, glass_thickness_mm=0.0)

@@ -19,10 +19,10 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.skin import Skin
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import Traced, TracedFace
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_least, at_most
+from host_tools.scenes.light_block import LightBlock
 from host_tools.scenes.scene import Press, Scene
 from host_tools.verification.light.pictures import draw_map
 from host_tools.verification.light.scenes import GRID_MM, TOUCHED, radii_mm

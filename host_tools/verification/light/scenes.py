@@ -14,9 +14,9 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import Traced, TracedFace
 from host_tools.optics.tracer import trace
+from host_tools.scenes.light_block import LightBlock
 
 FACE_RADIUS_MM = 11.0
 CENTRE_RADIUS_MM = 1.5

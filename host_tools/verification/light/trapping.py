@@ -9,10 +9,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import Traced
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.light.scenes import centre, face, traced, whole_face
 
 WALL_LEAK_BOUND, SLIVER_BOUND, CONTRAST_BOUND = 0.01, 1e-3, 100.0

@@ -8,7 +8,7 @@ import pytest
 
 from device.measurement.mode import RAMP_TO_N
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.hand import BESIDE_MM, RAMP_AIM_N, TOUCH_N, HandSettings, VirtualHand
+from device.simulation.hand import BESIDE_MM, RAMP_AIM_N, TOUCH_N, USUAL_ASIDE_MM, HandSettings, VirtualHand
 from device.simulation.physics.pressed_face import ProbePlacement
 
 STEADY = HandSettings(rate_n_per_s=0.5, reaction_s=0.2, aim_n=0.4, tremor_n=0.0, drift_n=0.0)
@@ -51,6 +51,16 @@ def test_it_reaches_its_aim_and_holds_it():
     hand = hand_at(STEADY, ("press_beside", 1.0))
     assert hand.force_n(2.0) == pytest.approx(0.4)
     assert hand.force_n(100.0) == pytest.approx(0.4)
+
+
+def test_it_knows_how_long_the_probe_is_pressed_through_all_that_it_is_told():
+    """From where the force begins; a press that begins anew counts anew."""
+    told = [("touch_lesion", 1.0), *(("press_slowly", 2.0 + 0.5 * i) for i in range(12)), ("hold_still", 9.0)]
+    hand = hand_at(STEADY, *told)
+    assert hand.pressed_s(11.2) == pytest.approx(10.0)
+    hand.follow("lift", 12.0)
+    hand.follow("touch_beside", 15.0)
+    assert hand.pressed_s(16.2) == pytest.approx(1.0)
 
 
 def test_it_lifts_to_exactly_nothing():
@@ -190,6 +200,42 @@ def test_a_hand_that_was_too_fast_once_stays_slower_until_it_takes_up_the_probe_
     assert hand.force_n(22.2) == pytest.approx(TOUCH_N + 0.1)
 
 
+EXACT = replace(SLOW, aside_error_mm=0.0, miss_x_mm=1.0)
+
+
+def test_it_moves_aside_of_where_it_takes_the_middle_to_be_each_time_to_another_side():
+    """A hand that misses the middle by 1 mm, told 5, 3, 3 mm and nothing."""
+    hand, places = hand_at(EXACT, ("touch_lesion", 0.0)), []
+    for number, aside_mm in enumerate((5.0, 3.0, 3.0, None)):
+        t_s = 10.0 * (number + 1)
+        hand.follow("lift", t_s)
+        hand.follow("move_aside", t_s + 4.0, aside_mm)
+        assert hand.force_n(t_s + 4.0) == 0.0
+        assert hand.force_n(t_s + 9.0) == pytest.approx(TOUCH_N)
+        places.append((hand.place(t_s + 9.0).x_mm, hand.place(t_s + 9.0).y_mm))
+    assert np.array(places) == pytest.approx(
+        np.array([(6.0, 0.0), (1.0, 3.0), (-2.0, 0.0), (1.0, -USUAL_ASIDE_MM)]), abs=1e-9
+    )
+    hand.follow("touch_lesion", 60.0)
+    assert hand.place(61.0) == ProbePlacement(1.0, 0.0)
+
+
+def test_it_places_the_probe_aside_with_an_error_that_is_the_same_in_every_run():
+    def places(seed):
+        hand = hand_at(HandSettings(seed=seed))
+        for number in range(400):
+            hand.follow("touch_lesion", 10.0 * number)
+            hand.follow("move_aside", 10.0 * number + 5.0, 4.0)
+            yield hand.place(10.0 * number + 9.0)
+
+    found = [(place.x_mm, place.y_mm) for place in places(1)]
+    assert found == [(place.x_mm, place.y_mm) for place in places(1)]
+    assert found != [(place.x_mm, place.y_mm) for place in places(2)]
+    off_mm = np.array(found) - (4.0, 0.0)
+    assert off_mm.std(axis=0) == pytest.approx([1.0, 1.0], abs=0.12)
+    assert off_mm.mean(axis=0) == pytest.approx([0.0, 0.0], abs=0.16)
+
+
 @pytest.mark.parametrize("code", ["wait", "press_harder", "press_lighter", "hold_still", "press_slowly", "slower"])
 def test_other_guidance_does_not_change_what_it_aims_at(code):
     hand = hand_at(STEADY, ("press_beside", 0.0), (code, 1.0))
@@ -220,6 +266,7 @@ def test_a_long_session_of_presses_is_followed_to_the_end():
         ("tremor_hz", 1, 30),
         ("tremor_n", 0, 1),
         ("drift_n", 0, 1),
+        ("aside_error_mm", 0, 10),
     ],
 )
 def test_a_setting_is_taken_at_both_ends_of_its_bound_and_refused_beyond(name, low, high):

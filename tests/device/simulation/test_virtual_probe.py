@@ -15,7 +15,7 @@ from device.simulation.physics.off_axis_table import load_off_axis_table
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.physics.slab import Slab
 from device.simulation.scenario import CellSettings, Scenario
-from device.simulation.virtual_probe import ProbeTables, VirtualProbe
+from device.simulation.virtual_probe import SIMULATED_PROBE_SHA256, ProbeTables, VirtualProbe
 
 MODELS = ROOT / "models" / "simulated_probe"
 SHAPE = (123, 193)
@@ -138,6 +138,16 @@ def test_tables_of_two_scenes_are_refused_together(tmp_path):
     table.save(tmp_path / "tables", {"scene_defaults": {"tissue": {"youngs_modulus_kpa": 50.0}}, "strain": "small"})
     with pytest.raises(InvalidQuantity, match=r"off axis table's scene is .*50\.0.*host_tools table"):
         ProbeTables.load(tmp_path / "tables")
+
+
+def test_light_of_another_probe_is_refused_beside_its_mechanics(tmp_path):
+    shutil.copytree(MODELS, tmp_path / "tables")
+    light = load_light_table(MODELS)
+    light.save(tmp_path / "tables", {"probe": {"serial": "TSIS-0007", "sha256": "ab" * 32}})
+    with pytest.raises(InvalidQuantity, match=r"light table's probe is abababababab, .* the file of one probe"):
+        ProbeTables.load(tmp_path / "tables")
+    light.save(tmp_path / "tables", {"probe": {"serial": "SIM-0001", "sha256": SIMULATED_PROBE_SHA256}})
+    assert ProbeTables.load(tmp_path / "tables").light.block["half_width_mm"] == 12.0
 
 
 def test_a_table_of_light_in_an_impossible_block_is_refused_by_name(tmp_path):

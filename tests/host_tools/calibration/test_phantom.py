@@ -1,6 +1,7 @@
 """Simulated phantoms are recorded by the same probe as the daemon simulates: otherwise a calibration would not hold."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import RecordedCell
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.physics.sensor import Sensor
+from device.simulation.physics.world import World
 from device.simulation.scenario import Scenario
 from host_tools.calibration import phantom
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
@@ -40,6 +42,56 @@ def test_a_ramp_has_frames_at_each_force_on_the_lesion_and_beside_it(tables):
     assert len(recording.with_role("reference")) == phantom.UNLOADED_FRAMES + 4
     assert recording.position_mm == (6.0, 0.0)
     assert recording.cell == RecordedCell(100_000.0, 8200.0)
+
+
+SCAN = PhantomProtocol((0.2, 0.4), frames=2, further_places=(ProbePlacement(y_mm=4.0), ProbePlacement(x_mm=-6.0)))
+
+
+def test_a_scan_presses_the_lesion_at_every_place_after_one_reference(tables):
+    recording = phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=1, protocol=SCAN)
+    assert len(recording.with_role("reference")) == phantom.UNLOADED_FRAMES + 4
+    ramps = recording.ramps()
+    assert list(ramps) == [0, 1, 2]
+    for frames in ramps.values():
+        assert [frame.force_n for frame in frames] == pytest.approx([0.2, 0.2, 0.4, 0.4], abs=0.03)
+    assert [frame.t_s for frame in recording.frames] == sorted(frame.t_s for frame in recording.frames)
+
+
+def test_further_places_show_the_inclusion_on_another_side(tables):
+    """Pressed 4 mm further along y it lies towards -y: there the image is brighter than beside the middle."""
+    recording = phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=1, protocol=SCAN)
+    height, width = recording.camera.height_px, recording.camera.width_px
+    first, along_y, along_x = (frames[-1].counts.astype(float) for frames in recording.ramps().values())
+
+    def difference(counts, axis):
+        halves = np.split(counts - first, 2, axis=axis)
+        return halves[1].mean() - halves[0].mean()
+
+    assert (height % 2, width % 2) == (0, 0)
+    assert abs(difference(along_y, 0)) > 5 * abs(difference(along_y, 1))
+    assert abs(difference(along_x, 1)) > 5 * abs(difference(along_x, 0))
+
+
+def test_further_places_leave_the_first_press_as_it_is_and_make_another_recording(tables):
+    one = phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=1, protocol=replace(SCAN, further_places=()))
+    scan = phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=1, protocol=SCAN)
+    assert scan.id != one.id
+    for alone, first in zip(one.frames, scan.frames, strict=False):
+        np.testing.assert_array_equal(alone.counts, first.counts)
+        assert alone.force_n == first.force_n
+
+
+def test_a_world_with_another_cell_reports_forces_of_another_scale_for_the_same_frames(tables):
+    def recorded(world):
+        protocol = PhantomProtocol((0.3, 0.5), frames=1)
+        scenario = Scenario(world=world)
+        return phantom_recording(Inclusion(10.0, 6.0, 60.0), tables, seed=2, protocol=protocol, scenario=scenario)
+
+    usual, off = recorded(World()), recorded(World(cell_span_ratio=1.02))
+    for one, other in zip(usual.frames, off.frames, strict=True):
+        np.testing.assert_array_equal(one.counts, other.counts)
+    forces, reported = ([frame.force_n for frame in each.with_role("press")] for each in (usual, off))
+    np.testing.assert_allclose(np.subtract(reported, forces), 0.02 * np.array(forces), atol=1e-4)
 
 
 def test_frames_of_ten_bits_are_recorded_in_sixteen(tables):

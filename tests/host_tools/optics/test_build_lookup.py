@@ -1,14 +1,17 @@
 """The table of light: right where paper knows the answer, reproducible, and what the probe loads."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from device.simulation.physics.light_table import load_light_table
 from device.simulation.physics.lookup_optics import LookupOptics
+from device.simulation.virtual_probe import probe_of_table, table_record
 from host_tools.optics.build_lookup import STEPS, light_field, write_light_table
-from host_tools.optics.light_block import LightBlock
+from host_tools.scenes.light_block import LightBlock
+from host_tools.scenes.probe_file import simulated_probe
 
 CLEAR = LightBlock(refractive_index=1.0, glass_refractive_index=1.0, led_radius_mm=0.05)
 
@@ -54,11 +57,16 @@ def test_a_table_is_written_step_by_step_and_one_seed_gives_one_table(tmp_path):
     assert (tmp_path / "a/light_table.npz").read_bytes() == (tmp_path / "b/light_table.npz").read_bytes()
     table = load_light_table(tmp_path / "a")
     assert LightBlock(**table.block) == LightBlock()
+    assert table_record(tmp_path / "a", "light_table")["probe"]["serial"] == "SIM-0001"
     assert LookupOptics(table).x_mm.shape == (160,)
 
 
 def test_haze_and_walls_go_into_the_table(tmp_path):
-    table = write_light_table(tmp_path, rays=100_000, block=LightBlock(haze_per_mm=0.01))
+    own = simulated_probe()
+    hazy = replace(own, serial="HAZY", block=replace(own.block, haze_per_mm=0.01))
+    table = write_light_table(tmp_path, rays=100_000, probe=hazy)
+    assert table.block["haze_per_mm"] == 0.01
+    assert probe_of_table(tmp_path, "light_table") == hazy.sha256 != own.sha256
     assert table.background.sum() > 0.0
     assert table.stray.min() >= 0.0
     assert 0.0 < table.returned_ratio.min() < table.returned_ratio.max() < 0.2

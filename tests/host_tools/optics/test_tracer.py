@@ -7,9 +7,9 @@ import pytest
 
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
 from host_tools.optics.tracer import trace
+from host_tools.scenes.light_block import LightBlock
 
 X = np.linspace(-12.0, 12.0, 97)
 BLOCK, SKIN = LightBlock(), Skin()

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.optics.light_block import LightBlock
+from host_tools.scenes.light_block import LightBlock
 
 
 @pytest.mark.parametrize(

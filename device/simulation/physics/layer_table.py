@@ -1,0 +1,108 @@
+"""What other layers change of the pressed face: the waveguide's three, the tissue's outermost and its deepest.
+
+A star, as of the slabs: one layer's modulus apart from the default, solved in finite strain at two ratios, each as the
+difference of two solves on one mesh; quadratic in the logarithm of the ratio, and several layers add up. Kept at
+coarse sizes, depths and mismatches, of the nominal slab and on the axis: what a layer changes of the tilt and of the
+shape of a field off the axis is left out. Written by `host_tools table --part layers`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Bound, Inclusion, require
+from device.simulation.physics.chebyshev import interpolation_weights
+from device.simulation.physics.inclusion_axes import InclusionAxes
+from device.simulation.physics.slab import Slab
+from device.simulation.physics.surface_table import PressRamps
+from device.simulation.physics.table_file import load_table, save_table
+
+NAME, SCHEMA = "layer_table", "tsis.layer_table/1"
+ACTION = "run `host_tools table --part layers` to make it again"
+SOLVED_RATIOS = {
+    "face_modulus_ratio": (0.8, 1.25),
+    "middle_modulus_ratio": (0.8, 1.25),
+    "backing_modulus_ratio": (0.8, 1.25),
+    "skin_modulus_ratio": (2.0, 4.0),
+    "deep_modulus_ratio": (0.5, 2.0),
+}
+"""Each layer's moduli over the default that are solved; 1 is the third point of its quadratic."""
+SKIN_MM, DEEP_FROM_MM = 1.5, 20.0
+
+
+@dataclass(frozen=True)
+class LayerRatios:
+    """Young's moduli over what the tables assume: the waveguide's layers from the tissue to the glass, the uppermost
+    1.5 mm of the tissue, and all tissue (not the inclusion) from 20 mm down.
+    """
+
+    face_modulus_ratio: float = 1.0
+    middle_modulus_ratio: float = 1.0
+    backing_modulus_ratio: float = 1.0
+    skin_modulus_ratio: float = 1.0
+    deep_modulus_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, solved in SOLVED_RATIOS.items():
+            bound = Bound(min(1.0, *solved), max(solved), "")
+            require(f"world.layers.{name}", getattr(self, name), bound, "stay inside what the table of layers holds")
+
+    def weights(self) -> Array:
+        """Return the weight [layer, 2] of what each of `SOLVED_RATIOS` changes."""
+        points = [sorted((1.0, *solved)) for solved in SOLVED_RATIOS.values()]
+        found = [
+            interpolation_weights(np.log(of_layer), float(np.log(ratio)))[np.array(of_layer) != 1.0]
+            for of_layer, ratio in zip(points, astuple(self), strict=True)
+        ]
+        return np.array(found)
+
+
+AS_TABULATED = LayerRatios()
+
+
+@dataclass(frozen=True)
+class LayerTable:
+    """`bare_change_per_n` [layer, 2, 2, F, R]: what each of `SOLVED_RATIOS` changes, w first, then p, over the force.
+
+    `inclusion_change_per_n_mm3` [layer, 2, 2, S, D, M, F, R]: the same of what an inclusion adds, also over size cubed
+    and mismatch, and over `inclusion_scale` [layer, 2, 2] of its own largest.
+    """
+
+    size_mm: Array
+    depth_mm: Array
+    elastic_mismatch: Array
+    bare_change_per_n: NDArray[np.float32]
+    inclusion_change_per_n_mm3: NDArray[np.float16]
+    inclusion_scale: Array
+
+    def changed(self, ramps: PressRamps, layers: LayerRatios, inclusion: Inclusion, slab: Slab) -> PressRamps:
+        """Return the ramps of an inclusion in a slab with other layers; refuses one outside the table.
+
+        A field off the axis grows by as much as the centred one does with the layers.
+        """
+        axes, weights = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch), layers.weights()
+        baseline = np.tensordot(weights, self.bare_change_per_n, 2)
+        scaled = weights[..., None] * self.inclusion_scale
+        per_n_mm3 = np.einsum("lnf,lnfsdmkr->fsdmkr", scaled, self.inclusion_change_per_n_mm3, optimize=True)
+        change = axes.inclusion_per_n(per_n_mm3, inclusion, slab)
+        return ramps._replace(
+            baseline=replace(ramps.baseline, fields_per_n=ramps.baseline.fields_per_n + baseline),
+            inclusion_field=replace(ramps.inclusion_field, fields_per_n=ramps.inclusion_field.fields_per_n + change),
+            nominal_inclusion_field=ramps.nominal_inclusion_field or ramps.inclusion_field,
+        )
+
+    def save(self, folder: Path, origin: dict[str, object]) -> None:
+        """Write layer_table.npz and its description with the hash."""
+        arrays = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table --part layers", **origin})
+
+
+def load_layer_table(folder: Path) -> LayerTable:
+    """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
+    arrays, _ = load_table(folder, NAME, SCHEMA, tuple(LayerTable.__dataclass_fields__), ACTION)
+    return LayerTable(**arrays)

@@ -1,0 +1,173 @@
+"""`host_tools probe`: the file of what a builder knows of a probe, and that of the phantoms it is pressed on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from device.measurement.quantities import InvalidQuantity
+from host_tools.commands.output import note, own_models, problem_record
+
+if TYPE_CHECKING:
+    from device.files.toml_record import Record
+    from host_tools.scenes.phantom_set import StatedPhantom
+    from host_tools.scenes.probe import Probe
+    from host_tools.scenes.scene import Scene
+    from host_tools.scenes.stated import StatedRow
+
+ProbeFile = Annotated[Path, typer.Argument(metavar="FILE", help="The probe's file, probe.toml.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, also of what is wrong.")]
+ProbeOption = Annotated[
+    Path | None,
+    typer.Option("--probe", help="The probe's file, probe.toml; the simulated probe unless given."),
+]
+"""Of every verb whose defaults are the simulated probe's."""
+
+probe = typer.Typer(no_args_is_help=True, help="A probe as a file: what its builder knows of it, and of its phantoms.")
+
+
+@probe.command(epilog="Example: host_tools probe new probe.toml --serial TSIS-0007")
+def new(
+    file: ProbeFile,
+    serial: Annotated[str | None, typer.Option(help="Serial number of the probe; to be filled in without it.")] = None,
+) -> None:
+    """Write a file to fill in: the design of docs/build.md, with every tolerance left open."""
+    from host_tools.scenes.probe_file import write_new_probe
+
+    write_new_probe(file, serial)
+    note.print(f'{file} written: fill in what stands behind "= ?", then run host_tools probe check {file}.')
+
+
+@probe.command(epilog="Example: host_tools probe check probe.toml")
+def check(file: ProbeFile, as_json: AsJson = False) -> None:
+    """Name everything that is wrong in a probe's file at once; exit code 1 if there is anything."""
+    from host_tools.scenes.probe_file import read_probe
+
+    found = _read(read_probe, file, as_json)
+    if as_json:
+        print(json.dumps({"accepted": True, "problems": [], "serial": found.serial, "sha256": found.sha256}))
+    else:
+        thickness_mm = sum(layer.thickness_mm for layer in found.layers)
+        print(f"{file}: probe {found.serial} can be built: {len(found.layers)} layers, {thickness_mm:g} mm together.")
+
+
+@probe.command(epilog="Example: host_tools probe show models/simulated_probe/probe.toml")
+def show(file: ProbeFile, as_json: AsJson = False) -> None:
+    """Print a probe's numbers with tolerance and unit, and what follows from them."""
+    from device.files.toml_record import as_table
+    from host_tools.scenes.probe_file import read_probe
+    from host_tools.scenes.stated import stated_rows
+
+    found = _read(read_probe, file, as_json)
+    follows = list(_consequences(found))
+    if as_json:
+        derived = {name: value for name, value, _ in follows}
+        print(json.dumps({"accepted": True, "problems": [], "probe": as_table(found), "follows": derived}))
+        return
+    print_rows([("quantity", "value", "tolerance", "unit"), *stated_rows(found)])
+    print()
+    print_rows([("what follows", "value", "unit"), *((name, f"{value:.5g}", unit) for name, value, unit in follows)])
+    print(f"\nTables of this probe are of {found.sha256[:12]}.")
+
+
+def _consequences(found: Probe) -> Iterator[tuple[str, float, str]]:
+    """Yield what follows from a probe's numbers: name, value, unit."""
+    scale, (width_mm, height_mm) = found.scale, found.frame_mm
+    yield "thickness_of_the_layers", sum(layer.thickness_mm for layer in found.layers), "mm"
+    yield "central_window_radius", found.waveguide.central_radius_mm, "mm"
+    yield "pixel_area", scale.area_mm2, "mm2"
+    yield "pixel_width_over_height", scale.mm_per_px_x / scale.mm_per_px_y, ""
+    yield "frame_width", width_mm, "mm"
+    yield "frame_height", height_mm, "mm"
+    yield "frame_height_over_face", height_mm / (2 * found.face.radius_mm), ""
+    yield "force_of_one_count", 1 / found.cell.counts_per_n, "N"
+
+
+@probe.command(epilog="Example: host_tools probe phantoms phantoms.toml")
+def phantoms(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file of the phantoms, phantoms.toml.")],
+    as_json: AsJson = False,
+) -> None:
+    """Check the file of a set of phantoms and print it: everything that is wrong at once, with exit code 1."""
+    from device.files.toml_record import as_table
+    from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+
+    found = _read(partial(read_phantoms, blocks_needed=BLOCKS_NEEDED), file, as_json)
+    if as_json:
+        advice = list(found.advice())
+        print(json.dumps({"accepted": True, "problems": [], "set": as_table(found), "advice": advice}))
+        return
+    print_rows([PHANTOM_COLUMNS, *(_phantom_row(one) for one in found.phantoms)])
+    inclusions = len(found.with_inclusion)
+    print(f"\nset {found.serial}: {inclusions} with an inclusion, {len(found.phantoms) - inclusions} bare blocks.")
+    for sentence in found.advice():
+        note.print(sentence, soft_wrap=True)
+
+
+PHANTOM_COLUMNS = ("phantom", "size mm", "depth mm", "modulus kPa", "tissue kPa", "thickness mm", "surface")
+
+
+def _phantom_row(phantom: StatedPhantom) -> tuple[str, ...]:
+    """Return a phantom as a row: each number with its tolerance."""
+    from host_tools.scenes.phantom_set import INCLUSION, TISSUE
+    from host_tools.scenes.stated import SUFFIX
+
+    pairs = ((getattr(phantom, name), getattr(phantom, name + SUFFIX)) for name in (*INCLUSION, *TISSUE))
+    numbers = ("-" if value is None else f"{value:g} +- {tolerance:g}" for value, tolerance in pairs)
+    return phantom.name, *numbers, phantom.surface
+
+
+def _read(read: Callable[[Path], Record], file: Path, as_json: bool) -> Record:
+    """Return a file's record; what is wrong in it is raised, or printed as JSON with exit code 1."""
+    try:
+        return read(file)
+    except InvalidQuantity as refusal:
+        if not as_json:
+            raise
+        problems: Iterable[InvalidQuantity] = getattr(refusal, "problems", [refusal])
+        print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in problems]}))
+        raise typer.Exit(1) from refusal
+
+
+def with_probe(scene: Scene, probe: Path | None) -> Scene:
+    """Return a scene pressed by the probe of a file; unchanged where none is given."""
+    from host_tools.scenes.probe_file import read_probe
+
+    return replace(scene, waveguide=read_probe(probe).waveguide) if probe else scene
+
+
+def probe_with_tables(probe: Path | None, table: Path) -> Probe | None:
+    """Return the probe of a file, None where none is given; refuse a folder's tables that are of another one.
+
+    Without a file they must be the simulated probe's.
+    """
+    from device.simulation.virtual_probe import probe_of_table
+    from host_tools.scenes.probe_file import probe_of
+
+    expected, found = probe_of(probe), probe_of_table(table, "surface_table")
+    if found != expected.sha256:
+        action = "name a probe's file with --probe and the folder of its own tables with --table"
+        bound = f"{expected.sha256[:12]} of {expected.serial}"
+        raise InvalidQuantity("surface table's probe", found[:12], bound, action)
+    return expected if probe else None
+
+
+def own_folder(probe: Path | None, out: Path | None) -> Path:
+    """Return the folder of a probe's tables; another probe's never stand in the simulated one's by default."""
+    if probe and out is None:
+        bound = "given with --probe"
+        raise InvalidQuantity("out", "not given", bound, "name a folder: models/simulated_probe is another probe's")
+    return out or own_models("simulated_probe")
+
+
+def print_rows(rows: Sequence[StatedRow | tuple[str, ...]]) -> None:
+    """Print a table of texts, each column as wide as its widest."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())

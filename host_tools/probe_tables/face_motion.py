@@ -1,0 +1,91 @@
+"""Builds the virtual probe's table of how far the pressed face moves outwards, from finite-strain force ramps."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.face_motion import FaceMotion
+from device.simulation.physics.inclusion_axes import InclusionAxes
+from device.simulation.physics.slab import NOMINAL
+from device.simulation.physics.surface_table import COARSE
+from host_tools.forward.face_state import FaceState
+from host_tools.forward.solution import Solution
+from host_tools.probe_tables.surface_table import (
+    BASELINE,
+    EVERY,
+    FORCES_N,
+    POINTS,
+    SMALLEST_SIZE_MM,
+    inclusion_axes,
+    ramp,
+    require_tabulated,
+    scene_in,
+    solved_for,
+)
+from host_tools.scenes.probe import Probe
+from host_tools.scenes.probe_file import simulated_probe
+from host_tools.scenes.scene import Waveguide
+
+
+def outward_mm(solution: Solution) -> tuple[Array, Array]:
+    """Return how far points of the face move [R] without the inclusion, and what the inclusion adds."""
+    without, pressed = (_outward_mm(state) for state in (solution.baseline, solution.pressed))
+    return without, pressed - without
+
+
+def _outward_mm(face: FaceState) -> Array:
+    assert face.outward_mm is not None  # finite strain says it
+    return face.outward_mm[0, ::EVERY]
+
+
+def _added_per_n_mm3(waveguide: Waveguide, size_mm: float, depth_mm: float, mismatch: float) -> Array:
+    """Return [F, R] over force, size cubed and mismatch."""
+    inclusion = Inclusion(size_mm, depth_mm, NOMINAL.modulus_kpa(mismatch))
+    scene = scene_in(NOMINAL, inclusion, waveguide=waveguide)
+    added = np.array([outward_mm(solution)[1] for solution in ramp(scene)])
+    return np.asarray(added / FORCES_N[:, None] / (size_mm**3 * mismatch))
+
+
+def build_face_motion(
+    *,
+    waveguide: Waveguide | None = None,
+    points: tuple[int, int, int] = POINTS,
+    jobs: int = -1,
+    on_point: Callable[[int, int], None] = lambda done, n: None,
+) -> FaceMotion:
+    """Solve every point of the table (two minutes on two cores); `on_point` hears done and total.
+
+    Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.
+    """
+    waveguide = waveguide or Waveguide()
+    require_tabulated(waveguide)
+    fine = inclusion_axes(points, SMALLEST_SIZE_MM)
+    axes = InclusionAxes(fine.size_mm[COARSE], fine.depth_mm[COARSE], fine.elastic_mismatch[[0, -1]])
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    without = (
+        np.array([outward_mm(solution)[0] for solution in ramp(scene_in(NOMINAL, waveguide=waveguide), level=BASELINE)])
+        / FORCES_N[:, None]
+    )
+    places = [tuple(map(float, place)) for place in product(*axes)]
+    solving = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_added_per_n_mm3)(waveguide, *place) for place in places
+    )
+    added: list[Array] = []
+    for done, of_place in enumerate(solving, start=1):
+        added.append(of_place)
+        on_point(done, len(places))
+    r_mm = np.linspace(0.0, waveguide.radius_mm, without.shape[-1])
+    return FaceMotion(*axes, r_mm, without, np.array(added).reshape(1, *map(len, axes), *without.shape))
+
+
+def write_face_motion(table: FaceMotion, folder: Path, probe: Probe | None = None) -> None:
+    """Write the table with the surroundings and the probe that it was solved for."""
+    table.save(folder, {**solved_for(probe or simulated_probe()), "strain": "finite"})
