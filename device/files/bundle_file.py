@@ -16,21 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.bundle import CARD_FILE, CARD_HASH_FILE, MODEL_FILE, BundleFiles, BundleRefused, ModelBundle
-from device.measurement.mode import Mode
 from device.measurement.mode_models import ModeModels
 from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QUICK_UNITS, QuickModel
-from device.measurement.ramp_modes.ellipticity import (
-    ROUND_FILE,
-    EllipticityTest,
-    ellipticity_arrays,
-    ellipticity_test_of,
+from device.measurement.ramp_modes.model import (
+    RAMP_UNITS,
+    SURROGATE_ARRAYS,
+    SURROGATE_FILE,
+    RampAnswers,
+    RampModel,
+    ramp_answers_of,
 )
-from device.measurement.ramp_modes.model import RAMP_MODES, RAMP_UNITS, SURROGATE_FILE, RampAnswers, RampModel
-from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE, RangeClassifier
-from device.measurement.ramp_modes.surrogate import ARRAYS, PressSurrogate, surrogate_of
 
 Arrays = Mapping[str, NDArray[Any]]
 ModeModel = TypeVar("ModeModel", QuickModel, RampModel)
@@ -50,17 +48,11 @@ def read_quick_model(folder: Path) -> QuickModel:
 
 def read_ramp_model(folder: Path) -> RampModel:
     """Return the model of modes standard and precise; raises `BundleRefused` or `InvalidQuantity` as the others."""
-    files = _files(folder, SURROGATE_FILE, RANGE_FILE, ROUND_FILE)
+    files = _files(folder, SURROGATE_FILE, RANGE_FILE)
     bundle = ModelBundle(files, RAMP_UNITS)
-    camera = {mode: f"camera_{mode}" for mode in RAMP_MODES}
     content = files.verified(SURROGATE_FILE, bundle.card.get("surrogate_sha256"))
-    arrays = _arrays("surrogate", folder / SURROGATE_FILE, content, (*ARRAYS, *camera.values()))
-    noise = {mode: PressNoise(np.asarray(arrays[name], np.float64)) for mode, name in camera.items()}
-    surrogate = surrogate_of(arrays)
-    ranges = RangeClassifier(files, bundle.fields, len(RAMP_UNITS), RAMP_MODES)
-    content = files.verified(ROUND_FILE, bundle.card.get("round_sha256"))
-    ellipticity = _ellipticity_test(folder / ROUND_FILE, content, surrogate, RAMP_MODES)
-    return RampModel(bundle, RampAnswers(surrogate, noise), ranges, ellipticity)
+    answers = ramp_answers_of(_arrays("surrogate", folder / SURROGATE_FILE, content, SURROGATE_ARRAYS))
+    return RampModel(bundle, answers, RangeClassifier(files, bundle.fields, len(RAMP_UNITS)))
 
 
 def read_models(paper: ModelBundle, quick: Path, standard: Path) -> ModeModels:
@@ -71,20 +63,9 @@ def read_models(paper: ModelBundle, quick: Path, standard: Path) -> ModeModels:
     return ModeModels(paper, _if_there(quick, read_quick_model), _if_there(standard, read_ramp_model))
 
 
-def read_surrogate(path: Path) -> PressSurrogate:
-    """Read a surrogate's file alone; raise `InvalidQuantity` when a part is missing or of another shape."""
-    return surrogate_of(_arrays("surrogate", path, _content("surrogate", path, ARRAYS), ARRAYS))
-
-
-def read_ellipticity_test(path: Path, surrogate: PressSurrogate, modes: tuple[Mode, ...]) -> EllipticityTest:
-    """Read an ellipticity test's file alone; raise `InvalidQuantity` when a part is missing or of another shape."""
-    return _ellipticity_test(path, _content("second harmonics", path, ellipticity_arrays(modes)), surrogate, modes)
-
-
-def _ellipticity_test(
-    path: Path, content: bytes, surrogate: PressSurrogate, modes: tuple[Mode, ...]
-) -> EllipticityTest:
-    return ellipticity_test_of(_arrays("second harmonics", path, content, ellipticity_arrays(modes)), surrogate, modes)
+def read_ramp_answers(path: Path) -> RampAnswers:
+    """Read forward model and noise alone; raise `InvalidQuantity` when a part is missing or of another shape."""
+    return ramp_answers_of(_arrays("surrogate", path, _content("surrogate", path, SURROGATE_ARRAYS), SURROGATE_ARRAYS))
 
 
 def _files(folder: Path, *more: str) -> BundleFiles:

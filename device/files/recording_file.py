@@ -29,10 +29,14 @@ from device.measurement.recording.recording import REPAIR, CameraSettings, Recor
 from device.measurement.recording.tactile_image import Frame
 
 SCHEMA = "tsis.recording/1"
+SCAN_SCHEMA = "tsis.recording/2"
+"""That of a recording with more than one press on the lesion, whose frames no reader of the first may mix."""
 PICTURE = "image.png"
 NUMBER = (int, float)
 READABLE = 0o644
 """Rights of a file that is unpacked from a .zip; by default nobody may read it."""
+MOST_BYTES = 1 << 30
+"""Of all frames of a recording in memory: some three thousand of the probe's camera, where a scan takes some sixty."""
 UNREADABLE = (OSError, KeyError, zipfile.BadZipFile, zlib.error)
 """What reading a file of a folder or .zip raises when it is missing or damaged."""
 
@@ -138,7 +142,7 @@ def _frame_name(i: int) -> str:
 
 def _as_json(recording: Recording) -> dict[str, Any]:
     return {
-        "schema": SCHEMA,
+        "schema": SCAN_SCHEMA if len(recording.ramps()) > 1 else SCHEMA,
         "id": recording.id,
         "device": {"serial": recording.serial, "software": recording.software},
         "started_at": recording.started_at,
@@ -152,6 +156,7 @@ def _as_json(recording: Recording) -> dict[str, Any]:
                 "t_s": frame.t_s,
                 "force_n": frame.force_n,
                 "led_ratio": frame.led_ratio,
+                **({"ramp": frame.ramp} if frame.ramp else {}),
             }
             for i, frame in enumerate(recording.frames)
         ],
@@ -188,19 +193,21 @@ def _field(record: Any, name: str, kind: type | tuple[type, ...], where: str = "
 
 
 def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recording:
-    if _field(record, "schema", str) != SCHEMA:
-        raise InvalidQuantity("schema", record["schema"], SCHEMA, "convert the recording with matching software")
+    if _field(record, "schema", str) not in (SCHEMA, SCAN_SCHEMA):
+        bound = f"{SCHEMA} or {SCAN_SCHEMA}"
+        raise InvalidQuantity("schema", record["schema"], bound, "convert the recording with matching software")
     device, camera = _field(record, "device", dict), _field(record, "camera", dict)
     names = CameraSettings.__dataclass_fields__
     settings = CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names})
-    truth = record.get("truth")
-    return Recording(
+    truth, entries = record.get("truth"), _field(record, "frames", list)
+    _require_room_for(len(entries), settings)
+    recording = Recording(
         id=_field(record, "id", str),
         serial=_field(device, "serial", str, "device."),
         software=_field(device, "software", str, "device."),
         started_at=_time(record),
         camera=settings,
-        frames=tuple(_frame(entry, i, read) for i, entry in enumerate(_field(record, "frames", list))),
+        frames=tuple(_frame(entry, i, read) for i, entry in enumerate(entries)),
         calibration_id=_optional(record, "calibration_id", str, None),
         position_mm=_position_mm(_optional(record, "position_mm", list, [0.0, 0.0])),
         truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth is not None else None,
@@ -208,6 +215,16 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         cell=_cell(_optional(record, "cell", dict, None)),
         phantom_serial=_optional(record, "phantom_serial", str, ""),
     )
+    if record["schema"] == SCHEMA and len(recording.ramps()) > 1:
+        raise InvalidQuantity("schema", SCHEMA, f"{SCAN_SCHEMA} with frames of several ramps", REPAIR)
+    return recording
+
+
+def _require_room_for(frames: int, camera: CameraSettings) -> None:
+    """Refuse more frames than `MOST_BYTES` of memory hold, before any of them is read."""
+    of_one = camera.width_px * camera.height_px * (1 if camera.bits == 8 else 2)
+    most = MOST_BYTES // max(int(of_one), 1)
+    require("frames of the recording", frames, Bound(0, most, "frames"), "record fewer frames, or split the recording")
 
 
 def _cell(record: dict[str, Any] | None) -> RecordedCell | None:
@@ -257,4 +274,5 @@ def _frame(entry: dict[str, Any], i: int, read: Callable[[str], bytes]) -> Frame
         raise InvalidQuantity(where + "led_ratio", ratio, "four numbers, one a side", REPAIR)
     force_n, t_s = (_field(entry, n, NUMBER, where) for n in ("force_n", "t_s"))
     require(where + "force_n", force_n, Bound(-1e3, 1e3, "N"), REPAIR)
-    return Frame(counts, _field(entry, "role", str, where), t_s, force_n, tuple(ratio))
+    ramp = _field(entry, "ramp", int, where) if "ramp" in entry else 0
+    return Frame(counts, _field(entry, "role", str, where), t_s, force_n, tuple(ratio), ramp)

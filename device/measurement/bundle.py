@@ -277,7 +277,15 @@ class ModelBundle:
             answered_ratio=fields.of(f"{path}.answered", int) / fields.of(f"{path}.presses", int),
             median_percent={name: fields.of(f"{path}.median_percent.{name}", float) for name in UNKNOWNS},
             determined_ratio={name: fields.of(f"{path}.determined.{name}", float) for name in UNKNOWNS},
+            reachable_half_width=self._reachable(f"modes.{mode}"),
         )
+
+    def _reachable(self, path: str) -> dict[str, float] | None:
+        """Return the narrowest half widths that the card states of a mode; None when it states none."""
+        if "reachable_half_width" not in self.fields.of(path, dict):
+            return None
+        path = f"{path}.reachable_half_width"
+        return {name: self.fields.of(f"{path}.{name}", float) for name in self.fields.of(path, dict)}
 
     def estimate(self, features: NDArray[np.floating[Any]]) -> Raw:
         """Return the raw estimate of features [n, F], in the order and units of `feature_names`.

@@ -8,11 +8,12 @@ ten whatever the truth is. Source: Masserano et al., WALDO, AISTATS 2023 (Neyman
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD
@@ -70,6 +71,21 @@ class Belt:
     def _at(self, truth: Array, log_spread: float, table: Array) -> Array:
         at_spread = np.array([np.interp(log_spread, self.log_spread, row) for row in table])
         return np.asarray(np.interp(truth, self.truth, at_spread))
+
+
+class BeltEnds(NamedTuple):
+    """Ends [3] of the unknowns' intervals in coordinates, and whether the press narrows each one's range down."""
+
+    low: Array
+    high: Array
+    is_identifiable: NDArray[np.bool_]
+
+
+def ends_in_belts(mean: Array, spread: Array, belts: Sequence[Belt]) -> BeltEnds:
+    """Return the intervals of mean and spread [3] by each unknown's belts."""
+    intervals = [belt.interval(float(at), float(width)) for belt, at, width in zip(belts, mean, spread, strict=True)]
+    low, high, known = zip(*intervals, strict=True)
+    return BeltEnds(np.array(low), np.array(high), np.array(known))
 
 
 def belts_of(entry: Mapping[str, Any]) -> tuple[Belt, ...]:

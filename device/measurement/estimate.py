@@ -6,10 +6,10 @@ told. Each mode has an estimator of its own, which ends here. Source of the form
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.confidence_belt import Belt
 from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, HIGH, LOW, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import saturated_ratio
 
-EstimateStatus = Literal["ok", "outside_range", "no_contact", "saturated", "not_identifiable", "rejected"]
+EstimateStatus = Literal[
+    "ok", "partly_identifiable", "outside_range", "no_contact", "saturated", "not_identifiable", "rejected"
+]
+"""`partly_identifiable`: some unknowns are determined, most often size and depth; `not_identifiable`: none is."""
 
 SATURATED_RATIO = 0.001
 """More pixels than this at full scale, and the sum and the peak are no longer the light."""
@@ -158,15 +160,33 @@ class Numbers:
         }
 
 
-def numbers_in_belts(mean: Array, spread: Array, belts: Sequence[Belt]) -> Numbers:
-    """Return the numbers of mean and spread [3] in coordinates (`parameters.normalise`), by each unknown's belts.
+class IntervalEnds(Protocol):
+    """Ends [3] of the unknowns' intervals in coordinates, and whether the press narrows each one's range down."""
+
+    @property
+    def low(self) -> Array:
+        """Lower ends."""
+        ...
+
+    @property
+    def high(self) -> Array:
+        """Upper ends."""
+        ...
+
+    @property
+    def is_identifiable(self) -> NDArray[np.bool_]:
+        """Whether the data determine it."""
+        ...
+
+
+def numbers_in(mean: Array, spread: Array, ends: IntervalEnds) -> Numbers:
+    """Return the numbers of mean and spread [3] in coordinates (`parameters.normalise`), within intervals.
 
     The standard deviation is half of what mean - spread to mean + spread spans in the unknown's own unit.
     """
-    intervals = [belt.interval(float(at), float(width)) for belt, at, width in zip(belts, mean, spread, strict=True)]
-    low, high = (denormalise_unknowns(np.array([one[end] for one in intervals])) for end in (0, 1))
+    low, high = denormalise_unknowns(ends.low), denormalise_unknowns(ends.high)
     below, above = (denormalise_unknowns(mean + sign * spread) for sign in (-1, 1))
-    known = np.array([one.is_identifiable for one in intervals])
+    known = ends.is_identifiable
     return Numbers(denormalise_unknowns(mean), (above - below) / 2, low, high, known, LOW[:COUNT], HIGH[:COUNT])
 
 
@@ -175,7 +195,8 @@ def with_numbers(numbers: Numbers, features: Mapping[str, float], origin: Origin
     quantities: dict[str, Any] = numbers.quantities()
     unknown = [SPOKEN[name] for name, one in quantities.items() if not one.identifiable]
     reason = f"This press does not determine {' and '.join(unknown)}." if unknown else ""
-    status: EstimateStatus = "not_identifiable" if unknown else "ok"
+    of_unknown: dict[int, EstimateStatus] = {0: "ok", len(UNKNOWNS): "not_identifiable"}
+    status = of_unknown.get(len(unknown), "partly_identifiable")
     return Estimate(**quantities, status=status, reason=reason, features=dict(features), **asdict(origin))
 
 

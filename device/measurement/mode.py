@@ -1,7 +1,7 @@
 """What a press is asked for: how much time it may take, and so which frames it needs and who answers.
 
-quick: one frame and one network. standard: ten frames over the force and an ensemble. precise: forty frames over the
-force, and the forward model fitted to them. paper: ten frames at one force, three features, as Lee & Won 2013.
+quick: one frame and one network. standard: ten frames over the force. precise: a scan, two to five presses as those of
+standard at different places on the lesion. paper: ten frames at one force, three features, as Lee & Won 2013.
 Measured error and time of each: the model cards, and docs/modes.md.
 """
 
@@ -24,16 +24,26 @@ RAMP_FROM_N, RAMP_TO_N = 0.08, 0.60
 
 @dataclass(frozen=True)
 class Frames:
-    """Frames that a press of a mode takes, beside the lesion and again on it: at one force, or over a ramp."""
+    """Frames that a press of a mode takes, beside the lesion and again on it: at one force, or over a ramp.
+
+    Beside the lesion it is one press; on it as many as `fewest_ramps` to `most_ramps`, each at another place.
+    """
 
     count: int
     is_ramp: bool
+    fewest_ramps: int = 1
+    most_ramps: int = 1
+
+    @property
+    def is_scan(self) -> bool:
+        """Whether the lesion is pressed more than once."""
+        return self.most_ramps > 1
 
 
 FRAMES: dict[Mode, Frames] = {
     "quick": Frames(1, is_ramp=False),
     "standard": Frames(10, is_ramp=True),
-    "precise": Frames(40, is_ramp=True),
+    "precise": Frames(10, is_ramp=True, fewest_ramps=2, most_ramps=5),
     "paper": Frames(10, is_ramp=False),
 }
 
@@ -44,20 +54,24 @@ class ModeWorth:
 
     `compute_s`: the time of an answer on the machine that measured. `answered_ratio`: the share of presses that got
     numbers; of those, by unknown, the median error in percent and the share that was called determined.
+    `reachable_half_width`: half of the narrowest 90 % interval that can be had, by unknown in its own unit; None where
+    nothing is known.
     """
 
     compute_s: float
     answered_ratio: float
     median_percent: Mapping[str, float]
     determined_ratio: Mapping[str, float]
+    reachable_half_width: Mapping[str, float] | None = None
 
 
-def mode_of(force_n: Sequence[float]) -> Mode:
-    """Return the mode that reads most of press frames at these forces."""
+def mode_of(force_n: Sequence[float], ramps: int = 1) -> Mode:
+    """Return the mode that reads most of press frames at these forces, which are those of so many ramps."""
+    if ramps > 1:
+        return "precise"
     if not force_n or max(force_n) <= 0.0 or max(force_n) < RAMP_RATIO * min(force_n):
         return "quick" if len(force_n) == FRAMES["quick"].count else "paper"
-    between = (FRAMES["standard"].count + FRAMES["precise"].count) / 2
-    return "precise" if len(force_n) > between else "standard"
+    return "standard"
 
 
 def mode_named(name: str) -> Mode:

@@ -14,9 +14,10 @@ from device.measurement.mode import Mode, ModeWorth, mode_of
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QuickModel, estimate_quick
-from device.measurement.ramp_modes.estimate import estimate_ramp
+from device.measurement.ramp_modes.estimate import advise_scan, estimate_ramp
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from device.measurement.recording.recording import Recording
+from device.measurement.scan_advice import ScanAdvice
 
 OwnModel = TypeVar("OwnModel", QuickModel, RampModel)
 
@@ -58,19 +59,36 @@ class ModeModels(NamedTuple):
         """
         if mode == "quick" and self.quick:
             return estimate_quick(recording, self.quick, calibration)
+        if mode == "precise" and self.ramp:
+            return self.advise(recording, calibration).estimate
         if mode in RAMP_MODES and self.ramp:
             return estimate_ramp(recording, mode, self.ramp, calibration)
         if mode == "paper":
             return estimate_paper(recording, self.paper, calibration)
-        raise InvalidQuantity(
-            "mode", mode, f"one of {', '.join(self.modes)}", "choose one of them, or install its model"
-        )
+        raise self._unavailable(mode)
+
+    def advise(self, recording: Recording, calibration: Calibration) -> ScanAdvice:
+        """Return what the ramps of a scan tell so far, and where the next one would tell most.
+
+        Raises `InvalidQuantity` without a model of force ramps, and as the estimate of mode precise does.
+        """
+        if not self.ramp:
+            raise self._unavailable("precise")
+        return advise_scan(recording, self.ramp, calibration)
+
+    def _unavailable(self, mode: Mode) -> InvalidQuantity:
+        available = ", ".join(self.modes)
+        return InvalidQuantity("mode", mode, f"one of {available}", "choose one of them, or install its model")
+
+
+def mode_of_recording(recording: Recording) -> Mode:
+    """Return the mode that reads most of a recording's press frames."""
+    return mode_of([frame.force_n for frame in recording.with_role("press")], len(recording.ramps()))
 
 
 def analysed(recording: Recording, models: ModeModels, calibration: Calibration, mode: Mode | None = None) -> Estimate:
     """Return the estimate of a recording in a mode; by default in the one that reads most of its press frames."""
-    of_frames = mode_of([frame.force_n for frame in recording.with_role("press")])
-    return models.estimate(recording, mode or of_frames, calibration)
+    return models.estimate(recording, mode or mode_of_recording(recording), calibration)
 
 
 def _if_for(serial: str, model: OwnModel | None) -> OwnModel | None:

@@ -7,6 +7,7 @@ its centre), and its Young's modulus (not its stiffness). Source: Lee & Won, IEE
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,6 +71,8 @@ def require(quantity: str, value: object, bound: Bound, action: str) -> float:
     """Return the value as a float, or raise `InvalidQuantity` when it is no finite number inside the bound."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidQuantity(quantity, repr(value), f"a number {bound}", action)
+    if isinstance(value, int) and abs(value) > sys.float_info.max:
+        value = math.inf if value > 0 else -math.inf  # of hundreds of digits, as JSON may hold
     if not bound.holds(float(value)):
         raise InvalidQuantity(quantity, value, str(bound), action)
     return float(value)

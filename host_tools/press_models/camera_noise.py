@@ -1,67 +1,94 @@
 """Recordings of random presses to the camera's part of the noise: how what is read scatters about the exact values.
 
 Camera, cell and the hand's tremor are in it; drift of light and cell and smooth errors are not, they have levels of
-their own. Fewer recordings than squares of columns leave a covariance that is partly chance: correlations are shrunk.
-Source of the shrinkage: Schaefer & Strimmer, Stat. Appl. Genet. Mol. Biol. 4 (2005), table 1, target D.
+their own. A force that is read wrong moves all rings alike, so what few rings tell by themselves is far below any
+column's noise. Correlations are therefore shrunk no more than recordings kept apart ask for: those of a closed formula
+(Schaefer & Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005), which cares for large correlations only, made that noise
+three times as large as it is. Source: Warton, JASA 103 (2008), shrinkage by cross-validated likelihood.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.mode import Mode
-from device.measurement.ramp_modes.noise import LOADS, light_ratio
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS
-from device.measurement.recording.ring_means import RINGS
+from device.measurement.ramp_modes.noise import light_ratio
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.press_models.press_samples import draw_parameters, exact_presses
-from host_tools.press_models.recorded_presses import in_parallel, record_presses
+from host_tools.press_models.press_samples import draw_beside, draw_parameters, profile_rows
+from host_tools.press_models.recorded_presses import direction_of_press_rad, in_parallel, record_presses
+from host_tools.press_models.seeds import derived_seed, press_seed
+
+PARTS = 5
+SHRINKAGES = np.geomspace(1e-4, 1.0, 33)
+TINY = 1e-9
+"""A column that is 0 in all but one part of the errors still has a covariance that can be inverted."""
 
 
-class CameraNoise(NamedTuple):
-    """Covariances of a mode over the light ratio: of profile rows [P, P], and of second harmonics [Q, Q]."""
+def camera_noise(tables: ProbeTables, near: int, beside: int, *, seed: int, jobs: int = -1) -> Array:
+    """Return the covariance [P, P] of profile rows of random presses about the exact ones, over the light.
 
-    rows: Array
-    second_harmonics: Array
-
-
-def camera_noise(tables: ProbeTables, mode: Mode, count: int, *, seed: int, jobs: int = -1) -> CameraNoise:
-    """Return the covariances of `count` random presses about the exact ones.
-
-    What lies across the offset, where a round inclusion has no second harmonic, counts as much as what lies along it.
+    So many presses lie `near` the inclusion, and so many `beside` it.
     """
-    parameters = draw_parameters(count, np.random.default_rng(seed))
-    recorded = record_presses(tables, parameters, mode, seed=seed, jobs=jobs)
-    exact = in_parallel(lambda i: exact_presses(tables, parameters[i : i + 1]), count, jobs)
-    rows, along = (np.concatenate(part) for part in zip(*exact, strict=True))
-    second = recorded.second_harmonics.reshape(count, 2, -1) - np.stack([along, np.zeros_like(along)], axis=1)
-    light = 1 + rows[:, :CONTRAST_COLUMNS].reshape(count, LOADS, RINGS)[:, :, 1:-1].reshape(count, 1, -1)
-    return CameraNoise(
-        shrunk_covariance((recorded.rows - rows) / light_ratio(rows)),
-        shrunk_covariance((second / light).reshape(2 * count, -1)),
-    )
+    errors = [
+        recorded_errors(tables, draw(count, np.random.default_rng(own)), seed=own, jobs=jobs)
+        for count, draw, own in (
+            (near, draw_parameters, derived_seed(seed, "camera of standard")),
+            (beside, draw_beside, derived_seed(seed, "camera beside")),
+        )
+    ]
+    return shrunk_covariance(np.concatenate(errors))
+
+
+def recorded_errors(tables: ProbeTables, parameters: Array, *, seed: int, jobs: int = -1) -> Array:
+    """Return by how much rows of recorded presses with parameters [n, 9] differ from exact ones [n, P], over the light.
+
+    Drift of light and cell and smooth errors are not in it.
+    """
+    recorded = record_presses(tables, parameters, "standard", seed=seed, jobs=jobs)
+    exact = exact_rows(tables, parameters, seed=seed, jobs=jobs)
+    return (np.concatenate(recorded.rows) - exact) / light_ratio(exact)
+
+
+def exact_rows(tables: ProbeTables, parameters: Array, *, seed: int, jobs: int = -1) -> Array:
+    """Return the profile rows [n, P] without noise of presses that are recorded with a seed, each in its direction."""
+
+    def exact(number: int) -> Array:
+        direction_rad = np.array([direction_of_press_rad(press_seed(seed, number))])
+        return np.asarray(profile_rows(tables, parameters[number : number + 1], direction_rad)[0])
+
+    return np.array(in_parallel(exact, len(parameters), jobs))
 
 
 def shrunk_covariance(errors: Array) -> Array:
     """Return the mean square [P, P] of errors [n, P], correlations shrunk by as much as chance made them."""
     std = np.sqrt(np.mean(errors**2, axis=0))
     standard = errors / std
-    correlation = standard.T @ standard / len(errors)
-    shrunk = (1 - shrinkage(standard, correlation)) * correlation
-    np.fill_diagonal(shrunk, 1.0)
-    return np.asarray(std[:, None] * std * shrunk)
+    return np.asarray(std[:, None] * std * _shrunk_correlation(standard, shrinkage(standard)))
 
 
-def shrinkage(standard: Array, correlation: Array) -> float:
-    """Return by how much correlations [P, P] of n standardised errors [n, P] are to be shrunk: 0 to 1.
+def shrinkage(standard: Array) -> float:
+    """Return by how much correlations of n standardised errors [n, P] are to be shrunk: one of `SHRINKAGES`.
 
-    The sum of their sampling variances over the sum of their squares, both off the diagonal.
+    It is the one under which parts of the errors are likeliest by the others' correlations.
     """
-    count = len(standard)
-    apart = ~np.eye(len(correlation), dtype=bool)
-    fourth = (standard**2).T @ standard**2 / count
-    variance = (fourth - correlation**2) / (count - 1)
-    return float(np.clip(variance[apart].sum() / (correlation[apart] ** 2).sum(), 0.0, 1.0))
+    parts = np.array_split(np.arange(len(standard)), min(PARTS, len(standard)))
+    likely = [sum(_log_likelihood(standard, part, ratio) for part in parts) for ratio in SHRINKAGES]
+    return float(SHRINKAGES[int(np.argmax(likely))])
+
+
+def _log_likelihood(standard: Array, part: NDArray[np.intp], ratio: float) -> float:
+    """Return the Gaussian log likelihood of a part of errors [n, P] by the shrunk correlations of the others."""
+    correlation = _shrunk_correlation(np.delete(standard, part, axis=0), ratio)
+    factor = np.linalg.cholesky(correlation)
+    whitened = np.linalg.solve(factor, standard[part].T)
+    return float(-0.5 * np.sum(whitened**2) - len(part) * np.log(np.diag(factor)).sum())
+
+
+def _shrunk_correlation(standard: Array, ratio: float) -> Array:
+    """Return the mean products [P, P] of errors [n, P], those of two columns less by a ratio."""
+    count, columns = standard.shape
+    correlation = standard.T @ standard / max(count, 1)
+    shrunk = (1 - ratio) * correlation + ratio * np.diag(np.diag(correlation))
+    shrunk[np.diag_indices(columns)] += ratio * TINY
+    return np.asarray(shrunk)

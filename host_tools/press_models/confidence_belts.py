@@ -8,13 +8,16 @@ widened by one factor. Source of both: split conformal prediction, Lei et al., J
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.confidence_belt import COVERAGE, IDENTIFIABLE_RATIO, Belt
+from device.measurement.confidence_belt import COVERAGE, IDENTIFIABLE_RATIO, Belt, ends_in_belts
 from device.measurement.parameters import EVEN_STD
 from device.measurement.quantities import Bound, require
+from host_tools.press_models.mode_outcome import EvaluatedPresses
 
 TRUTHS, SPREADS = 17, 5
 TRUTH_LENGTH = 0.15
@@ -28,6 +31,25 @@ RAREST_RATIO = 0.05
 NARROWEST = 1e-9
 WIDE_OPEN = 1e6
 """So many spreads hold all of the range."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadAnswers:
+    """Truth, mean and spread [n, 3] of presses, in coordinates."""
+
+    truth: Array
+    mean: Array
+    spread: Array
+
+    def part(self, chosen: slice) -> SpreadAnswers:
+        """Return some of the presses."""
+        return SpreadAnswers(self.truth[chosen], self.mean[chosen], self.spread[chosen])
+
+    def within(self, belts: tuple[Belt, ...]) -> EvaluatedPresses:
+        """Return them with the intervals of belts."""
+        ends = [ends_in_belts(mean, spread, belts) for mean, spread in zip(self.mean, self.spread, strict=True)]
+        low, high, known = (np.array(part) for part in zip(*ends, strict=True))
+        return EvaluatedPresses(self.truth, self.mean, low, high, known)
 
 
 def confidence_belts(truth: Array, mean: Array, spread: Array) -> tuple[Belt, ...]:

@@ -1,6 +1,6 @@
 """Turns the trained modes into model bundles: model.onnx and model.json.
 
-That of the ramps holds surrogate, range classifier and ellipticity test, too. The same parts give the same bytes.
+That of the ramps holds surrogate and range classifier, too. The same parts give the same bytes.
 Source of the format: the model bundle of docs/contracts.md.
 """
 
@@ -18,19 +18,21 @@ import numpy as np
 
 from device.measurement.arrays import Array, Single
 from device.measurement.bundle import CARD_FILE, MODEL_FILE, SCHEMA
+from device.measurement.confidence_belt import Belt
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.parameters import NUISANCES, RANGES
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import QUICK_UNITS
-from device.measurement.ramp_modes.ellipticity import COEFFICIENTS, DEGREES, ROUND_FILE, EllipticityTest
-from device.measurement.ramp_modes.model import RAMP_UNITS, SURROGATE_FILE
+from device.measurement.ramp_modes.model import RAMP_UNITS, SURROGATE_FILE, surrogate_arrays
+from device.measurement.ramp_modes.radial_profile import network_rows
 from device.measurement.ramp_modes.range_classifier import ENTRY, RANGE_FILE
 from host_tools.paper_network.export import write_folder
 from host_tools.press_models.mode_outcome import ModeOutcome
-from host_tools.press_models.mode_statistics import statistics
+from host_tools.press_models.mode_statistics import reachable_half_width, statistics
 from host_tools.press_models.onnx_networks import (
     budget_entry,
     build_network,
-    build_range_networks,
+    build_range_network,
     golden_vectors,
     range_entry,
 )
@@ -50,33 +52,25 @@ def export_ramp(
     """
     rows = trained.samples.rows[:: len(trained.samples.rows) // GOLDEN_ROWS][:GOLDEN_ROWS].astype(np.float32)
     network = build_network(trained.ensemble)
-    golden = golden_vectors(trained.ensemble, network, rows.astype(np.float64))
-    surrogate, ranges = _surrogate_file(trained), build_range_networks(trained.ranges.networks)
-    ellipticity = round_file(trained.ellipticity)
+    read: Array = network_rows(rows.astype(np.float64))
+    golden = golden_vectors(trained.ensemble, network, read)
+    surrogate = _archive(surrogate_arrays(trained.answers))
+    ranges = build_range_network(trained.ranges.network)
     card = {
         **_card(folder, network, serials, software_version, training_command),
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
-        "round_sha256": hashlib.sha256(ellipticity).hexdigest(),
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.samples.rows.tobytes()).hexdigest(),
         "effort": budget_entry(asdict(trained.budget)),
         "features": [{"name": name, "unit": unit} for name, unit in RAMP_UNITS.items()],
-        "training_range": _training_range(dict(zip(RAMP_UNITS, trained.samples.rows.T, strict=True))),
+        "training_range": _training_range(dict(zip(RAMP_UNITS, network_rows(trained.samples.rows).T, strict=True))),
         "surrogate_error": _error(trained.surrogate_error),
-        "round_error": _error(trained.round_error),
-        "modes": {
-            mode: {
-                "misfit_ratio": outcome.misfit_ratio,
-                "elongation_deviations": outcome.elongation_deviations,
-                "outside_log_odds": outcome.outside_log_odds,
-                **_answers(outcome),
-            }
-            for mode, outcome in trained.outcomes.items()
-        },
+        "beside_error": _error(trained.beside_error),
+        "modes": {mode: asdict(outcome.critical) | _answers(outcome) for mode, outcome in trained.outcomes.items()},
         ENTRY: range_entry(trained.ranges, ranges, np.array(golden["features"])),
         "golden": golden,
     }
-    files = {SURROGATE_FILE: surrogate, RANGE_FILE: ranges, ROUND_FILE: ellipticity}
+    files = {SURROGATE_FILE: surrogate, RANGE_FILE: ranges}
     write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card), **files})
 
 
@@ -104,6 +98,7 @@ def export_quick(
             "quick": {
                 "faintest_contrast": list(trained.faintest_contrast),
                 "elongation_ratio": trained.outcome.elongation_ratio,
+                "bands": _belts(trained.outcome.belts),
                 **_answers(trained.outcome),
             }
         },
@@ -148,18 +143,6 @@ def _text(card: dict[str, Any]) -> bytes:
     return (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
 
 
-def _surrogate_file(trained: TrainedRamp) -> bytes:
-    arrays: dict[str, Any] = trained.surrogate.arrays()
-    return _archive(arrays | {f"camera_{mode}": noise.camera for mode, noise in trained.noise.items()})
-
-
-def round_file(ellipticity: EllipticityTest) -> bytes:
-    """Return the content of `round.npz`: polynomials in single precision, and the camera's covariance of each mode."""
-    second = ellipticity.second
-    arrays = {DEGREES: second.degrees.astype(np.uint8), COEFFICIENTS: second.coefficients.astype(np.float32)}
-    return _archive(arrays | {f"camera_{mode}": camera for mode, camera in ellipticity.camera.items()})
-
-
 def _archive(arrays: dict[str, Any]) -> bytes:
     content = io.BytesIO()
     np.savez(content, **arrays)
@@ -170,13 +153,20 @@ def _error(of_columns: Array) -> dict[str, float]:
     return {"largest": float(of_columns.max()), "mean": float(of_columns.mean())}
 
 
-def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
-    """Return belts and statistics of a mode."""
+def _reachable(mode: Mode, outcome: ModeOutcome) -> dict[str, Any]:
+    """Return what accuracy can be asked for, in the mode that goes on until it is there."""
+    return {"reachable_half_width": reachable_half_width(outcome.simulated)} if FRAMES[mode].is_scan else {}
+
+
+def _belts(belts: tuple[Belt, ...]) -> dict[str, Any]:
+    """Return the belts of a mode."""
+    parts = ("truth", "log_spread", "low", "high")
     return {
-        "bands": {
-            name: {part: np.round(getattr(belts, part), 4).tolist() for part in ("truth", "log_spread", "low", "high")}
-            for name, belts in zip(UNKNOWNS, outcome.belts, strict=True)
-        },
-        "simulated": statistics(outcome.simulated, outcome.belts),
-        "recorded": statistics(outcome.recorded, outcome.belts),
+        name: {part: np.round(getattr(of_unknown, part), 4).tolist() for part in parts}
+        for name, of_unknown in zip(UNKNOWNS, belts, strict=True)
     }
+
+
+def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
+    """Return the statistics of a mode."""
+    return {"simulated": statistics(outcome.simulated), "recorded": statistics(outcome.recorded)}

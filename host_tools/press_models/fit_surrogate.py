@@ -1,30 +1,36 @@
-"""Random presses to the surrogate and to the second harmonics of round inclusions: polynomials by least squares.
+"""Random presses to the surrogate: polynomials by least squares, near the inclusion and beside it.
 
-Size and depth get nearly every product of theirs, since contact follows them steeply; skin, tissue and offset little.
-The offset is the reason of a second harmonic and enters by its square; the rest bends it little. The error that counts
-is the one on presses kept apart: for second harmonics against the 1e-3 that flat field and model leave open.
+Size and depth get nearly every product of theirs, since contact follows them steeply; skin and tissue little, and the
+offset little near the inclusion. The error that counts is the one on presses kept apart.
 """
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import NUISANCES, PARAMETERS, normalise
+from device.measurement.parameters import HIGH, LOW, NUISANCES, PARAMETERS, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
-from device.measurement.ramp_modes.ellipticity import EllipticityTest, second_factor
 from device.measurement.ramp_modes.legendre import LegendreSum, LegendreTerms
+from device.measurement.ramp_modes.noise import light_ratio, rms_contrast
+from device.measurement.ramp_modes.radial_profile import RESPONSE
 from device.measurement.ramp_modes.surrogate import (
-    CONTRAST_COLUMNS,
-    RESPONSE_COLUMNS,
+    HARMONICS,
+    OFFSET,
+    WAVES,
+    PressRows,
     PressSurrogate,
+    ScanSurrogate,
+    direction_waves,
     inclusion_factor,
+    offsets_in_range,
     polynomial_coordinates,
 )
-from host_tools.press_models.press_samples import PressSamples
+from host_tools.press_models.camera_noise import shrunk_covariance
+from host_tools.press_models.press_samples import BESIDE_TO_MM, PressSamples
 
 INCLUSION_REACH = {
     "size_mm": 18.0,
@@ -46,38 +52,67 @@ BASELINE_REACH = dict.fromkeys(PARAMETERS, 0.5) | {
     "albedo": 3.0,
     "spread_mm": 4.0,
 }
-SECOND_REACH = {
-    "size_mm": 12.0,
-    "depth_mm": 11.0,
-    "youngs_modulus_kpa": 3.2,
-    "tissue_modulus_kpa": 2.1,
-    "slab_thickness_mm": 1.1,
-    "contact_pressure_kpa": 2.1,
-    "albedo": 1.1,
-    "spread_mm": 1.6,
-    "offset_mm": 3.2,
+BESIDE_REACH = INCLUSION_REACH | {"offset_mm": 8.2}
+"""The same beside the inclusion, where the offset changes what is seen as much as size and depth do."""
+TURNED_REACH = dict.fromkeys(PARAMETERS, 0.5) | {
+    "size_mm": 9.0,
+    "depth_mm": 8.0,
+    "youngs_modulus_kpa": 2.4,
+    "tissue_modulus_kpa": 1.6,
+    "contact_pressure_kpa": 1.3,
+    "spread_mm": 1.3,
+    "offset_mm": 6.2,
 }
-"""The same for second harmonics."""
-SECOND_HIGHEST = {"size_mm": 7, "depth_mm": 6}
+"""The direction changes a press by a few per cent of itself: fewer terms say how much."""
+AXIS_EVERY = 4
+"""Every so many presses one is put on the axis."""
 PRESSES_A_TERM = 3.0
 """Fewer presses than this a term, and the polynomials follow the noise of the tables."""
 
 
-def fit_surrogate(samples: PressSamples) -> PressSurrogate:
-    """Return the surrogate of random presses; raises `InvalidQuantity` when they are too few or not finite."""
-    at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
-    return PressSurrogate(*fit_polynomials(samples, at, INCLUSION_REACH, INCLUSION_HIGHEST))
+def fit_surrogate(near: PressSamples, beside: PressSamples, detail_ratio: float = 1.0) -> ScanSurrogate:
+    """Return the surrogate of random presses, near the inclusion and beside it.
+
+    `detail_ratio`: reach of the polynomials' degrees over that of the probe's own. Raises `InvalidQuantity` when they
+    are too few or not finite.
+    """
+    return ScanSurrogate(
+        _fitted(near, float(LOW[OFFSET]), float(HIGH[OFFSET]), INCLUSION_REACH, detail_ratio),
+        _fitted(beside, float(HIGH[OFFSET]), BESIDE_TO_MM, BESIDE_REACH, detail_ratio),
+    )
+
+
+def _fitted(
+    samples: PressSamples, from_mm: float, to_mm: float, reach: dict[str, float], detail_ratio: float
+) -> PressSurrogate:
+    at = offsets_in_range(polynomial_coordinates(normalise(samples.parameters), samples.parameters), from_mm, to_mm)
+    reaches_axis = from_mm == float(LOW[OFFSET])
+    fields = fit_polynomials(
+        samples, at, reach, INCLUSION_HIGHEST, reaches_axis=reaches_axis, detail_ratio=detail_ratio
+    )
+    return PressSurrogate(*fields, from_mm, to_mm)
 
 
 def fit_polynomials(
-    samples: PressSamples, at: Array, reach: dict[str, float], highest: dict[str, int]
-) -> tuple[LegendreSum, LegendreSum]:
-    """Return the polynomials of the inclusion and of the baseline, for coordinates `at` [n, 9].
+    samples: PressSamples,
+    at: Array,
+    reach: dict[str, float],
+    highest: dict[str, int],
+    *,
+    reaches_axis: bool = True,
+    detail_ratio: float = 1.0,
+) -> tuple[LegendreSum, LegendreSum, LegendreSum]:
+    """Return the polynomials of the inclusion, of what its direction adds, and of the baseline, for `at` [n, 9].
 
-    `reach` and `highest` bound the inclusion's terms. Raises as `fit_surrogate`.
+    `reach` and `highest` bound the inclusion's terms. Where offsets reach the axis, the first of coordinates, no
+    direction matters there: few presses lie so near that they would say it. Raises as `fit_surrogate`.
     """
-    inclusion_degrees, baseline_degrees = degrees(reach, highest), degrees(BASELINE_REACH, {})
-    bound = Bound(PRESSES_A_TERM * len(inclusion_degrees), np.inf, "presses")
+    inclusion_degrees, turned_degrees, baseline_degrees = (
+        degrees(scaled(of_part, detail_ratio), most)
+        for of_part, most in ((reach, highest), (TURNED_REACH, {}), (BASELINE_REACH, {}))
+    )
+    terms = len(inclusion_degrees) + len(WAVES) * len(turned_degrees)
+    bound = Bound(PRESSES_A_TERM * terms, np.inf, "presses")
     require("presses", len(samples.rows), bound, "simulate more presses")
     require(
         "presses that are not finite",
@@ -85,27 +120,49 @@ def fit_polynomials(
         Bound(0, 0, ""),
         "leave them out",
     )
-    contrast, reference_response, offset = np.split(
-        samples.rows, [CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS], axis=1
-    )
-    factor, design = inclusion_factor(samples.parameters), LegendreTerms(inclusion_degrees).values(at)
-    strength, placed = factor[:, 0], factor[:, -1]
-    inclusion = [_weighted(design, strength, contrast), _weighted(design, placed, offset)]
-    baseline, *_ = np.linalg.lstsq(LegendreTerms(baseline_degrees).values(at), reference_response, rcond=None)
-    return LegendreSum(inclusion_degrees, np.hstack(inclusion)), LegendreSum(
-        baseline_degrees, np.asarray(baseline, np.float64)
+    factor, turned_terms = inclusion_factor(samples.parameters), LegendreTerms(turned_degrees).values(at)
+    waves = direction_waves(samples.direction_rad)
+    of_inclusion = LegendreTerms(inclusion_degrees).values(at)
+    design = np.hstack([of_inclusion, *(turned_terms * wave[:, None] for wave in waves.T)])
+    ends = np.cumsum((0, *HARMONICS))
+    field = np.delete(samples.rows, np.arange(RESPONSE.start, RESPONSE.stop), axis=1)
+    parts = [(design, factor[:, start], field[:, start:end]) for start, end in pairwise(ends)]
+    if reaches_axis:
+        parts[0] = _still_on_axis(parts[0], LegendreTerms(turned_degrees).values(_on_axis(at[::AXIS_EVERY])))
+    fitted = np.hstack([_weighted(*part) for part in parts])
+    inclusion, *turned = np.split(fitted, len(inclusion_degrees) + len(turned_degrees) * np.arange(len(WAVES)))
+    baseline, *_ = np.linalg.lstsq(LegendreTerms(baseline_degrees).values(at), samples.rows[:, RESPONSE], rcond=None)
+    return (
+        LegendreSum(inclusion_degrees, inclusion),
+        LegendreSum(turned_degrees, np.hstack(turned)),
+        LegendreSum(baseline_degrees, np.asarray(baseline, np.float64)),
     )
 
 
-def fit_second_harmonics(samples: PressSamples) -> LegendreSum:
-    """Return polynomials [9] to [Q] of `EllipticityTest`; raises `InvalidQuantity` when the presses are too few."""
-    found = degrees(SECOND_REACH, SECOND_HIGHEST)
-    bound = Bound(PRESSES_A_TERM * len(found), np.inf, "presses")
-    require("presses", len(samples.rows), bound, "simulate more presses")
-    at = polynomial_coordinates(normalise(samples.parameters), samples.parameters)
-    design = second_factor(samples.parameters)[:, None] * LegendreTerms(found).values(at)
-    coefficients, *_ = np.linalg.lstsq(design, samples.second_harmonics, rcond=None)
-    return LegendreSum(found, np.asarray(coefficients))
+def _on_axis(at: Array) -> Array:
+    """Return coordinates [n, 9] with offsets of 0."""
+    moved = np.array(at)
+    moved[:, OFFSET] = -1.0
+    return moved
+
+
+def _still_on_axis(of_contrast: tuple[Array, Array, Array], turned_terms: Array) -> tuple[Array, Array, Array]:
+    """Return design, weight and contrast with presses on the axis, to whose contrast no wave adds anything."""
+    design, weight, contrast = of_contrast
+    each_wave = np.kron(np.eye(len(WAVES)), turned_terms)
+    of_inclusion = np.zeros((len(each_wave), design.shape[1] - each_wave.shape[1]))
+    nothing = np.zeros((len(each_wave), contrast.shape[1]))
+    strength = np.tile(weight[::AXIS_EVERY], len(WAVES))
+    return (
+        np.vstack([design, np.hstack([of_inclusion, each_wave])]),
+        np.append(weight, strength),
+        np.vstack([contrast, nothing]),
+    )
+
+
+def scaled(reach: dict[str, float], ratio: float) -> dict[str, float]:
+    """Return reaches that are so many times as far; those below 1, which give no term, stay."""
+    return {name: ratio * one if one >= 1 else one for name, one in reach.items()}
 
 
 def degrees(reach: dict[str, float], highest: dict[str, int]) -> NDArray[np.uint8]:
@@ -133,12 +190,22 @@ def _weighted(design: Array, weight: Array, rows: Array) -> Array:
     return np.asarray(found)
 
 
-def held_out_error(surrogate: PressSurrogate, samples: PressSamples) -> Array:
+def held_out_error(surrogate: PressRows, samples: PressSamples) -> Array:
     """Return the root mean square error [P] of the profile's columns on presses that were kept apart."""
-    return np.asarray(np.sqrt(np.mean((surrogate.rows(normalise(samples.parameters)) - samples.rows) ** 2, axis=0)))
+    return np.asarray(np.sqrt(np.mean(_missed(surrogate, samples) ** 2, axis=0)))
 
 
-def held_out_second_harmonics(ellipticity: EllipticityTest, samples: PressSamples) -> Array:
-    """Return the root mean square error [Q] of second harmonics on presses that were kept apart."""
-    errors = ellipticity.second_harmonics(normalise(samples.parameters)) - samples.second_harmonics
-    return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
+def forward_error(surrogate: PressRows, *kept: PressSamples) -> Array:
+    """Return the covariance [P, P] of what a surrogate misses of presses kept apart, as `PressNoise.forward`.
+
+    Errors of large and shallow inclusions are the largest: about as the root of the contrast.
+    """
+    missed = [
+        _missed(surrogate, samples) / light_ratio(samples.rows) / np.sqrt(rms_contrast(samples.rows))[:, None]
+        for samples in kept
+    ]
+    return shrunk_covariance(np.concatenate(missed))
+
+
+def _missed(surrogate: PressRows, samples: PressSamples) -> Array:
+    return surrogate.rows(normalise(samples.parameters), samples.direction_rad) - samples.rows

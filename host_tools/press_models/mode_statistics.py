@@ -2,7 +2,8 @@
 
 An error in percent is (estimate - truth) / truth. Skill is 1 - (root mean square error / standard deviation of the even
 prior): 0 is as good as the middle of the range, 1 is perfect. Coverage counts only intervals of presses that determine
-the unknown, since the others hold the whole range and so always the truth.
+the unknown, since the others hold the whole range and so always the truth: by the unknown's own octiles, and by those
+of every unknown.
 """
 
 from __future__ import annotations
@@ -10,27 +11,52 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.confidence_belt import Belt
+from device.measurement.confidence_belt import COVERAGE
 from device.measurement.parameters import EVEN_STD, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 
 OCTILES = 8
 DIGITS = 4
+EASIEST = 0.05
+"""Share of the determined presses whose interval is narrower than what is called reachable."""
 
 
-def statistics(evaluated: EvaluatedPresses, belts: tuple[Belt, ...]) -> dict[str, Any]:
-    """Return the statistics of presses by unknown."""
-    covered, known = evaluated.covered(belts)
+def statistics(evaluated: EvaluatedPresses) -> dict[str, Any]:
+    """Return the statistics of presses by unknown, and how often intervals hold together, under `joint`."""
     truth, mean = denormalise_unknowns(evaluated.truth), denormalise_unknowns(evaluated.mean)
     percent = 100 * (mean - truth) / truth
-    error = evaluated.mean - evaluated.truth
     return {"presses": len(truth)} | {
-        name: _of_unknown(truth[:, i], percent[:, i], error[:, i], covered[:, i], known[:, i])
-        for i, name in enumerate(UNKNOWNS)
-    }
+        name: _of_unknown(evaluated, i, truth, percent[:, i]) for i, name in enumerate(UNKNOWNS)
+    } | {"joint": {"size_and_depth": _joint(evaluated, 2), "all": _joint(evaluated, 3)}}  # fmt: skip
+
+
+def _joint(evaluated: EvaluatedPresses, count: int) -> float | None:
+    """Return how often the intervals of the first unknowns hold together, where all of these are determined."""
+    return _coverage(np.all(evaluated.is_covered[:, :count], axis=1), np.all(evaluated.is_known[:, :count], axis=1))
+
+
+def interval_score(evaluated: EvaluatedPresses) -> Array:
+    """Return the mean interval score [3] in coordinates: the width, and for a miss its length times 2 / (1 - level).
+
+    The least mean score is that of the true quantiles. Source: Gneiting & Raftery, JASA 102 (2007), section 6.2.
+    """
+    below = np.maximum(evaluated.low - evaluated.truth, 0)
+    above = np.maximum(evaluated.truth - evaluated.high, 0)
+    return np.asarray((evaluated.high - evaluated.low + 2 / (1 - COVERAGE) * (below + above)).mean(axis=0))
+
+
+def reachable_half_width(evaluated: EvaluatedPresses) -> dict[str, float]:
+    """Return half of the narrowest interval that can be had, in each unknown's own unit.
+
+    One press in twenty of those that determine the unknown has a narrower one: presses on the easiest inclusions.
+    """
+    half = (denormalise_unknowns(evaluated.high) - denormalise_unknowns(evaluated.low)) / 2
+    columns = zip(UNKNOWNS, half.T, evaluated.is_known.T, strict=True)
+    return {name: _rounded(np.quantile(column[known], EASIEST)) for name, column, known in columns if known.any()}
 
 
 def octile_ends(truth: Array) -> Array:
@@ -43,9 +69,11 @@ def octile_of(truth: Array) -> Array:
     return np.clip(np.searchsorted(octile_ends(truth), truth, side="right") - 1, 0, OCTILES - 1)
 
 
-def _of_unknown(truth: Array, percent: Array, error: Array, covered: Array, known: Array) -> dict[str, Any]:
-    octile = octile_of(truth)
-    of_octile = [octile == number for number in range(OCTILES)]
+def _of_unknown(evaluated: EvaluatedPresses, unknown: int, truths: Array, percent: Array) -> dict[str, Any]:
+    truth, error = truths[:, unknown], (evaluated.mean - evaluated.truth)[:, unknown]
+    covered, known = evaluated.is_covered[:, unknown], evaluated.is_known[:, unknown]
+    of_octiles = {name: _octiles(truths[:, i]) for i, name in enumerate(UNKNOWNS)}
+    of_octile = of_octiles[UNKNOWNS[unknown]]
     return {
         "mean_percent": _rounded(np.abs(percent).mean()),
         "sd_percent": _rounded(np.abs(percent).std()),
@@ -59,15 +87,25 @@ def _of_unknown(truth: Array, percent: Array, error: Array, covered: Array, know
         "rms_coordinate_per_octile": [_rounded(_rms(error[one])) if one.any() else None for one in of_octile],
         "determined_per_octile": [_mean(known[one]) for one in of_octile],
         "coverage_per_octile": [_coverage(covered[one], known[one]) for one in of_octile],
+        "coverage_by_octiles": {
+            name: [_coverage(covered[one], known[one]) for one in octiles] for name, octiles in of_octiles.items()
+        },
+        "determined_by_octiles": {name: [_mean(known[one]) for one in octiles] for name, octiles in of_octiles.items()},
+        "interval_score": _rounded(interval_score(evaluated)[unknown]),
     }
 
 
-def _coverage(covered: Array, known: Array) -> float | None:
+def _octiles(truth: Array) -> list[NDArray[np.bool_]]:
+    octile = octile_of(truth)
+    return [octile == number for number in range(OCTILES)]
+
+
+def _coverage(covered: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
     """Return the covered share of the determined ones; None where none is."""
     return _mean(covered[known])
 
 
-def _mean(values: Array) -> float | None:
+def _mean(values: Array | NDArray[np.bool_]) -> float | None:
     return _rounded(values.mean()) if len(values) else None
 
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.mode import Mode
 from device.measurement.parameters import BY_RATIO, HIGH, LOW, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.range_classifier import OUTPUT
 from host_tools.paper_network.export import AGREEMENT, OnnxGraph, agreed_outputs
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling
 from host_tools.press_models.train_ensemble import DenseEnsemble
@@ -83,13 +83,11 @@ def golden_vectors(ensemble: DenseEnsemble, network: bytes, rows: Array) -> dict
     return {"features": rows.tolist()} | {name: one.tolist() for name, one in found.items()}
 
 
-def build_range_networks(networks: Mapping[Mode, RangeNetwork]) -> bytes:
-    """Return the networks as serialised ONNX: features float32 [n, P] -> one float32 [n, 1] named as each mode."""
-    graph, columns = OnnxGraph(), 0
-    for mode, network in networks.items():
-        columns = len(network.scaling.mean)
-        graph.add("ReduceMean", add_members(graph, network.scaling, network.members), axes=[0], keepdims=0, output=mode)
-    return graph.serialise(columns, dict.fromkeys(networks, 1))
+def build_range_network(network: RangeNetwork) -> bytes:
+    """Return the networks as serialised ONNX: features float32 [n, F] -> float32 [n, 1]."""
+    graph = OnnxGraph()
+    graph.add("ReduceMean", add_members(graph, network.scaling, network.members), axes=[0], keepdims=0, output=OUTPUT)
+    return graph.serialise(len(network.scaling.mean), {OUTPUT: 1})
 
 
 def budget_entry(budget: Mapping[str, Any]) -> dict[str, Any]:
@@ -105,7 +103,7 @@ def range_entry(trained: TrainedRange, network: bytes, rows: Array) -> dict[str,
 
     Raises `ExportRefused` when onnxruntime and NumPy differ.
     """
-    expected: dict[str, Array] = {mode: one.log_odds(rows)[:, None] for mode, one in trained.networks.items()}
+    expected = {OUTPUT: trained.network.log_odds(rows)[:, None]}
     golden = agreed_outputs(network, rows, expected, tolerance=20 * AGREEMENT, floor=1.0, of=" of the ranges")
     return {
         "sha256": hashlib.sha256(network).hexdigest(),

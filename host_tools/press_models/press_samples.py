@@ -15,9 +15,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import NUISANCES, PARAMETERS, denormalise
+from device.measurement.parameters import HIGH, NUISANCES, PARAMETERS, denormalise
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, harmonic, second_harmonic
+from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, first_harmonic, second_harmonic
+from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.ring_means import RingMeans, ring_weights
 from device.measurement.recording.tactile_image import Image
@@ -37,6 +38,8 @@ LIT = (0.6, 0.6, 0.6, 0.6)
 INCLUSIONS_A_SKIN = 3
 """Inclusions that are pressed on one tissue and skin: their inclusion-free press is made once."""
 CHUNK = 24
+BESIDE_TO_MM = 8.0
+"""Largest offset of a press of a scan: three millimetres from the rim of the face."""
 NEAREST_MM = 1.0
 """An inclusion ends at least this far above the slab's base."""
 
@@ -50,21 +53,18 @@ class Draw(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PressSamples:
-    """Parameters [n, 9] in the order of `PARAMETERS`, rows [n, P] in that of `radial_profile.ROW_NAMES`.
-
-    `second_harmonics` [n, Q]: of the contrast, along the offset, of all forces and all rings but the two at the ends.
-    """
+    """Parameters [n, 9] in the order of `PARAMETERS`, rows [n, P] of the profile, directions [n] of the inclusion."""
 
     parameters: Array
     rows: Array
-    second_harmonics: Array
+    direction_rad: Array
 
     def split(self, count: int) -> tuple[PressSamples, PressSamples]:
         """Return the first `count` presses and the others."""
         return self._part(slice(0, count)), self._part(slice(count, None))
 
     def _part(self, of: slice) -> PressSamples:
-        return PressSamples(self.parameters[of], self.rows[of], self.second_harmonics[of])
+        return PressSamples(self.parameters[of], self.rows[of], self.direction_rad[of])
 
 
 def draw_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
@@ -84,6 +84,13 @@ def draw_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: 
     return values
 
 
+def draw_beside(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
+    """Return the same [count, 9], but for offsets that are even from where those of one press end to `BESIDE_TO_MM`."""
+    values = draw_parameters(count, rng, inclusions_a_skin=inclusions_a_skin)
+    values[:, OFFSET] = rng.uniform(HIGH[OFFSET], BESIDE_TO_MM, count)
+    return values
+
+
 def sample_presses(
     tables: ProbeTables,
     count: int,
@@ -94,72 +101,83 @@ def sample_presses(
     on_done: Callable[[int], None] = lambda done: None,
 ) -> PressSamples:
     """Return `count` random presses; the same seed gives the same ones whatever `jobs` (-1: all cores)."""
-    parameters = draw(count, np.random.default_rng(seed), inclusions_a_skin=INCLUSIONS_A_SKIN)
-    parts = np.split(parameters, range(CHUNK * INCLUSIONS_A_SKIN, count, CHUNK * INCLUSIONS_A_SKIN))
+    rng = np.random.default_rng(seed)
+    parameters = draw(count, rng, inclusions_a_skin=INCLUSIONS_A_SKIN)
+    direction_rad = rng.uniform(0, 2 * np.pi, count)
+    ends = range(CHUNK * INCLUSIONS_A_SKIN, count, CHUNK * INCLUSIONS_A_SKIN)
+    parts = zip(np.split(parameters, ends), np.split(direction_rad, ends), strict=True)
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     pressed = []
-    for part in Parallel(n_jobs=jobs, return_as="generator")(delayed(exact_presses)(tables, p) for p in parts):
+    for part in Parallel(n_jobs=jobs, return_as="generator")(delayed(profile_rows)(tables, *p) for p in parts):
         pressed.append(part)
-        on_done(len(part[0]))
-    rows, second_harmonics = zip(*pressed, strict=True)
-    return PressSamples(parameters, np.concatenate(rows), np.concatenate(second_harmonics))
+        on_done(len(part))
+    return PressSamples(parameters, np.concatenate(pressed), direction_rad)
 
 
 def profile_rows(
-    tables: ProbeTables, parameters: Array, *, ramps: PressRamps | None = None, span_ratio: float = 1.0
+    tables: ProbeTables,
+    parameters: Array,
+    direction_rad: Array | None = None,
+    *,
+    ramps: PressRamps | None = None,
+    span_ratio: float = 1.0,
+    reference_span_ratio: float | None = None,
 ) -> Array:
     """Return the profile rows [n, P] of presses without noise, for parameters [n, 9].
 
-    `ramps` are those of an inclusion that the tables do not hold, on the axis. `span_ratio`: true force over what the
-    cell says.
+    The inclusion lies in directions [n] of the image, along its rows unless they are told. `ramps` are those of an
+    inclusion that the tables do not hold, on the axis. `span_ratio`: true force over what the cell says;
+    `reference_span_ratio`: the same of the reference press, where it is another.
     """
-    return exact_presses(tables, parameters, ramps=ramps, span_ratio=span_ratio)[0]
-
-
-def exact_presses(
-    tables: ProbeTables, parameters: Array, *, ramps: PressRamps | None = None, span_ratio: float = 1.0
-) -> tuple[Array, Array]:
-    """Return profile rows [n, P] and second harmonics [n, Q] along the offset; as `profile_rows`."""
-    scene = _Scene(tables, ramps, span_ratio)
-    pressed = [scene.press(dict(zip(PARAMETERS, map(float, values), strict=True))) for values in parameters]
-    rows, second_harmonics = zip(*pressed, strict=True)
-    return np.array(rows), np.array(second_harmonics)
+    scene = _Scene(tables, ramps, span_ratio, span_ratio if reference_span_ratio is None else reference_span_ratio)
+    directions = np.zeros(len(parameters)) if direction_rad is None else direction_rad
+    return np.array([
+        scene.press(dict(zip(PARAMETERS, map(float, values), strict=True)), float(direction))
+        for values, direction in zip(parameters, directions, strict=True)
+    ])  # fmt: skip
 
 
 class _Scene:
     """Presses inclusions on one tissue and skin after the other; remembers the inclusion-free press of the last."""
 
-    def __init__(self, tables: ProbeTables, ramps: PressRamps | None, span_ratio: float) -> None:
+    def __init__(
+        self, tables: ProbeTables, ramps: PressRamps | None, span_ratio: float, reference_span_ratio: float
+    ) -> None:
         self._tables, self._ramps, self._weights = tables, ramps, ring_weights(SHAPE, SCALE)
-        self._forces_n = span_ratio * PROFILE_FORCES_N
+        self._forces_n, self._reference_n = span_ratio * PROFILE_FORCES_N, reference_span_ratio * PROFILE_FORCES_N
         self._valid = np.ones(SHAPE, dtype=bool)
         self._skin: Skin | None = None
         self._slab: Slab | None = None
 
-    def press(self, at: dict[str, float]) -> tuple[Array, Array]:
+    def press(self, at: dict[str, float], direction_rad: float) -> Array:
         skin = Skin(albedo=at["albedo"], spread_mm=at["spread_mm"], contact_pressure_kpa=at["contact_pressure_kpa"])
         slab = Slab(at["tissue_modulus_kpa"], at["slab_thickness_mm"])
         inclusion = Inclusion(at["size_mm"], at["depth_mm"], at["youngs_modulus_kpa"])
         if (skin, slab) != (self._skin, self._slab):
             self._skin, self._slab = skin, slab
             self._image = ScatteredImage(self._tables.light, skin, LENS, SHAPE, SCALE)
-            self._baseline = self._lights(inclusion, ProbePlacement(*BESIDE_MM))
+            self._baseline = self._lights(inclusion, ProbePlacement(*BESIDE_MM), self._reference_n)
             baseline = np.array([self._means(light).mean for light in self._baseline])
             self._reference_response = np.log(baseline[:-1] / baseline[-1])
-        lights = self._lights(inclusion, ProbePlacement(x_mm=at["offset_mm"]))
+        across = at["offset_mm"] * np.array([np.cos(direction_rad), np.sin(direction_rad)])
+        lights = self._lights(inclusion, ProbePlacement(*map(float, across)), self._forces_n)
         rings = [
             self._means(light / baseline - np.float32(1))
             for light, baseline in zip(lights, self._baseline, strict=True)
         ]
         stacked = RingMeans(*(np.array(part) for part in zip(*rings, strict=True)))
-        row = np.concatenate([stacked.mean.ravel(), self._reference_response.ravel(), harmonic(stacked, 1)])
-        return row, second_harmonic(stacked)[0].ravel()
+        return np.concatenate([
+            stacked.mean.ravel(),
+            self._reference_response.ravel(),
+            first_harmonic(stacked).ravel(),
+            second_harmonic(stacked)[0].ravel(),
+        ])  # fmt: skip
 
-    def _lights(self, inclusion: Inclusion, place: ProbePlacement) -> list[Image]:
+    def _lights(self, inclusion: Inclusion, place: ProbePlacement, forces_n: Array) -> list[Image]:
         assert self._slab is not None  # press has set it
         ramps = self._ramps or self._tables.centred.ramps(inclusion, self._slab)
         face = PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, self._slab)
-        return [self._image.intensity(*face.at(float(force), place), LIT) for force in self._forces_n]
+        return [self._image.intensity(*face.at(float(force), place), LIT) for force in forces_n]
 
     def _means(self, image: Image) -> RingMeans:
         return self._weights.means(image, self._valid)

@@ -21,15 +21,15 @@ from device.measurement.quick_mode.profile import QUICK_FORCES_N, QuickPress, qu
 from device.measurement.ramp_modes.estimate import VISIBLE_DEVIATIONS
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, smooth_ring_errors
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, PressSurrogate
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, PressRows
 from device.measurement.recording.reference_light import EXPONENT
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.press_models.camera_noise import shrunk_covariance
-from host_tools.press_models.confidence_belts import confidence_belts, widened
+from host_tools.press_models.camera_noise import exact_rows, shrunk_covariance
+from host_tools.press_models.confidence_belts import SpreadAnswers, confidence_belts, widened
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.noisy_presses import Index, PressSet, random_press_set
-from host_tools.press_models.press_samples import draw_parameters, profile_rows
+from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.recorded_presses import EXACT, in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
@@ -84,7 +84,7 @@ class RecordedHolds:
 
 def train_quick(
     tables: ProbeTables,
-    surrogate: PressSurrogate,
+    surrogate: PressRows,
     noise: PressNoise,
     *,
     budget: QuickBudget | None = None,
@@ -129,28 +129,28 @@ def recorded_holds(tables: ProbeTables, count: int, seed: int, levels: ErrorLeve
 def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
     """Return the covariance [11, 11] of recorded contrast about the exact one, at the force that was reported."""
     recorded = recorded_holds(tables, count, seed, EXACT, jobs)
-    parameters = recorded.parameters
-    ramps = np.array(in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], count, jobs))
+    ramps = exact_rows(tables, recorded.parameters, seed=seed, jobs=jobs)
     exact = quick_rows(ramps, recorded.rows[:, RINGS])
     return shrunk_covariance((recorded.rows - exact)[:, :RINGS] / (1 + exact[:, :RINGS]))
 
 
-def _outcome(ensemble: DenseEnsemble, simulated: EvaluatedPresses, recorded: RecordedHolds) -> QuickOutcome:
+def _outcome(ensemble: DenseEnsemble, simulated: SpreadAnswers, recorded: RecordedHolds) -> QuickOutcome:
     """Return belts and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
     half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
     seen, evaluated = simulated.part(slice(half)), _evaluated(ensemble, recorded.rows, normalise(recorded.parameters))
     first = evaluated.part(usual)
     belts = confidence_belts(seen.truth, seen.mean, seen.spread)
+    belts = widened(belts, first.truth, first.mean, first.spread)
     return QuickOutcome(
-        widened(belts, first.truth, first.mean, first.spread),
+        belts,
         float(np.quantile(recorded.elongation[usual], CRITICAL_RATIO)),
-        simulated.part(slice(half, None)),
-        evaluated.part(slice(usual.stop, None)),
+        simulated.part(slice(half, None)).within(belts),
+        evaluated.part(slice(usual.stop, None)).within(belts),
     )
 
 
-def _evaluated(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> EvaluatedPresses:
-    return EvaluatedPresses(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))
+def _evaluated(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> SpreadAnswers:
+    return SpreadAnswers(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))
 
 
 @dataclass(frozen=True, eq=False)

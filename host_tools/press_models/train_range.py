@@ -1,7 +1,7 @@
-"""Random presses in and around the trained ranges to the networks that tell them apart, one for each ramp mode.
+"""Random presses in and around the trained ranges to the networks that tell them apart.
 
 Faces of inclusions around the ranges are those of `out_of_range_table`; their presses make polynomials over the wide
-ranges, and these endless training presses with the noise of each mode. Only size and depth are drawn wide: the modulus
+ranges, and these endless training presses with noise. Only size and depth are drawn wide: the modulus
 and all that nobody tells the probe stay in their ranges.
 
 The network is `dense_network` with one output and the logistic loss: the log odds that size or depth lies outside. By
@@ -12,23 +12,29 @@ which these networks approach. Source: Bishop, Pattern Recognition and Machine L
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
 from device.measurement.arrays import Array, Single
-from device.measurement.mode import Mode
 from device.measurement.parameters import PARAMETERS, normalise
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.surrogate import DEPTH, SIZE, assemble, inclusion_factor, polynomial_coordinates
+from device.measurement.ramp_modes.surrogate import (
+    DEPTH,
+    SIZE,
+    assemble,
+    inclusion_factor,
+    polynomial_coordinates,
+    turned,
+)
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, activations_of, backward
 from host_tools.press_models.fit_surrogate import INCLUSION_REACH, fit_polynomials
-from host_tools.press_models.noisy_presses import BLOCK, NoiseSampler, PressSet
+from host_tools.press_models.noisy_presses import BLOCK, NetworkPresses, NoiseSampler, PressSet
 from host_tools.press_models.press_samples import NEAREST_MM, PressSamples, draw_parameters, sample_presses
 from host_tools.press_models.seeds import derived_seed
 from host_tools.press_models.train_ensemble import Task, train_members
@@ -55,16 +61,17 @@ class RangeBudget:
     trained_on: int = 200_000
     members: int = 2
     steps: int = 20_000
+    detail_ratio: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class TrainedRange:
-    """A network of each mode, and the root mean square error [P] of the polynomials on presses kept apart.
+    """The networks, and the root mean square error [P] of the polynomials on presses kept apart.
 
     `dataset_sha256`: of the rows of all presses in and around the ranges.
     """
 
-    networks: dict[Mode, RangeNetwork]
+    network: RangeNetwork
     surrogate_error: Array
     dataset_sha256: str
     budget: RangeBudget
@@ -73,7 +80,7 @@ class TrainedRange:
 def train_range(
     tables: ProbeTables,
     wide: WideTable,
-    noise: Mapping[Mode, PressNoise],
+    noise: PressNoise,
     *,
     budget: RangeBudget | None = None,
     seed: int = 1,
@@ -91,49 +98,48 @@ def train_range(
         jobs=jobs,
     )
     learned, kept = samples.split(asked.presses)
-    surrogate = wide_surrogate(learned)
-    say(f"{asked.members} networks for the ranges of each mode")
-    presses = wide_press_set(surrogate, noise["standard"], asked.trained_on, seed)
-    networks = {
-        mode: train_network(replace(presses, sampler=NoiseSampler(of_mode)), seed, asked, jobs)
-        for mode, of_mode in noise.items()
-    }
-    error = np.sqrt(np.mean((surrogate.rows(kept.parameters) - kept.rows) ** 2, axis=0))
-    return TrainedRange(networks, error, hashlib.sha256(samples.rows.tobytes()).hexdigest(), asked)
+    surrogate = wide_surrogate(learned, asked.detail_ratio)
+    say(f"{asked.members} networks for the ranges")
+    presses = wide_press_set(surrogate, noise, asked.trained_on, seed)
+    network = train_network(presses, seed, asked, jobs)
+    error = np.sqrt(np.mean((surrogate.rows(kept.parameters, kept.direction_rad) - kept.rows) ** 2, axis=0))
+    return TrainedRange(network, error, hashlib.sha256(samples.rows.tobytes()).hexdigest(), asked)
 
 
-def wide_surrogate(samples: PressSamples) -> WideSurrogate:
-    """Return the polynomials of presses in and around the ranges; raises as `fit_polynomials`."""
-    return WideSurrogate(*fit_polynomials(samples, wide_coordinates(samples.parameters), REACH, HIGHEST))
+def wide_surrogate(samples: PressSamples, detail_ratio: float = 1.0) -> WideSurrogate:
+    """Return the polynomials of presses in and around the ranges; as `fit_polynomials`."""
+    at = wide_coordinates(samples.parameters)
+    return WideSurrogate(*fit_polynomials(samples, at, REACH, HIGHEST, detail_ratio=detail_ratio))
 
 
 def wide_press_set(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int) -> PressSet:
     """Return random presses in and around the ranges; coordinates of those outside lie outside -1 to 1."""
     rng = np.random.default_rng(derived_seed(seed, "training presses around the ranges"))
     parameters = draw_wide_parameters(count, rng)
-    rows = [surrogate.rows(parameters[start : start + BLOCK]) for start in range(0, count, BLOCK)]
+    direction_rad = rng.uniform(0, 2 * np.pi, count)
+    blocks = [slice(start, start + BLOCK) for start in range(0, count, BLOCK)]
+    rows = np.concatenate([surrogate.rows(parameters[block], direction_rad[block]) for block in blocks])
     return PressSet(
-        normalise(parameters).astype(np.float32), np.concatenate(rows).astype(np.float32), NoiseSampler(noise)
+        normalise(parameters).astype(np.float32), rows.astype(np.float32), direction_rad, NoiseSampler(noise)
     )
 
 
 def train_network(training_set: PressSet, seed: int, budget: RangeBudget, jobs: int) -> RangeNetwork:
     """Return the networks trained on a training set's rows; raises as `train_members`."""
     task = Task(1, is_outside(training_set.normalised).astype(np.float32), logistic_loss_and_gradient)
-    return RangeNetwork(
-        *train_members(training_set, task, seed=seed, members=budget.members, steps=budget.steps, jobs=jobs)
-    )
+    presses = NetworkPresses(training_set)
+    return RangeNetwork(*train_members(presses, task, seed=seed, members=budget.members, steps=budget.steps, jobs=jobs))
 
 
 @dataclass(frozen=True, eq=False)
 class RangeNetwork:
-    """Networks that share one scaling of the inputs; their log odds are averaged."""
+    """Networks that share one scaling of the inputs, those of `network_rows`; their log odds are averaged."""
 
     scaling: InputScaling
     members: tuple[list[DenseLayer], ...]
 
     def log_odds(self, rows: Array) -> Array:
-        """Return the log odds [n] that size or depth lies outside, for rows [n, P]."""
+        """Return the log odds [n] that size or depth lies outside, for rows [n, F]."""
         inputs = self.scaling.inputs(rows.astype(np.float32))
         return np.asarray(np.mean([activations_of(layers, inputs)[-1][:, 0] for layers in self.members], axis=0))
 
@@ -179,9 +185,11 @@ class WideSurrogate:
     """`PressSurrogate` over the wide ranges."""
 
     inclusion_field: LegendreSum
+    turned_field: LegendreSum
     baseline: LegendreSum
 
-    def rows(self, parameters: Array) -> Array:
-        """Return profile rows [n, P] at parameters [n, 9]."""
+    def rows(self, parameters: Array, direction_rad: Array) -> Array:
+        """Return profile rows [n, P] at parameters [n, 9], the inclusion in directions [n] of the image."""
         at = wide_coordinates(parameters)
-        return assemble(inclusion_factor(parameters) * self.inclusion_field.values(at), self.baseline.values(at))
+        inclusion = self.inclusion_field.values(at) + turned(self.turned_field.values(at), direction_rad)
+        return assemble(inclusion_factor(parameters) * inclusion, self.baseline.values(at))

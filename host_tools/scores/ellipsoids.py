@@ -1,9 +1,9 @@
-"""How often the ramp modes refuse ellipsoids that are longer than wide, beside how often any test could.
+"""How often mode standard refuses ellipsoids that are longer than wide, beside how often any test could.
 
 What being longer adds to a sphere is solved by finite elements for each, its long axis along or across its offset,
 and carried on to the probe's own sphere (`stretched_inclusion`). How far a press of it lies from its nearest round
-inclusion inside the ranges - in the profile and in the second harmonics at once, whatever tissue and skin that one
-has - bounds any test that, as the probe, does not know which way an inclusion is longer.
+inclusion inside the ranges - in the profile, which holds second harmonics, whatever tissue and skin that one has -
+bounds any test that, as the probe, does not know which way an inclusion is longer.
 Source: Lehmann & Romano, Testing Statistical Hypotheses (2005), 6.3: of tests that treat all directions alike the best
 one rejects by the length, whose square is a noncentral chi-square of two degrees of freedom.
 """
@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 from scipy.stats import ncx2
 
@@ -24,18 +23,20 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import HIGH, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
-from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
+from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
-from host_tools.press_models.press_samples import draw_parameters, exact_presses
+from host_tools.press_models.press_samples import draw_parameters, profile_rows
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.probe_tables.ellipsoid import stretched_inclusion
 from host_tools.scenes.scene import Placement, Scene
 from host_tools.scores.outside import FALSE_AT_MOST, REFUSED_AT_LEAST, SHARE, EstimateOf, clear_inclusions
 
+MODE: Mode = "standard"
+QUICK: Mode = "quick"
 WIDTH_RATIO = (1.6, 2.4)
 ELLIPSOIDS, SKINS = 40, 3
 """Inclusions that are solved, and presses of each: on other skins and tissue, and turned otherwise under the camera."""
@@ -77,12 +78,14 @@ def draw_oblong(count: int, rng: np.random.Generator) -> list[Oblong]:
     ]
 
 
-def round_deviations(solved: ProbeTables, parameters: Array, model: RampModel, mode: Mode) -> float:
-    """Return how many standard deviations a press [9] of an ellipsoid, without noise, lies from any round one."""
-    rows, second = exact_presses(solved, parameters[None])
-    posterior = PressPosterior(rows[0], model.answers.surrogate, model.answers.noise[mode])
-    harmonics, sphere = np.stack([second[0], np.zeros_like(second[0])]), normalise(parameters[None])[0]
-    return nearest_round(posterior, harmonics, sphere, model, mode)[1]
+def round_deviations(solved: ProbeTables, parameters: Array, answers: RampAnswers) -> float:
+    """Return how many standard deviations a press [9] of an ellipsoid, without noise, lies from any round one.
+
+    Its long axis lies along or across the offset: across the bright side it has no second harmonic, as a round one.
+    """
+    row = profile_rows(solved, parameters[None])[0]
+    posterior = PressPosterior(row, answers.surrogate, answers.noise, direction_rad=np.zeros(1))
+    return nearest_round(posterior, normalise(parameters[None])[0])[1]
 
 
 def most_flagged(deviations: Array, false_flags: float) -> Array:
@@ -93,23 +96,17 @@ def most_flagged(deviations: Array, false_flags: float) -> Array:
     return np.asarray(ncx2.sf(-2 * np.log(false_flags), 2, np.square(deviations)))
 
 
-def nearest_round(
-    posterior: PressPosterior, second: Array, sphere: Array, model: RampModel, mode: Mode
-) -> tuple[Array, float]:
-    """Return coordinates [9] and distance in standard deviations of the round inclusion nearest to row and harmonics.
+def nearest_round(posterior: PressPosterior, sphere: Array) -> tuple[Array, float]:
+    """Return coordinates [9] and distance in standard deviations of the round inclusion nearest to a row.
 
-    The search begins at the sphere as wide as the ellipsoid, coordinates [9]: first for the row, then for both.
+    The search begins at the sphere as wide as the ellipsoid, coordinates [9].
     """
-    start = best_fit(posterior, sphere)
-    factor = np.linalg.cholesky(model.ellipticity.covariance(start, mode))
 
-    def residuals(normalised: Array) -> Array:
-        of_second = solve_triangular(
-            factor, model.ellipticity.left(second, normalised).T, lower=True, check_finite=False
-        )
-        return np.concatenate([posterior.residuals(normalised), of_second.ravel()])
+    def jacobian(normalised: Array) -> Array:
+        return np.asarray(posterior.residuals_and_jacobian(normalised[None])[1][0])
 
-    found = least_squares(residuals, np.clip(start, -0.98, 0.98), bounds=(-1.0, 1.0), xtol=1e-7, ftol=1e-7)
+    start = np.clip(best_fit(posterior, sphere), -0.98, 0.98)
+    found = least_squares(posterior.residuals, start, jac=jacobian, bounds=(-1.0, 1.0), xtol=1e-7, ftol=1e-7)
     return np.asarray(found.x), float(np.sqrt(2 * found.cost))
 
 
@@ -123,31 +120,28 @@ def spoken(oblong: Oblong) -> Sequence[str]:
     )  # fmt: skip
 
 
-def oblong_chapter(answer: EstimateOf, model: RampModel, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
-    """Return how often presses of each ellipsoid are refused; mode quick is shown and not judged."""
+def oblong_chapter(answer: EstimateOf, answers: RampAnswers, tables: ProbeTables, *, jobs: int = -1) -> Chapter:
+    """Return how often presses of each ellipsoid are refused in mode standard; mode quick is shown and not judged."""
     seed = derived_seed(1, "oblong")
     rng = np.random.default_rng(seed)
     inclusions = draw_oblong(ELLIPSOIDS, rng)
     solved = in_parallel(lambda i: inclusions[i].on(tables), len(inclusions), jobs)
     parameters = skins(inclusions, rng)
     press = partial(_is_refused, answer, solved, parameters, seed)
-    benchmarks: list[Benchmark] = []
-    rows: list[tuple[str, ...]] = []
-    sums: list[tuple[str, ...]] = []
-    for mode in RAMP_MODES:
-        refused = np.array(in_parallel(partial(press, mode), len(parameters), jobs), float)
-        apart = np.array(in_parallel(partial(_apart, solved, parameters, model, mode), len(parameters), jobs))
-        benchmarks.append(_benchmark(mode, apart, refused))
-        rows += _rows(mode, inclusions, apart, refused)
-        sums.append(_sum(mode, refused, apart))
-    sums.append(_sum("quick", np.array(in_parallel(partial(press, "quick"), len(parameters), jobs), float)))
+    refused, by_quick = (
+        np.array(in_parallel(partial(press, mode), len(parameters), jobs), float) for mode in (MODE, QUICK)
+    )
+    apart = np.array(in_parallel(partial(_apart, solved, parameters, answers), len(parameters), jobs))
     return Chapter(
         title="Inclusions that are not round",
         claim=CLAIM,
         source="Lehmann & Romano, Testing Statistical Hypotheses (2005), 6.3; "
         "device/measurement/ramp_modes/ellipticity.py",
-        benchmarks=tuple(benchmarks),
-        tables=(Table("All of them", SUMMARY, tuple(sums)), Table("Each ellipsoid, means", HEADER, tuple(rows))),
+        benchmarks=(_benchmark(apart, refused),),
+        tables=(
+            Table("All of them", SUMMARY, (_sum(MODE, refused, apart), _sum(QUICK, by_quick))),
+            Table("Each ellipsoid, means", HEADER, tuple(_rows(inclusions, apart, refused))),
+        ),
         facts={"false_at_most": FALSE_AT_MOST, "refused_at_least": REFUSED_AT_LEAST},
     )
 
@@ -168,15 +162,15 @@ def _is_refused(
     return answer(recording, mode).size_mm.value is None
 
 
-def _apart(solved: Sequence[ProbeTables], parameters: Array, model: RampModel, mode: Mode, number: int) -> float:
-    return round_deviations(solved[number // SKINS], parameters[number], model, mode)
+def _apart(solved: Sequence[ProbeTables], parameters: Array, answers: RampAnswers, number: int) -> float:
+    return round_deviations(solved[number // SKINS], parameters[number], answers)
 
 
-def _benchmark(mode: Mode, apart: Array, refused: Array) -> Benchmark:
+def _benchmark(apart: Array, refused: Array) -> Benchmark:
     """Return the benchmark of the presses that a test flags nearly always; NaN, and failed, without any."""
     tellable = most_flagged(apart, FALSE_AT_MOST) >= REFUSED_AT_LEAST
     share = float(refused[tellable].mean()) if tellable.any() else float("nan")
-    case = f"{mode}, ellipsoids that a test could tell ({int(tellable.sum())} presses)"
+    case = f"{MODE}, ellipsoids that a test could tell ({int(tellable.sum())} presses)"
     return at_least(case, SHARE, share, REFUSED_AT_LEAST)
 
 
@@ -185,10 +179,10 @@ def _sum(mode: Mode, refused: Array, apart: Array | None = None) -> tuple[str, .
     return mode, f"{refused.mean():.1%}", could
 
 
-def _rows(mode: Mode, inclusions: Sequence[Oblong], apart: Array, refused: Array) -> list[tuple[str, ...]]:
+def _rows(inclusions: Sequence[Oblong], apart: Array, refused: Array) -> list[tuple[str, ...]]:
     could = most_flagged(apart, FALSE_AT_MOST)
     means = zip(inclusions, *(part.reshape(-1, SKINS).mean(axis=1) for part in (apart, could, refused)), strict=True)
     return [
-        (mode, *spoken(inclusion), f"{deviations:.1f}", f"{most:.0%}", f"{share:.0%}")
+        (MODE, *spoken(inclusion), f"{deviations:.1f}", f"{most:.0%}", f"{share:.0%}")
         for inclusion, deviations, most, share in means
     ]

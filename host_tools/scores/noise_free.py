@@ -18,7 +18,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import denormalise, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.model import RampAnswers
-from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, PressSurrogate
+from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, PressRows
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Chapter, Table, at_most
 from host_tools.press_models.mode_statistics import OCTILES, octile_of
@@ -32,6 +32,8 @@ SIZES_MM, DEPTHS_MM, MODULI_KPA = (5.0, 15.0), (4.0, 8.0), (40.0, 120.0)
 DETERMINED_SIZES_MM, DETERMINED_DEPTHS_MM = (8.0, 15.0), (4.0, 6.0)
 """The part of it for which one of the modulus was."""
 BOUNDS_PERCENT = (0.5, 1.0, 2.5)
+ALONG = np.zeros(1)
+"""The inclusion lies along the image's rows from the axis."""
 STARTS = tuple(product((-0.5, 0.5), (-0.5, 0.5), (-0.7, 0.0, 0.7)))
 """Coordinates of size, depth and modulus from which fits are begun; the best counts, for there are local minima."""
 
@@ -44,7 +46,7 @@ def noise_free_chapter(
     Raises `InvalidQuantity` for fewer than 40 presses, of which there might be none that scores the modulus.
     """
     require("presses without noise", presses, Bound(FEWEST_PRESSES, np.inf, "presses"), "ask for more")
-    surrogate, std = answers.surrogate, np.sqrt(np.diag(answers.noise["precise"].camera))
+    surrogate, std = answers.surrogate, np.sqrt(np.diag(answers.noise.camera))
     parameters = _parameters(presses, derived_seed(seed, "noise-free"))
     normalised = normalise(parameters)
     rows = in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], presses, jobs)
@@ -86,7 +88,7 @@ def _by_octiles(truths: Sequence[Array], percents: Sequence[Array]) -> Table:
     return Table("Mean errors in % by octiles of the truth, lowest first", header, tuple(rows))
 
 
-def known_nuisances_fit(surrogate: PressSurrogate, row: Array, normalised: Array, std: Array) -> Array:
+def known_nuisances_fit(surrogate: PressRows, row: Array, normalised: Array, std: Array) -> Array:
     """Return size, depth and modulus that fit a row [P] best, the nuisances of coordinates [9] being known.
 
     Columns count by their standard deviations `std` [P].
@@ -98,9 +100,9 @@ def known_nuisances_fit(surrogate: PressSurrogate, row: Array, normalised: Array
 
     fits = [
         least_squares(
-            lambda at: (surrogate.rows(whole(at)[None])[0] - row) / std,
+            lambda at: (surrogate.rows(whole(at)[None], ALONG)[0] - row) / std,
             np.array(start),
-            jac=lambda at: surrogate.rows_and_jacobian(whole(at)[None])[1][0][:, : len(UNKNOWNS)] / std[:, None],
+            jac=lambda at: surrogate.rows_and_jacobian(whole(at)[None], ALONG)[1][0][:, : len(UNKNOWNS)] / std[:, None],
             bounds=(-1.0, 1.0),
             x_scale=1e-2,
             xtol=1e-10,

@@ -107,7 +107,7 @@ def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) ->
 
 
 @dataclass(frozen=True)
-class Intervals:
+class SceneIntervals:
     """Random scenes through the camera: truths [n, 3], and whether each is answered [n].
 
     Of each unknown [n, 3]: whether the truth is inside the interval, whether it is called identifiable, and the
@@ -133,7 +133,7 @@ class Intervals:
         }
 
 
-def random_intervals(rig: Rig, *, scenes: int, seed: int) -> Intervals:
+def random_intervals(rig: Rig, *, scenes: int, seed: int) -> SceneIntervals:
     """Return what random scenes through the camera are answered."""
     truths = np.random.default_rng(seed).uniform(SCORED_LOW, PAPER_BOX_HIGH, (scenes, 3))
     seen = [rig.through_camera(Inclusion(*map(float, row)), seed + 100 + i) for i, row in enumerate(truths)]
@@ -141,10 +141,10 @@ def random_intervals(rig: Rig, *, scenes: int, seed: int) -> Intervals:
     known = np.array([[getattr(e, name).identifiable for name in UNKNOWNS] for e in seen])
     error = np.abs(values(seen) - truths) / truths
     inside = np.asarray((low <= truths) & (truths <= high))
-    return Intervals(truths, np.asarray(np.isfinite(low).all(axis=1)), inside, known, error)
+    return SceneIntervals(truths, np.asarray(np.isfinite(low).all(axis=1)), inside, known, error)
 
 
-def print_intervals(found: Intervals, out: Console) -> None:
+def print_intervals(found: SceneIntervals, out: Console) -> None:
     """Print errors, coverage and width of the 90 % intervals of random scenes."""
     title = f"{found.answered.sum()} of {len(found.answered)} random scenes answered"
     table = Table("", *(SPOKEN[name] for name in UNKNOWNS), title=title)
@@ -154,7 +154,7 @@ def print_intervals(found: Intervals, out: Console) -> None:
     out.print(table)
 
 
-def paper_record(errors: Mapping[str, ErrorTable], intervals: Intervals | None) -> dict[str, Any]:
+def paper_record(errors: Mapping[str, ErrorTable], intervals: SceneIntervals | None) -> dict[str, Any]:
     """Return the scores of mode paper as JSON; null stands for a number that is none."""
     record: dict[str, Any] = {
         "phantoms": {

@@ -1,6 +1,8 @@
 """Recordings that carry truth to a score: errors, coverage and refusals, over all presses and by octiles of the truth.
 
 What is scored is what the device would say: values clipped to their intervals, and only presses that it answers.
+Beside that stands the error over all presses, where one that is not answered counts as the guess of the range alone: a
+device that refuses what is hard does not look better there.
 Errors are compared with the Cramer-Rao bound in coordinates, which run from -1 to 1 over the trained range, the modulus
 by its logarithm: there the range bounds what a press that tells nothing adds, in per cent it would be all of the mean.
 """
@@ -22,7 +24,7 @@ from rich.table import Table
 from device.measurement.arrays import Array
 from device.measurement.estimate import SPOKEN, Estimate
 from device.measurement.mode import Mode, mode_named
-from device.measurement.parameters import NOMINAL, normalise_unknowns
+from device.measurement.parameters import NOMINAL, denormalise_unknowns, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
 from host_tools.press_models.mode_statistics import OCTILES, octile_ends, octile_of
@@ -31,6 +33,17 @@ from host_tools.workers import one_core_each
 FEWEST_A_OCTILE = 5
 WORTH_SHARING, SHARED_AT_ONCE = 24, 4
 """Recordings from which other processes, which take seconds to start, are worth it; and how many go to one at once."""
+
+
+PRIOR_GUESS = Inclusion(*map(float, denormalise_unknowns(np.zeros(len(UNKNOWNS)))))
+"""What the trained ranges alone tell of an inclusion: the mean of their coordinates."""
+
+
+def percent_error(truth: Inclusion, estimate: Estimate, name: str) -> float:
+    """Return the error of an unknown in %, that of `PRIOR_GUESS` where the press has no numbers."""
+    value = getattr(estimate, name).value
+    found = getattr(PRIOR_GUESS, name) if value is None else value
+    return float(100 * abs(found / getattr(truth, name) - 1))
 
 
 class Sample(NamedTuple):
@@ -122,7 +135,8 @@ def _scored(sample: Sample, estimate: Callable[[Recording], Estimate], least_err
 def score_record(scored: Score) -> dict[str, Any]:
     """Return the score as JSON: counts by status, numbers of each unknown over answered presses, and every press.
 
-    Null stands for a number that is none. Raises `InvalidQuantity` when there is no press to score.
+    `all_mean_percent` is over all presses, unanswered ones guessed. Null stands for a number that is none. Raises
+    `InvalidQuantity` when there is no press to score.
     """
     answered = _answered(scored)
     return {
@@ -131,6 +145,7 @@ def score_record(scored: Score) -> dict[str, Any]:
         "status": dict(Counter(press.estimate.status for press in scored.presses).most_common()),
         "answered": len(answered),
         "unknowns": {name: _Column(answered, name).as_record() for name in UNKNOWNS} if answered else {},
+        "all_mean_percent": {name: float(np.mean(_of_all(scored.presses, name))) for name in UNKNOWNS},
         "each": [
             {"name": press.name, "truth": asdict(press.truth), "estimate": press.estimate.as_record()}
             for press in scored.presses
@@ -144,6 +159,11 @@ def _answered(scored: Score) -> list[ScoredPress]:
     return [press for press in scored.presses if press.estimate.size_mm.value is not None]
 
 
+def _of_all(presses: Sequence[ScoredPress], name: str) -> Array:
+    """Return the errors [n] of an unknown in % over all presses; those without numbers are guessed."""
+    return np.array([percent_error(press.truth, press.estimate, name) for press in presses])
+
+
 def print_score(scored: Score, out: Console) -> None:
     """Print the score; raises `InvalidQuantity` when there is no press to score."""
     presses, answered = scored.presses, _answered(scored)
@@ -151,13 +171,13 @@ def print_score(scored: Score, out: Console) -> None:
     headline = f"{len(presses)} presses: " + ", ".join(f"{count} {name}" for name, count in status.most_common())
     out.print(headline + (f"; {scored.left_out} left out" if scored.left_out else ""))
     if answered:
-        out.print(_overall(answered))
+        out.print(_overall(answered, presses))
         octiles = _by_octiles(answered)
         if octiles.row_count:
             out.print(octiles)
 
 
-def _overall(presses: Sequence[ScoredPress]) -> Table:
+def _overall(presses: Sequence[ScoredPress], presented: Sequence[ScoredPress]) -> Table:
     table = Table("", *(SPOKEN[name] for name in UNKNOWNS), title=f"{len(presses)} answered presses")
     columns = [_Column(presses, name) for name in UNKNOWNS]
     for spoken, part in (
@@ -167,6 +187,9 @@ def _overall(presses: Sequence[ScoredPress]) -> Table:
         ("largest error", np.max),
     ):
         table.add_row(spoken, *(f"{part(column.percent):.2f} %" for column in columns))
+    table.add_row(
+        "mean error of all, others guessed", *(f"{_of_all(presented, name).mean():.2f} %" for name in UNKNOWNS)
+    )
     table.add_row("error / stated spread", *(f"{column.error_over_spread:.2f}" for column in columns))
     table.add_row("skill against the range", *(f"{column.skill:.2f}" for column in columns))
     table.add_row("determined", *(f"{column.known.mean():.1%}" for column in columns))

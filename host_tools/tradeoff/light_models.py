@@ -20,10 +20,10 @@ from device.simulation.physics.light_table import LightTable
 from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.surface_table import SurfaceTable
 from host_tools.optics.build_lookup import make_light_table
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import Traced, TracedFace
 from host_tools.optics.tracer import trace
 from host_tools.pages.benchmark import Chapter
+from host_tools.scenes.light_block import LightBlock
 from host_tools.tradeoff.fronts import Panel, front_figure, front_table
 from host_tools.tradeoff.pareto import Choice, needless_everywhere
 from host_tools.tradeoff.yardstick import cost, timed

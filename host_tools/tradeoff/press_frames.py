@@ -2,7 +2,8 @@
 
 Each press is recorded once in as many frames as anything here needs, held and over a ramp, in 8 and in 10 bits; fewer
 frames are taken from it evenly, and binned by means over squares of pixels, as a camera does. Ramps are answered by
-the fit of mode precise and by the networks of mode standard, held presses by mode quick, all without any rejection.
+the fit of mode standard and by the networks with which it begins, held presses by mode quick, all without any
+rejection.
 The camera's part of the noise that the fit believes in has the size that these recordings show for each choice.
 """
 
@@ -30,7 +31,8 @@ from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 from host_tools.pages.benchmark import Chapter
-from host_tools.press_models.press_samples import draw_parameters, profile_rows
+from host_tools.press_models.camera_noise import exact_rows
+from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.recorded_presses import HELD_STRAY_N, drifted, in_parallel, scenario_of
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.tradeoff.fronts import Panel, front_figure, front_table, unknown_panels
@@ -65,7 +67,7 @@ class FrameChoice:
     @property
     def chosen(self) -> bool:
         """Whether it is what a mode takes."""
-        modes = {HELD: "quick", NETWORKS: "standard", FITTED: "precise"}
+        modes = {HELD: "quick", FITTED: "standard"}
         return self.family in modes and self.frames == FRAMES[modes[self.family]].count  # type: ignore[index]
 
 
@@ -83,10 +85,14 @@ SHORT: dict[str, Any] = {"presses": 2, "choices": (CHOICES[0], CHOICES[5], CHOIC
 
 
 class ReadPress(NamedTuple):
-    """What a choice makes of one press: its row with every drift, and without any; None where it is the same."""
+    """What a choice makes of one press: its row with every drift, and without any.
+
+    `direction_rad` [1] is where the inclusion lies in the image. A held press says neither that nor the last.
+    """
 
     row: Array
-    exact: Array | None
+    direction_rad: Array | None = None
+    exact: Array | None = None
 
 
 def frames_chapter(
@@ -102,7 +108,7 @@ def frames_chapter(
     seed = derived_seed(1, "trade-off of the frames")
     parameters = draw_parameters(presses, np.random.default_rng(seed))
     read = in_parallel(lambda i: _read(tables, parameters[i], press_seed(seed, i), choices), presses, jobs)
-    exact = np.array(in_parallel(lambda i: profile_rows(tables, parameters[i : i + 1])[0], presses, jobs))
+    exact = exact_rows(tables, parameters, seed=seed, jobs=jobs)
     timing, truth = _Recordings(tables, parameters[0], press_seed(seed, 0)), parameters[:, : len(UNKNOWNS)]
     points = []
     for choice, of_choice in zip(choices, zip(*read, strict=True), strict=True):
@@ -115,7 +121,7 @@ def frames_chapter(
 
 def _percent(answers: _Answers, read: Sequence[ReadPress], truth: Array, jobs: int) -> Array:
     """Return the median errors [3] in % of answers to presses, truth [n, 3]."""
-    found = np.array(in_parallel(lambda i: answers(read[i].row), len(read), jobs))
+    found = np.array(in_parallel(lambda i: answers(read[i]), len(read), jobs))
     return np.asarray(100 * np.median(np.abs(found / truth - 1), axis=0))
 
 
@@ -152,8 +158,8 @@ class _Recordings:
         angle, offset_mm = rng.uniform(0, 2 * np.pi), float(self._at[-1])
         place = ProbePlacement(offset_mm * float(np.cos(angle)), offset_mm * float(np.sin(angle)))
         forces = (TARGET_N,) if held else tuple(np.linspace(RAMP_FROM_N, RAMP_TO_N, MOST_FRAMES))
-        stray = {"stray_n": HELD_STRAY_N} if held else {}
-        protocol = PhantomProtocol(forces, frames=MOST_FRAMES if held else 1, place=place, **stray)
+        protocol = PhantomProtocol(forces, frames=MOST_FRAMES if held else 1, place=place)
+        protocol = replace(protocol, stray_n=HELD_STRAY_N) if held else protocol
         scenario = scenario_of(self._at)
         scenario = replace(scenario, sensor=replace(scenario.sensor, bits=bits))
         inclusion = Inclusion(*map(float, self._at[: len(UNKNOWNS)]))
@@ -168,33 +174,39 @@ def _read(tables: ProbeTables, at: Array, seed: int, choices: Sequence[FrameChoi
     for choice in choices:
         drifts, exact = recordings.of(choice)
         if choice.family == HELD:
-            read.append(ReadPress(quick_press(drifts).row, None))
+            read.append(ReadPress(quick_press(drifts).row))
         else:
-            read.append(ReadPress(press_profile(drifts).as_row(), press_profile(exact).as_row()))
+            read.append(_read_ramp(drifts)._replace(exact=press_profile(exact).as_row()))
     return read
 
 
+def _read_ramp(recording: Recording) -> ReadPress:
+    profile = press_profile(recording)
+    return ReadPress(profile.as_row(), np.array([profile.direction_rad]))
+
+
 class _Answers:
-    """What a choice's row is answered with: size, depth and modulus [3]."""
+    """What a press as a choice reads it is answered with: size, depth and modulus [3]."""
 
     def __init__(self, choice: FrameChoice, model: RampModel, quick: QuickModel, noise: PressNoise) -> None:
         self._family, self._model, self._quick = choice.family, model, quick
-        self._fit = RampAnswers(model.answers.surrogate, {"precise": noise})
+        self._fit = RampAnswers(model.answers.surrogate, noise)
 
-    def __call__(self, row: Array) -> Array:
+    def __call__(self, press: ReadPress) -> Array:
+        rows = press.row[None]
         if self._family == HELD:
-            return np.asarray(self._quick.bundle.estimate(row[None]).estimate[0])
+            return np.asarray(self._quick.bundle.estimate(rows).estimate[0])
+        guesses = self._model.first_guesses(rows)
         if self._family == NETWORKS:
-            return np.asarray(self._model.bundle.estimate(row[None]).estimate[0])
-        mean, spread = self._model.networks(row[None])
-        return np.asarray(denormalise_unknowns(self._fit.answer(row, "precise", mean[0], spread[0]).mean))
+            return np.asarray(denormalise_unknowns(guesses[0]))
+        return np.asarray(denormalise_unknowns(self._fit.answer(rows, guesses, press.direction_rad).mean))
 
 
 def _answers(
     choice: FrameChoice, read: Sequence[ReadPress], exact: Array, model: RampModel, quick: QuickModel
 ) -> _Answers:
     """Return what answers a choice; its camera noise is that of ten frames, times what these recordings show."""
-    noise = model.answers.noise["standard"]
+    noise = model.answers.noise
     recorded = [one.exact for one in read if one.exact is not None]
     if recorded:
         errors = (np.array(recorded) - exact) / light_ratio(exact)
@@ -207,8 +219,8 @@ def _time(choice: FrameChoice, recordings: _Recordings, answers: _Answers) -> fl
     """Return the cost of a press's way from its frames to the answer, in yardsticks."""
     recording, _ = recordings.of(choice)
     if choice.family == HELD:
-        return cost(lambda: answers(quick_press(recording).row)).yardsticks
-    return cost(lambda: answers(press_profile(recording).as_row()), 2).yardsticks
+        return cost(lambda: answers(ReadPress(quick_press(recording).row))).yardsticks
+    return cost(lambda: answers(_read_ramp(recording)), 2).yardsticks
 
 
 def thinned(recording: Recording, count: int) -> Recording:

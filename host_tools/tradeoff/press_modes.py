@@ -10,7 +10,7 @@ import numpy as np
 
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import SPOKEN, Estimate
-from device.measurement.mode import FRAMES, Mode
+from device.measurement.mode import Mode
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.recording.recording import Recording
@@ -64,6 +64,6 @@ def _measured(
     entry = dial_entry(mode, timed_presses(answer, mode, tables, presses=presses))
     cost, share = float(np.median(yardsticks)), f"{entry['answered'] / entry['presses']:.0%}"
     errors, known = entry["median_percent"], entry["determined"]
-    row = (mode, f"{FRAMES[mode].count}", f"{cost:.0f}", share, *(f"{errors[name]:.1f} %" for name in UNKNOWNS))
+    row = (mode, f"{entry['frames']}", f"{cost:.0f}", share, *(f"{errors[name]:.1f} %" for name in UNKNOWNS))
     points = [Choice(f"{mode} ({share})", mode, cost, max(errors[name], LEAST_PERCENT)) for name in UNKNOWNS]
     return (*row, *(f"{known[name]:.0%}" for name in UNKNOWNS)), points

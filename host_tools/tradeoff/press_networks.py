@@ -1,4 +1,4 @@
-"""Networks of mode standard: how wide, how many, in which numbers; error on presses nobody has learned from.
+"""Networks with which a fit begins: how wide, how many, in which numbers; error on presses nobody has learned from.
 
 The committed ensemble loses members and is written in 8-bit integers (weights and activations, onnxruntime's dynamic
 quantisation of the wide products); networks of other widths are trained for a fraction of its budget, so they compete
@@ -22,7 +22,7 @@ from device.measurement.parameters import denormalise
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.model import RampModel
 from host_tools.pages.benchmark import Chapter
-from host_tools.press_models.noisy_presses import PressSet, random_press_set
+from host_tools.press_models.noisy_presses import NetworkPresses, random_press_set
 from host_tools.press_models.onnx_networks import build_network
 from host_tools.press_models.seeds import derived_seed
 from host_tools.press_models.train_ensemble import train_ensemble
@@ -52,7 +52,7 @@ SHORT = NetworkBudget(presses=200, widths=(4, 8), members=1, steps=20, trained_o
 
 
 class ScoredPresses(NamedTuple):
-    """Noisy rows [n, P] and the unknowns' true values [n, 3]."""
+    """Noisy rows [n, F] as networks read them, and the unknowns' true values [n, 3]."""
 
     rows: Single
     truth: Array
@@ -61,17 +61,19 @@ class ScoredPresses(NamedTuple):
 def networks_chapter(
     network: bytes, model: RampModel, budget: NetworkBudget | None = None, *, jobs: int = -1
 ) -> Chapter:
-    """Return the fronts of the standard mode's networks; `network` is the ONNX file of `model`."""
+    """Return the fronts of the networks with which a fit begins; `network` is the ONNX file of `model`."""
     asked = budget or NetworkBudget()
     scored = _scored(_press_set(model, asked.presses, "trade-off of the networks"))
     trained = _trained(_press_set(model, asked.trained_on, "short training"), asked, scored, jobs)
     panels = unknown_panels(_committed(network, scored)) + unknown_panels(trained, ", short training")
     return Chapter(
-        "Networks of mode standard",
+        "Networks with which a fit begins",
         f"{asked.presses} random presses of the surrogate with every drift; one call of the networks for one press.",
         "host_tools/tradeoff/press_networks.py",
         tables=(front_table("Every network", panels),),
-        figures=(front_figure("tradeoff_networks.svg", "Time and error of the standard mode's networks", panels),),
+        figures=(
+            front_figure("tradeoff_networks.svg", "Time and error of the networks with which a fit begins", panels),
+        ),
         facts={
             "needless": needless_everywhere([panel.choices for panel in panels]),
             "members": members_of(network),
@@ -93,7 +95,7 @@ def _committed(network: bytes, scored: ScoredPresses) -> list[Choices]:
     return exact + [_points(f"{n} int8", INTEGERS, in_integers(fewer[n]), scored) for n in (1, whole)]
 
 
-def _trained(training_set: PressSet, asked: NetworkBudget, scored: ScoredPresses, jobs: int) -> list[Choices]:
+def _trained(training_set: NetworkPresses, asked: NetworkBudget, scored: ScoredPresses, jobs: int) -> list[Choices]:
     """Return networks of every width, trained for a short while."""
     networks = {
         width: train_ensemble(training_set, seed=2, members=asked.members, steps=asked.steps, hidden=width, jobs=jobs)
@@ -105,11 +107,12 @@ def _trained(training_set: PressSet, asked: NetworkBudget, scored: ScoredPresses
     ]
 
 
-def _press_set(model: RampModel, count: int, purpose: str) -> PressSet:
-    return random_press_set(model.answers.surrogate, model.answers.noise["standard"], count, derived_seed(2, purpose))
+def _press_set(model: RampModel, count: int, purpose: str) -> NetworkPresses:
+    answers = model.answers
+    return NetworkPresses(random_press_set(answers.surrogate, answers.noise, count, derived_seed(2, purpose)))
 
 
-def _scored(presses: PressSet) -> ScoredPresses:
+def _scored(presses: NetworkPresses) -> ScoredPresses:
     rng = np.random.default_rng(derived_seed(2, "noise on the trade-off of the networks"))
     rows = presses.noisy(np.arange(len(presses.rows)), rng)
     return ScoredPresses(rows, denormalise(presses.normalised.astype(np.float64))[:, : len(UNKNOWNS)])

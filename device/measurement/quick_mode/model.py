@@ -9,14 +9,14 @@ from __future__ import annotations
 from device.measurement.arrays import Array
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
-from device.measurement.confidence_belt import belts_of
+from device.measurement.confidence_belt import belts_of, ends_in_belts
 from device.measurement.estimate import (
     NO_NUMBERS,
     NOT_ROUND,
     NOTHING_STANDS_OUT,
     UNKNOWN_IMAGE,
     Estimate,
-    numbers_in_belts,
+    numbers_in,
     origin_of,
     outside_training,
     require_trained_for,
@@ -87,5 +87,6 @@ def estimate_quick(recording: Recording, model: QuickModel, calibration: Calibra
     if rejections:
         return without_numbers("outside_range", " ".join([*rejections, NO_NUMBERS]), origin, features | outside)
     raw = model.bundle.estimate(row[None])
-    numbers = numbers_in_belts(normalise_unknowns(raw.estimate[0]), raw.spread[0], model.belts)
+    mean, spread = normalise_unknowns(raw.estimate[0]), raw.spread[0]
+    numbers = numbers_in(mean, spread, ends_in_belts(mean, spread, model.belts))
     return with_numbers(numbers, features, origin)

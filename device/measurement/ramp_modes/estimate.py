@@ -18,7 +18,8 @@ from device.measurement.estimate import (
     NOT_ROUND,
     NOTHING_STANDS_OUT,
     Estimate,
-    numbers_in_belts,
+    Origin,
+    numbers_in,
     origin_of,
     require_trained_for,
     saturation,
@@ -27,47 +28,97 @@ from device.measurement.estimate import (
     without_numbers,
 )
 from device.measurement.mode import Mode
-from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampAnswer, RampModel
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, press_profile
+from device.measurement.ramp_modes.radial_profile import (
+    CONTRAST,
+    FORCES,
+    RESPONSE,
+    SeenPresses,
+    press_profiles,
+    seen_presses,
+)
+from device.measurement.ramp_modes.scan import worth_of_places
+from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.recording import Recording
-from device.measurement.recording.ring_means import MIDDLE, MIDDLE_LESS_RIM, RINGS
+from device.measurement.recording.ring_means import MIDDLE, MIDDLE_LESS_RIM
+from device.measurement.scan_advice import ScanAdvice, half_widths
 
 VISIBLE_DEVIATIONS = 4.0
 """An inclusion stands out when its contrast lies more than so many standard deviations above none."""
+WORTH_A_RAMP = 0.05
+"""A further ramp is asked for when it is expected to narrow some unknown's interval by this part."""
+PLACES_MM = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+"""Where it may be asked for: nearer than these nobody places a hand-held probe on purpose."""
 
 
 def estimate_ramp(recording: Recording, mode: Mode, model: RampModel, calibration: Calibration) -> Estimate:
-    """Return the estimate of a recording in mode standard or precise.
+    """Return the estimate of a recording in mode standard, of one ramp on the lesion, or precise, of all its ramps.
 
     Raises `InvalidQuantity` for another mode, a probe or pixel size that model and certificate are not for, or a
-    recording whose reference and press are no force ramps.
+    recording whose reference and presses are no force ramps.
     """
+    return _answered(recording, mode, model, calibration)[0]
+
+
+def advise_scan(recording: Recording, model: RampModel, calibration: Calibration) -> ScanAdvice:
+    """Return the estimate of all ramps of a scan so far, and where the next one would tell most.
+
+    Raises as `estimate_ramp`. Where a further ramp would narrow nothing by `WORTH_A_RAMP`, none is asked for.
+    """
+    estimate, answered = _answered(recording, "precise", model, calibration)
+    now = half_widths(estimate)
+    if answered is None or not now:
+        return ScanAdvice(estimate, now, None, now)
+    seen, answer = answered
+    surrogate, noise = model.answers.surrogate, model.answers.noise
+    at = _with_reach(answer, model.answers.reach_mm(len(seen.rows)) / surrogate.to_mm)
+    parts = worth_of_places(seen.rows, at, surrogate, noise, surrogate.to_mm, PLACES_MM, seen.direction_rad)
+    best = int(np.argmin(np.log(parts).sum(axis=1)))
+    if parts[best].min() > 1 - WORTH_A_RAMP:
+        return ScanAdvice(estimate, now, None, now)
+    part_of = dict(zip(UNKNOWNS, map(float, parts[best]), strict=True))
+    return ScanAdvice(estimate, now, PLACES_MM[best], {name: part_of[name] * half for name, half in now.items()})
+
+
+def _with_reach(answer: RampAnswer, ratio: float) -> Array:
+    """Return the best fit with offsets over a longer reach: `ratio` is the old one over it."""
+    return np.concatenate([answer.fit.best[:OFFSET], ratio * (answer.fit.best[OFFSET:] + 1) - 1])
+
+
+def _answered(
+    recording: Recording, mode: Mode, model: RampModel, calibration: Calibration
+) -> tuple[Estimate, tuple[SeenPresses, RampAnswer] | None]:
+    """Return the estimate, and the presses and answer behind it, if there was one to give."""
     if mode not in RAMP_MODES:
         raise InvalidQuantity("mode", mode, f"one of {', '.join(RAMP_MODES)}", "choose one that reads a force ramp")
     require_trained_for(recording, model.bundle, calibration)
     origin = origin_of(recording, mode, model.bundle, calibration)
     if reason := saturation(recording):
-        return without_numbers("saturated", reason, origin)
-    profile = press_profile(recording)
-    row, critical = profile.as_row(), model.critical[mode]
-    seen = contrast_deviations(row, model.answers.noise[mode])
-    if not seen > VISIBLE_DEVIATIONS:
-        features = with_critical({"contrast_deviations": seen}, {"contrast_deviations": VISIBLE_DEVIATIONS})
-        return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features)
-    answer = model.answer(row, mode)
-    found = CriticalValues(
-        misfit_ratio=answer.misfit_ratio,
-        elongation_deviations=model.ellipticity.elongation_deviations(profile.second_harmonic, answer.best, mode),
-        outside_log_odds=float(model.ranges.log_odds(row[None], mode)[0]),
-    )
-    features = with_critical(asdict(found), asdict(critical)) | {"residual": profile.residual}
-    if answer.tissue_kpa:
-        features |= dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
+        return without_numbers("saturated", reason, origin), None
+    profiles = press_profiles(recording)
+    profiles = profiles if mode == "precise" else profiles[:1]
+    seen = seen_presses(profiles)
+    contrast = max(contrast_deviations(row, model.answers.noise) for row in seen.rows)
+    if not contrast > VISIBLE_DEVIATIONS:
+        features = with_critical({"contrast_deviations": contrast}, {"contrast_deviations": VISIBLE_DEVIATIONS})
+        return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features), None
+    answer = model.answer(seen.rows, seen.direction_rad)
+    found = model.found(answer, seen)
+    residual = max(profile.residual for profile in profiles)
+    return _judged(answer, found, model.critical[mode], residual, origin), (seen, answer)
+
+
+def _judged(
+    answer: RampAnswer, found: CriticalValues, critical: CriticalValues, residual: float, origin: Origin
+) -> Estimate:
+    """Return the numbers of an answer, or why it is none of one round inclusion inside the trained ranges."""
+    tissue = dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
+    features = with_critical(asdict(found), asdict(critical)) | {"residual": residual} | tissue
     if reasons := rejections(found, critical):
         return without_numbers("outside_range", " ".join([*reasons, NO_NUMBERS]), origin, features)
-    return with_numbers(numbers_in_belts(answer.mean, answer.spread, model.belts[mode]), features, origin)
+    return with_numbers(numbers_in(answer.mean, answer.spread, answer.intervals), features, origin)
 
 
 def stands_out(row: Array, noise: PressNoise) -> bool:
@@ -80,12 +131,12 @@ def contrast_deviations(row: Array, noise: PressNoise) -> float:
 
     By itself, or against the rim: whichever is more.
     """
-    forces = len(PROFILE_FORCES_N)
-    baseline = np.concatenate([np.zeros(forces * RINGS), row[forces * RINGS :]])
-    covariance = noise.covariance(baseline)[: forces * RINGS, : forces * RINGS]
+    baseline = np.zeros_like(row)
+    baseline[RESPONSE] = row[RESPONSE]
+    covariance = noise.covariance(baseline)[CONTRAST, CONTRAST]
     return max(
-        float(weights @ row[: forces * RINGS]) / float(np.sqrt(weights @ covariance @ weights))
-        for weights in (np.tile(rings / forces, forces) for rings in (MIDDLE, MIDDLE_LESS_RIM))
+        float(weights @ row[CONTRAST]) / float(np.sqrt(weights @ covariance @ weights))
+        for weights in (np.tile(rings / FORCES, FORCES) for rings in (MIDDLE, MIDDLE_LESS_RIM))
     )
 
 

@@ -7,57 +7,116 @@ Source: the iterated loop asked for by Lee & Won 2013, section V.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import EVEN_STD, PARAMETERS
+from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS
 from device.measurement.ramp_modes.bounded_least_squares import least_squares
-from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.surrogate import OFFSET, PressSurrogate
+from device.measurement.ramp_modes.noise import FURTHER, PressNoise, as_one_row
+from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
 TOLERANCE, STEPS = 1e-10, 100
-EVERY = np.ones(len(PARAMETERS), dtype=bool)
 
 
 class PressPosterior:
-    """The posterior of one row [P]: how well parameters explain it."""
+    """The posterior of a press, or of a scan's presses: how well parameters explain their rows.
 
-    def __init__(self, row: Array, surrogate: PressSurrogate, noise: PressNoise) -> None:
-        self._row, self._surrogate = row, surrogate
-        self._whitening = np.linalg.inv(np.linalg.cholesky(noise.covariance(row)))
+    Its coordinates [8 + N] are those of `parameters.normalise`, but for the offset: each of N presses has its own, at
+    the end, from -1 on the axis to 1 at `reach_mm`.
+    """
 
-    def residuals(self, normalised: Array) -> Array:
-        """Return whitened residuals [..., P] at coordinates [..., 9]."""
-        points = normalised.reshape(-1, len(PARAMETERS))
-        residuals = (self._surrogate.rows(points) - self._row) @ self._whitening.T
-        return np.asarray(residuals.reshape(*normalised.shape[:-1], -1))
+    def __init__(
+        self,
+        rows: Array,
+        surrogate: PressRows,
+        noise: PressNoise,
+        reach_mm: float = float(HIGH[OFFSET]),
+        direction_rad: Array | None = None,
+    ) -> None:
+        """Take the row [P] of a press, or the rows [N, P] of presses with one reference.
 
-    def residuals_and_jacobian(self, normalised: Array) -> tuple[Array, Array]:
-        """Return the same [n, P] at coordinates [n, 9], and their derivatives [n, P, 9]."""
-        rows, slopes = self._surrogate.rows_and_jacobian(normalised)
-        return (rows - self._row) @ self._whitening.T, self._whitening @ slopes
-
-    def log_density(self, normalised: Array) -> Array:
-        """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, 9].
-
-        Coordinates are even within their ranges before the press, but for the offset: its place is even over a disk.
+        `direction_rad` [N]: where the image says that the inclusion lies; one that is no number is not known.
         """
-        log = np.full(len(normalised), -np.inf)
-        inside = np.all(np.abs(normalised) <= 1, axis=1)
-        residuals = self.residuals(normalised[inside])
-        log[inside] = np.log1p(normalised[inside, OFFSET]) - 0.5 * np.sum(residuals**2, axis=1)
+        presses = np.atleast_2d(rows)
+        self._direction_rad = direction_rad
+        self.presses, self.dimensions = len(presses), OFFSET + len(presses)
+        self._row, self._surrogate = as_one_row(presses), surrogate
+        self._units = reach_mm / float(HIGH[OFFSET])  # of `normalise`, for one of the offset's own
+        self._whitening = np.linalg.inv(np.linalg.cholesky(noise.scan_covariance(presses)))
+
+    def residuals(self, at: Array) -> Array:
+        """Return whitened residuals [..., S] at coordinates [..., 8 + N]."""
+        points = at.reshape(-1, self.dimensions)
+        rows = self._surrogate.rows(self._of_presses(points), self._directions(len(points)))
+        residuals = (self._joined(self._apart(rows)) - self._row) @ self._whitening.T
+        return np.asarray(residuals.reshape(*at.shape[:-1], len(self._row)))
+
+    def whitened(self, change: Array) -> Array:
+        """Return a change [S] of the rows in standard deviations of the noise."""
+        return np.asarray(self._whitening @ change)
+
+    def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
+        """Return the same [n, S] at coordinates [n, 8 + N], and their derivatives [n, S, 8 + N]."""
+        rows, slopes = self._surrogate.rows_and_jacobian(self._of_presses(at), self._directions(len(at)))
+        slopes = self._apart(slopes)
+        jacobian = np.zeros((len(at), len(self._row), self.dimensions))
+        jacobian[:, :, :OFFSET] = self._joined(slopes[..., :OFFSET])
+        for number, columns in enumerate(self._columns(self.presses, slopes.shape[2])):
+            own = slopes[:, number, :, OFFSET] if number == 0 else slopes[:, number, FURTHER, OFFSET]
+            jacobian[:, columns, OFFSET + number] = self._units * own
+        joined = self._joined(self._apart(rows))
+        return (joined - self._row) @ self._whitening.T, self._whitening @ jacobian
+
+    def log_density(self, at: Array) -> Array:
+        """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, 8 + N].
+
+        Coordinates are even within their ranges before the press, but for offsets: a place is even over a disk.
+        """
+        log = np.full(len(at), -np.inf)
+        inside = np.all(np.abs(at) <= 1, axis=1)
+        residuals = self.residuals(at[inside])
+        log[inside] = np.log1p(at[inside, OFFSET:]).sum(axis=1) - 0.5 * np.sum(residuals**2, axis=1)
         return log
+
+    def _of_presses(self, at: Array) -> Array:
+        """Return the coordinates [n N, 9] of `normalise` of every press, for coordinates [n, 8 + N]."""
+        each = np.empty((len(at), self.presses, len(PARAMETERS)))
+        each[:, :, :OFFSET] = at[:, None, :OFFSET]
+        each[:, :, OFFSET] = self._units * (at[:, OFFSET:] + 1) - 1
+        return each.reshape(-1, len(PARAMETERS))
+
+    def _directions(self, count: int) -> Array | None:
+        """Return the directions [n N] of every press."""
+        return None if self._direction_rad is None else np.tile(self._direction_rad, count)
+
+    def _apart(self, of_presses: Array) -> Array:
+        """Return what is of every press [n N, ...] as [n, N, ...]; n may be 0."""
+        return of_presses.reshape(len(of_presses) // self.presses, self.presses, *of_presses.shape[1:])
+
+    def _joined(self, parts: Array) -> Array:
+        """Return parts [n, N, P, ...] of every press as `as_one_row` joins them [n, S, ...]."""
+        count = (self.presses - 1) * len(FURTHER)
+        further = parts[:, 1:, FURTHER].reshape(len(parts), count, *parts.shape[3:])
+        return np.concatenate([parts[:, 0], further], axis=1)
+
+    @staticmethod
+    def _columns(presses: int, first: int) -> list[slice]:
+        """Return where the columns of each press stand in one row."""
+        ends = [first + number * len(FURTHER) for number in range(presses)]
+        return [slice(0, first), *(slice(*pair) for pair in pairwise(ends))]
 
 
 def best_fit(posterior: PressPosterior, start: Array) -> Array:
-    """Return the coordinates [9] that explain a row best, each held weakly to the middle of its range."""
-    (best,) = best_fits(posterior, start[None], EVERY, tolerance=TOLERANCE)
+    """Return the coordinates [8 + N] that explain a row best, each held weakly to the middle of its range."""
+    (best,) = best_fits(posterior, start[None], np.ones(len(start), dtype=bool), tolerance=TOLERANCE)
     return np.asarray(best)
 
 
 def best_fits(posterior: PressPosterior, start: Array, free: NDArray[np.bool_], *, tolerance: float) -> Array:
-    """Return the best fits [n, 9] begun at n points, in the coordinates that are `free` [9]; the others stay."""
+    """Return the best fits [n, 8 + N] begun at n points, in those of the coordinates that are `free`; others stay."""
     held = np.broadcast_to(np.eye(free.sum()) / EVEN_STD, (len(start), free.sum(), free.sum()))
 
     def residuals(at: Array, which: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -10,19 +10,27 @@ than all camera noise, because no number of pixels takes them out. Source: Kenne
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TypeVar
+from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET_COLUMNS, RESPONSE_COLUMNS
+from device.measurement.ramp_modes.radial_profile import (
+    COLUMNS,
+    CONTRAST,
+    FIRST,
+    PROFILE_FORCES_N,
+    RESPONSE,
+    SECOND,
+    Rows,
+)
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS
 
-Rows = TypeVar("Rows", Array, NDArray[np.float32])
 LOADS = len(PROFILE_FORCES_N)
+FURTHER = np.setdiff1d(np.arange(COLUMNS), np.arange(RESPONSE.start, RESPONSE.stop))
+"""Columns of a further press of a scan: contrast and harmonics; its reference is that of the first."""
+MOST_SHARED = 0.9
+"""Of what no other column tells; each press keeps some of its own."""
 CIRCLE_MM = RING_MM / 24
 """Distance of the circles of which a ring is made."""
 FEWEST_ANGLES, ANGLES_A_SHARPNESS = 16, 4.5
@@ -33,44 +41,107 @@ FEWEST_ANGLES, ANGLES_A_SHARPNESS = 16, 4.5
 class ErrorLevels:
     """Standard deviations: light between the presses, zero of the cell between them, smooth errors of the image.
 
-    Both smooth errors are ratios of the light, correlated over `flat_field_mm` and `model_mm`.
+    `force_n` is that of each of the profile's forces by itself, of cell and tremor.
+
+    `reference_ratio` of the camera's variance of a contrast is the reference press's, which a scan's presses share.
+    Both smooth errors are ratios of the light, correlated over `flat_field_mm` and `model_mm`. The flat field's is one
+    of all presses with one reference; of the model's error they share `model_shared_ratio` of the variance.
     """
 
     gain_ratio: float = 0.01
     zero_n: float = 0.001
+    force_n: float = 0.0005
     flat_field_ratio: float = 0.002
     flat_field_mm: float = 2.0
     model_ratio: float = 0.002
     model_mm: float = 3.0
+    model_shared_ratio: float = 0.5
+    reference_ratio: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class PressNoise:
-    """`camera` [P, P]: covariance of repeated recordings over the light ratio; `levels` of everything else."""
+    """`camera` [P, P]: covariance of repeated recordings over the light ratio; `levels` of drift and smooth errors.
+
+    `forward` [P, P]: what the forward model's polynomials miss of presses kept apart, over the light ratio, for a root
+    mean square contrast of 1; it grows with that contrast. None where they miss nothing.
+    """
 
     camera: Array
     levels: ErrorLevels = ErrorLevels()
+    forward: Array | None = None
 
     def covariance(self, row: Array) -> Array:
         """Return the covariance [P, P] of a row [P] about the forward model's; it depends on the contrast seen."""
         light = light_ratio(row)
-        common = np.stack(drift_directions(row), axis=-1)
-        levels = np.array([self.levels.gain_ratio, self.levels.zero_n])
+        gain, zero = drift_directions(row)
+        common = np.column_stack([gain, zero, harmonics_by_force(zero)])
+        levels = np.array([self.levels.gain_ratio, self.levels.zero_n, *[self.levels.force_n] * LOADS])
         alike = self.camera + smooth_errors(self.levels)
+        if self.forward is not None:
+            alike = alike + rms_contrast(row) * self.forward
         return np.asarray((common * levels**2) @ common.T + light[:, None] * light * alike)
+
+    def scan_covariance(self, rows: Array) -> Array:
+        """Return the covariance [S, S] of the presses of a scan, rows [N, P], in the order of `as_one_row`.
+
+        Each press has gain, zero and a part of the model's error of its own. All share the reference press, the flat
+        field and the rest of the model's error.
+        """
+        columns = [np.arange(rows.shape[1]), *[FURTHER] * (len(rows) - 1)]
+        light, shared = light_ratio(rows), self._shared_by_presses
+        blocks = [
+            [
+                self.covariance(rows[k])[np.ix_(columns[k], columns[k])]
+                if k == other
+                else (light[k][:, None] * light[other] * shared)[np.ix_(columns[k], columns[other])]
+                for other in range(len(rows))
+            ]
+            for k in range(len(rows))
+        ]
+        return np.block(blocks)
+
+    @cached_property
+    def _shared_by_presses(self) -> Array:
+        """Covariance [P, P] of what two presses with one reference share, for a light ratio of 1 everywhere.
+
+        Of the camera's noise that is what the reference press makes: half, for it has as many frames in the same light,
+        of which the reference force response tells a part. Harmonics are taken along each press's own direction:
+        between two of them nothing else is known.
+        """
+        told = np.linalg.solve(self.camera[RESPONSE, RESPONSE], self.camera[RESPONSE])
+        shared = self.camera[:, RESPONSE] @ told
+        alone = np.linalg.inv(np.linalg.inv(self.camera)[CONTRAST, CONTRAST])  # what no other column tells
+        of_reference = self.levels.reference_ratio * np.diag(self.camera)[CONTRAST] - np.diag(shared)[CONTRAST]
+        shared[CONTRAST, CONTRAST] += np.clip(np.mean(of_reference / np.diag(alone)), 0, MOST_SHARED) * alone
+        flat, model = smooth_ring_errors(self.levels, harmonic=0)
+        shared[CONTRAST, CONTRAST] += np.kron(np.ones((LOADS, LOADS)), flat)
+        shared[CONTRAST, CONTRAST] += self.levels.model_shared_ratio * np.kron(np.eye(LOADS), model)
+        return shared
+
+
+def as_one_row(rows: Array) -> Array:
+    """Return the presses of a scan, rows [N, P], as one row [S]: their reference force response is the same."""
+    return np.concatenate([rows[0], rows[1:, FURTHER].ravel()])
 
 
 def light_ratio(rows: Rows) -> Rows:
     """Return by how much a ratio of the light moves each column of rows [..., P].
 
-    It is 1 + contrast in the contrasts and 1 in the reference response.
-    An offset is the first harmonic of the contrast, mean over the loads: what is seen there is the mean light's.
+    It is 1 + contrast of ring and force, also for harmonics, and 1 in the reference response.
     """
     light = np.ones_like(rows)
-    contrast = rows[..., :CONTRAST_COLUMNS]
-    light[..., :CONTRAST_COLUMNS] += contrast
-    light[..., -OFFSET_COLUMNS:] += contrast.reshape(*rows.shape[:-1], LOADS, RINGS).mean(axis=-2)[..., 1:]
+    contrast = rows[..., CONTRAST].reshape(*rows.shape[:-1], LOADS, RINGS)
+    light[..., CONTRAST] += rows[..., CONTRAST]
+    light[..., FIRST] += contrast[..., 1:].reshape(*rows.shape[:-1], -1)
+    light[..., SECOND] += contrast[..., 1:-1].reshape(*rows.shape[:-1], -1)
     return light
+
+
+def rms_contrast(rows: Rows) -> Rows:
+    """Return the root mean square contrast [...] of rows [..., P]."""
+    root: Rows = np.sqrt((rows[..., CONTRAST] ** 2).mean(axis=-1))
+    return root
 
 
 def drift_directions(rows: Rows) -> tuple[Rows, Rows]:
@@ -79,15 +150,31 @@ def drift_directions(rows: Rows) -> tuple[Rows, Rows]:
     A cell that reads a newton too much looks up the reference light a newton too high: d ln(light) / d force of it,
     which the reference response in the row tells, ring by ring.
     """
-    light = light_ratio(rows)
     gain, zero = np.zeros_like(rows), np.zeros_like(rows)
-    gain[..., :CONTRAST_COLUMNS] = light[..., :CONTRAST_COLUMNS]
-    gain[..., -OFFSET_COLUMNS:] = rows[..., -OFFSET_COLUMNS:]
-    below = rows[..., CONTRAST_COLUMNS : CONTRAST_COLUMNS + RESPONSE_COLUMNS]
+    gain[..., CONTRAST] = 1 + rows[..., CONTRAST]
+    gain[..., FIRST], gain[..., SECOND] = rows[..., FIRST], rows[..., SECOND]
+    below = rows[..., RESPONSE]
     log_light = below.reshape(*rows.shape[:-1], LOADS - 1, RINGS)  # over that at the largest force, where it is 0
     slope_per_n = np.einsum("kl,...lj->...kj", _SLOPE_PER_N[:, :-1].astype(rows.dtype), log_light)
-    zero[..., :CONTRAST_COLUMNS] = -gain[..., :CONTRAST_COLUMNS] * slope_per_n.reshape(*rows.shape[:-1], -1)
+    for columns, rings in ((CONTRAST, slice(None)), (FIRST, slice(1, None)), (SECOND, slice(1, -1))):
+        of_rings = slope_per_n[..., rings].reshape(*rows.shape[:-1], -1)
+        zero[..., columns] = -gain[..., columns] * of_rings
     return gain, zero
+
+
+def harmonics_by_force(zero: Rows) -> Rows:
+    """Return the harmonics' part of a zero's drift [..., P] force by force [..., P, K], each alone.
+
+    A force that is read wrong by itself moves that force's harmonics in proportion to what they are. The camera's
+    covariance holds what it does to the contrast, which is alike in all presses.
+    """
+    apart = np.zeros((*zero.shape, LOADS), dtype=zero.dtype)
+    for columns in (FIRST, SECOND):
+        rings = (columns.stop - columns.start) // LOADS
+        for force in range(LOADS):
+            own = slice(columns.start + force * rings, columns.start + (force + 1) * rings)
+            apart[..., own, force] = zero[..., own]
+    return apart
 
 
 def _slope_per_n() -> Array:
@@ -105,25 +192,15 @@ _SLOPE_PER_N = _slope_per_n()
 @lru_cache(maxsize=4)
 def smooth_errors(levels: ErrorLevels) -> Array:
     """Return the covariance [P, P] of smooth errors of the light, for a light ratio of 1 everywhere."""
-    flat, model = smooth_ring_errors(levels, harmonic=0)
-    contrast = np.kron(np.ones((LOADS, LOADS)), flat) + np.kron(np.eye(LOADS), model)
-    reference_response = np.kron(np.eye(LOADS - 1) + 1, model)
-    first_flat, first_model = smooth_ring_errors(levels, harmonic=1)
-    first = first_flat + first_model / LOADS
-    covariance = np.zeros(2 * (CONTRAST_COLUMNS + RESPONSE_COLUMNS + OFFSET_COLUMNS,))
-    a, b = CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS
-    covariance[:a, :a], covariance[a:b, a:b], covariance[b:, b:] = contrast, reference_response, first[1:, 1:]
+    covariance = np.zeros((COLUMNS, COLUMNS))
+    for order, columns in enumerate((CONTRAST, FIRST, SECOND)):
+        flat, model = smooth_ring_errors(levels, harmonic=order)
+        rings = (slice(None), slice(1, None), slice(1, -1))[order]
+        covariance[columns, columns] = np.kron(np.ones((LOADS, LOADS)), flat[rings, rings])
+        covariance[columns, columns] += np.kron(np.eye(LOADS), model[rings, rings])
+    _, model = smooth_ring_errors(levels, harmonic=0)
+    covariance[RESPONSE, RESPONSE] = np.kron(np.eye(LOADS - 1) + 1, model)
     return covariance
-
-
-@lru_cache(maxsize=4)
-def smooth_second_harmonics(levels: ErrorLevels) -> Array:
-    """Return the covariance [Q, Q] of smooth errors in the second harmonics of all loads, for a light ratio of 1.
-
-    Without the ring in the middle, which has none, and the outermost one, as in the profile.
-    """
-    flat, model = smooth_ring_errors(levels, harmonic=2)
-    return np.kron(np.ones((LOADS, LOADS)), flat[1:-1, 1:-1]) + np.kron(np.eye(LOADS), model[1:-1, 1:-1])
 
 
 def smooth_ring_errors(levels: ErrorLevels, *, harmonic: int) -> tuple[Array, Array]:

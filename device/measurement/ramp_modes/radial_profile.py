@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import cv2
 import numpy as np
@@ -17,12 +18,14 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import BEYOND_RATIO, HeldLight, Image, RampLight, reference_light
-from device.measurement.recording.ring_means import RING_RADII_MM, RingMeans, ring_weights
+from device.measurement.recording.ring_means import RING_RADII_MM, RINGS, RingMeans, ring_weights
 from device.measurement.recording.tactile_image import Frame
 
+Rows = TypeVar("Rows", Array, NDArray[np.float32])
 PROFILE_FORCES_N: Array = np.array([0.12, 0.25, 0.40, 0.55])
 """From some 0.6 to 2.7 mm of indentation."""
 BINNED_MM = 0.125
@@ -34,6 +37,8 @@ RAMP_LOW_N, RAMP_HIGH_N = 0.17, 0.5
 """A ramp reaches from at most the first to at least the second of these forces."""
 TOUCHED_N = 0.07
 """Below this force a reference frame shows an untouched face."""
+LED_STEP = 1 / 255
+"""One step of the LED chip's brightness: sides may be off so much by rounding."""
 MIN_RAMP_FRAMES = 6
 LARGEST_STEP_N = 0.17
 """Between forces further apart than this a ramp's polynomials are not held: four forces hold them, three do not."""
@@ -45,32 +50,75 @@ class RadialProfile:
     """What a press says about inclusion, tissue and skin; K forces `force_n`, J rings `RING_RADII_MM`.
 
     contrast [K, J]: ring means of the tactile image. reference_response [K - 1, J]: ln of the inclusion-free light at
-    each force over that at the largest. offset [J - 1]: first harmonic of the contrast towards its bright side, mean
-    over the forces, without the ring in the middle. second_harmonic [2, K, J - 2]: the second harmonic at each force,
-    along and across the direction of the bright side, also without the outermost ring. residual: root mean square,
-    over rings and frames, of what the polynomial in the force leaves.
+    each force over that at the largest. first_harmonic [K, J - 1]: of the contrast towards its bright side, without the
+    ring in the middle. second_harmonic [2, K, J - 2]: along and across that direction, also without the outermost ring.
+    direction_rad: of the bright side in the image, 0 along its rows. residual: root mean square, over rings and frames,
+    of what the polynomial in the force leaves.
     """
 
     force_n: Array
     contrast: Array
     reference_response: Array
-    offset: Array
+    first_harmonic: Array
     second_harmonic: Array
+    direction_rad: float
     residual: float
 
     def as_row(self) -> Array:
-        """Return contrast, reference response and offset as one row, in the order of `ROW_NAMES`."""
-        return np.concatenate([self.contrast.ravel(), self.reference_response.ravel(), self.offset])
+        """Return contrast, reference response, and first and second harmonic along the bright side as one row [P]."""
+        return np.concatenate(
+            [
+                self.contrast.ravel(),
+                self.reference_response.ravel(),
+                self.first_harmonic.ravel(),
+                self.second_harmonic[0].ravel(),
+            ]
+        )
 
 
-def _row_names() -> tuple[str, ...]:
+class SeenPresses(NamedTuple):
+    """What is read of presses with one reference: rows [N, P], second harmonics [N, 2, K, J - 2], directions [N]."""
+
+    rows: Array
+    second_harmonics: Array
+    direction_rad: Array
+
+
+def seen_presses(profiles: Sequence[RadialProfile]) -> SeenPresses:
+    """Return what is read of the profiles of presses."""
+    return SeenPresses(
+        np.array([profile.as_row() for profile in profiles]),
+        np.array([profile.second_harmonic for profile in profiles]),
+        np.array([profile.direction_rad for profile in profiles]),
+    )
+
+
+FORCES, FIRST_RINGS, SECOND_RINGS = len(PROFILE_FORCES_N), RINGS - 1, RINGS - 2
+COLUMN_COUNTS = FORCES * RINGS, (FORCES - 1) * RINGS, FORCES * FIRST_RINGS, FORCES * SECOND_RINGS
+CONTRAST, RESPONSE, FIRST, SECOND = (
+    slice(sum(COLUMN_COUNTS[:number]), sum(COLUMN_COUNTS[: number + 1])) for number in range(len(COLUMN_COUNTS))
+)
+"""Columns of a row: contrast, reference response, first and second harmonic, each force by force and ring by ring."""
+COLUMNS = SECOND.stop
+
+
+def network_rows(rows: Rows) -> Rows:
+    """Return what networks read of rows [..., P], in the order of `NETWORK_NAMES`.
+
+    Contrast, reference response, and the first harmonic's mean over the forces.
+    """
+    first = rows[..., FIRST].reshape(*rows.shape[:-1], FORCES, FIRST_RINGS).mean(axis=-2)
+    return np.concatenate([rows[..., : RESPONSE.stop], first], axis=-1)
+
+
+def _network_names() -> tuple[str, ...]:
     rings, forces = [f"{r:.1f}_mm" for r in RING_RADII_MM], [f"{f:.2f}_n" for f in PROFILE_FORCES_N]
     contrast = [f"contrast_{f}_{r}" for f in forces for r in rings]
     reference_response = [f"growth_{f}_{r}" for f in forces[:-1] for r in rings]
     return (*contrast, *reference_response, *(f"offset_{r}" for r in rings[1:]))
 
 
-ROW_NAMES = _row_names()
+NETWORK_NAMES = _network_names()
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,23 +131,43 @@ class RampLights:
 
 
 def press_profile(recording: Recording) -> RadialProfile:
-    """Return the profile of a recording whose reference and press are force ramps.
+    """Return the profile of a recording whose reference and one press are force ramps; raises as `press_profiles`."""
+    return press_profiles(recording)[0]
+
+
+def press_profiles(recording: Recording) -> list[RadialProfile]:
+    """Return the profile of each ramp on the lesion, in order; all have one reference ramp.
 
     Press frames far below or above the reference's forces count nothing. Raises `InvalidQuantity` when a role is
     missing, or a ramp is too short, has too few frames or a gap.
     """
-    return profile_of_lights(*lights_of(recording))
+    ramps = sorted(recording.ramps()) or [0]
+    return [profile_of_lights(*lights_of(recording.of_ramp(number))) for number in ramps]
 
 
 def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
-    """Return the light of the touched reference frames and of the press frames; raises without dark frames."""
+    """Return the light of the touched reference frames and of the press frames, all as bright as the first of them.
+
+    Raises `InvalidQuantity` without dark frames, and for a frame whose sides are not lit in the first one's proportion.
+    """
     dark = recording.with_role("dark")
     if not dark:
         raise InvalidQuantity("dark frames", 0, "at least one", "record dark frames before the press")
     factor = _binning(recording.camera.scale)
     base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
     per_count = 1 if recording.camera.bits == 8 else 1 / 256
-    reference, press = (_lights(recording, role, base, per_count, factor) for role in ("reference", "press"))
+    lit = {role: _touched(recording, role) for role in ("reference", "press")}
+    first = next((frame.led_ratio for frames in lit.values() for frame in frames), None)
+    scale = binned_scale(recording.camera.scale)
+
+    def light(frame: Frame) -> Image:
+        assert first is not None  # of a frame that is there
+        return (_binned(frame, factor) - base) * np.float32(per_count / _brightness(frame.led_ratio, first))
+
+    reference, press = (
+        RampLights(np.array([frame.force_n for frame in frames]), [light(frame) for frame in frames], scale)
+        for frames in lit.values()
+    )
     return reference, press
 
 
@@ -117,8 +185,9 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile
         force_n=PROFILE_FORCES_N,
         contrast=rings.mean,
         reference_response=np.log(baseline[:-1] / baseline[-1]),
-        offset=harmonic(rings, 1),
+        first_harmonic=first_harmonic(rings),
         second_harmonic=second_harmonic(rings),
+        direction_rad=bright_side_rad(rings),
         residual=residual,
     )
 
@@ -146,16 +215,32 @@ def harmonic(rings: RingMeans, order: int) -> Array:
     return _along(cosine, sine, _direction(cosine, sine))
 
 
+def first_harmonic(rings: RingMeans) -> Array:
+    """Return the first harmonic [K, J - 1] at each force, along its direction in the window, mean over the forces.
+
+    The frame cuts the outermost ring at top and bottom, which would turn the direction: that ring has no say in it.
+    """
+    cosine, sine = _waves(rings, 1)
+    return _along(cosine, sine, bright_side_rad(rings))
+
+
 def second_harmonic(rings: RingMeans) -> Array:
     """Return the second harmonic [2, K, J - 2] at each force, along and across the direction of the bright side.
 
-    That direction is the first harmonic's of the whole window, mean over the forces. A round inclusion has none across.
+    That direction is the first harmonic's, as in `first_harmonic`. A round inclusion has none across.
     The frame cuts the outermost ring at top and bottom: what is left there has a second harmonic of its own.
     """
     cosine, sine = (part[:, :-1] for part in _waves(rings, 2))
-    turned = 2 * _direction(*(part.mean(axis=0) for part in _waves(rings, 1)))
+    turned = 2 * bright_side_rad(rings)
     across = sine * np.cos(turned) - cosine * np.sin(turned)
     return np.stack([_along(cosine, sine, turned), across])
+
+
+def bright_side_rad(rings: RingMeans) -> float:
+    """Return the angle of the first harmonic, mean over the forces, of all rings that the frame holds whole."""
+    cosine, sine = (part.mean(axis=0)[:-1] for part in _waves(rings, 1))
+    r_mm = RING_RADII_MM[1:-1]
+    return float(np.arctan2(sine @ r_mm, cosine @ r_mm))
 
 
 def _waves(rings: RingMeans, order: int) -> tuple[Array, Array]:
@@ -171,11 +256,19 @@ def _along(cosine: Array, sine: Array, direction: float) -> Array:
     return np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
 
 
-def _lights(recording: Recording, role: str, dark: Image, per_count: float, factor: tuple[int, int]) -> RampLights:
-    frames = [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > TOUCHED_N]
-    images = [(_binned(frame, factor) - dark) * np.float32(per_count) for frame in frames]
-    forces = np.array([frame.force_n for frame in frames])
-    return RampLights(forces, images, binned_scale(recording.camera.scale))
+def _touched(recording: Recording, role: str) -> list[Frame]:
+    return [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > TOUCHED_N]
+
+
+def _brightness(led_ratio: LedRatio, first: LedRatio) -> float:
+    """Return how many times as bright a frame is lit as the first one; raises unless every side is so many times."""
+    times = sum(led_ratio) / sum(first) if sum(first) > 0 else 0.0
+    if times <= 0 or any(
+        abs(side - times * of_first) > LED_STEP for side, of_first in zip(led_ratio, first, strict=True)
+    ):
+        action = "press beside the lesion and on it under one light"
+        raise InvalidQuantity("led_ratio of a frame", led_ratio, f"above 0 and in the proportion of {first}", action)
+    return times
 
 
 def _within(press: RampLights, reference_n: Array) -> RampLights:

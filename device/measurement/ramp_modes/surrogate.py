@@ -2,14 +2,16 @@
 
 Polynomials in nine parameters, fitted to simulated presses by `host_tools train`. What is polynomial is the contrast
 over size^3 / distance^3, the strength of a small sphere far away, and the modulus enters by Eshelby's mismatch: both
-take out what no polynomial follows well. Differentiable, so that a press can be fitted by Gauss-Newton.
+take out what no polynomial follows well. Differentiable, so that a press can be fitted by Gauss-Newton. A press beside
+the inclusion has polynomials of its own. In which direction the inclusion lies matters, too, and the image says it:
+four LEDs light the face alike after a quarter of a turn, the frame's edges after half of one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +20,26 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise, slope_of_normalised
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.recording.ring_means import RINGS
+from device.measurement.ramp_modes.radial_profile import COLUMN_COUNTS, COLUMNS
 
 SIZE, DEPTH, MODULUS, TISSUE, OFFSET = (
     PARAMETERS.index(name) for name in ("size_mm", "depth_mm", "youngs_modulus_kpa", "tissue_modulus_kpa", "offset_mm")
 )
-CONTRAST_COLUMNS = len(PROFILE_FORCES_N) * RINGS
-RESPONSE_COLUMNS = (len(PROFILE_FORCES_N) - 1) * RINGS
-OFFSET_COLUMNS = RINGS - 1
 Number = TypeVar("Number", float, Array)
-ARRAYS = ("lump_degrees", "lump_coefficients", "bare_degrees", "bare_coefficients")
+CONTRAST_COLUMNS, RESPONSE_COLUMNS, FIRST_COLUMNS, SECOND_COLUMNS = COLUMN_COUNTS
+INCLUSION_COLUMNS = COLUMNS - RESPONSE_COLUMNS
+HARMONICS = CONTRAST_COLUMNS, FIRST_COLUMNS, SECOND_COLUMNS
+"""Columns of the inclusion's field, by the order of the harmonic."""
+WAVES = np.array([2.0, 4.0])
+"""Orders of the direction's waves: the frame's edges, and the four LEDs."""
+ARRAYS = (
+    "lump_degrees",
+    "lump_coefficients",
+    "turned_degrees",
+    "turned_coefficients",
+    "bare_degrees",
+    "bare_coefficients",
+)
 
 
 def elastic_mismatch(modulus_kpa: Array, tissue_kpa: Array) -> Array:
@@ -44,51 +55,158 @@ ELASTIC_MISMATCH_RANGE = (
 
 @dataclass(frozen=True, eq=False)
 class PressSurrogate:
-    """`inclusion_field`: contrast and offset over the strength. `baseline`: reference force response."""
+    """`inclusion_field`: contrast and harmonics over `inclusion_factor`, mean over all directions of the inclusion.
+
+    `turned_field`: what each wave of the direction adds to it. `baseline`: reference force response. All hold for
+    offsets `from_mm` to `to_mm`.
+    """
 
     inclusion_field: LegendreSum
+    turned_field: LegendreSum
     baseline: LegendreSum
+    from_mm: float = float(LOW[OFFSET])
+    to_mm: float = float(HIGH[OFFSET])
 
-    def rows(self, normalised: Array) -> Array:
-        """Return profile rows [n, P] at coordinates [n, 9] of `parameters.normalise`."""
+    def rows(self, normalised: Array, direction_rad: Array | None = None) -> Array:
+        """Return profile rows [n, P] at coordinates [n, 9] of `parameters.normalise`; directions as in `PressRows`."""
         parameters = denormalise(normalised)
-        at = polynomial_coordinates(normalised, parameters)
-        factor = inclusion_factor(parameters)
-        return assemble(factor * self.inclusion_field.values(at), self.baseline.values(at))
+        at = self.coordinates(normalised, parameters)
+        inclusion = self.inclusion_field.values(at)
+        if direction_rad is not None:
+            inclusion += turned(self.turned_field.values(at), direction_rad)
+        return assemble(inclusion_factor(parameters) * inclusion, self.baseline.values(at))
 
-    def rows_and_jacobian(self, normalised: Array) -> tuple[Array, Array]:
+    def rows_and_jacobian(self, normalised: Array, direction_rad: Array | None = None) -> tuple[Array, Array]:
         """Return the rows [n, P] at coordinates [n, 9] and their derivatives [n, P, 9] by them."""
         parameters = denormalise(normalised)
-        at = polynomial_coordinates(normalised, parameters)
+        at = self.coordinates(normalised, parameters)
         inclusion, inclusion_slope = self.inclusion_field.values_and_gradient(at)
+        if direction_rad is not None:
+            values, slopes = self.turned_field.values_and_gradient(at)
+            inclusion += turned(values, direction_rad)
+            inclusion_slope += turned(slopes, direction_rad)
         baseline, baseline_slope = self.baseline.values_and_gradient(at)
         factor = inclusion_factor(parameters)
-        inclusion_slope = factor * _by_normalised(inclusion_slope, parameters) + _factor_slope(parameters) * inclusion
-        slope = assemble(inclusion_slope, _by_normalised(baseline_slope, parameters))
+        inclusion_slope = factor * self._by_normalised(inclusion_slope, parameters)
+        inclusion_slope += _factor_slope(parameters) * inclusion
+        slope = assemble(inclusion_slope, self._by_normalised(baseline_slope, parameters))
         return assemble(factor * inclusion, baseline), slope.transpose(1, 2, 0)
+
+    def coordinates(self, normalised: Array, parameters: Array) -> Array:
+        """Return the polynomials' coordinates [n, 9]: the offset runs from -1 to 1 over this surrogate's own range."""
+        return offsets_in_range(polynomial_coordinates(normalised, parameters), self.from_mm, self.to_mm)
+
+    def _by_normalised(self, gradient: Array, parameters: Array) -> Array:
+        """Return derivatives [9, n, Q] by `normalised` of those by the polynomials' coordinates, at [n, 9]."""
+        slope = _by_normalised(gradient, parameters)
+        slope[OFFSET] *= float(HIGH[OFFSET] - LOW[OFFSET]) / (self.to_mm - self.from_mm)
+        return slope
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the polynomials by the names in `ARRAYS`, as a file holds them: single precision."""
         values = (
             self.inclusion_field.degrees,
             self.inclusion_field.coefficients,
+            self.turned_field.degrees,
+            self.turned_field.coefficients,
             self.baseline.degrees,
             self.baseline.coefficients,
         )
-        kinds = (np.uint8, np.float32, np.uint8, np.float32)
+        kinds = (np.uint8, np.float32) * 3
         return {name: np.asarray(value, kind) for name, value, kind in zip(ARRAYS, values, kinds, strict=True)}
 
 
-def surrogate_of(arrays: Mapping[str, NDArray[Any]]) -> PressSurrogate:
-    """Return the surrogate of the arrays in `ARRAYS`; raise `InvalidQuantity` when one is of another shape."""
-    a, b, c, d = (arrays[name] for name in ARRAYS)
-    inclusion, baseline = LegendreSum(a, b.astype(np.float64)), LegendreSum(c, d.astype(np.float64))
-    for field, columns in ((inclusion, CONTRAST_COLUMNS + OFFSET_COLUMNS), (baseline, RESPONSE_COLUMNS)):
+class PressRows(Protocol):
+    """A forward model of a press at any offset up to `to_mm`, in coordinates of `parameters.normalise`.
+
+    Directions [n] are those in which the inclusion lies in the image; without them rows are the mean over all of them.
+    """
+
+    @property
+    def to_mm(self) -> float:
+        """Largest offset."""
+        ...
+
+    def rows(self, normalised: Array, direction_rad: Array | None = None) -> Array:
+        """Return profile rows [n, P] at coordinates [n, 9]; those of the offset go on beyond 1."""
+        ...
+
+    def rows_and_jacobian(self, normalised: Array, direction_rad: Array | None = None) -> tuple[Array, Array]:
+        """Return the rows [n, P] at coordinates [n, 9] and their derivatives [n, P, 9] by them."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ScanSurrogate:
+    """Two surrogates, of presses near the inclusion and beside it; `near` ends where `beside` begins."""
+
+    near: PressSurrogate
+    beside: PressSurrogate
+
+    @property
+    def to_mm(self) -> float:
+        """Largest offset."""
+        return self.beside.to_mm
+
+    def rows(self, normalised: Array, direction_rad: Array | None = None) -> Array:
+        """Return profile rows [n, P] at coordinates [n, 9], each of the surrogate that holds its offset."""
+        is_beside = self._is_beside(normalised)
+        rows = np.empty((len(normalised), COLUMNS))
+        for surrogate, chosen in ((self.near, ~is_beside), (self.beside, is_beside)):
+            if chosen.any():
+                rows[chosen] = surrogate.rows(normalised[chosen], _of(direction_rad, chosen))
+        return rows
+
+    def rows_and_jacobian(self, normalised: Array, direction_rad: Array | None = None) -> tuple[Array, Array]:
+        """Return the rows [n, P] at coordinates [n, 9] and their derivatives [n, P, 9] by them."""
+        is_beside = self._is_beside(normalised)
+        rows = np.empty((len(normalised), COLUMNS))
+        jacobian = np.empty((len(normalised), COLUMNS, len(PARAMETERS)))
+        for surrogate, chosen in ((self.near, ~is_beside), (self.beside, is_beside)):
+            if chosen.any():
+                directions = _of(direction_rad, chosen)
+                rows[chosen], jacobian[chosen] = surrogate.rows_and_jacobian(normalised[chosen], directions)
+        return rows, jacobian
+
+    def _is_beside(self, normalised: Array) -> NDArray[np.bool_]:
+        return np.asarray(denormalise(normalised)[:, OFFSET] > self.near.to_mm)
+
+
+def surrogate_of(
+    arrays: Mapping[str, NDArray[Any]], from_mm: float = float(LOW[OFFSET]), to_mm: float = float(HIGH[OFFSET])
+) -> PressSurrogate:
+    """Return the surrogate of the arrays in `ARRAYS`, for offsets `from_mm` to `to_mm`.
+
+    Raises `InvalidQuantity` when an array is of another shape.
+    """
+    pairs = zip(ARRAYS[::2], ARRAYS[1::2], strict=True)
+    fields = [LegendreSum(arrays[degrees], arrays[values].astype(np.float64)) for degrees, values in pairs]
+    columns_of = INCLUSION_COLUMNS, len(WAVES) * INCLUSION_COLUMNS, RESPONSE_COLUMNS
+    for field, columns in zip(fields, columns_of, strict=True):
         expected = (len(field.degrees), columns), (len(field.coefficients), len(PARAMETERS))
         if (field.coefficients.shape, field.degrees.shape) != expected:
             action = "install the model bundle again"
             raise InvalidQuantity("surrogate's shape", field.coefficients.shape, str(expected[0]), action)
-    return PressSurrogate(inclusion, baseline)
+    inclusion, turned_field, baseline = fields
+    return PressSurrogate(inclusion, turned_field, baseline, from_mm, to_mm)
+
+
+def turned(waves: Array, direction_rad: Array) -> Array:
+    """Return what directions [n] add [..., n, Q], of what each wave of the direction does [..., n, waves x Q].
+
+    A direction that is no number adds nothing.
+    """
+    each = waves.reshape(*waves.shape[:-1], len(WAVES), -1)
+    return np.asarray(np.einsum("...nwq,nw->...nq", each, direction_waves(direction_rad)))
+
+
+def direction_waves(direction_rad: Array) -> Array:
+    """Return cos(2 phi) and cos(4 phi) [n, waves] of directions [n]; 0 for one that is no number."""
+    return np.asarray(np.nan_to_num(np.cos(direction_rad[:, None] * WAVES)))
+
+
+def _of(direction_rad: Array | None, chosen: NDArray[np.bool_]) -> Array | None:
+    return None if direction_rad is None else direction_rad[chosen]
 
 
 def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
@@ -104,17 +222,28 @@ def polynomial_coordinates(normalised: Array, parameters: Array) -> Array:
     return at
 
 
+def offsets_in_range(at: Array, from_mm: float, to_mm: float) -> Array:
+    """Return coordinates [n, 9] whose offset, that of `normalise`, runs from -1 to 1 between two ends instead."""
+    low, high = float(LOW[OFFSET]), float(HIGH[OFFSET])
+    offset_mm = low + (at[:, OFFSET] + 1) / 2 * (high - low)
+    moved = np.array(at)
+    moved[:, OFFSET] = 2 * (offset_mm - from_mm) / (to_mm - from_mm) - 1
+    return moved
+
+
 def inclusion_factor(parameters: Array) -> Array:
-    """Return what multiplies the polynomials [n, contrast + offset columns]: strength, and for the offset its place."""
-    strength, offset = _strength(parameters), parameters[:, OFFSET] / HIGH[OFFSET]
+    """Return what multiplies the polynomials [n, contrast and harmonics].
+
+    The strength, and for the k-th harmonic the offset to the k-th power: so a smooth field's begins.
+    """
+    strength, place = _strength(parameters), parameters[:, OFFSET] / HIGH[OFFSET]
     return np.hstack([
-        np.repeat(strength[:, None], CONTRAST_COLUMNS, axis=1),
-        np.repeat((strength * offset)[:, None], OFFSET_COLUMNS, axis=1),
+        np.repeat((strength * place**order)[:, None], columns, axis=1) for order, columns in enumerate(HARMONICS)
     ])  # fmt: skip
 
 
 def assemble(inclusion: Array, baseline: Array) -> Array:
-    """Return rows [..., P] in the order of `radial_profile.ROW_NAMES`: contrast, reference response, offset."""
+    """Return rows [..., P] in the order of the row: contrast, reference response, harmonics."""
     return np.concatenate([inclusion[..., :CONTRAST_COLUMNS], baseline, inclusion[..., CONTRAST_COLUMNS:]], axis=-1)
 
 
@@ -123,16 +252,21 @@ def _strength(parameters: Array) -> Array:
 
 
 def _factor_slope(parameters: Array) -> Array:
-    """Return the derivatives [9, n, contrast + offset columns] of `inclusion_factor` by the coordinates."""
+    """Return the derivatives [9, n, contrast and harmonics] of `inclusion_factor` by the coordinates."""
     size, depth, place = parameters[:, SIZE], parameters[:, DEPTH], parameters[:, OFFSET] / HIGH[OFFSET]
-    slope = np.zeros((len(PARAMETERS), len(parameters), CONTRAST_COLUMNS + OFFSET_COLUMNS))
     by_normalised, strength, centre = slope_of_normalised(parameters), _strength(parameters), depth + size / 2
     by_size = strength * (3 / size - 1.5 / centre) * by_normalised[:, SIZE]
     by_depth = strength * (-3 / centre) * by_normalised[:, DEPTH]
-    for parameter, by_parameter in ((SIZE, by_size), (DEPTH, by_depth)):
-        slope[parameter, :, :CONTRAST_COLUMNS] = by_parameter[:, None]
-        slope[parameter, :, CONTRAST_COLUMNS:] = (place * by_parameter)[:, None]
-    slope[OFFSET, :, CONTRAST_COLUMNS:] = (strength / HIGH[OFFSET] * by_normalised[:, OFFSET])[:, None]
+    by_place = strength / HIGH[OFFSET] * by_normalised[:, OFFSET]
+    slope = np.zeros((len(PARAMETERS), len(parameters), INCLUSION_COLUMNS))
+    first = 0
+    for order, count in enumerate(HARMONICS):
+        columns = slice(first, first + count)
+        slope[SIZE, :, columns] = (by_size * place**order)[:, None]
+        slope[DEPTH, :, columns] = (by_depth * place**order)[:, None]
+        if order:
+            slope[OFFSET, :, columns] = (by_place * order * place ** (order - 1))[:, None]
+        first += count
     return slope
 
 

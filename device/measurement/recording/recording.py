@@ -1,4 +1,4 @@
-"""A recording: the frames of one press, how they were taken and where they came from.
+"""A recording: the frames of one press or scan, how they were taken and where they came from.
 
 What probe, simulator, calibration and tests pass to each other; what is not finite or contradictory is refused with the
 field's name. Its file is in device/files/recording_file.py. Source: docs/contracts.md.
@@ -7,7 +7,7 @@ field's name. Its file is in device/files/recording_file.py. Source: docs/contra
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
@@ -60,7 +60,7 @@ class RecordedCell:
 
 @dataclass(frozen=True)
 class Recording:
-    """One press: frames of every role with their force, and where it came from.
+    """One press or scan: frames of every role with their force, and where it came from.
 
     `truth` only for phantoms, `phantom_serial` that of their set if it is known.
     """
@@ -92,6 +92,16 @@ class Recording:
     def with_role(self, role: str) -> list[Frame]:
         """Return the frames of one role in order."""
         return [f for f in self.frames if f.role == role]
+
+    def ramps(self) -> dict[int, list[Frame]]:
+        """Return the press frames of each ramp in order, by its number; {} without press frames."""
+        press = self.with_role("press")
+        return {ramp: [f for f in press if f.ramp == ramp] for ramp in sorted({f.ramp for f in press})}
+
+    def of_ramp(self, ramp: int) -> Recording:
+        """Return the recording that there were if this ramp were the only press on the lesion."""
+        kept = (f for f in self.frames if f.role != "press" or f.ramp == ramp)
+        return replace(self, frames=tuple(replace(f, ramp=0) if f.ramp else f for f in kept))
 
     def press_images(self) -> Iterator[TactileImage]:
         """Yield the corrected image of each press frame."""

@@ -21,6 +21,8 @@ from device.measurement.recording.reference_light import Image as Image
 
 Counts = NDArray[np.uint8] | NDArray[np.uint16]
 Role = Literal["dark", "reference", "press"]
+LAST_RAMP = 7
+"""The largest number that a ramp on the lesion may have."""
 
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
@@ -28,13 +30,17 @@ FLOOR_COUNTS = 6.0
 
 @dataclass(frozen=True)
 class Frame:
-    """One exposure with what was true while it was taken: role, force (N), time (s), light."""
+    """One exposure with what was true while it was taken: role, force (N), time (s), light.
+
+    `ramp`: of a press frame, by how many presses on the lesion it was preceded; 0 of every other frame.
+    """
 
     counts: Counts
     role: Role
     t_s: float
     force_n: float
     led_ratio: LedRatio
+    ramp: int = 0
 
     def __post_init__(self) -> None:
         if self.counts.ndim != 2 or self.counts.dtype not in (np.uint8, np.uint16):
@@ -46,6 +52,14 @@ class Frame:
         require("t_s", self.t_s, Bound(-1e12, 1e12, "s"), "give the frame's time")
         for ratio in self.led_ratio:
             require("led_ratio", ratio, Bound(0.0, 1.0, ""), "give the brightness of four sides")
+        self._require_ramp()
+
+    def _require_ramp(self) -> None:
+        last = LAST_RAMP if self.role == "press" else 0
+        is_number = isinstance(self.ramp, int) and not isinstance(self.ramp, bool)
+        if not (is_number and 0 <= self.ramp <= last):
+            bound = f"a whole number from 0 to {last} in a {self.role} frame"
+            raise InvalidQuantity("ramp", repr(self.ramp), bound, "number the presses on the lesion from 0")
 
 
 @dataclass(frozen=True)

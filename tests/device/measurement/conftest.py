@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -33,7 +33,10 @@ def quick_model() -> QuickModel:
 
 @pytest.fixture(scope="session")
 def pressed(tables: ProbeTables) -> Press:
-    """A press on the nominal tissue in a mode: 12 mm, 6 mm deep, 60 kPa unless told otherwise."""
+    """A press on the nominal tissue in a mode: 12 mm, 6 mm deep, 60 kPa unless told otherwise.
+
+    `further_mm` are the offsets of the further ramps of a scan.
+    """
 
     def press(
         mode: Mode,
@@ -41,9 +44,12 @@ def pressed(tables: ProbeTables) -> Press:
         *,
         neighbour: Neighbour | None = None,
         wet_ratio: float = 0.0,
+        further_mm: Sequence[float] = (),
         **nuisances: float,
     ) -> Recording:
         parameters = np.array([*unknowns, *(NOMINAL | nuisances).values()])
-        return recorded_press(tables, parameters, mode, 5, neighbour=neighbour, wet_ratio=wet_ratio)
+        return recorded_press(
+            tables, parameters, mode, 5, neighbour=neighbour, wet_ratio=wet_ratio, further_mm=further_mm
+        )
 
     return press

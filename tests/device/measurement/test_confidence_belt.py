@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.confidence_belt import Belt
+from device.measurement.confidence_belt import Belt, ends_in_belts
 from device.measurement.quantities import InvalidQuantity
 
 TRUTH, LOG_SPREAD = np.array([-1.0, 1.0]), np.log([0.01, 0.2])
@@ -67,3 +67,19 @@ def test_an_answer_unusual_for_every_truth_is_given_two_spreads_on_each_side():
 def test_tables_of_another_shape_are_refused():
     with pytest.raises(InvalidQuantity, match="shape of the belt"):
         Belt(TRUTH, LOG_SPREAD, np.zeros((3, 2)), np.zeros((2, 2)))
+
+
+def test_each_unknown_has_the_interval_of_its_own_belts():
+    """Belts of one, two and three spreads of 0.1, the last of an unknown that is not determined."""
+    mean, spread = np.array([0.2, 0.0, 0.1]), np.array([0.1, 0.1, 0.4])
+    three = [belts(-bound, bound) for bound in (1.0, 2.0, 3.0)]
+    ends = ends_in_belts(mean, spread, three)
+    for number, belt in enumerate(three):
+        alone = belt.interval(float(mean[number]), float(spread[number]))
+        assert (ends.low[number], ends.high[number], ends.is_identifiable[number]) == alone
+    assert ends.is_identifiable.tolist() == [True, True, False]
+
+
+def test_belts_for_another_number_of_unknowns_are_refused():
+    with pytest.raises(ValueError, match="zip"):
+        ends_in_belts(np.zeros(3), np.ones(3), [belts(-1.0, 1.0)] * 2)

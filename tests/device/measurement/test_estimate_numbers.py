@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from device.measurement.confidence_belt import Belt
+from device.measurement.confidence_belt import Belt, ends_in_belts
 from device.measurement.estimate import (
     UNKNOWN_QUANTITY,
     Numbers,
     Origin,
-    numbers_in_belts,
+    numbers_in,
     with_numbers,
     without_numbers,
 )
+from device.measurement.ramp_modes.intervals import PressIntervals
 
 ORIGIN = Origin("standard", "demo", "00" * 32, "id", True)
 WITHIN_TWO = Belt(np.array([-1.0, 1.0]), np.array([-9.0, 0.0]), np.full((2, 2), -2.0), np.full((2, 2), 2.0))
@@ -21,7 +22,8 @@ HALF_CELL = 1 / 400
 
 
 def estimate_of(mean, spread):
-    numbers = numbers_in_belts(np.array(mean), np.array(spread), [WITHIN_TWO] * 3)
+    at, width = np.array(mean), np.array(spread)
+    numbers = numbers_in(at, width, ends_in_belts(at, width, [WITHIN_TWO] * 3))
     return with_numbers(numbers, {"misfit_ratio": 1.0}, ORIGIN)
 
 
@@ -65,13 +67,22 @@ def test_a_spread_that_says_no_more_than_the_range_leaves_the_whole_range_open()
     modulus = estimate.youngs_modulus_kpa
     assert (modulus.low, modulus.high, modulus.low_is_open, modulus.high_is_open) == (10.0, 160.0, True, True)
     assert not modulus.identifiable
-    assert estimate.status == "not_identifiable"
+    assert estimate.status == "partly_identifiable"
     assert estimate.reason == "This press does not determine Young's modulus."
 
 
 def test_a_value_beyond_the_range_is_brought_to_the_end_of_its_interval():
     size = estimate_of([1.1, 0.0, 0.0], [0.1, 0.1, 0.1]).size_mm
     assert (size.value, size.high) == (15.0, 15.0)
+
+
+def test_numbers_lie_within_any_ends_whatever_they_were_made_of():
+    """Ends of coordinates -0.2 and 0.4: 8.5 mm less 1.3 mm and more 2.6 mm; 8 mm less 0.8 mm and more 1.6 mm."""
+    ends = PressIntervals(np.full(3, -0.2), np.full(3, 0.4), np.array([True, True, False]))
+    estimate = with_numbers(numbers_in(np.zeros(3), np.full(3, 0.1), ends), {}, ORIGIN)
+    assert (estimate.size_mm.low, estimate.size_mm.high) == pytest.approx((7.2, 11.1))
+    assert (estimate.depth_mm.low, estimate.depth_mm.high) == pytest.approx((7.2, 9.6))
+    assert estimate.reason == "This press does not determine Young's modulus."
 
 
 def test_all_that_is_not_determined_is_named():
@@ -87,3 +98,16 @@ def test_an_estimate_without_numbers_says_why_and_where_it_is_from():
     estimate = without_numbers("saturated", "Too bright.", ORIGIN)
     assert {estimate.size_mm, estimate.depth_mm, estimate.youngs_modulus_kpa} == {UNKNOWN_QUANTITY}
     assert (estimate.status, estimate.reason, estimate.mode) == ("saturated", "Too bright.", "standard")
+
+
+@pytest.mark.parametrize(
+    ("spread", "status"),
+    [
+        ([0.1, 0.1, 0.1], "ok"),
+        ([0.1, 0.1, 0.4], "partly_identifiable"),
+        ([0.1, 0.4, 0.4], "partly_identifiable"),
+        ([0.4, 0.4, 0.4], "not_identifiable"),
+    ],
+)
+def test_the_status_tells_all_from_a_part_from_nothing(spread, status):
+    assert estimate_of([0.0, 0.0, 0.0], spread).status == status

@@ -9,10 +9,10 @@ from device.measurement.feature_definitions import (
     definition_of,
 )
 from device.measurement.quick_mode.profile import QUICK_NAMES
-from device.measurement.ramp_modes.radial_profile import ROW_NAMES
+from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES
 
 
-@pytest.mark.parametrize(("names", "group"), [(ROW_NAMES, RADIAL_PROFILE_FEATURES), (QUICK_NAMES, QUICK_FEATURES)])
+@pytest.mark.parametrize(("names", "group"), [(NETWORK_NAMES, RADIAL_PROFILE_FEATURES), (QUICK_NAMES, QUICK_FEATURES)])
 def test_every_name_of_a_row_is_defined_and_every_definition_is_of_a_name(names, group):
     assert {stem for stem in group for name in names if definition_of(name, group) is group[stem]} == set(group)
 

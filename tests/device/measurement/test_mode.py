@@ -11,15 +11,21 @@ def ramp(count: int) -> list[float]:
     return list(np.linspace(RAMP_FROM_N, RAMP_TO_N, count))
 
 
-@pytest.mark.parametrize("mode", [mode for mode in MODES if FRAMES[mode].is_ramp])
-def test_a_ramp_of_a_modes_own_frames_is_read_by_that_mode(mode):
-    assert mode_of(ramp(FRAMES[mode].count)) == mode
+@pytest.mark.parametrize("count", [2, 10, 40, 400])
+def test_a_ramp_is_read_by_mode_standard_however_many_frames_it_has(count):
+    assert mode_of(ramp(count)) == "standard"
 
 
-@pytest.mark.parametrize(("count", "mode"), [(2, "standard"), (25, "standard"), (26, "precise"), (400, "precise")])
-def test_from_the_middle_between_both_modes_frames_on_a_ramp_is_a_precise_one(count, mode):
-    """10 and 40 frames: 25 are as near to one as to the other."""
-    assert mode_of(ramp(count)) == mode
+@pytest.mark.parametrize("ramps", range(2, FRAMES["precise"].most_ramps + 1))
+def test_more_than_one_ramp_on_the_lesion_is_a_scan(ramps):
+    assert mode_of(ramp(FRAMES["precise"].count) * ramps, ramps) == "precise"
+
+
+def test_a_scan_presses_two_to_five_times_on_the_lesion_each_time_as_mode_standard_does():
+    precise = FRAMES["precise"]
+    assert (precise.count, precise.is_ramp) == (FRAMES["standard"].count, True)
+    assert (precise.fewest_ramps, precise.most_ramps) == (2, 5)
+    assert [mode for mode in MODES if FRAMES[mode].is_scan] == ["precise"]
 
 
 @pytest.mark.parametrize("force_n", [[], [0.5, 0.5], [0.5] * 10, [0.49, 0.51, 0.5], [0.26, 0.5], [0.5] * 40])

@@ -3,11 +3,12 @@
 import pytest
 
 from device.files.bundle_file import read_models
+from device.measurement.bundle import BundleRefused
 from device.measurement.mode import MODES
-from device.measurement.mode_models import ModeModels
+from device.measurement.mode_models import ModeModels, analysed, mode_of_recording
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import estimate_quick
-from device.measurement.ramp_modes.estimate import estimate_ramp
+from device.measurement.ramp_modes.estimate import advise_scan, estimate_ramp
 
 
 @pytest.fixture(scope="module")
@@ -23,6 +24,32 @@ def test_each_mode_is_answered_by_its_own_model(models, quick_model, ramp_model,
     assert models.estimate(pressed("paper"), "paper", calibration).mode == "paper"
 
 
+def test_what_cannot_be_surpassed_is_known_where_the_card_says_so(models, ramp_model, monkeypatch):
+    entry = ramp_model.bundle.card["modes"]["precise"]
+    monkeypatch.delitem(entry, "reachable_half_width", raising=False)
+    assert models.worth("precise").reachable_half_width is None
+    monkeypatch.setitem(entry, "reachable_half_width", {"size_mm": 0.8})
+    assert models.worth("precise").reachable_half_width == {"size_mm": 0.8}
+    monkeypatch.setitem(entry, "reachable_half_width", {"size_mm": "small"})
+    with pytest.raises(BundleRefused, match=r"modes\.precise\.reachable_half_width\.size_mm is 'small'"):
+        models.worth("precise")
+
+
+def test_a_scan_is_advised_by_the_ramps_model_and_by_no_other(models, bundle, ramp_model, calibration, pressed):
+    standard = pressed("standard")
+    assert models.advise(standard, calibration) == advise_scan(standard, ramp_model, calibration)
+    with pytest.raises(InvalidQuantity, match="mode is precise, but must be one of paper"):
+        ModeModels(bundle).advise(standard, calibration)
+
+
+@pytest.mark.parametrize(("further_mm", "mode"), [((), "standard"), ((4.0,), "precise")])
+def test_a_recording_is_read_by_default_as_what_it_is(models, calibration, pressed, further_mm, mode):
+    recording = pressed("precise", further_mm=further_mm)
+    assert mode_of_recording(recording) == mode
+    assert analysed(recording, models, calibration).mode == mode
+    assert analysed(recording, models, calibration, "standard").mode == "standard"
+
+
 def test_models_of_another_probe_are_left_out_but_for_the_papers(models):
     assert models.for_probe("SIM-0001").modes == MODES
     assert models.for_probe("TSIS-0042").modes == ("paper",)
@@ -32,3 +59,5 @@ def test_a_mode_without_a_model_is_refused_and_not_answered_by_another(bundle, c
     paper_only = read_models(bundle, tmp_path / "quick", tmp_path / "standard")
     with pytest.raises(InvalidQuantity, match="mode is standard, but must be one of paper"):
         paper_only.estimate(pressed("standard"), "standard", calibration)
+    with pytest.raises(InvalidQuantity, match="mode is precise, but must be one of paper"):
+        paper_only.advise(pressed("standard"), calibration)

@@ -1,16 +1,17 @@
-"""Covariances from few recordings, shrunk: variances stay, correlations are those of the paper formula."""
+"""Covariances from few recordings, shrunk: variances stay, chance goes, and what is alike in all columns is kept."""
 
 import numpy as np
 import pytest
 
-from device.measurement.parameters import NOMINAL
+from device.measurement.parameters import HIGH, NOMINAL
 from device.measurement.ramp_modes.noise import light_ratio
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.recording.ring_means import RINGS
+from device.measurement.ramp_modes.radial_profile import SeenPresses
+from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.press_models import camera_noise as module
-from host_tools.press_models.camera_noise import camera_noise, shrinkage, shrunk_covariance
-from host_tools.press_models.press_samples import exact_presses
-from host_tools.press_models.recorded_presses import RecordedPresses
+from host_tools.press_models.camera_noise import camera_noise, recorded_errors, shrinkage, shrunk_covariance
+from host_tools.press_models.press_samples import profile_rows
+from host_tools.press_models.recorded_presses import RecordedPresses, direction_of_press_rad
+from host_tools.press_models.seeds import press_seed
 
 
 def test_mean_squares_stay_and_correlations_shrink():
@@ -31,8 +32,15 @@ def test_correlations_that_are_chance_vanish_and_those_that_are_not_stay():
 
 
 def intensity(errors: np.ndarray) -> float:
-    standard = errors / np.sqrt(np.mean(errors**2, axis=0))
-    return shrinkage(standard, standard.T @ standard / len(errors))
+    return shrinkage(errors / np.sqrt(np.mean(errors**2, axis=0)))
+
+
+def test_what_columns_tell_beside_a_strong_common_error_is_kept():
+    """Columns that share an error of 1 and have 0.03 of their own: the least variance is that of their own."""
+    rng = np.random.default_rng(5)
+    errors = rng.standard_normal((600, 1)) + 0.03 * rng.standard_normal((600, 40))
+    least = np.linalg.eigvalsh(shrunk_covariance(errors))[:39]
+    assert np.median(least) == pytest.approx(0.03**2, rel=0.3)
 
 
 def test_a_common_error_counts_as_noise_and_is_not_taken_out_as_a_mean():
@@ -45,29 +53,40 @@ def test_fewer_recordings_than_columns_still_leave_a_covariance_that_can_be_inve
     assert np.linalg.eigvalsh(shrunk_covariance(errors)).min() > 0.1
 
 
-def test_the_covariances_are_those_of_what_is_recorded_about_the_exact_values(tables, monkeypatch):
-    """Recordings that are the exact rows and second harmonics plus known errors, as large as the light, give back the
-    errors' covariance; those of second harmonics along and across the offset count as twice as many."""
+def test_errors_are_those_of_what_is_recorded_about_the_exact_rows(tables, monkeypatch):
+    """Recordings that are the exact rows plus known errors, as large as the light, give back the errors.
+
+    Exact rows are those of the direction in which each recording was pressed: it is told by the seed, as there.
+    """
     aside = (NOMINAL | {"offset_mm": 1.5}).values()
     drawn = np.array([[12.0, 6.0, 60.0, *aside], [9.0, 5.0, 120.0, *aside]])
-    exact, along = exact_presses(tables, drawn)
-    rng, forces = np.random.default_rng(2), len(PROFILE_FORCES_N)
-    errors = rng.normal(0, 1e-3, exact.shape)
-    of_second = rng.normal(0, 1e-3, (2, 2, forces, RINGS - 2))
-    light = 1 + exact[:, : forces * RINGS].reshape(2, 1, forces, RINGS)[..., 1:-1]
-    second = light * of_second
-    second[:, 0] += along.reshape(2, forces, RINGS - 2)
+    direction_rad = np.array([direction_of_press_rad(press_seed(9, number)) for number in range(2)])
+    exact = profile_rows(tables, drawn, direction_rad)
+    assert np.abs(exact - profile_rows(tables, drawn)).max() > 1e-4
+    errors = np.random.default_rng(2).normal(0, 1e-3, exact.shape)
     asked = {}
 
     def record(tables, parameters, mode, *, seed, jobs):
         asked.update(mode=mode, seed=seed, jobs=jobs)
-        return RecordedPresses(parameters, exact + light_ratio(exact) * errors, second)
+        rows = exact + light_ratio(exact) * errors
+        return RecordedPresses(parameters, [SeenPresses(row[None], np.zeros(0), np.zeros(1)) for row in rows])
 
-    monkeypatch.setattr(module, "draw_parameters", lambda count, rng: drawn[:count])
     monkeypatch.setattr(module, "record_presses", record)
-    found = camera_noise(tables, "precise", 2, seed=9, jobs=1)
-    assert asked == {"mode": "precise", "seed": 9, "jobs": 1}
-    np.testing.assert_allclose(found.rows, shrunk_covariance(errors), atol=1e-12)
-    assert np.diag(found.rows) == pytest.approx(np.mean(errors**2, axis=0))
-    np.testing.assert_allclose(found.second_harmonics, shrunk_covariance(of_second.reshape(4, -1)), atol=1e-12)
-    assert np.diag(found.second_harmonics) == pytest.approx(np.mean(of_second**2, axis=(0, 1)).ravel())
+    found = recorded_errors(tables, drawn, seed=9, jobs=1)
+    assert asked == {"mode": "standard", "seed": 9, "jobs": 1}
+    np.testing.assert_allclose(found, errors, atol=1e-12)
+
+
+def test_the_covariance_is_that_of_presses_near_and_beside_the_inclusion_together(tables, monkeypatch):
+    errors, drawn = np.random.default_rng(2).normal(0, 1e-3, (30, 5)), []
+
+    def errors_of(tables, parameters, *, seed, jobs):
+        drawn.append((parameters[:, OFFSET], seed))
+        return errors[: len(parameters)] if len(drawn) == 1 else errors[-len(parameters) :]
+
+    monkeypatch.setattr(module, "recorded_errors", errors_of)
+    found = camera_noise(tables, 20, 10, seed=9, jobs=1)
+    np.testing.assert_allclose(found, shrunk_covariance(errors))
+    (near_mm, near_seed), (beside_mm, beside_seed) = drawn
+    assert near_mm.max() <= HIGH[OFFSET] <= beside_mm.min()
+    assert near_seed != beside_seed

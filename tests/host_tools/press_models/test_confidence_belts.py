@@ -6,7 +6,7 @@ import pytest
 from device.measurement.confidence_belt import Belt
 from device.measurement.quantities import InvalidQuantity
 from host_tools.press_models import confidence_belts as module
-from host_tools.press_models.confidence_belts import confidence_belts, widened
+from host_tools.press_models.confidence_belts import SpreadAnswers, confidence_belts, widened
 
 
 def shrunk_answers(count, seed, noise=0.15):
@@ -84,3 +84,21 @@ def test_belts_that_hold_recordings_stay_what_they_are():
 def test_recordings_that_determine_nothing_widen_nothing():
     belts, none = flat_belts(1.0), np.zeros((20, 3))
     assert widened(belts, none + 5.0, none, none + 1.0) == belts
+
+
+def test_answers_within_belts_have_the_intervals_that_the_device_gives():
+    rng = np.random.default_rng(5)
+    answers = SpreadAnswers(rng.uniform(-1, 1, (6, 3)), rng.uniform(-1, 1, (6, 3)), rng.uniform(0.05, 0.5, (6, 3)))
+    found = answers.within(flat_belts(1.5))
+    np.testing.assert_array_equal(found.truth, answers.truth)
+    np.testing.assert_array_equal(found.mean, answers.mean)
+    for number in np.ndindex(6, 3):
+        one = flat_belts(1.5)[0].interval(answers.mean[number], answers.spread[number])
+        assert (found.low[number], found.high[number], found.is_known[number]) == one
+
+
+def test_a_part_of_answers_is_of_the_same_presses():
+    answers = SpreadAnswers(*np.random.default_rng(6).normal(size=(3, 8, 3)))
+    part = answers.part(slice(2, 5))
+    for name in ("truth", "mean", "spread"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(answers, name)[2:5])

@@ -1,36 +1,35 @@
-"""The bundle of the ramp modes: the network NumPy has, surrogate and ellipticity test, both modes' limits."""
+"""The bundle of the ramp modes: the networks NumPy has, surrogates and noise, both modes' critical values."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import onnxruntime
 import pytest
-from model_card import write_card
-from small_surrogate import COLUMNS, random_surrogate, white_noise
+from model_card import edit_card, write_card
+from small_surrogate import COLUMNS, random_scan_surrogate, white_noise
 
 from device.files.bundle_file import read_ramp_model
 from device.measurement.bundle import BundleRefused
-from device.measurement.confidence_belt import Belt
-from device.measurement.parameters import NUISANCES, PARAMETERS, RANGES
+from device.measurement.parameters import HIGH, NUISANCES, PARAMETERS, RANGES, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.ellipticity import ROUND_FILE, SECOND_COLUMNS, EllipticityTest
-from device.measurement.ramp_modes.legendre import LegendreSum
-from device.measurement.ramp_modes.model import RAMP_MODES, SURROGATE_FILE, RampModel
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, ROW_NAMES
-from device.measurement.ramp_modes.range_classifier import RANGE_FILE
-from device.measurement.ramp_modes.surrogate import PressSurrogate
+from device.measurement.ramp_modes.ellipticity import elongation_deviations
+from device.measurement.ramp_modes.model import RAMP_MODES, SURROGATE_FILE, CriticalValues, RampAnswers, RampModel
+from device.measurement.ramp_modes.noise import ErrorLevels
+from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES, PROFILE_FORCES_N, network_rows
+from device.measurement.ramp_modes.range_classifier import OUTPUT, RANGE_FILE
+from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.ring_means import RINGS
 from host_tools.paper_network.export import ExportRefused
 from host_tools.press_models import export as exporting
 from host_tools.press_models.dense_network import LARGEST_LOG_VARIANCE, DenseLayer, InputScaling, initial_layers
 from host_tools.press_models.export import GOLDEN_ROWS, export_ramp
 from host_tools.press_models.mode_outcome import EvaluatedPresses, ModeOutcome
-from host_tools.press_models.onnx_networks import build_network, build_range_networks, physical_estimate
+from host_tools.press_models.onnx_networks import build_network, build_range_network, physical_estimate
 from host_tools.press_models.press_samples import PressSamples, draw_parameters
 from host_tools.press_models.ramp_training import DRY_RUN, TrainedRamp
 from host_tools.press_models.train_ensemble import DenseEnsemble
@@ -40,8 +39,12 @@ SERIALS = ("SIM-0001", "SIM-0002")
 PRESSES = 40
 
 
-def made_ensemble(rows: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble:
-    scaling = InputScaling.fit(rows, np.eye(COLUMNS))
+READ = len(NETWORK_NAMES)
+
+
+def made_ensemble(read: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble:
+    """Return networks of rows [n, F] as `network_rows` gives them."""
+    scaling = InputScaling.fit(read, np.eye(READ))
     members = []
     for seed in (1, 2):
         *hidden, last = initial_layers(2 * scaling.projection.shape[1], np.random.default_rng(seed))
@@ -51,51 +54,38 @@ def made_ensemble(rows: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble
 
 
 def made_outcome(misfit_ratio: float) -> ModeOutcome:
-    ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
-    belts = tuple(Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound) for bound in (1.5, 1.6, 1.7))
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
-    seen = EvaluatedPresses(truth, truth + 0.05, np.full((64, 3), 0.1))
-    return ModeOutcome(belts, misfit_ratio, 2.0 + misfit_ratio, 0.3, seen, seen)
+    seen = EvaluatedPresses(truth, truth + 0.05, truth - 0.1, truth + 0.2, np.ones((64, 3), bool))
+    return ModeOutcome(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3), seen, seen)
 
 
-def made_ellipticity_test(surrogate: PressSurrogate) -> EllipticityTest:
-    rng = np.random.default_rng(12)
-    second = LegendreSum(
-        rng.integers(0, 4, (6, len(PARAMETERS))).astype(np.uint8), rng.normal(size=(6, SECOND_COLUMNS))
-    )
-    factors = {mode: rng.normal(0, 1e-3, (SECOND_COLUMNS, SECOND_COLUMNS)) for mode in RAMP_MODES}
-    return EllipticityTest(surrogate, second, {mode: factor @ factor.T for mode, factor in factors.items()})
-
-
-def made_ranges(rows: np.ndarray) -> TrainedRange:
-    scaling, rng = InputScaling.fit(rows, np.eye(COLUMNS)), np.random.default_rng(3)
-    networks = {
-        mode: RangeNetwork(
-            scaling, tuple(initial_layers(2 * scaling.projection.shape[1], rng, outputs=1) for _ in "ab")
-        )
-        for mode in RAMP_MODES
-    }
-    return TrainedRange(networks, np.array([2e-4, 4e-4]), "0123", DRY_RUN.ranges)
+def made_ranges(read: np.ndarray) -> TrainedRange:
+    scaling, rng = InputScaling.fit(read, np.eye(READ)), np.random.default_rng(3)
+    members = tuple(initial_layers(2 * scaling.projection.shape[1], rng, outputs=1) for _ in "ab")
+    return TrainedRange(RangeNetwork(scaling, members), np.array([2e-4, 4e-4]), "0123", DRY_RUN.ranges)
 
 
 @pytest.fixture(scope="module")
 def trained() -> TrainedRamp:
     rng = np.random.default_rng(5)
     rows = rng.normal(0, 0.2, (PRESSES, COLUMNS))
-    surrogate = random_surrogate()
     return TrainedRamp(
-        surrogate=surrogate,
+        answers=RampAnswers(random_scan_surrogate(), white_noise(2e-3, ErrorLevels())),
         surrogate_error=np.array([1e-4, 3e-4]),
-        round_error=np.array([2e-4, 5e-4]),
-        noise={"standard": white_noise(2e-3), "precise": white_noise(1e-3)},
-        ensemble=made_ensemble(rows),
-        ranges=made_ranges(rows),
-        ellipticity=made_ellipticity_test(surrogate),
+        beside_error=np.array([2e-4, 5e-4]),
+        ensemble=made_ensemble(network_rows(rows)),
+        ranges=made_ranges(network_rows(rows)),
         outcomes={"standard": made_outcome(1.3), "precise": made_outcome(1.2)},
-        samples=PressSamples(draw_parameters(PRESSES, rng), rows, np.zeros((PRESSES, SECOND_COLUMNS))),
+        samples=PressSamples(draw_parameters(PRESSES, rng), rows, rng.uniform(0, 2 * np.pi, PRESSES)),
         budget=DRY_RUN,
         seed=11,
     )
+
+
+@pytest.fixture(scope="module")
+def read(trained: TrainedRamp) -> np.ndarray:
+    """What networks read of the presses of the training [n, F]."""
+    return network_rows(trained.samples.rows)
 
 
 def write(trained: TrainedRamp, folder: Path) -> Path:
@@ -120,7 +110,7 @@ def run(network: bytes, rows: np.ndarray) -> list[np.ndarray]:
 
 def test_the_exported_network_computes_what_numpy_does(trained: TrainedRamp) -> None:
     """Single precision all along: a few of its roundings of 6e-8."""
-    rows = np.random.default_rng(8).normal(0, 0.3, (200, COLUMNS)).astype(np.float32)
+    rows = np.random.default_rng(8).normal(0, 0.3, (200, READ)).astype(np.float32)
     found = run(build_network(trained.ensemble), rows)
     for theirs, ours in zip(found, physical_estimate(trained.ensemble, rows.astype(float)), strict=True):
         assert theirs.dtype == np.float32
@@ -128,67 +118,64 @@ def test_the_exported_network_computes_what_numpy_does(trained: TrainedRamp) -> 
         assert np.std(ours, axis=0).min() > 0
 
 
-def test_what_nobody_knows_is_held_at_the_largest_variance_in_both(trained: TrainedRamp) -> None:
+def test_what_nobody_knows_is_held_at_the_largest_variance_in_both(read: np.ndarray) -> None:
     """So a spread is exp(1/2), or more where the members disagree."""
-    ensemble = made_ensemble(trained.samples.rows, log_variance=9.0)
-    found = run(build_network(ensemble), trained.samples.rows)[1]
-    expected = physical_estimate(ensemble, trained.samples.rows.astype(np.float32).astype(float))[1]
+    ensemble = made_ensemble(read, log_variance=9.0)
+    found = run(build_network(ensemble), read)[1]
+    expected = physical_estimate(ensemble, read.astype(np.float32).astype(float))[1]
     np.testing.assert_allclose(found, expected, rtol=2e-5)
     assert found.min() == pytest.approx(np.exp(LARGEST_LOG_VARIANCE / 2), rel=0.1)
     assert found.min() >= np.exp(LARGEST_LOG_VARIANCE / 2) - 1e-5
 
 
-def test_coordinates_of_the_network_are_millimetres_and_kilopascals(trained: TrainedRamp) -> None:
+def test_coordinates_of_the_network_are_millimetres_and_kilopascals(trained: TrainedRamp, read: np.ndarray) -> None:
     """Networks that always say 0.1: size 8.5 + 0.65, depth 8 + 0.4, modulus 40 x 4 to the power 0.1."""
     still = [
         [*layers[:-1], DenseLayer(0 * layers[-1].weights, layers[-1].biases)] for layers in trained.ensemble.members
     ]
     ensemble = replace(trained.ensemble, members=tuple(still))
-    estimate, spread = run(build_network(ensemble), trained.samples.rows)
+    estimate, spread = run(build_network(ensemble), read)
     np.testing.assert_allclose(estimate, np.tile([9.15, 8.4, 40 * 4**0.1], (PRESSES, 1)), rtol=1e-5)
     np.testing.assert_allclose(spread, np.exp(-1), rtol=1e-5)
 
 
-def test_the_device_gets_back_the_networks_coordinates(trained: TrainedRamp, model: RampModel) -> None:
-    rows = trained.samples.rows
-    for found, expected in zip(model.networks(rows), trained.ensemble.estimate(rows), strict=True):
-        np.testing.assert_allclose(found, expected, atol=1e-5)
+def test_the_device_gets_back_the_networks_coordinates_as_first_guesses(trained, model, read) -> None:
+    found, expected = model.first_guesses(trained.samples.rows), trained.ensemble.estimate(read)[0]
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+    assert found.shape == (PRESSES, len(UNKNOWNS))
+    physical = physical_estimate(trained.ensemble, read)[0]
+    np.testing.assert_allclose(found, normalise_unknowns(physical), atol=1e-5)
 
 
-def test_the_device_gets_back_surrogate_and_noise(trained: TrainedRamp, model: RampModel) -> None:
-    """The surrogate to single precision."""
+def test_the_device_gets_back_both_surrogates_and_the_noise(trained: TrainedRamp, model: RampModel) -> None:
+    """The surrogates to single precision; error levels are the usual ones."""
     normalised = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
-    expected = trained.surrogate.rows(normalised)
-    np.testing.assert_allclose(model.answers.surrogate.rows(normalised), expected, atol=1e-5 * np.abs(expected).max())
-    for mode, noise in trained.noise.items():
-        np.testing.assert_array_equal(model.answers.noise[mode].camera, noise.camera)
+    normalised[10:, OFFSET] = 2 * np.linspace(2.5, 8.0, 10) / HIGH[OFFSET] - 1
+    found, made = model.answers.surrogate, trained.answers.surrogate
+    assert (found.near.to_mm, found.beside.from_mm, found.to_mm) == (2.0, 2.0, made.to_mm)
+    direction_rad = np.random.default_rng(12).uniform(0, 2 * np.pi, 20)
+    expected = made.rows(normalised, direction_rad)
+    np.testing.assert_allclose(found.rows(normalised, direction_rad), expected, atol=1e-5 * np.abs(expected).max())
+    np.testing.assert_array_equal(model.answers.noise.camera, trained.answers.noise.camera)
+    assert model.answers.noise.levels == ErrorLevels()
 
 
-def test_the_device_gets_back_what_is_round(trained: TrainedRamp, model: RampModel) -> None:
-    """Second harmonics to single precision, the camera's covariances exactly."""
-    normalised = np.random.default_rng(9).uniform(-1, 1, (20, len(PARAMETERS)))
-    expected = trained.ellipticity.second_harmonics(normalised)
-    found = model.ellipticity.second_harmonics(normalised)
-    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
-    assert set(model.ellipticity.camera) == set(RAMP_MODES)
-    for mode, camera in trained.ellipticity.camera.items():
-        np.testing.assert_array_equal(model.ellipticity.camera[mode], camera)
-
-
-@pytest.mark.parametrize("mode", RAMP_MODES)
-def test_the_device_tells_as_many_deviations_from_round_as_the_training(trained, model, mode) -> None:
-    """To single precision of surrogate and second harmonics."""
+def test_the_device_tells_as_many_deviations_from_round_as_the_training(trained, model) -> None:
+    """To single precision of the surrogate."""
     second = np.random.default_rng(10).normal(0, 0.1, (2, len(PROFILE_FORCES_N), RINGS - 2))
     best = np.random.default_rng(11).uniform(-0.5, 0.5, len(PARAMETERS))
-    found, expected = (one.ellipticity.elongation_deviations(second, best, mode) for one in (model, trained))
+    direction_rad = np.array([0.7])
+    found, expected = (
+        elongation_deviations(second, one.answers.surrogate.rows(best[None], direction_rad)[0], one.answers.noise)
+        for one in (model, trained)
+    )
     assert found == pytest.approx(expected, rel=1e-3)
     assert expected > 1
 
 
-@pytest.mark.parametrize("mode", RAMP_MODES)
-def test_the_device_gets_back_the_log_odds_of_each_mode(trained: TrainedRamp, model: RampModel, mode) -> None:
+def test_the_device_gets_back_the_log_odds(trained: TrainedRamp, model: RampModel) -> None:
     rows = np.random.default_rng(8).normal(0, 0.3, (50, COLUMNS)).astype(np.float32).astype(float)
-    found, expected = model.ranges.log_odds(rows, mode), trained.ranges.networks[mode].log_odds(rows)
+    found, expected = model.ranges.log_odds(rows), trained.ranges.network.log_odds(network_rows(rows))
     np.testing.assert_allclose(found, expected, atol=2e-5)
     assert np.std(expected) > 0.01
 
@@ -201,36 +188,28 @@ def test_the_card_tells_how_wide_the_networks_of_the_ranges_have_seen(trained, f
     budget = DRY_RUN.ranges
     assert (entry["effort"]["pool"], entry["effort"]["steps"]) == (budget.trained_on, budget.steps)
     assert entry["surrogate_error"] == {"largest": 4e-4, "mean": pytest.approx(3e-4)}
-    for mode in RAMP_MODES:
-        expected = trained.ranges.networks[mode].log_odds(np.array(model.bundle.card["golden"]["features"]))
-        np.testing.assert_allclose(entry["golden"][mode], expected, atol=2e-5)
+    expected = trained.ranges.network.log_odds(np.array(model.bundle.card["golden"]["features"]))
+    assert list(entry["golden"]) == [OUTPUT]
+    np.testing.assert_allclose(entry["golden"][OUTPUT], expected, atol=2e-5)
 
 
 def test_networks_of_the_ranges_that_differ_from_numpy_are_refused(trained, tmp_path, monkeypatch) -> None:
-    other = made_ranges(trained.samples.rows * 1.01).networks
-    wrong = build_range_networks(other)
-    monkeypatch.setattr(exporting, "build_range_networks", lambda networks: wrong)
+    wrong = build_range_network(made_ranges(network_rows(trained.samples.rows * 1.01)).network)
+    monkeypatch.setattr(exporting, "build_range_network", lambda network: wrong)
     with pytest.raises(ExportRefused, match="^standard of the exported network of the ranges differs from NumPy"):
         write(trained, tmp_path / "demo")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_device_gets_back_the_limits_of_each_mode(trained: TrainedRamp, model: RampModel) -> None:
-    assert (model.critical["standard"].misfit_ratio, model.critical["precise"].misfit_ratio) == (1.3, 1.2)
-    assert (model.critical["standard"].elongation_deviations, model.critical["precise"].elongation_deviations) == (
-        3.3,
-        3.2,
-    )
-    assert {critical.outside_log_odds for critical in model.critical.values()} == {0.3}
-    for belts_of_mode in model.belts.values():
-        assert [belts.high[0, 0] for belts in belts_of_mode] == [1.5, 1.6, 1.7]
-        assert [belts.low[1, 1] for belts in belts_of_mode] == [-1.5, -1.6, -1.7]
-    assert model.belts["standard"][0].interval(0.0, 0.1)[:2] == pytest.approx((-0.15, 0.15), abs=0.005)
+def test_the_device_gets_back_the_critical_values_of_each_mode(trained: TrainedRamp, model: RampModel) -> None:
+    assert set(model.critical) == set(RAMP_MODES)
+    for mode, misfit_ratio in (("standard", 1.3), ("precise", 1.2)):
+        assert asdict(model.critical[mode]) == asdict(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3))
 
 
 def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trained, folder, model) -> None:
     card = model.bundle.card
-    assert tuple(card["serials"]) == tuple(card["serials"]) == SERIALS
+    assert tuple(card["serials"]) == SERIALS
     assert (card["name"], card["software_version"], card["seed"]) == ("demo", "1.2.3", 11)
     assert card["training_command"] == "host_tools train x"
     assert card["effort"]["members"] == DRY_RUN.members
@@ -240,15 +219,14 @@ def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trai
     assert card["sha256"] == hashlib.sha256((folder / "model.onnx").read_bytes()).hexdigest()
     assert card["surrogate_sha256"] == hashlib.sha256((folder / SURROGATE_FILE).read_bytes()).hexdigest()
     assert (card["surrogate_error"]["largest"], card["surrogate_error"]["mean"]) == pytest.approx((3e-4, 2e-4))
-    assert card["round_sha256"] == hashlib.sha256((folder / ROUND_FILE).read_bytes()).hexdigest()
-    assert (card["round_error"]["largest"], card["round_error"]["mean"]) == pytest.approx((5e-4, 3.5e-4))
+    assert (card["beside_error"]["largest"], card["beside_error"]["mean"]) == pytest.approx((5e-4, 3.5e-4))
     ranges = card["training_range"]
     assert {name: tuple(ends) for name, ends in (ranges["unknowns"] | ranges["nuisances"]).items()} == {
         name: (RANGES[name].low, RANGES[name].high) for name in (*UNKNOWNS, *NUISANCES)
     }
-    name, column = ROW_NAMES[-1], trained.samples.rows[:, -1]
+    name, column = NETWORK_NAMES[-1], network_rows(trained.samples.rows)[:, -1]
     assert ranges["features"][name] == [column.min(), column.max()]
-    assert tuple(feature["name"] for feature in card["features"]) == ROW_NAMES
+    assert tuple(feature["name"] for feature in card["features"]) == NETWORK_NAMES
 
 
 def test_the_card_states_each_modes_errors_on_simulated_and_on_recorded_presses(model: RampModel) -> None:
@@ -258,14 +236,16 @@ def test_the_card_states_each_modes_errors_on_simulated_and_on_recorded_presses(
         for kind in ("simulated", "recorded"):
             assert entry[kind]["presses"] == 64
             assert entry[kind]["depth_mm"]["skill"] == pytest.approx(1 - 0.05 * np.sqrt(3), rel=1e-3)
+            assert entry[kind]["joint"] == {"size_and_depth": 1.0, "all": 1.0}
+            assert entry[kind]["size_mm"]["interval_score"] == pytest.approx(0.3)
 
 
 def test_golden_rows_are_of_the_training_and_spread_over_it(trained: TrainedRamp, model: RampModel) -> None:
     golden = model.bundle.card["golden"]
     features = np.array(golden["features"])
-    assert features.shape == (GOLDEN_ROWS, COLUMNS)
-    expected = trained.samples.rows[:: PRESSES // GOLDEN_ROWS].astype(np.float32)
-    np.testing.assert_array_equal(features, expected)
+    assert features.shape == (GOLDEN_ROWS, READ)
+    chosen = trained.samples.rows[:: PRESSES // GOLDEN_ROWS].astype(np.float32)
+    np.testing.assert_array_equal(features, network_rows(chosen.astype(float)))
     np.testing.assert_allclose(golden["estimate"], physical_estimate(trained.ensemble, features)[0], rtol=1e-4)
     np.testing.assert_allclose(golden["spread"], physical_estimate(trained.ensemble, features)[1], rtol=1e-4)
 
@@ -274,7 +254,7 @@ def test_the_same_parts_give_the_same_bytes(trained: TrainedRamp, folder: Path, 
     twice = folder, write(trained, tmp_path / "demo")
     first, again = ({path.name: path.read_bytes() for path in at.iterdir()} for at in twice)
     assert first == again
-    assert set(first) == {"model.onnx", "model.json", "model.json.sha256", SURROGATE_FILE, RANGE_FILE, ROUND_FILE}
+    assert set(first) == {"model.onnx", "model.json", "model.json.sha256", SURROGATE_FILE, RANGE_FILE}
 
 
 def changed(trained: TrainedRamp, tmp_path: Path, file: str) -> Path:
@@ -290,7 +270,6 @@ def changed(trained: TrainedRamp, tmp_path: Path, file: str) -> Path:
     [
         (SURROGATE_FILE, "surrogate.npz is [0-9a-f]{64}"),
         (RANGE_FILE, "range.onnx is [0-9a-f]{64}"),
-        (ROUND_FILE, "round.npz is [0-9a-f]{64}"),
         ("model.onnx", "sha256"),
     ],
 )
@@ -299,7 +278,7 @@ def test_a_changed_bit_is_refused_by_the_device(trained, tmp_path, file, named) 
         read_ramp_model(changed(trained, tmp_path, file))
 
 
-@pytest.mark.parametrize("file", [SURROGATE_FILE, ROUND_FILE])
+@pytest.mark.parametrize("file", [SURROGATE_FILE, RANGE_FILE])
 def test_a_missing_file_is_refused_by_the_device(trained: TrainedRamp, tmp_path: Path, file: str) -> None:
     folder = write(trained, tmp_path / "demo")
     (folder / file).unlink()
@@ -307,14 +286,18 @@ def test_a_missing_file_is_refused_by_the_device(trained: TrainedRamp, tmp_path:
         read_ramp_model(folder)
 
 
-def test_a_card_that_states_no_hash_of_the_round_spot_is_refused_by_the_device(trained, tmp_path) -> None:
-    """As one of before there was an ellipticity test, which does not hold the file either."""
+def test_a_card_that_states_no_hash_of_the_surrogate_is_refused_by_the_device(trained, tmp_path) -> None:
     folder = write(trained, tmp_path / "demo")
-    card = json.loads((folder / "model.json").read_text())
-    del card["round_sha256"]
-    write_card(folder, json.dumps(card))
-    (folder / ROUND_FILE).unlink()
-    with pytest.raises(BundleRefused, match=r"hash of round.npz is missing, but must be in the card: use a bundle"):
+    edit_card(folder, lambda card: card.pop("surrogate_sha256"))
+    with pytest.raises(BundleRefused, match=r"hash of surrogate.npz is missing, but must be in the card: use a bundle"):
+        read_ramp_model(folder)
+
+
+@pytest.mark.parametrize("value", ["none", None, [1.0]])
+def test_a_critical_value_that_is_no_number_is_refused_by_the_device(trained, tmp_path, value) -> None:
+    folder = write(trained, tmp_path / "demo")
+    edit_card(folder, lambda card: card["modes"]["standard"].update(misfit_ratio=value))
+    with pytest.raises(BundleRefused, match="modes"):
         read_ramp_model(folder)
 
 

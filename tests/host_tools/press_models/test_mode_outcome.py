@@ -1,238 +1,205 @@
-"""Belts, coverage and critical values of toys: answers with Gaussian errors of a spread that they know."""
+"""Answers, coverage and critical values of toys: posteriors that are known on paper, figures that are what they say."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
-from small_surrogate import COLUMNS, linear_surrogate, white_noise
+from linear_press import NOISE, STD, TOLD, on_paper, random_slopes
+from small_surrogate import COLUMNS, LinearRows, linear_surrogate, white_noise
 
-from device.measurement.confidence_belt import Belt
-from device.measurement.parameters import EVEN_STD, PARAMETERS, denormalise
+from device.measurement.parameters import COUNT, EVEN_STD, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RampAnswer, RampAnswers
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, RESPONSE_COLUMNS
+from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
+from device.measurement.ramp_modes.model import CriticalValues, RampAnswer, RampAnswers
+from device.measurement.ramp_modes.posterior import CELLS, ModulusCells, PressFit
+from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, PROFILE_FORCES_N, RESPONSE, SeenPresses
+from device.measurement.ramp_modes.surrogate import MODULUS, OFFSET
 from device.measurement.recording.ring_means import RINGS
-from host_tools.press_models.confidence_belts import confidence_belts
+from host_tools.press_models import mode_outcome as module
 from host_tools.press_models.mode_outcome import (
     CRITICAL_RATIO,
     EvaluatedPresses,
-    ModeOutcome,
     answers_to,
-    critical_log_odds,
-    elongations,
-    evaluate_mode,
+    critical_values,
+    evaluated,
+    outcome_of,
 )
-from host_tools.press_models.noisy_presses import NoiseSampler, PressSet
 from host_tools.press_models.recorded_presses import RecordedPresses
 
-STD, COUNT, RECORDED = 0.1, 4000, 150
-TOLD = np.arange(len(PARAMETERS)) != MODULUS
-RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
-NOISE = white_noise(STD)
+K, RECORDED = len(PARAMETERS), 160
+FLAT = RampAnswers(LinearRows(np.zeros((K, COLUMNS))), white_noise(1e-3))
 
 
-class FirstColumns:
-    """In place of an ensemble: the first three columns are the coordinates, seen with the rows' noise."""
-
-    def estimate(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return rows[:, :3], np.full((len(rows), 3), STD)
+def middle(rows: np.ndarray) -> np.ndarray:
+    return np.zeros((1, COUNT))
 
 
-def even(count: int, columns: int, seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(-1, 1, (count, columns))
+def answer_of(mean: float, spread: float, misfit_ratio: float = 1.0) -> RampAnswer:
+    """Return an answer of a Gaussian posterior, the same whatever the modulus."""
+    at, width = np.full(K, mean), np.full(K, spread)
+    cells = ModulusCells(np.full(CELLS, 1 / CELLS), np.tile(at, (CELLS, 1)), np.tile(width, (CELLS, 1)))
+    fit = PressFit(at, at, width, 1000.0, cells)
+    return RampAnswer(fit, intervals_of(fit), misfit_ratio, 0, at, (5.0, 0.2))
 
 
-class FirstColumn:
-    """In place of a range network: the first column is the log odds."""
-
-    def log_odds(self, rows: np.ndarray) -> np.ndarray:
-        return rows[:, 0]
-
-
-class FirstHarmonic:
-    """In place of an ellipticity test: the first of the second harmonics is the deviations."""
-
-    def elongation_deviations(self, second: np.ndarray, best: np.ndarray, mode: str) -> float:
-        return float(second[0, 0, 0])
+def recorded_of(rows: np.ndarray) -> RecordedPresses:
+    """Return recorded presses of one ramp with rows [n, P], of inclusions in the middle of the ranges."""
+    parameters = np.tile([8.5, 8.0, 40.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0], (len(rows), 1))
+    none = np.zeros((1, 2, len(PROFILE_FORCES_N), RINGS - 2))
+    return RecordedPresses(parameters, [SeenPresses(row[None], none, np.zeros(1)) for row in rows])
 
 
-def harmonics(deviations: np.ndarray) -> np.ndarray:
-    """Return second harmonics [n, 2, K, J - 2] of which that toy tells deviations [n]."""
-    found = np.zeros((len(deviations), 2, len(PROFILE_FORCES_N), RINGS - 2))
-    found[:, 0, 0, 0] = deviations
-    return found
+@pytest.fixture
+def figures(monkeypatch) -> None:
+    """Found values that are told by the rows: their first column, twice and thrice it."""
+
+    def found_values(answer, seen, answers, log_odds):
+        first = seen.rows[0, 0]
+        return CriticalValues(first, 2 * first, float(log_odds(seen.rows)[0]))
+
+    monkeypatch.setattr(module, "found_values", found_values)
 
 
-def gaussian(count: int, seed: int) -> EvaluatedPresses:
-    truth = even(count, 3, seed)
-    return EvaluatedPresses(
-        truth, truth + np.random.default_rng([seed, 1]).normal(0, STD, truth.shape), np.full((count, 3), STD)
-    )
+def thrice(rows: np.ndarray) -> np.ndarray:
+    return 3 * rows[:, 0]
 
 
-def exact_belts(bound: float) -> tuple[Belt, ...]:
-    """Belts of an error that is never more than so many spreads, whatever truth and spread."""
-    ends, none = np.array([-1.0, 1.0]), np.zeros((2, 2))
-    return (Belt(ends, np.log([0.01, 1.0]), none - bound, none + bound),) * 3
-
-
-def some(recorded: RecordedPresses, count: int) -> RecordedPresses:
-    return RecordedPresses(recorded.parameters[:count], recorded.rows[:count], recorded.second_harmonics[:count])
-
-
-def evaluate_modes(answers: RampAnswers, press_set: PressSet, recorded: RecordedPresses, seed: int = 4) -> ModeOutcome:
-    toys = FirstColumns(), answers, press_set, recorded, FirstHarmonic()
-    return evaluate_mode("standard", *toys, outside_log_odds=0.3, seed=seed, jobs=1)
-
-
-@pytest.fixture(scope="module")
-def slopes() -> np.ndarray:
-    slopes = np.random.default_rng(5).normal(0.0, 0.5, (len(PARAMETERS), RESPONSE_COLUMNS))
-    slopes[MODULUS] = 0.0
-    return slopes
-
-
-@pytest.fixture(scope="module")
-def answers(slopes) -> RampAnswers:
-    return RampAnswers(linear_surrogate(slopes), {"standard": NOISE, "precise": NOISE})
-
-
-@pytest.fixture(scope="module")
-def press_set() -> PressSet:
-    normalised = even(COUNT, len(PARAMETERS), 1)
-    rows = np.zeros((COUNT, COLUMNS))
-    rows[:, :3] = normalised[:, :3]
-    return PressSet(normalised.astype(np.float32), rows.astype(np.float32), NoiseSampler(NOISE))
-
-
-@pytest.fixture(scope="module")
-def recorded(answers) -> RecordedPresses:
-    """Presses of unknowns in the middle, seen with the surrogate's noise; elongations 1 to 150."""
-    normalised = even(RECORDED, len(PARAMETERS), 2) * 0.8
-    normalised[:, :3] = 0.0
-    rows = answers.surrogate.rows(normalised) + np.random.default_rng(3).normal(0, STD, (RECORDED, COLUMNS))
-    return RecordedPresses(denormalise(normalised), rows, harmonics(np.arange(1.0, RECORDED + 1)))
-
-
-@pytest.fixture(scope="module")
-def outcome(answers, press_set, recorded) -> ModeOutcome:
-    return evaluate_modes(answers, press_set, recorded)
-
-
-def test_an_interval_of_1_64_spreads_covers_nine_in_ten_gaussian_errors():
-    covered, known = gaussian(3000, 1).covered(exact_belts(1.645))
-    assert known.all()
-    np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.015)
-
-
-def test_belts_of_one_half_of_gaussian_answers_cover_nine_in_ten_of_the_other():
-    both = gaussian(5000, 2)
-    seen, unseen = both.part(slice(3000)), both.part(slice(3000, None))
-    covered, _ = unseen.covered(confidence_belts(seen.truth, seen.mean, seen.spread))
-    np.testing.assert_allclose(covered.mean(axis=0), 0.9, atol=0.02)
-
-
-def test_an_interval_covers_the_truth_inside_it_and_not_the_one_beside_it():
-    """0.1 +- 2 x 0.1 holds -0.05 and 0.29, not 0.32 and -0.15; a spread above half the prior's tells nothing."""
-    truth = np.array([[-0.05, 0.32, 0.9], [0.29, -0.15, -0.9]])
-    spread = np.array([[0.1, 0.1, 0.51 * EVEN_STD]] * 2)
-    covered, known = EvaluatedPresses(truth, np.full((2, 3), 0.1), spread).covered(exact_belts(2.0))
-    np.testing.assert_array_equal(covered, [[True, False, True]] * 2)
-    np.testing.assert_array_equal(known, [[True, True, False]] * 2)
+def test_an_interval_covers_the_truth_inside_it_ends_included_and_not_the_one_beside_it():
+    truth = np.array([[-0.1, 0.32, 0.9], [0.3, -0.15, -1.0]])
+    low, high = np.array([[-0.1, -0.1, -1.0]] * 2), np.array([[0.3, 0.3, 1.0]] * 2)
+    presses = EvaluatedPresses(truth, truth, low, high, np.ones((2, 3), bool))
+    np.testing.assert_array_equal(presses.is_covered, [[True, False, True]] * 2)
 
 
 def test_a_part_is_of_the_same_presses_in_all_its_arrays():
-    whole = gaussian(10, 3)
+    rng = np.random.default_rng(3)
+    whole = EvaluatedPresses(*rng.normal(size=(4, 10, 3)), rng.integers(0, 2, (10, 3)).astype(bool))
     part = whole.part(slice(4, 7))
-    for name in ("truth", "mean", "spread"):
+    for name in ("truth", "mean", "low", "high", "is_known", "is_covered"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[4:7])
 
 
-def test_simulated_answers_are_of_the_half_that_the_belts_have_not_seen(outcome, press_set):
-    """Noise is as large as the light, 1 + a contrast that is even between -1 and 1: its mean square is 1 + 1/3."""
-    np.testing.assert_array_equal(outcome.simulated.truth, press_set.normalised[COUNT // 2 :, :3])
-    error = outcome.simulated.mean - outcome.simulated.truth
-    np.testing.assert_allclose(error.std(axis=0), STD * np.sqrt(4 / 3), rtol=0.05)
-    assert (outcome.simulated.covered(outcome.belts)[0].mean(axis=0) > 0.875).all()
+def test_answers_stand_beside_their_truths_with_the_intervals_that_the_device_gives():
+    truth = np.array([[0.0, 0.1, -0.2], [0.3, 0.3, 0.9]])
+    found = evaluated(truth, [answer_of(0.0, 0.1), answer_of(0.2, 0.9 * EVEN_STD)])
+    np.testing.assert_array_equal(found.truth, truth)
+    np.testing.assert_array_equal(found.mean, [[0.0] * 3, [0.2] * 3])
+    np.testing.assert_allclose(found.low, [[-0.16449] * 3, [-1.0] * 3], atol=1e-4)
+    np.testing.assert_allclose(found.high, [[0.16449] * 3, [1.0] * 3], atol=1e-4)
+    np.testing.assert_array_equal(found.is_known, [[True] * 3, [False] * 3])
 
 
-def test_belts_come_from_the_first_halves_alone(outcome, answers, press_set, recorded):
-    """Truths that lie elsewhere in the second half, simulated or recorded, leave the belts what they were."""
-    parameters = recorded.parameters.copy()
-    parameters[RECORDED // 2 :, :3] = denormalise(np.full((1, len(PARAMETERS)), 0.9))[0, :3]
-    elsewhere = RecordedPresses(parameters, recorded.rows, recorded.second_harmonics)
-    normalised = press_set.normalised.copy()
-    normalised[COUNT // 2 :] *= -1
-    turned = PressSet(normalised, press_set.rows, press_set.sampler)
-    other = evaluate_modes(answers, turned, elsewhere)
-    for one, again in zip(outcome.belts, other.belts, strict=True):
-        np.testing.assert_array_equal(one.low, again.low)
-        np.testing.assert_array_equal(one.high, again.high)
-    assert other.simulated.covered(other.belts)[0].mean() < 0.5
+def test_intervals_of_gaussian_answers_cover_nine_in_ten():
+    rng = np.random.default_rng(1)
+    truth = 0.2 + rng.normal(0, 0.1, (3000, 3))
+    found = evaluated(truth, [answer_of(0.2, 0.1)] * len(truth))
+    np.testing.assert_allclose(found.is_covered.mean(axis=0), 0.9, atol=0.015)
 
 
-def test_recorded_answers_keep_their_truth_and_the_networks_mean(outcome, recorded):
-    np.testing.assert_allclose(outcome.recorded.truth, np.zeros((RECORDED // 2, 3)), atol=1e-12)
-    np.testing.assert_array_equal(outcome.recorded.mean, recorded.rows[RECORDED // 2 :, :3])
-    np.testing.assert_array_equal(outcome.recorded.spread, STD)
-
-
-def test_a_usual_elongation_is_one_that_few_recordings_pass(outcome, recorded):
-    """Elongations of 1, 2 ... 150: the quantile 0.9875 lies at 1 + 0.9875 x 149."""
-    assert outcome.elongation_deviations == pytest.approx(1 + CRITICAL_RATIO * (RECORDED - 1))
-
-
-def test_an_elongation_is_that_of_a_press_about_its_own_best_fit_in_its_mode(recorded):
-    class Told:
-        def elongation_deviations(self, second, best, mode):
-            return second[0, 0, 0] + 1000 * best[0] + len(mode)
-
-    none = np.zeros(3)
-    found = [RampAnswer(none, none, 1.0, best=np.full(len(PARAMETERS), number)) for number in (0.0, 1.0)]
-    told = elongations(Told(), some(recorded, 2), found, "precise")
-    np.testing.assert_array_equal(told, [1 + 7, 2 + 1000 + 7])
-
-
-def test_a_usual_misfit_is_a_high_quantile_of_chi_square(outcome):
-    """Less the eight parameters that fit: COLUMNS - 8 degrees of freedom, whose 0.9875 quantile is 2.24
-    deviations above their number (and a little for its skewness); of 150 draws it strays by a twentieth."""
-    freedom = COLUMNS - TOLD.sum()
-    expected = (freedom + 2.24 * np.sqrt(2 * freedom) + 2 / 3 * (2.24**2 - 1)) / COLUMNS
-    assert outcome.misfit_ratio == pytest.approx(expected, rel=0.15)
-
-
-def test_usual_log_odds_are_those_of_presses_in_which_an_inclusion_stands_out():
-    """Of two hundred rows the last half is dark in the middle, and has the larger odds: it does not count."""
-    rows = np.zeros((200, COLUMNS))
-    rows[:100, :CONTRAST_COLUMNS] = np.linspace(40, 60, 100)[:, None]
-    rows[100:, 0], rows[100:, 1:4] = 100.0, -50.0
-    assert critical_log_odds(FirstColumn(), rows, NOISE) == pytest.approx(np.quantile(rows[:100, 0], CRITICAL_RATIO))
-
-
-def test_where_no_inclusion_stands_out_nothing_is_usual():
-    with pytest.raises(InvalidQuantity, match="presses in which an inclusion stands out is 0"):
-        critical_log_odds(FirstColumn(), np.zeros((5, COLUMNS)), NOISE)
-
-
-def test_the_log_odds_are_kept_as_they_are_told(outcome):
-    assert outcome.outside_log_odds == 0.3
-
-
-def test_the_same_seed_gives_the_same_answers_and_another_one_other_noise(outcome, answers, press_set, recorded):
-    few = some(recorded, 2)
-    again, other = (evaluate_modes(answers, press_set, few, seed) for seed in (4, 5))
-    np.testing.assert_array_equal(again.simulated.mean, outcome.simulated.mean)
-    assert (other.simulated.mean != again.simulated.mean).mean() > 0.99
-
-
-def test_mode_precise_answers_by_the_fit_and_not_by_the_networks(answers, slopes):
-    """The posterior of the linear model is known on paper; the toy networks read zeros."""
-    truth = 0.4 * even(2, len(PARAMETERS), 6)
+def test_presses_are_answered_by_the_fit_from_first_guesses_of_their_own():
+    """The posterior of the linear model is known on paper, wherever it is begun."""
+    slopes = random_slopes()
+    answers = RampAnswers(linear_surrogate(slopes), NOISE)
+    truth = 0.4 * np.random.default_rng(6).uniform(-1, 1, (2, K))
     rows = answers.surrogate.rows(truth)
-    found = answers_to("precise", FirstColumns().estimate, answers, rows, 1)
-    std = STD * np.sqrt(np.diag(np.linalg.inv(slopes[TOLD] @ slopes[TOLD].T)))[:2]
-    for answer, at in zip(found, truth, strict=True):
-        np.testing.assert_allclose(answer.mean[:2], at[:2], atol=0.25 * std.max())
-        np.testing.assert_allclose(answer.spread[:2], std, rtol=0.1)
+    asked = []
+
+    def guess(of: np.ndarray) -> np.ndarray:
+        asked.append(of)
+        return np.full((len(of), COUNT), 0.2)
+
+    found = answers_to(answers, guess, list(rows[:, None]), [np.zeros(1)] * 2, 1)
+    for answer, row, read in zip(found, rows, asked, strict=True):
+        np.testing.assert_array_equal(read, row[None])
+        mean, covariance = on_paper(row, slopes)
+        spread = np.sqrt(np.diag(covariance))[:2]
+        np.testing.assert_allclose(answer.mean[:2], mean[:2], atol=0.25 * spread.max())
+        np.testing.assert_allclose(answer.spread[:2], spread, rtol=0.1)
         assert answer.spread[MODULUS] == pytest.approx(EVEN_STD, rel=0.1)
+    assert STD < 0.1
+    assert TOLD.sum() == K - 1
+
+
+def test_each_press_is_answered_in_the_directions_of_its_own_ramps():
+    """What a direction adds to a linear model is explained with it, and with another one is not."""
+    rng = np.random.default_rng(8)
+    slopes, along = rng.normal(0.0, 0.01, (K, COLUMNS)), np.zeros(COLUMNS)
+    slopes[OFFSET, RESPONSE], along[FIRST] = 0.0, 0.02 * rng.choice([-1.0, 1.0], FIRST.stop - FIRST.start)
+    answers = RampAnswers(LinearRows(slopes, along), white_noise(1e-3))
+    directions = [np.array([0.3]), np.array([1.5, -0.8])]
+    at = np.append(np.full(OFFSET, 0.1), 0.2)
+    rows = [answers.surrogate.rows(np.tile(at, (len(one), 1)), one) for one in directions]
+    found = answers_to(answers, middle, rows, directions, 1)
+    assert max(answer.misfit_ratio for answer in found) < 0.01
+    swapped = answers_to(answers, middle, rows, [directions[1][:1], directions[1][::-1]], 1)
+    assert min(answer.misfit_ratio for answer in swapped) > 1
+
+
+def seen_rows(count: int) -> np.ndarray:
+    """Return rows whose contrast in the middle is far above noise, and whose first column is 1 to `count`."""
+    rows = np.zeros((count, COLUMNS))
+    rows[:, CONTRAST] = 1.0
+    rows[:, 0] = np.arange(1.0, count + 1)
+    return rows
+
+
+@pytest.mark.usefixtures("figures")
+def test_each_critical_value_is_one_that_few_recordings_pass():
+    """Figures of 1, 2 ... 160: the quantile 0.9875 lies at 1 + 0.9875 x 159, 158.0125 of 160."""
+    found = critical_values(recorded_of(seen_rows(RECORDED)), [answer_of(0.0, 0.1)] * RECORDED, FLAT, thrice)
+    expected = 1 + CRITICAL_RATIO * (RECORDED - 1)
+    assert (found.misfit_ratio, found.elongation_deviations, found.outside_log_odds) == pytest.approx(
+        (expected, 2 * expected, 3 * expected)
+    )
+    assert (np.arange(1, RECORDED + 1) > found.misfit_ratio).mean() == pytest.approx(1 - CRITICAL_RATIO)
+
+
+@pytest.mark.usefixtures("figures")
+def test_critical_log_odds_are_those_of_presses_in_which_an_inclusion_stands_out():
+    """The last half is dark but for the first column, and has the larger odds: these do not count, their misfits do."""
+    rows = seen_rows(RECORDED)
+    half = RECORDED // 2
+    rows[half:, 1:] = 0.0
+    rows[half:, 1 : RINGS // 2] = -2 * RECORDED
+    found = critical_values(recorded_of(rows), [answer_of(0.0, 0.1)] * RECORDED, FLAT, thrice)
+    assert found.outside_log_odds == pytest.approx(3 * (1 + CRITICAL_RATIO * (half - 1)))
+    assert found.misfit_ratio == pytest.approx(1 + CRITICAL_RATIO * (RECORDED - 1))
+
+
+@pytest.mark.usefixtures("figures")
+def test_an_inclusion_stands_out_of_a_scan_when_it_does_in_one_of_its_ramps():
+    rows = seen_rows(2)
+    recorded = recorded_of(rows)
+    recorded.seen[1] = recorded.seen[1]._replace(rows=np.stack([np.zeros(COLUMNS), rows[1]]))
+    found = critical_values(recorded, [answer_of(0.0, 0.1)] * 2, FLAT, lambda rows: rows[-1:, 0])
+    assert found.outside_log_odds == pytest.approx(1 + CRITICAL_RATIO)
+
+
+@pytest.mark.usefixtures("figures")
+def test_where_no_inclusion_stands_out_nothing_is_usual():
+    recorded = recorded_of(np.zeros((5, COLUMNS)))
+    with pytest.raises(InvalidQuantity, match="presses in which an inclusion stands out is 0"):
+        critical_values(recorded, [answer_of(0.0, 0.1)] * 5, FLAT, thrice)
+
+
+@pytest.mark.usefixtures("figures")
+def test_an_outcome_keeps_what_it_makes_of_both_kinds_of_presses():
+    truth = np.zeros((2, 3))
+    simulated = evaluated(truth, [answer_of(0.0, 0.1)] * 2)
+    recorded, found = recorded_of(seen_rows(3)), [answer_of(0.3, 0.1)] * 3
+    outcome = outcome_of(simulated, recorded, found, FLAT, thrice)
+    assert outcome.simulated is simulated
+    np.testing.assert_allclose(outcome.recorded.truth, normalise(recorded.parameters)[:, :3])
+    np.testing.assert_array_equal(outcome.recorded.mean, 0.3)
+    assert asdict(outcome.critical) == asdict(critical_values(recorded, found, FLAT, thrice))
+
+
+def test_guesses_in_the_middle_are_enough_for_a_press_that_tells_nothing():
+    """A flat model: everything stays what it was before."""
+    (answer,) = answers_to(FLAT, middle, [np.zeros((1, COLUMNS))], [np.zeros(1)], 1)
+    assert isinstance(answer.intervals, PressIntervals)
+    assert not answer.intervals.is_identifiable.any()
+    np.testing.assert_allclose(answer.spread, EVEN_STD, rtol=0.1)
+    assert answer.misfit_ratio == pytest.approx(0.0, abs=1e-12)

@@ -3,22 +3,26 @@
 import numpy as np
 import pytest
 
-from device.measurement.confidence_belt import Belt
+from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
 from host_tools.press_models.mode_outcome import EvaluatedPresses
-from host_tools.press_models.mode_statistics import OCTILES, octile_of, statistics
+from host_tools.press_models.mode_statistics import OCTILES, interval_score, octile_of, statistics
 
 COUNT = 4000
-ENDS, NONE = np.array([-1.0, 1.0]), np.zeros((2, 2))
-BELTS = (Belt(ENDS, np.log([0.01, 1.0]), NONE - 2, NONE + 2),) * 3
-"""Two spreads on either side of the mean."""
 EVEN = np.tile((2 * np.arange(COUNT) + 1)[:, None] / COUNT - 1, 3)
 
 
+def presses_of(mean, spread=0.1, truth=EVEN):
+    """Return presses whose intervals are two spreads on either side of the mean, within the range."""
+    mean, spread = (np.array(np.broadcast_to(part, truth.shape), float) for part in (mean, spread))
+    known = spread < IDENTIFIABLE_RATIO * EVEN_STD
+    low, high = (np.where(known, np.clip(mean + sign * 2 * spread, -1, 1), sign) for sign in (-1, 1))
+    return EvaluatedPresses(truth, mean, low, high, known)
+
+
 def of(mean, spread=0.1, truth=EVEN):
-    mean, spread = (np.broadcast_to(part, truth.shape) for part in (mean, spread))
-    return statistics(EvaluatedPresses(truth, np.array(mean), np.array(spread)), BELTS)
+    return statistics(presses_of(mean, spread, truth))
 
 
 def test_a_perfect_answer_has_skill_1_and_no_error():
@@ -87,3 +91,85 @@ def test_every_octile_holds_as_many_truths_and_the_largest_is_in_the_last():
 
 def test_numbers_are_rounded_to_four_digits():
     assert of(EVEN + EVEN_STD * 0.123456)["size_mm"]["skill"] == 0.8765
+
+
+SHUFFLED = np.column_stack([EVEN[:, 0], EVEN[::-1, 0], np.random.default_rng(3).permutation(EVEN[:, 0])])
+"""Depths fall where sizes grow; moduli are as they come."""
+
+
+def test_coverage_is_told_by_the_octiles_of_every_unknown():
+    """Of sizes those are missed whose modulus lies in the first octile; depths whose size lies in the last one."""
+    aside = np.zeros((COUNT, 3))
+    aside[SHUFFLED[:, 2] < -0.75, 0] = 0.3
+    aside[SHUFFLED[:, 0] > 0.75, 1] = 0.3
+    found = of(SHUFFLED + aside, truth=SHUFFLED)
+    size, depth, modulus = (found[name]["coverage_by_octiles"] for name in UNKNOWNS)
+    assert set(size) == set(depth) == set(modulus) == set(UNKNOWNS)
+    assert size["youngs_modulus_kpa"] == pytest.approx([0.0] + [1.0] * 7, abs=0.15)
+    assert size["size_mm"][:7] == pytest.approx([7 / 8] * 7, abs=0.05)
+    assert depth["size_mm"] == pytest.approx([1.0] * 7 + [0.0], abs=1e-3)
+    assert depth["depth_mm"] == pytest.approx([0.0] + [1.0] * 7, abs=1e-3)
+    assert modulus == {name: [1.0] * OCTILES for name in UNKNOWNS}
+    for name in UNKNOWNS:
+        assert found[name]["coverage_per_octile"] == found[name]["coverage_by_octiles"][name]
+
+
+def test_what_is_determined_is_told_by_the_octiles_of_every_unknown():
+    """The size where the depth lies in the upper half, which is where the size lies in the lower one."""
+    spread = np.full((COUNT, 3), 0.1)
+    spread[SHUFFLED[:, 1] < 0, 0] = 0.6 * EVEN_STD
+    found = of(SHUFFLED, spread, SHUFFLED)["size_mm"]
+    assert found["determined"] == 0.5
+    assert found["determined_by_octiles"]["depth_mm"] == [0.0] * 4 + [1.0] * 4
+    assert found["determined_by_octiles"]["size_mm"] == [1.0] * 4 + [0.0] * 4
+    assert found["determined_per_octile"] == found["determined_by_octiles"]["size_mm"]
+    assert found["determined_by_octiles"]["youngs_modulus_kpa"] == pytest.approx([0.5] * 8, abs=0.1)
+    assert found["coverage_by_octiles"]["depth_mm"][:4] == [None] * 4
+
+
+def test_intervals_hold_together_where_all_of_them_do():
+    """Of a hundred presses the size is missed in 10, the depth in 20 others, the modulus in 5 of those and 5 more."""
+    truth = np.zeros((100, 3))
+    mean = np.zeros((100, 3))
+    mean[:10, 0] = mean[10:30, 1] = mean[25:35, 2] = 0.5
+    joint = of(mean, truth=truth)["joint"]
+    assert joint == {"size_and_depth": 0.7, "all": 0.65}
+
+
+def test_intervals_together_are_counted_where_all_of_them_are_determined():
+    """The modulus is known in 40 of 100 presses, the depth missed in 10 of these and in 20 of the others."""
+    truth, mean, spread = np.zeros((100, 3)), np.zeros((100, 3)), np.full((100, 3), 0.1)
+    spread[40:, 2] = 0.6 * EVEN_STD
+    mean[30:60, 1] = 0.5
+    assert of(mean, spread, truth)["joint"] == {"size_and_depth": 0.7, "all": 0.75}
+    assert of(mean, 0.6 * EVEN_STD, truth)["joint"] == {"size_and_depth": None, "all": None}
+
+
+def test_an_interval_scores_its_width_and_twenty_times_what_it_misses_by():
+    """2 / (1 - 0.9) = 20. Size: 0.4 and held. Depth: 0.2 and 0.1 too low, 2.2. Modulus: 0.6 and 0.05 too high, 1.6."""
+    truth = np.array([[0.0, 0.3, -0.45]])
+    low, high = np.array([[-0.1, 0.0, -0.4]]), np.array([[0.3, 0.2, 0.2]])
+    presses = EvaluatedPresses(truth, truth, low, high, np.ones((1, 3), bool))
+    np.testing.assert_allclose(interval_score(presses), [0.4, 2.2, 1.6])
+
+
+def test_the_interval_score_is_the_mean_over_presses_and_stands_by_each_unknown():
+    """Whole ranges score 2; intervals of 0.4 that hold 0.4: half of each is 1.2."""
+    spread = np.where(np.arange(COUNT) % 2, 0.1, 0.6 * EVEN_STD)[:, None]
+    truth = 0.5 * EVEN
+    found = of(truth, spread, truth)
+    np.testing.assert_allclose(interval_score(presses_of(truth, spread, truth)), 1.2)
+    assert [found[name]["interval_score"] for name in UNKNOWNS] == pytest.approx([1.2] * 3)
+
+
+def test_no_interval_scores_less_on_average_than_the_quantiles():
+    """Gaussian errors of 0.1: 1.2, 1.645 and 2.2 deviations either way."""
+    truth = np.random.default_rng(4).normal(0, 0.1, (20_000, 3))
+    scores = [
+        interval_score(
+            EvaluatedPresses(truth, 0 * truth, 0 * truth - half, 0 * truth + half, np.ones_like(truth, bool))
+        )
+        for half in (0.12, 0.1645, 0.22)
+    ]
+    assert (scores[1] < scores[0]).all()
+    assert (scores[1] < scores[2]).all()

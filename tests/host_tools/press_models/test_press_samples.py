@@ -1,20 +1,24 @@
-"""Random presses are drawn as the priors say; rows and second harmonics are what a recording of the press gives."""
+"""Random presses are drawn as the priors say; rows are what a recording of the press gives."""
 
 import numpy as np
 import pytest
+from joblib import parallel_config
 
 from device.measurement.parameters import HIGH, LOW, NOMINAL, NUISANCES, PARAMETERS, normalise
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.radial_profile import RAMP_HIGH_N, press_profile
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET, RESPONSE_COLUMNS
+from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, RAMP_HIGH_N, RESPONSE, SECOND, press_profile
+from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.pressed_face import ProbePlacement
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
+from host_tools.press_models import press_samples as module
 from host_tools.press_models.press_samples import (
+    BESIDE_TO_MM,
+    INCLUSIONS_A_SKIN,
     NEAREST_MM,
     PressSamples,
+    draw_beside,
     draw_parameters,
-    exact_presses,
     profile_rows,
     sample_presses,
 )
@@ -78,6 +82,20 @@ def test_the_same_seed_draws_the_same_parameters():
     assert (first != other).all()
 
 
+def test_presses_beside_the_inclusion_are_the_same_but_for_offsets_even_over_what_is_left():
+    """From 2 mm, where those of one press end, to 8 mm: mean 5 mm and variance 36 / 12, within five standard errors."""
+    beside, near = (
+        draw(COUNT, np.random.default_rng(1), inclusions_a_skin=3) for draw in (draw_beside, draw_parameters)
+    )
+    np.testing.assert_array_equal(beside[:, :OFFSET], near[:, :OFFSET])
+    offset_mm = beside[:, OFFSET]
+    assert (HIGH[OFFSET], BESIDE_TO_MM) == (2.0, 8.0)
+    assert HIGH[OFFSET] <= offset_mm.min() < HIGH[OFFSET] + 0.01
+    assert BESIDE_TO_MM - 0.01 < offset_mm.max() <= BESIDE_TO_MM
+    assert offset_mm.mean() == pytest.approx(5.0, abs=5 * np.sqrt(3 / COUNT))
+    assert offset_mm.var() == pytest.approx(3.0, rel=5 * np.sqrt(0.8 / COUNT))
+
+
 @pytest.fixture(scope="module")
 def row(tables) -> np.ndarray:
     return profile_rows(tables, at(INCLUSION)[None])[0]
@@ -88,10 +106,8 @@ def test_a_row_is_the_profile_of_a_recording_of_the_same_press(tables, row):
     ramp = PhantomProtocol(tuple(np.linspace(0.09, RAMP_HIGH_N + 0.08, 24)), frames=1)
     recorded = press_profile(phantom_recording(INCLUSION, tables, seed=1, protocol=ramp)).as_row()
     assert row[0] > 0.02
-    np.testing.assert_allclose(row[:CONTRAST_COLUMNS], recorded[:CONTRAST_COLUMNS], atol=3e-3)
-    reference_response = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
-    np.testing.assert_allclose(row[reference_response], recorded[reference_response], atol=0.01)
-    np.testing.assert_allclose(row[reference_response.stop :], recorded[reference_response.stop :], atol=1e-3)
+    for columns, atol in ((CONTRAST, 3e-3), (RESPONSE, 0.01), (FIRST, 2e-3), (SECOND, 2e-3)):
+        np.testing.assert_allclose(row[columns], recorded[columns], atol=atol)
 
 
 def test_several_inclusions_on_one_skin_give_the_rows_that_each_gives_alone(tables, row):
@@ -102,60 +118,129 @@ def test_several_inclusions_on_one_skin_give_the_rows_that_each_gives_alone(tabl
     np.testing.assert_array_equal(together[1], profile_rows(tables, soft[None])[0])
 
 
-def test_an_inclusion_beside_the_axis_shows_in_the_offset(tables):
-    beside = profile_rows(tables, at(INCLUSION, offset_mm=1.5)[None])[0]
-    assert beside[CONTRAST_COLUMNS + RESPONSE_COLUMNS :].max() > 5e-3
-
-
-OFFSETS_MM = (0.0, 1.0, 2.0)
+OFFSETS_MM = (0.0, 1.0, 2.0, 5.0)
 
 
 @pytest.fixture(scope="module")
-def second(tables) -> np.ndarray:
-    """Second harmonics [3, K, J - 2] of an inclusion at each offset."""
-    found = exact_presses(tables, np.array([at(INCLUSION, offset_mm=offset_mm) for offset_mm in OFFSETS_MM]))[1]
-    return found.reshape(len(OFFSETS_MM), -1, RINGS - 2)
+def aside(tables) -> np.ndarray:
+    """Rows [4, P] of an inclusion at each offset."""
+    return profile_rows(tables, np.array([at(INCLUSION, offset_mm=offset_mm) for offset_mm in OFFSETS_MM]))
 
 
-def test_an_inclusion_on_the_axis_has_no_second_harmonic_and_one_beside_it_has(second):
-    """Bright towards both sides where the spot falls off, and across them nearer to its middle."""
-    np.testing.assert_allclose(second[0], 0.0, atol=1e-6)
-    assert second[2].max() > 1e-2
-    assert second[2].min() < -5e-3
+def test_an_inclusion_on_the_axis_has_no_harmonics_and_one_beside_it_has(aside):
+    """A second one is bright towards both sides where the spot falls off, and across them nearer to its middle.
+
+    Single precision of the images and the tables' own steps leave 1e-5.
+    """
+    np.testing.assert_allclose(aside[0, FIRST.start :], 0.0, atol=1e-5)
+    assert aside[2, FIRST].max() > 1e-2
+    assert aside[2, SECOND].max() > 1e-2
+    assert aside[2, SECOND].min() < -5e-3
 
 
-def test_the_second_harmonic_is_one_of_the_square_of_the_offset(second):
+def test_near_the_axis_the_second_harmonic_is_one_of_the_square_of_the_offset(aside):
     """Half the offset, a quarter as much; the tables' own steps and the next order leave 2e-4 where it is 1e-2."""
-    np.testing.assert_allclose(second[1], second[2] / 4, atol=2e-4)
+    np.testing.assert_allclose(aside[1, SECOND], aside[2, SECOND] / 4, atol=2e-4)
 
 
-def test_second_harmonics_are_those_of_a_recording_of_the_same_press(tables):
+def test_beside_an_inclusion_the_middle_is_darker_and_the_rim_brighter(aside):
+    middle, rim = CONTRAST.start, slice(CONTRAST.start + 8, CONTRAST.start + 10)
+    assert aside[3, middle] < 0.7 * aside[0, middle]
+    assert aside[3, FIRST].max() > aside[2, FIRST].max()
+    assert (aside[3, rim] > aside[0, rim]).all()
+
+
+SIDE = 0.3
+TURNED = SIDE, SIDE + np.pi / 2, SIDE + np.pi, -SIDE, SIDE + np.pi / 4
+QUARTER, HALF, MIRRORED, EIGHTH = 1, 2, 3, 4
+
+
+@pytest.fixture(scope="module", params=[1.5, 5.0])
+def in_directions(tables, request) -> np.ndarray:
+    """Rows [5, P] of an inclusion at one offset in the directions `TURNED`."""
+    parameters = np.tile(at(INCLUSION, offset_mm=request.param), (len(TURNED), 1))
+    return profile_rows(tables, parameters, np.array(TURNED))
+
+
+def without_outermost(row: np.ndarray) -> np.ndarray:
+    """Return all of a row but the contrast and the first harmonic of the outermost ring, which the frame cuts."""
+    contrast, first = row[CONTRAST].reshape(-1, RINGS)[:, :-1], row[FIRST].reshape(-1, RINGS - 1)[:, :-1]
+    return np.concatenate([contrast.ravel(), row[RESPONSE], first.ravel(), row[SECOND]])
+
+
+def test_a_press_from_the_other_side_or_mirrored_at_the_images_rows_is_the_same(in_directions):
+    """Frame and LEDs are as symmetric as that; single precision of the images leaves 1e-5."""
+    for same in (HALF, MIRRORED):
+        np.testing.assert_allclose(in_directions[same], in_directions[0], atol=2e-5)
+
+
+def test_after_a_quarter_of_a_turn_a_press_is_the_same_but_for_what_the_frame_cuts_off(in_directions):
+    """Four LEDs light the face alike then; the pixels, which are not square, leave 3e-5."""
+    first, quarter = in_directions[0], in_directions[QUARTER]
+    np.testing.assert_allclose(without_outermost(quarter), without_outermost(first), atol=5e-5)
+    assert np.abs(quarter - first).max() > 1e-3
+
+
+def test_after_an_eighth_of_a_turn_the_leds_light_another_press(in_directions):
+    assert np.abs(without_outermost(in_directions[EIGHTH]) - without_outermost(in_directions[0])).max() > 1e-4
+
+
+def test_a_press_lies_along_the_images_rows_unless_its_direction_is_told(tables):
+    parameters = at(INCLUSION, offset_mm=1.5)[None]
+    np.testing.assert_array_equal(profile_rows(tables, parameters), profile_rows(tables, parameters, np.zeros(1)))
+
+
+@pytest.mark.parametrize("offset_mm", [1.5, 5.0])
+def test_harmonics_are_those_of_a_recording_of_the_same_press(tables, offset_mm):
     """Whichever side the inclusion lies on, they are told along it, and nothing is left across."""
-    side, offset_mm = 0.8, 1.5
+    side = 0.8
     place = ProbePlacement(offset_mm * np.cos(side), offset_mm * np.sin(side))
     ramp = PhantomProtocol(tuple(np.linspace(0.09, RAMP_HIGH_N + 0.08, 24)), frames=1, place=place)
-    recorded = press_profile(phantom_recording(INCLUSION, tables, seed=1, protocol=ramp)).second_harmonic
-    rows, second = exact_presses(tables, at(INCLUSION, offset_mm=offset_mm)[None])
-    along = second.reshape(1, -1, RINGS - 2)[0]
-    np.testing.assert_array_equal(rows, profile_rows(tables, at(INCLUSION, offset_mm=offset_mm)[None]))
-    assert along.max() > 5e-3
-    np.testing.assert_allclose(recorded[0], along, atol=1e-3)
-    np.testing.assert_allclose(recorded[1], 0.0, atol=1e-3)
+    recorded = press_profile(phantom_recording(INCLUSION, tables, seed=1, protocol=ramp))
+    (row,) = profile_rows(tables, at(INCLUSION, offset_mm=offset_mm)[None], np.array([side]))
+    assert row[SECOND].max() > 5e-3
+    found = recorded.as_row()
+    np.testing.assert_allclose(found[FIRST], row[FIRST], atol=2e-3)
+    np.testing.assert_allclose(found[SECOND], row[SECOND], atol=2e-3)
+    np.testing.assert_allclose(recorded.second_harmonic[1], 0.0, atol=2e-3)
+    by_rad = recorded.direction_rad - side
+    assert np.cos(2 * by_rad) == pytest.approx(1.0, abs=0.01)  # as half a turn changes nothing, either side does
 
 
 def test_presses_are_split_with_all_that_belongs_to_them():
-    samples = PressSamples(*(np.random.default_rng(6).normal(size=(5, columns)) for columns in (9, 87, 36)))
+    rng = np.random.default_rng(6)
+    samples = PressSamples(rng.normal(size=(5, 9)), rng.normal(size=(5, 153)), rng.normal(size=5))
     for part, chosen in zip(samples.split(2), (slice(0, 2), slice(2, 5)), strict=True):
-        for name in ("parameters", "rows", "second_harmonics"):
+        for name in ("parameters", "rows", "direction_rad"):
             np.testing.assert_array_equal(getattr(part, name), getattr(samples, name)[chosen])
 
 
-def test_the_same_seed_gives_the_same_presses(tables):
+@pytest.mark.parametrize("draw", [draw_parameters, draw_beside])
+def test_the_same_seed_gives_the_same_presses(tables, draw):
     """Seed 13 draws two inclusions near 95 kPa."""
     done: list[int] = []
-    first = sample_presses(tables, 2, seed=13, jobs=1, on_done=done.append)
-    rows, second_harmonics = exact_presses(tables, first.parameters)
-    np.testing.assert_array_equal(first.rows, rows)
-    np.testing.assert_array_equal(first.second_harmonics, second_harmonics)
-    np.testing.assert_array_equal(first.parameters, draw_parameters(2, np.random.default_rng(13), inclusions_a_skin=3))
+    first = sample_presses(tables, 2, seed=13, draw=draw, jobs=1, on_done=done.append)
+    np.testing.assert_array_equal(first.rows, profile_rows(tables, first.parameters, first.direction_rad))
+    np.testing.assert_array_equal(first.parameters, draw(2, np.random.default_rng(13), inclusions_a_skin=3))
     assert sum(done) == len(first.rows) == 2
+
+
+def test_presses_lie_in_the_same_directions_whatever_the_jobs(tables, monkeypatch):
+    """Chunks of one skin: presses keep their own directions in each of them."""
+    pressed: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def press(tables, parameters, direction_rad):
+        pressed.append((parameters, direction_rad))
+        return np.column_stack([parameters, direction_rad])
+
+    monkeypatch.setattr(module, "profile_rows", press)
+    monkeypatch.setattr(module, "CHUNK", 1)
+    with parallel_config(backend="threading"):
+        one, two = (sample_presses(tables, 200, seed=13, jobs=jobs) for jobs in (1, 2))
+    assert max(len(directions) for _, directions in pressed) == INCLUSIONS_A_SKIN
+    for found in (one, two):
+        np.testing.assert_array_equal(found.rows, np.column_stack([found.parameters, found.direction_rad]))
+    np.testing.assert_array_equal(one.rows, two.rows)
+    assert (one.direction_rad != sample_presses(tables, 200, seed=14, jobs=1).direction_rad).all()
+    for order in (1, 2, 4):  # even over the circle: a mean of n strays by sqrt(1 / 2 n)
+        assert abs(np.exp(1j * order * one.direction_rad).mean()) < 5 * np.sqrt(0.5 / 200)

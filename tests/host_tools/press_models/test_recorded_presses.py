@@ -7,13 +7,15 @@ from device.measurement.mode import FRAMES, MODES, RAMP_FROM_N, RAMP_TO_N, mode_
 from device.measurement.parameters import NOMINAL, PARAMETERS
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.noise import ErrorLevels
-from device.measurement.ramp_modes.radial_profile import press_profile
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, RESPONSE, press_profile
 from device.measurement.recording.recording import Recording
 from device.simulation.physics.neighbour import Neighbour
 from device.simulation.physics.skin import Skin
 from host_tools.calibration.phantom import TARGET_N, UNLOADED_FRAMES
 from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.recorded_presses import (
+    RecordedPresses,
+    direction_of_press_rad,
     in_parallel,
     protocol_of,
     record_presses,
@@ -35,7 +37,7 @@ def test_a_modes_protocol_takes_its_frames_over_the_ramp_or_at_one_force(mode):
     assert len(protocol.forces_n) * protocol.frames == FRAMES[mode].count
     if FRAMES[mode].is_ramp:
         assert (min(protocol.forces_n), max(protocol.forces_n)) == pytest.approx((RAMP_FROM_N, RAMP_TO_N))
-        assert mode_of(protocol.forces_n) == mode
+        assert mode_of(protocol.forces_n, FRAMES[mode].fewest_ramps) == mode
     else:
         assert set(protocol.forces_n) == {TARGET_N}
 
@@ -57,6 +59,14 @@ def test_every_press_is_pressed_from_another_side(tables, recording):
     other = recorded_press(tables, INCLUSION, "quick", seed=6)
     assert np.hypot(*other.position_mm) == pytest.approx(1.5)
     assert np.hypot(*np.subtract(other.position_mm, recording.position_mm)) > 0.01
+
+
+def test_the_direction_of_a_press_is_known_from_its_seed_and_seen_in_its_frames(recording):
+    """From either side, for the face looks the same after half a turn; noise turns what is seen by some degrees."""
+    direction_rad = direction_of_press_rad(5)
+    assert recording.position_mm == pytest.approx((1.5 * np.cos(direction_rad), 1.5 * np.sin(direction_rad)))
+    assert np.cos(2 * (press_profile(recording).direction_rad - direction_rad)) > 0.97
+    assert direction_of_press_rad(5) == direction_rad != direction_of_press_rad(6)
 
 
 def test_parameters_become_skin_and_slab_of_the_scenario_by_their_names():
@@ -98,16 +108,56 @@ def test_rows_and_second_harmonics_are_those_of_each_press_alone_with_its_own_se
     found = record_presses(tables, parameters, "standard", seed=3, jobs=1)
     for number, one in enumerate(parameters):
         profile = press_profile(recorded_press(tables, one, "standard", 300_000 + number))
-        np.testing.assert_array_equal(found.rows[number], profile.as_row())
-        np.testing.assert_array_equal(found.second_harmonics[number], profile.second_harmonic)
+        np.testing.assert_array_equal(found.rows[number], profile.as_row()[None])
+        np.testing.assert_array_equal(found.rows[number], found.seen[number].rows)
+        np.testing.assert_array_equal(found.seen[number].second_harmonics, profile.second_harmonic[None])
+        assert found.seen[number].direction_rad.tolist() == [profile.direction_rad]
     assert found.parameters is parameters
 
 
 def test_presses_of_one_inclusion_differ_by_noise_alone(tables):
     """Other hand, camera noise and side of the offset; the contrast in the middle keeps within a tenth of its peak."""
     rows = record_presses(tables, np.array([INCLUSION, INCLUSION]), "standard", seed=4, jobs=1).rows
-    assert (rows[0] != rows[1]).all()
-    np.testing.assert_allclose(rows[0][:11], rows[1][:11], atol=0.1 * rows[0][:11].max())
+    (first,), (second,) = rows
+    assert (first != second).all()
+    np.testing.assert_allclose(first[:11], second[:11], atol=0.1 * first[:11].max())
+
+
+FURTHER_MM = [np.array([4.0]), np.array([6.0, 3.0])]
+
+
+@pytest.fixture(scope="module")
+def scans(tables) -> RecordedPresses:
+    parameters = np.array([INCLUSION, INCLUSION])
+    return record_presses(tables, parameters, "precise", seed=3, further_mm=FURTHER_MM, jobs=1)
+
+
+def test_a_scan_has_a_row_and_second_harmonics_for_every_ramp(scans):
+    assert [rows.shape for rows in scans.rows] == [(2, COLUMNS), (3, COLUMNS)]
+    assert [len(one.second_harmonics) for one in scans.seen] == [2, 3]
+    assert [len(np.unique(one.direction_rad)) for one in scans.seen] == [2, 3]
+
+
+def test_ramps_of_a_scan_have_one_reference_and_see_the_inclusion_from_their_own_places(scans):
+    """The further aside, the fainter the middle."""
+    rows = scans.rows[1]
+    np.testing.assert_array_equal(rows[1:, RESPONSE], np.tile(rows[0, RESPONSE], (2, 1)))
+    middle = rows[:, CONTRAST.start]
+    assert middle[0] > middle[2] > middle[1]
+
+
+def test_further_ramps_leave_the_first_one_as_it_is_alone(tables, scans):
+    """The same hand, side and noise of the camera: its frames are taken first."""
+    alone = record_presses(tables, INCLUSION[None], "precise", seed=3, jobs=1)
+    np.testing.assert_array_equal(scans.rows[0][0], alone.rows[0][0])
+
+
+def test_a_scans_frames_are_numbered_by_their_ramps_each_at_its_own_offset(tables):
+    recording = recorded_press(tables, INCLUSION, "precise", seed=5, further_mm=(4.0, 6.0))
+    ramps = recording.ramps()
+    assert list(ramps) == [0, 1, 2]
+    assert {len(frames) for frames in ramps.values()} == {FRAMES["precise"].count}
+    assert np.hypot(*recording.position_mm) == pytest.approx(1.5)
 
 
 def test_results_come_in_the_order_of_the_numbers():

@@ -6,14 +6,14 @@ from small_surrogate import linear_surrogate, white_noise
 
 from device.measurement.parameters import PARAMETERS
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, DEPTH, MODULUS, RESPONSE_COLUMNS, SIZE
+from device.measurement.ramp_modes.radial_profile import RESPONSE
+from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, RESPONSE_COLUMNS, SIZE
 from host_tools.press_models.dense_network import initial_layers
 from host_tools.press_models.noisy_presses import PressSet, random_press_set
 from host_tools.press_models.train_ensemble import DenseEnsemble, train_ensemble
 
 STD, COUNT, STEPS = 0.3, 20_000, 300
 EVEN = 1 / np.sqrt(3)
-RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_the_same_seed_gives_the_same_ensemble_and_the_members_differ(press_set)
 
 
 def test_too_few_presses_or_no_network_are_refused_by_name(press_set):
-    few = PressSet(press_set.normalised[:999], press_set.rows[:999], press_set.sampler)
+    few = PressSet(press_set.normalised[:999], press_set.rows[:999], press_set.direction_rad[:999], press_set.sampler)
     with pytest.raises(InvalidQuantity, match="^presses is 999"):
         train_ensemble(few, seed=1, members=1, steps=1, jobs=1)
     with pytest.raises(InvalidQuantity, match="^members is 0"):

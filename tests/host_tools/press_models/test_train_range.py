@@ -6,9 +6,9 @@ from scipy.special import expit
 from scipy.stats import norm
 from small_surrogate import COLUMNS, white_noise
 
-from device.measurement.parameters import normalise
-from device.measurement.ramp_modes.ellipticity import SECOND_COLUMNS
-from host_tools.press_models import train_range
+from device.measurement.parameters import PARAMETERS, denormalise, normalise
+from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES, network_rows
+from host_tools.press_models import fit_surrogate, train_range
 from host_tools.press_models.fit_surrogate import INCLUSION_HIGHEST, INCLUSION_REACH
 from host_tools.press_models.noisy_presses import NoiseSampler, PressSet
 from host_tools.press_models.press_samples import PressSamples
@@ -24,7 +24,6 @@ from host_tools.press_models.train_range import (
 )
 
 STD, COUNT = 0.3, 20_000
-RESPONSE = slice(44, 77)
 BUDGET = RangeBudget(members=1, steps=700)
 
 
@@ -34,7 +33,7 @@ def press_set() -> PressSet:
     normalised = normalise(draw_wide_parameters(COUNT, np.random.default_rng(1)))
     rows = np.zeros((COUNT, COLUMNS), np.float32)
     rows[:, 44:46] = normalised[:, :2]
-    return PressSet(normalised.astype(np.float32), rows, NoiseSampler(white_noise(STD)))
+    return PressSet(normalised.astype(np.float32), rows, np.zeros(COUNT), NoiseSampler(white_noise(STD)))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +42,8 @@ def network(press_set) -> RangeNetwork:
 
 
 def seen_at(size: float, depth: float, count: int = 1) -> np.ndarray:
-    rows = np.zeros((count, COLUMNS))
+    """Return rows as networks read them: their first columns are those of the profile."""
+    rows = np.zeros((count, len(NETWORK_NAMES)))
     rows[:, 44:46] = size, depth
     return rows
 
@@ -58,7 +58,7 @@ def test_the_odds_are_nearly_as_good_as_can_be(press_set, network):
     """Mean of -ln(probability of what is so), on fresh noise, against that of the exact probability."""
     rows = press_set.noisy(np.arange(COUNT), np.random.default_rng(9)).astype(float)
     outside = is_outside(press_set.normalised)
-    found, exact = expit(network.log_odds(rows)), np.clip(on_paper(rows[:, 44:46]), 1e-9, 1 - 1e-9)
+    found, exact = expit(network.log_odds(network_rows(rows))), np.clip(on_paper(rows[:, 44:46]), 1e-9, 1 - 1e-9)
     losses = [-np.mean(np.log(np.where(outside, p, 1 - p))) for p in (found, exact)]
     assert losses[1] < 0.4 < np.log(2)
     assert losses[0] < losses[1] + 0.03
@@ -78,27 +78,39 @@ def test_the_same_seed_gives_the_same_network(press_set):
     assert (first != other).all()
 
 
+ONLY_OFFSET = dict.fromkeys(PARAMETERS, 0.5) | {"offset_mm": 1.0}
+
+
 @pytest.fixture(scope="module")
 def surrogate() -> WideSurrogate:
-    """Of presses whose contrast is the far field's strength, and nothing else."""
-    parameters = draw_wide_parameters(3200, np.random.default_rng(2), inclusions_a_skin=3)
+    """Of presses whose contrast is the far field's strength, and nothing else but what their direction adds."""
+    rng = np.random.default_rng(2)
+    parameters = draw_wide_parameters(3200, rng, inclusions_a_skin=3)
+    direction_rad = rng.uniform(0, 2 * np.pi, 3200)
     with pytest.MonkeyPatch.context() as patch:  # terms of the probe's own surrogate are half as many, and enough here
         patch.setattr(train_range, "REACH", INCLUSION_REACH)
         patch.setattr(train_range, "HIGHEST", INCLUSION_HIGHEST)
-        return wide_surrogate(PressSamples(parameters, far_rows(parameters), np.zeros((3200, SECOND_COLUMNS))))
+        patch.setattr(fit_surrogate, "TURNED_REACH", ONLY_OFFSET)
+        return wide_surrogate(PressSamples(parameters, far_rows(parameters, direction_rad), direction_rad))
 
 
-def far_rows(parameters: np.ndarray) -> np.ndarray:
+def far_rows(parameters: np.ndarray, direction_rad: np.ndarray) -> np.ndarray:
+    """Return rows whose contrast grows by a tenth along the image's rows, falls by as much across them, 2 mm aside.
+
+    On the axis it does neither, and between as the offset.
+    """
     rows = np.zeros((len(parameters), COLUMNS))
     size_mm, depth_mm = parameters[:, 0], parameters[:, 1]
-    rows[:, :44] = ((size_mm / (depth_mm + size_mm / 2)) ** 3)[:, None]
+    strength = (size_mm / (depth_mm + size_mm / 2)) ** 3
+    rows[:, :44] = (strength * (1 + 0.05 * parameters[:, -1] * np.cos(2 * direction_rad)))[:, None]
     return rows
 
 
 def test_polynomials_follow_what_is_one_around_the_ranges_as_well(surrogate):
-    apart = draw_wide_parameters(200, np.random.default_rng(3))
+    rng = np.random.default_rng(3)
+    apart, direction_rad = draw_wide_parameters(200, rng), rng.uniform(0, 2 * np.pi, 200)
     assert is_outside(normalise(apart)).any()
-    np.testing.assert_allclose(surrogate.rows(apart), far_rows(apart), atol=1e-6)
+    np.testing.assert_allclose(surrogate.rows(apart, direction_rad), far_rows(apart, direction_rad), atol=1e-6)
 
 
 def test_a_press_set_keeps_coordinates_outside_and_is_drawn_anew_by_another_seed(surrogate):
@@ -106,3 +118,12 @@ def test_a_press_set_keeps_coordinates_outside_and_is_drawn_anew_by_another_seed
     assert 0.3 < is_outside(first.normalised).mean() < 0.7
     np.testing.assert_allclose(first.rows[:, :44].std(axis=1), 0, atol=1e-5)
     assert (first.normalised != other.normalised).all()
+    assert len(np.unique(first.direction_rad)) == len(first.rows)
+    assert (first.direction_rad != other.direction_rad).all()
+
+
+def test_rows_of_a_press_set_are_those_of_its_directions_also_across_blocks(surrogate, monkeypatch):
+    monkeypatch.setattr(train_range, "BLOCK", 7)
+    found = wide_press_set(surrogate, white_noise(STD), 20, 1)
+    expected = far_rows(denormalise(found.normalised.astype(float)), found.direction_rad)
+    np.testing.assert_allclose(found.rows, expected, atol=1e-5 * np.abs(expected).max())

@@ -6,12 +6,12 @@ import pytest
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, RANGES, normalise
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.surrogate import (
-    CONTRAST_COLUMNS,
     DEPTH,
+    INCLUSION_COLUMNS,
     MODULUS,
-    OFFSET_COLUMNS,
     RESPONSE_COLUMNS,
     SIZE,
+    WAVES,
     PressSurrogate,
     polynomial_coordinates,
 )
@@ -81,10 +81,10 @@ def test_rows_are_put_together_as_the_probes_own_surrogate_does(drawn):
     rng = np.random.default_rng(3)
     degrees = rng.integers(0, 3, (6, len(PARAMETERS))).astype(np.uint8)
     degrees[:, :2] = 0
-    fields = [
-        LegendreSum(degrees, rng.normal(size=(6, columns)))
-        for columns in (CONTRAST_COLUMNS + OFFSET_COLUMNS, RESPONSE_COLUMNS)
-    ]
-    inside = drawn[~is_outside(normalise(drawn))][:20]
-    found, expected = WideSurrogate(*fields).rows(inside), PressSurrogate(*fields).rows(normalise(inside))
+    columns_of = INCLUSION_COLUMNS, len(WAVES) * INCLUSION_COLUMNS, RESPONSE_COLUMNS
+    fields = [LegendreSum(degrees, rng.normal(size=(6, columns))) for columns in columns_of]
+    inside, direction_rad = drawn[~is_outside(normalise(drawn))][:20], rng.uniform(0, 2 * np.pi, 20)
+    found = WideSurrogate(*fields).rows(inside, direction_rad)
+    expected = PressSurrogate(*fields).rows(normalise(inside), direction_rad)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+    assert (found != WideSurrogate(*fields).rows(inside, direction_rad + 1.0)).any(axis=1).all()

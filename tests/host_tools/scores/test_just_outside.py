@@ -41,7 +41,8 @@ def test_one_of_three_tests_has_less_than_a_third_of_the_false_flags():
 def test_an_inclusion_inside_is_its_own_nearest(tables):
     answers = read_ramp_model(MODELS / "standard").answers
     row = profile_rows(tables, at_nominal(INSIDE)[None])[0]
-    nearest = nearest_inside(PressPosterior(row, answers.surrogate, answers.noise["standard"]), seed=0)
+    posterior = PressPosterior(row, answers.surrogate, answers.noise, direction_rad=np.zeros(1))
+    nearest = nearest_inside(posterior, seed=0)
     assert nearest.deviations < 1.5
     assert (nearest.inclusion.size_mm, nearest.inclusion.depth_mm) == pytest.approx((9.0, 5.0), rel=0.02)
 
@@ -83,11 +84,11 @@ def test_a_refusal_is_asked_for_only_where_a_test_could_tell():
     large = quantity(14.0, 15.0, high_is_open=True)
     found = [estimate(large, quantity(6.5, 8.0), quantity(20.0, 90.0)), estimate(*[UNKNOWN_QUANTITY] * 3)]
     for too_alike in (3.0, 3.7):
-        assert _benchmarks("standard", INCLUSIONS[0], NearestInside(INSIDE, too_alike), found) == []
-    [benchmark] = _benchmarks("standard", INCLUSIONS[0], NearestInside(INSIDE, 4.0), found)
+        assert _benchmarks(INCLUSIONS[0], NearestInside(INSIDE, too_alike), found) == []
+    [benchmark] = _benchmarks(INCLUSIONS[0], NearestInside(INSIDE, 4.0), found)
     assert benchmark.measured == 0.5
     assert not benchmark.passed
-    assert _row("standard", INCLUSIONS[0], NearestInside(INSIDE, 4.0), found)[8:] == (
+    assert _row(INCLUSIONS[0], NearestInside(INSIDE, 4.0), found)[8:] == (
         "96%",
         "99%",
         "50%",

@@ -20,13 +20,13 @@ def test_only_presses_that_a_test_could_tell_are_judged():
     apart = np.where(np.arange(PRESSES) < 40, 6.0, 2.0)
     refused = apart > 2
     refused[[3, 7]] = False
-    benchmark = _benchmark("standard", apart, refused)
+    benchmark = _benchmark(apart, refused)
     assert benchmark.measured == pytest.approx(38 / 40)
     assert benchmark.passed
     assert "(40 presses)" in benchmark.case
     refused[11] = False
-    assert not _benchmark("standard", apart, refused).passed
-    assert not _benchmark("standard", np.full(len(apart), 2.0), refused).passed  # none is left to be judged
+    assert not _benchmark(apart, refused).passed
+    assert not _benchmark(np.full(len(apart), 2.0), refused).passed  # none is left to be judged
 
 
 def test_four_deviations_are_what_a_test_tells_nearly_always():
@@ -61,7 +61,7 @@ def test_each_press_turns_its_inclusion_to_another_side(tables, monkeypatch):
 
 
 def test_the_chapter_counts_what_each_mode_refuses(monkeypatch, tables):
-    """Everything is refused in standard, nothing in precise; solves and recordings are words."""
+    """Everything is refused in standard, nothing in quick; solves and recordings are words."""
     monkeypatch.setattr(ellipsoids, "in_parallel", lambda work, count, jobs: [work(i) for i in range(count)])
     monkeypatch.setattr(ellipsoids.Oblong, "on", lambda inclusion, tables: inclusion)
     monkeypatch.setattr(ellipsoids, "recorded_press", lambda inclusion, *_, **__: inclusion)
@@ -73,8 +73,8 @@ def test_the_chapter_counts_what_each_mode_refuses(monkeypatch, tables):
         return replace(answered, size_mm=UNKNOWN_QUANTITY) if mode == "standard" else answered
 
     chapter = oblong_chapter(answer, None, tables)
-    assert [(one.measured, one.passed) for one in chapter.benchmarks] == [(1.0, True), (0.0, False)]
+    assert [(one.measured, one.passed) for one in chapter.benchmarks] == [(1.0, True)]
     shares, each = chapter.tables
-    assert shares.rows == (("standard", "100.0%", "100.0%"), ("precise", "0.0%", "100.0%"), ("quick", "0.0%", "-"))
-    assert len(each.rows) == 2 * ELLIPSOIDS
+    assert shares.rows == (("standard", "100.0%", "100.0%"), ("quick", "0.0%", "-"))
+    assert len(each.rows) == ELLIPSOIDS
     assert each.rows[0][-3:] == ("10.0", "100%", "100%")

@@ -9,14 +9,14 @@ import pytest
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
 from device.measurement.mode import Mode
 from device.measurement.recording.recording import Recording
-from host_tools.scores.outside import Kind, outside_chapter, refused_share
+from host_tools.scores.outside import ORDINARY_KIND, Kind, outside_chapter, refused_share
 
 ANSWERED, UNDETERMINED, REFUSED, UNSEEN = "answered", "undetermined", "refused", "unseen"
 
 
-def presses(*outcomes: str) -> Kind:
+def presses(*outcomes: str, name: str = "spots", modes: tuple[Mode, ...] = ("standard", "quick")) -> Kind:
     """Each recording is the word for what is made of it."""
-    return Kind("spots", len(outcomes), lambda mode, i: cast(Recording, outcomes[i]))
+    return Kind(name, len(outcomes), lambda mode, i: cast(Recording, outcomes[i]), modes)
 
 
 def answer(recording: Recording, mode: Mode) -> Estimate:
@@ -48,17 +48,27 @@ def test_a_kind_is_recorded_and_answered_in_the_mode_that_is_asked():
         asked.append((mode, number))
         return cast(Recording, ANSWERED)
 
-    refused_share(answer, Kind("one", 2, record), "precise", jobs=1)
-    assert asked == [("precise", 0), ("precise", 1)]
+    refused_share(answer, Kind("one", 2, record), "quick", jobs=1)
+    assert asked == [("quick", 0), ("quick", 1)]
 
 
-def test_few_of_the_first_kind_and_nearly_all_of_the_others_must_be_refused():
+def test_few_ordinary_presses_and_nearly_all_of_the_others_must_be_refused():
     """A chapter passes on a false share of 0 beside one of 1, and fails when both kinds change places."""
-    good, strange = presses(ANSWERED, ANSWERED, UNSEEN), presses(REFUSED, UNSEEN)
-    chapter = outside_chapter(answer, [good, strange], jobs=1)
-    assert [one.measured for one in chapter.benchmarks] == [0.0, 1.0, 0.0, 1.0]
+    good, strange = (ANSWERED, ANSWERED, UNSEEN), (REFUSED, UNSEEN)
+    chapter = outside_chapter(answer, [presses(*good, name=ORDINARY_KIND), presses(*strange)], jobs=1)
+    assert [one.measured for one in chapter.benchmarks] == [0.0, 1.0]
     assert chapter.passed
-    assert not outside_chapter(answer, [strange, good], jobs=1).passed
+    assert not outside_chapter(answer, [presses(*strange, name=ORDINARY_KIND), presses(*good)], jobs=1).passed
+
+
+def test_each_mode_is_judged_on_the_kinds_that_are_of_it():
+    scan_only = presses(REFUSED, ANSWERED, name="gives way", modes=("precise",))
+    chapter = outside_chapter(answer, [presses(REFUSED), scan_only], jobs=1)
+    assert [(one.case, one.measured) for one in chapter.benchmarks] == [
+        ("standard, spots (1)", 1.0),
+        ("precise, gives way (2)", 0.5),
+    ]
+    assert chapter.tables[0].rows == (("spots (1)", "100%"),)
 
 
 def test_mode_quick_is_shown_and_not_judged():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_surrogate import COLUMNS, linear_surrogate, white_noise
+from small_surrogate import COLUMNS, linear_surrogate, random_surrogate, white_noise
 
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
@@ -30,6 +30,14 @@ def test_an_exact_row_gives_back_size_depth_and_modulus(slopes, modulus):
     surrogate = linear_surrogate(slopes)
     found = known_nuisances_fit(surrogate, surrogate.rows(normalised[None])[0], normalised, ALIKE)
     np.testing.assert_allclose(found, denormalise(normalised)[:3], rtol=1e-6)
+
+
+def test_a_press_lies_along_the_images_rows_as_the_rows_that_it_is_fitted_to():
+    """Sizes, depths and moduli that any direction would make of it are others."""
+    surrogate = random_surrogate()
+    along, mean = (surrogate.rows(TRUTH[None], direction_rad)[0] for direction_rad in (np.zeros(1), None))
+    np.testing.assert_allclose(known_nuisances_fit(surrogate, along, TRUTH, ALIKE), denormalise(TRUTH)[:3], rtol=1e-5)
+    assert np.abs(known_nuisances_fit(surrogate, mean, TRUTH, ALIKE) / denormalise(TRUTH)[:3] - 1).max() > 0.01
 
 
 def test_a_row_that_does_not_fit_is_fitted_by_least_squares(slopes):
@@ -79,7 +87,7 @@ def test_a_fit_stays_inside_the_trained_ranges(slopes):
 
 def test_the_chapter_scores_each_unknown_over_all_presses_and_by_octiles(tables, monkeypatch):
     """Presses that are answered with i % too much size, i being their rank by it: octiles of five ranks each."""
-    noise = {"precise": white_noise(0.01)}
+    noise = white_noise(0.01)
     fitted = []
 
     def answer(surrogate, row, normalised, std):
@@ -108,4 +116,6 @@ def test_the_chapter_scores_each_unknown_over_all_presses_and_by_octiles(tables,
 
 def test_too_few_presses_for_a_score_of_the_modulus_are_refused(tables):
     with pytest.raises(InvalidQuantity, match="presses without noise is 39, but must be at least 40 presses"):
-        noise_free_chapter(RampAnswers(linear_surrogate(np.zeros((9, RESPONSE_COLUMNS))), {}), tables, presses=39)
+        noise_free_chapter(
+            RampAnswers(linear_surrogate(np.zeros((9, RESPONSE_COLUMNS))), white_noise(0.01)), tables, presses=39
+        )

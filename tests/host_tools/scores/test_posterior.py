@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from linear_press import STD, TRUTH, noisy_row, on_paper, random_slopes
-from small_surrogate import linear_surrogate, white_noise
+from small_surrogate import COLUMNS, LinearRows, linear_surrogate, white_noise
 
 from device.measurement.parameters import EVEN_STD, PARAMETERS
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.radial_profile import FIRST
 from device.measurement.ramp_modes.surrogate import MODULUS
 from host_tools.scores import posterior as mode_posterior
-from host_tools.scores.posterior import OneScene, Sampled, posterior_chapter, sampled
+from host_tools.scores.posterior import OneScene, Sampled, posterior_chapter, sampled, split_r_hat
 
-STEPS, BURN_IN = 1200, 400
+STEPS, BURN_IN = 600, 400
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +48,7 @@ def test_mean_and_spread_are_those_of_linear_algebra(found, row, slopes):
     """The ends of the ranges are far away; chance is that of the steps over their autocorrelation."""
     mean, covariance = on_paper(row, slopes)
     std = np.sqrt(np.diag(covariance))
-    chance = np.sqrt(found.autocorrelation / (STEPS * mode_posterior.WALKERS))
+    chance = 1 / np.sqrt(found.effective_samples)
     assert chance < 0.1
     assert np.abs((found.mean[:2] - mean[:2]) / std[:2]).max() < 5 * chance
     np.testing.assert_allclose(found.std[:2], std[:2], rtol=5 * chance)
@@ -56,8 +60,30 @@ def test_what_the_row_does_not_tell_keeps_its_even_prior(found):
     assert found.std[MODULUS] == pytest.approx(EVEN_STD, rel=0.1)
 
 
-def test_the_autocorrelation_is_far_shorter_than_the_chain(found):
-    assert 10 < found.autocorrelation < STEPS / 5
+def test_the_chains_are_worth_far_fewer_samples_than_they_hold(found):
+    """Autocorrelation times are tens of steps, and each run is many of them long."""
+    drawn = mode_posterior.RUNS * STEPS * mode_posterior.WALKERS
+    assert 10 < drawn / found.effective_samples < STEPS / 5
+
+
+def test_runs_that_began_apart_agree(found):
+    """Chance alone: 1 + half the variance of means of some hundred effective samples a half."""
+    assert 1.0 < found.r_hat < 1.03
+
+
+def test_r_hat_of_equal_halves_is_nearly_1_and_of_a_moved_run_what_its_distance_makes():
+    """Means of four halves at 0, 0, 2 and 2, each of variance 1: 1 + 4 / 3."""
+    rng = np.random.default_rng(4)
+    chains = rng.standard_normal((2, 20_000, 2, 3))
+    assert split_r_hat(chains) == pytest.approx(1.0, abs=1e-3)
+    chains[1, ..., 2] += 2.0
+    assert split_r_hat(chains) == pytest.approx(np.sqrt(1 + 4 / 3), rel=0.01)
+
+
+def test_r_hat_notes_a_run_that_drifts():
+    """Halves of one run at -1 and 1, twice: as far apart as two runs at -1 and 1."""
+    chain = np.random.default_rng(4).standard_normal((10_000, 2, 1)) + np.repeat([-1.0, 1.0], 5_000)[:, None, None]
+    assert split_r_hat([chain, chain]) == pytest.approx(np.sqrt(1 + 4 / 3), rel=0.03)
 
 
 def test_the_same_seed_gives_the_same_sample_and_another_one_another(row, slopes, monkeypatch):
@@ -81,22 +107,51 @@ def test_a_truth_at_the_end_of_its_range_is_begun_inside_it(slopes, monkeypatch)
     assert np.isfinite(found.std).all()
 
 
-def test_the_chapter_sets_a_mode_that_is_asked_for_over_the_posterior_and_its_spread(monkeypatch):
+def test_mode_and_reference_are_told_the_direction_of_each_press(monkeypatch):
+    """What a direction adds is twice the light: neither errs by more than its own spread says."""
+    slopes, along = np.random.default_rng(5).normal(0.0, 0.15, (len(PARAMETERS), COLUMNS)), np.zeros(COLUMNS)
+    along[FIRST] = 2.0
+    answers = RampAnswers(LinearRows(slopes, along), white_noise(STD))
+    model = SimpleNamespace(answers=answers, first_guesses=lambda rows: np.zeros((len(rows), 3)))
+    posteriors = []
+
+    def reference(posterior, truth, seed):
+        posteriors.append(np.mean(posterior.residuals(truth) ** 2))
+        return Sampled(truth[:3], np.ones(3), 1.0, 1.0)
+
+    monkeypatch.setattr(mode_posterior, "sampled", reference)
+    found = mode_posterior.compared(model, seed=3, scenes=4, jobs=1)
+    assert np.mean(posteriors) == pytest.approx(1.0, abs=0.25)  # of 4 x 153 columns
+    for one in found:
+        assert np.abs((one.mean - one.truth) / one.spread).max() < 5
+
+
+def test_the_chapter_sets_the_mode_over_the_posterior_and_its_spread(monkeypatch):
     """Errors of 0.3 where the posterior's mean errs by 0.2 and says 0.25: 1.5 of the mean's, 1.2 of the bound."""
     asked = []
 
-    def compared(model, mode, *, seed, scenes, jobs):
-        asked.append((mode, scenes))
+    def compared(model, *, seed, scenes, jobs):
+        asked.append(scenes)
         truth, alike = np.zeros(3), np.ones(3)
         return [
-            OneScene(truth, Sampled(0.2 * alike, 0.25 * alike, 40.0), sign * 0.3 * alike, alike) for sign in (-1, 1)
+            OneScene(
+                truth,
+                Sampled(0.2 * alike, 0.25 * alike, 500.0 + 100 * sign, 1.02 + 0.02 * sign),
+                sign * 0.3 * alike,
+                alike,
+            )
+            for sign in (-1, 1)
         ]
 
     monkeypatch.setattr(mode_posterior, "compared", compared)
-    chapter = posterior_chapter(None, modes=("standard",), scenes=2)
-    assert asked == [("standard", 2)]
-    assert [one.error for one in chapter.benchmarks] == pytest.approx([1.5] * 3)
-    assert chapter.tables[0].rows[0] == ("standard, size_mm", "0.3000", "0.2000", "0.2500", "1.20")
+    chapter = posterior_chapter(None, scenes=2)
+    assert asked == [2]
+    assert [one.error for one in chapter.benchmarks[:3]] == pytest.approx([1.5] * 3)
+    assert [one.measured for one in chapter.benchmarks[3:]] == [1.02, pytest.approx(1.04), 400.0]
+    assert [one.passed for one in chapter.benchmarks[3:]] == [False, True, True]
+    errors, alike = chapter.tables
+    assert alike.rows[0] == ("size_mm", "1.200", "1.840", "4.000", "4.000", "4.000")
+    assert errors.rows[0] == ("size_mm", "0.3000", "0.2000", "0.2500", "1.20")
 
 
 def test_one_scene_is_no_comparison():

@@ -38,3 +38,20 @@ def test_the_card_states_frames_time_and_errors_of_the_same_presses(folder, tabl
     assert entry["determined"]["size_mm"] == 1.0
     assert entry["compute_ms"] >= 0
     assert "cores" in entry["machine"]
+
+
+def test_a_scan_counts_the_frames_of_its_ramps(folder, tables, monkeypatch):
+    monkeypatch.setattr(mode_dial, "PRESSES", 1)
+    card = json.loads((folder / "model.json").read_text())
+    (folder / "model.json").write_text(json.dumps(card | {"modes": {"precise": {}}}))
+    quantity, asked = Quantity(10.0, 9.0, 11.0, 0.5, True), []
+
+    def answer(recording, mode):
+        asked.append(len(recording.ramps()))
+        return Estimate(quantity, quantity, quantity, "ok", "", mode, "m", "0", "c", True, features={})
+
+    publish_dial(folder, ("precise",), answer, tables)
+    entry = json.loads((folder / "model.json").read_text())["modes"]["precise"]["dial"]
+    assert asked == [2]
+    assert entry["frames"] == 20
+    assert entry["median_percent_of_all"] == entry["median_percent"]  # nothing was left unanswered

@@ -13,7 +13,15 @@ from rich.console import Console
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, EstimateStatus, Quantity
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
-from host_tools.scores.score_recordings import Sample, Score, ScoredPress, print_score, score, unbounded
+from host_tools.scores.score_recordings import (
+    Sample,
+    Score,
+    ScoredPress,
+    print_score,
+    score,
+    score_record,
+    unbounded,
+)
 
 
 def estimate_of(quantities: Sequence[Quantity], status: EstimateStatus = "ok") -> Estimate:
@@ -105,6 +113,17 @@ def test_presses_without_numbers_are_counted_by_status_but_have_no_error():
     assert text.startswith("5 presses: 4 ok, 1 outside_range")
     assert "4 answered presses" in text
     assert row(text, "mean error")[0] == "10.00 %"
+
+
+def test_refused_presses_count_as_the_middle_of_the_ranges_among_all():
+    """Sizes of 10 mm: one answered 11, one refused and guessed 8.5; 6 mm deep, 60 kPa, guessed 8 and 40."""
+    refused = scored(Inclusion(10.0, 6.0, 60.0), REFUSED)
+    presses = [of_size(10.0, quantity(11.0, 2.0)), refused]
+    assert row(printed(presses), "mean error of all, others guessed") == ["12.50 %", "16.67 %", "16.67 %"]
+    assert row(printed(presses), "mean error")[0] == "10.00 %"
+    record = score_record(Score(tuple(presses)))
+    assert record["all_mean_percent"]["size_mm"] == pytest.approx(12.5)
+    assert record["unknowns"]["size_mm"]["mean_percent"] == pytest.approx(10.0)
 
 
 def test_of_refused_presses_only_there_is_nothing_to_tabulate():

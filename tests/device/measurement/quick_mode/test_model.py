@@ -34,7 +34,7 @@ def test_one_frame_is_answered_and_each_truth_lies_in_its_interval(held, quick_m
 
 def test_the_row_is_the_contrast_that_a_ramp_shows_at_that_force(held, pressed):
     """Between 0.40 and 0.55 N the contrast on each ring lies between what the ramp's profile says there."""
-    row, profile = quick_press(held).row, press_profile(pressed("precise"))
+    row, profile = quick_press(held).row, press_profile(pressed("standard"))
     low, high = np.sort(profile.contrast[2:], axis=0)
     assert (row[:RINGS] > low - 0.01).all()
     assert (row[:RINGS] < high + 0.01).all()

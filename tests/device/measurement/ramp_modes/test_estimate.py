@@ -7,17 +7,23 @@ import numpy as np
 import pytest
 
 from device.measurement.estimate import NO_NUMBERS, NOTHING_STANDS_OUT
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from device.measurement.ramp_modes import estimate as estimate_module
+from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.estimate import (
+    PLACES_MM,
     REASONS,
+    WORTH_A_RAMP,
+    advise_scan,
     estimate_ramp,
     rejections,
     stands_out,
 )
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
-from device.measurement.ramp_modes.radial_profile import ROW_NAMES, press_profile
+from device.measurement.ramp_modes.radial_profile import COLUMNS, press_profile, press_profiles
 from device.measurement.recording.ring_means import RINGS
+from device.measurement.scan_advice import half_widths
 from device.simulation.physics.neighbour import Neighbour
 
 CRITICAL = CriticalValues(misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
@@ -28,9 +34,15 @@ def ramp(pressed):
     return pressed("standard")
 
 
+@pytest.fixture(scope="module")
+def scan(pressed):
+    return pressed("precise", further_mm=(4.0,))
+
+
 @pytest.mark.parametrize("mode", RAMP_MODES)
-def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(pressed, ramp_model, calibration, mode):
-    estimate = estimate_ramp(pressed(mode), mode, ramp_model, calibration)
+def test_the_truth_lies_in_each_interval_and_size_and_depth_near_it(ramp, scan, ramp_model, calibration, mode):
+    recording = {"standard": ramp, "precise": scan}[mode]
+    estimate = estimate_ramp(recording, mode, ramp_model, calibration)
     assert (estimate.mode, estimate.model) == (mode, "standard")
     for name, truth, share in (("size_mm", 12.0, 0.1), ("depth_mm", 6.0, 0.1), ("youngs_modulus_kpa", 60.0, None)):
         quantity = getattr(estimate, name)
@@ -43,14 +55,14 @@ def test_a_press_is_answered_near_the_truth_and_each_truth_lies_in_its_interval(
 
 @pytest.mark.parametrize("tissue_kpa", [4.3, 5.7])
 def test_the_press_beside_the_lesion_tells_the_patients_tissue(pressed, ramp_model, calibration, tissue_kpa):
-    recording = pressed("precise", tissue_modulus_kpa=tissue_kpa)
-    features = estimate_ramp(recording, "precise", ramp_model, calibration).features
+    recording = pressed("standard", tissue_modulus_kpa=tissue_kpa)
+    features = estimate_ramp(recording, "standard", ramp_model, calibration).features
     assert features["tissue_modulus_std_kpa"] < 0.4
     assert features["tissue_modulus_kpa"] == pytest.approx(tissue_kpa, abs=3 * features["tissue_modulus_std_kpa"])
 
 
-def test_the_same_recording_gives_the_same_estimate_again(ramp, ramp_model, calibration):
-    first, again = (estimate_ramp(ramp, "precise", ramp_model, calibration) for _ in range(2))
+def test_the_same_recording_gives_the_same_estimate_again(scan, ramp_model, calibration):
+    first, again = (estimate_ramp(scan, "precise", ramp_model, calibration) for _ in range(2))
     assert first == again
 
 
@@ -62,7 +74,7 @@ def test_an_unknown_that_is_not_determined_gets_the_whole_range(pressed, ramp_mo
     assert not modulus.identifiable
     assert modulus.low_is_open
     assert modulus.high_is_open
-    assert estimate.status == "not_identifiable"
+    assert estimate.status == "partly_identifiable"
     assert "Young's modulus" in estimate.reason
 
 
@@ -77,12 +89,12 @@ def test_an_interval_is_open_only_where_the_trained_range_ends(ramp, ramp_model,
 
 def flat_row(middle, rim):
     """Return a row whose light grows with the force nowhere, of these contrasts on the four inner and other rings."""
-    row = np.zeros(len(ROW_NAMES))
+    row = np.zeros(COLUMNS)
     row[: 4 * RINGS] = np.tile(np.repeat([middle, rim], [4, RINGS - 4]), 4)
     return row
 
 
-WHITE = PressNoise(1e-12 * np.eye(len(ROW_NAMES)), ErrorLevels(gain_ratio=0.01, zero_n=0.0, model_ratio=1e-6))
+WHITE = PressNoise(1e-12 * np.eye(COLUMNS), ErrorLevels(gain_ratio=0.01, zero_n=0.0, model_ratio=1e-6))
 """Light drifts by 1 % between the presses, the flat field by 0.2 %; all else hardly anything."""
 
 
@@ -148,9 +160,9 @@ def test_all_rejections_are_said_and_what_is_no_number_is_rejected_too():
 
 def test_a_press_that_is_refused_keeps_the_figures_and_their_critical_values(pressed, ramp_model, calibration):
     """Gel on the face: which of the three figures is above its critical value is what the sentences say."""
-    refused = estimate_ramp(pressed("precise", wet_ratio=0.4), "precise", ramp_model, calibration)
+    refused = estimate_ramp(pressed("standard", wet_ratio=0.4), "standard", ramp_model, calibration)
     assert refused.status == "outside_range"
-    critical = ramp_model.critical["precise"]
+    critical = ramp_model.critical["standard"]
     for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"):
         assert refused.features[f"critical_{name}"] == getattr(critical, name)
     above = [name for name in REASONS if refused.features[name] > refused.features[f"critical_{name}"]]
@@ -200,14 +212,112 @@ def test_a_round_inclusions_elongation_is_told_beside_the_other_features(ramp, r
 
 def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, ramp_model):
     """2 mm aside the second harmonic of a sphere is far above noise; its best fit's is as large."""
-    aside = press_profile(pressed("precise", (12.0, 4.5, 60.0), offset_mm=2.0))
-    best, spot = ramp_model.answer(aside.as_row(), "precise").best, ramp_model.ellipticity
+    aside = press_profile(pressed("standard", (12.0, 4.5, 60.0), offset_mm=2.0))
+    direction_rad = np.array([aside.direction_rad])
+    best = ramp_model.answer(aside.as_row()[None], direction_rad).best
+    answers, limit = ramp_model.answers, ramp_model.critical["standard"].elongation_deviations
     assert np.abs(aside.second_harmonic).max() > 0.005
-    limit = ramp_model.critical["precise"].elongation_deviations
-    assert spot.elongation_deviations(aside.second_harmonic, best, "precise") < limit
+
+    def deviations(at):
+        (row,) = answers.surrogate.rows(at[None], direction_rad)
+        return elongation_deviations(aside.second_harmonic, row, answers.noise)
+
+    assert deviations(best) < limit
     on_axis = best.copy()
     on_axis[-1] = -1.0
-    assert spot.elongation_deviations(aside.second_harmonic, on_axis, "precise") > limit
+    assert deviations(on_axis) > limit
+
+
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_ramps_are_answered_in_the_directions_that_their_frames_show(scan, ramp_model, calibration, mode, monkeypatch):
+    """And whether they are round is looked for in the same ones."""
+    asked, answer, found = [], ramp_model.answer, ramp_model.found
+
+    def answered(rows, direction_rad):
+        asked.append(direction_rad)
+        return answer(rows, direction_rad)
+
+    def judged(answer, seen):
+        asked.append(seen.direction_rad)
+        return found(answer, seen)
+
+    monkeypatch.setattr(ramp_model, "answer", answered)
+    monkeypatch.setattr(ramp_model, "found", judged)
+    estimate_ramp(scan, mode, ramp_model, calibration)
+    shown = [profile.direction_rad for profile in press_profiles(scan)]
+    expected = shown if mode == "precise" else shown[:1]
+    assert [one.tolist() for one in asked] == [expected] * 2
+
+
+def test_a_further_ramp_is_weighed_beside_those_so_far_in_their_directions(scan, ramp_model, calibration, monkeypatch):
+    asked, worth = [], estimate_module.worth_of_places
+
+    def weighed(*told):
+        asked.append(told[-1].tolist())
+        return worth(*told)
+
+    monkeypatch.setattr(estimate_module, "worth_of_places", weighed)
+    advise_scan(scan, ramp_model, calibration)
+    assert asked == [[profile.direction_rad for profile in press_profiles(scan)]]
+
+
+def test_a_scan_tells_more_than_its_first_ramp(scan, ramp, ramp_model, calibration):
+    """One of two ramps and the same one alone: intervals of what both determine are narrower."""
+    both, one = (half_widths(estimate_ramp(r, "precise", ramp_model, calibration)) for r in (scan, ramp))
+    assert set(both) == set(one) == set(UNKNOWNS)
+    assert both["size_mm"] < one["size_mm"]
+    assert both["depth_mm"] < one["depth_mm"]
+
+
+def test_half_widths_are_those_of_the_intervals_and_nothing_without_numbers(ramp, ramp_model, calibration, pressed):
+    estimate = estimate_ramp(ramp, "standard", ramp_model, calibration)
+    size = estimate.size_mm
+    assert half_widths(estimate)["size_mm"] == pytest.approx((size.high - size.low) / 2)
+    nothing = estimate_ramp(pressed("standard", (0.0, 6.0, 60.0)), "standard", ramp_model, calibration)
+    assert half_widths(nothing) == {}
+
+
+def test_after_one_ramp_a_further_one_is_advised_at_a_place_that_narrows_something(ramp, ramp_model, calibration):
+    advice = advise_scan(ramp, ramp_model, calibration)
+    assert advice.estimate == estimate_ramp(ramp, "precise", ramp_model, calibration)
+    assert advice.half_width == half_widths(advice.estimate)
+    assert advice.next_offset_mm in PLACES_MM
+    parts = [advice.expected_half_width[name] / advice.half_width[name] for name in UNKNOWNS]
+    assert min(parts) <= 1 - WORTH_A_RAMP
+    assert max(parts) <= 1 + 1e-9
+
+
+def test_the_more_ramps_there_are_the_less_a_further_one_is_expected_to_tell(ramp, scan, ramp_model, calibration):
+    first, second = (advise_scan(recording, ramp_model, calibration) for recording in (ramp, scan))
+
+    def part(advice):
+        return min(advice.expected_half_width[name] / advice.half_width[name] for name in UNKNOWNS)
+
+    assert part(second) > part(first)
+
+
+def test_where_there_are_no_numbers_nothing_is_advised(pressed, ramp_model, calibration):
+    for recording in (pressed("standard", (0.0, 6.0, 60.0)), pressed("standard", wet_ratio=0.4)):
+        advice = advise_scan(recording, ramp_model, calibration)
+        assert advice.estimate.size_mm.value is None
+        assert (advice.next_offset_mm, dict(advice.half_width), dict(advice.expected_half_width)) == (None, {}, {})
+
+
+def test_a_further_ramp_that_narrows_nothing_is_not_asked_for(ramp, ramp_model, calibration, monkeypatch):
+    none = np.full((len(PLACES_MM), len(UNKNOWNS)), 1 - 0.9 * WORTH_A_RAMP)
+    monkeypatch.setattr(estimate_module, "worth_of_places", lambda *asked: none)
+    advice = advise_scan(ramp, ramp_model, calibration)
+    assert advice.next_offset_mm is None
+    assert advice.expected_half_width == advice.half_width
+
+
+def test_of_places_the_one_that_narrows_most_all_told_is_advised(ramp, ramp_model, calibration, monkeypatch):
+    parts = np.full((len(PLACES_MM), len(UNKNOWNS)), 0.9)
+    parts[3] = 0.9, 0.6, 0.8
+    monkeypatch.setattr(estimate_module, "worth_of_places", lambda *asked: parts)
+    advice = advise_scan(ramp, ramp_model, calibration)
+    assert advice.next_offset_mm == PLACES_MM[3]
+    assert advice.expected_half_width["depth_mm"] == pytest.approx(0.6 * advice.half_width["depth_mm"])
 
 
 def test_full_scale_pixels_are_refused(ramp, ramp_model, calibration):

@@ -1,5 +1,7 @@
 """The noise model against direct averages over the angle, and what each kind of drift does to a row."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_surrogate import COLUMNS, EXACT, white_noise
@@ -9,18 +11,17 @@ from device.measurement.ramp_modes.noise import (
     PressNoise,
     circle_correlation,
     drift_directions,
+    harmonics_by_force,
     light_ratio,
     ring_correlation,
     smooth_errors,
-    smooth_second_harmonics,
 )
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, RESPONSE_COLUMNS
+from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, PROFILE_FORCES_N, RESPONSE, SECOND
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS, ring_weights
 
 POWER = 0.8
-RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 
 
 @pytest.fixture
@@ -90,16 +91,27 @@ def test_a_short_field_averages_out_along_a_circle_but_not_in_the_middle():
 
 
 def test_more_light_moves_a_contrast_by_the_light_that_is_there(row):
-    """(1 + g) (1 + c) - 1 = c + g (1 + c); it leaves the reference response; an offset is part of a contrast."""
+    """(1 + g) (1 + c) - 1 = c + g (1 + c); it leaves the reference response; harmonics are part of a contrast."""
     gain, _ = drift_directions(row)
     np.testing.assert_allclose(gain[:CONTRAST_COLUMNS], 1 + row[:CONTRAST_COLUMNS], rtol=1e-14)
     np.testing.assert_array_equal(gain[RESPONSE], 0.0)
     np.testing.assert_array_equal(gain[RESPONSE.stop :], row[RESPONSE.stop :])
 
 
-def test_an_offsets_light_is_the_mean_over_the_loads_at_its_ring(row):
-    contrast = row[:CONTRAST_COLUMNS].reshape(-1, RINGS)
-    np.testing.assert_allclose(light_ratio(row)[RESPONSE.stop :], 1 + contrast.mean(axis=0)[1:], rtol=1e-14)
+def test_a_harmonics_light_is_that_of_its_ring_and_force(row):
+    """First harmonics have no ring in the middle, second ones neither that nor the outermost one."""
+    light, contrast = light_ratio(row), row[:CONTRAST_COLUMNS].reshape(-1, RINGS)
+    np.testing.assert_allclose(light[FIRST], 1 + contrast[:, 1:].ravel(), rtol=1e-14)
+    np.testing.assert_allclose(light[SECOND], 1 + contrast[:, 1:-1].ravel(), rtol=1e-14)
+    np.testing.assert_array_equal(light[RESPONSE], 1.0)
+
+
+def test_a_drift_of_the_cells_zero_moves_harmonics_as_the_contrast_of_their_ring_and_force(row):
+    """Light that is the same power of the force everywhere moves all of a ring by one ratio: -0.8 / F a newton."""
+    _, zero = drift_directions(row)
+    for columns in (FIRST, SECOND):
+        per_n = np.repeat(-POWER / PROFILE_FORCES_N, (columns.stop - columns.start) // len(PROFILE_FORCES_N))
+        np.testing.assert_allclose(zero[columns], row[columns] * per_n, rtol=1e-9)
 
 
 def test_a_drift_of_the_cells_zero_looks_up_the_reference_at_another_force(row):
@@ -123,7 +135,7 @@ def test_drifts_of_many_rows_are_those_of_each(row):
 
 
 def test_drifts_enter_the_covariance_with_their_levels(row):
-    levels = ErrorLevels(gain_ratio=0.02, zero_n=0.0, flat_field_ratio=0.0, model_ratio=0.0)
+    levels = replace(EXACT, gain_ratio=0.02)
     light = 1 + row[:CONTRAST_COLUMNS]
     covariance = white_noise(1e-3, levels).covariance(row)[:CONTRAST_COLUMNS, :CONTRAST_COLUMNS]
     expected = np.outer(light, light) * (4e-4 + 1e-6 * np.eye(CONTRAST_COLUMNS))
@@ -140,22 +152,33 @@ def test_the_flat_field_is_common_to_all_loads_and_the_models_error_is_each_ones
     assert model[0, 0] == pytest.approx(1e-4 * ring_correlation(ErrorLevels().model_mm, harmonic=0)[0, 0])
 
 
-def test_in_second_harmonics_too_the_flat_field_is_common_and_the_models_error_each_loads_own():
-    """Without the ring in the middle, which has none, and the outermost one: nine rings of four loads are left."""
-    flat = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))
-    model = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.02))
+@pytest.mark.parametrize(("columns", "harmonic", "rings"), [(FIRST, 1, np.s_[1:]), (SECOND, 2, np.s_[1:-1])])
+def test_in_harmonics_too_the_flat_field_is_common_and_the_models_error_each_loads_own(columns, harmonic, rings):
+    flat = smooth_errors(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.0))[columns, columns]
+    model = smooth_errors(ErrorLevels(flat_field_ratio=0.0, model_ratio=0.02))[columns, columns]
     of_flat, of_model = (
-        ratio**2 * ring_correlation(length_mm, harmonic=2)[1:-1, 1:-1]
+        ratio**2 * ring_correlation(length_mm, harmonic=harmonic)[rings, rings]
         for ratio, length_mm in ((0.01, ErrorLevels().flat_field_mm), (0.02, ErrorLevels().model_mm))
     )
-    assert flat.shape == model.shape == (36, 36)
+    size = len(of_flat)
+    assert flat.shape == model.shape == (4 * size, 4 * size)
     for load in range(4):
         for other in range(4):
-            block = np.s_[9 * load : 9 * load + 9, 9 * other : 9 * other + 9]
+            block = np.s_[size * load : size * (load + 1), size * other : size * (other + 1)]
             np.testing.assert_allclose(flat[block], of_flat, rtol=1e-14)
             np.testing.assert_allclose(model[block], of_model if other == load else 0.0, rtol=1e-14)
-    both = smooth_second_harmonics(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.02))
+    both = smooth_errors(ErrorLevels(flat_field_ratio=0.01, model_ratio=0.02))[columns, columns]
     np.testing.assert_allclose(both, flat + model, rtol=1e-14)
+
+
+def test_contrast_and_the_harmonics_share_no_smooth_error():
+    """Means and waves of an isotropic field around a circle are uncorrelated."""
+    kinds = slice(0, CONTRAST_COLUMNS), RESPONSE, FIRST, SECOND
+    covariance = smooth_errors(ErrorLevels())
+    for one in kinds:
+        assert covariance[one, one].any()
+        for other in kinds:
+            assert one == other or not covariance[one, other].any()
 
 
 def test_reference_response_is_a_ratio_to_the_largest_load_so_its_error_is_twice_and_shared():
@@ -166,10 +189,33 @@ def test_reference_response_is_a_ratio_to_the_largest_load_so_its_error_is_twice
 
 
 def test_smooth_errors_grow_with_the_light_they_are_a_ratio_of():
-    levels = ErrorLevels(gain_ratio=0.0, zero_n=0.0)
+    levels = replace(ErrorLevels(), gain_ratio=0.0, zero_n=0.0, force_n=0.0)
     camera = np.zeros((COLUMNS, COLUMNS))
     dark, bright = (PressNoise(camera, levels).covariance(np.full(COLUMNS, c)) for c in (0.0, 0.5))
     np.testing.assert_allclose(np.diag(bright)[:CONTRAST_COLUMNS], 2.25 * np.diag(dark)[:CONTRAST_COLUMNS], rtol=1e-12)
     np.testing.assert_allclose(np.diag(bright)[RESPONSE], np.diag(dark)[RESPONSE], rtol=1e-12)
     np.testing.assert_allclose(np.diag(bright)[RESPONSE.stop :], 2.25 * np.diag(dark)[RESPONSE.stop :], rtol=1e-12)
     assert np.diag(PressNoise(camera, EXACT).covariance(np.ones(COLUMNS))).max() == 0
+
+
+def test_a_force_that_is_read_wrong_by_itself_moves_its_own_harmonics_in_proportion(row):
+    _, zero = drift_directions(row)
+    apart = harmonics_by_force(zero)
+    np.testing.assert_array_equal(apart[CONTRAST], 0.0)
+    for columns in (FIRST, SECOND):
+        np.testing.assert_array_equal(apart[columns].sum(axis=-1), zero[columns])
+        blocks = apart[columns].reshape(len(PROFILE_FORCES_N), -1, len(PROFILE_FORCES_N))
+        for force, block in enumerate(blocks):
+            np.testing.assert_array_equal(np.delete(block, force, axis=-1), 0.0)
+
+
+def test_what_the_polynomials_miss_grows_with_the_contrast():
+    """A row whose contrast is 0.04 everywhere: its error's variance is that of a contrast of 1, times 0.04."""
+    row = np.zeros(COLUMNS)
+    row[CONTRAST] = 0.04
+    forward = np.diag(np.arange(1.0, COLUMNS + 1))
+    missed = PressNoise(np.eye(COLUMNS), EXACT, forward).covariance(row) - PressNoise(
+        np.eye(COLUMNS), EXACT
+    ).covariance(row)
+    np.testing.assert_allclose(np.diag(missed), 0.04 * light_ratio(row) ** 2 * np.diag(forward))
+    assert not (missed - np.diag(np.diag(missed))).any()

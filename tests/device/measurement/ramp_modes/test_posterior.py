@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from linear_press import NOISE, START, TOLD, TRUTH, noisy_row, on_paper, random_slopes
-from small_surrogate import linear_surrogate
+from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
 from device.measurement.parameters import EVEN_STD, PARAMETERS
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.posterior import FEWEST_EFFECTIVE, PressFit, sample_press
+from device.measurement.ramp_modes.posterior import FEWEST_EFFECTIVE, MOST_SPOTS, PressFit, sample_press
 from device.measurement.ramp_modes.surrogate import MODULUS
 
 
@@ -89,5 +89,41 @@ def test_samples_that_all_miss_the_ranges_but_for_one_tell_nothing(inside, row, 
 
     monkeypatch.setattr(posterior, "log_density", of_few)
     fit = sample_press(posterior, START)
-    assert fit.effective_samples <= inside
+    assert fit.effective_samples <= inside * (1 + MOST_SPOTS)
     np.testing.assert_array_equal(fit.spread, EVEN_STD)
+
+
+class BentRows:
+    """A forward model whose first column is x0 + 1.5 x1^2, of the first two coordinates; nothing else shows."""
+
+    to_mm = 2.0
+
+    def rows(self, normalised: np.ndarray, direction_rad: np.ndarray | None = None) -> np.ndarray:
+        rows = np.zeros((len(normalised), COLUMNS))
+        rows[:, 0] = normalised[:, 0] + 1.5 * normalised[:, 1] ** 2
+        return rows
+
+    def rows_and_jacobian(
+        self, normalised: np.ndarray, direction_rad: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        slopes = np.zeros((len(normalised), COLUMNS, len(PARAMETERS)))
+        slopes[:, 0, 0], slopes[:, 0, 1] = 1.0, 3.0 * normalised[:, 1]
+        return self.rows(normalised), slopes
+
+
+def test_a_bent_posterior_gets_more_gaussians_and_comes_nearer_to_its_integral(monkeypatch):
+    """Along x1 the posterior is even wherever x0 = 0.3 - 1.5 x1^2 lies in its range; six other coordinates are free."""
+    row = np.zeros(COLUMNS)
+    row[0] = 0.3
+    posterior, start = PressPosterior(row, BentRows(), white_noise(0.05)), np.zeros(len(PARAMETERS))
+    bent = sample_press(posterior, start)
+    monkeypatch.setattr("device.measurement.ramp_modes.posterior.MOST_SPOTS", 0)
+    straight = sample_press(posterior, start)
+    assert straight.effective_samples < 100 < 2 * 100 < bent.effective_samples
+    x1 = np.linspace(-1, 1, 20_001)
+    x0 = 0.3 - 1.5 * x1**2
+    x0, x1 = x0[np.abs(x0) <= 1], x1[np.abs(x0) <= 1]
+    for moment, exact in (("mean", (x0.mean(), 0.0)), ("spread", (x0.std(), x1.std()))):
+        errors = [np.abs(getattr(fit, moment)[:2] - exact) for fit in (bent, straight)]
+        assert errors[0][0] < 0.5 * errors[1][0]
+    assert bent.spread[1] > 1.5 * straight.spread[1]

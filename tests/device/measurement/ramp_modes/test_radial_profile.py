@@ -9,12 +9,22 @@ from daemon_process import ROOT
 
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import (
+    COLUMNS,
+    CONTRAST,
+    FIRST,
     LARGEST_STEP_N,
     MIN_RAMP_FRAMES,
+    NETWORK_NAMES,
     PROFILE_FORCES_N,
-    ROW_NAMES,
+    RESPONSE,
+    SECOND,
+    bright_side_rad,
+    first_harmonic,
     harmonic,
+    network_rows,
     press_profile,
+    press_profiles,
+    seen_presses,
 )
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RingMeans
@@ -81,16 +91,51 @@ def test_reference_response_is_the_logarithm_of_the_inclusion_free_light_over_th
 
 def test_a_press_that_looks_like_the_reference_has_no_contrast_and_no_harmonics():
     found = press_profile(recording(lambda force_n: 0.0))
-    for values in (found.contrast, found.offset, found.second_harmonic):
+    for values in (found.contrast, found.first_harmonic, found.second_harmonic):
         np.testing.assert_allclose(values, 0.0, atol=1e-4)
 
 
 @pytest.mark.parametrize("towards", [0.0, 2.0, -2.5])
-def test_the_offset_is_a_length_along_its_own_direction(towards):
-    """0.01 cos(angle - towards) on every ring, wherever it points; a second harmonic does not enter."""
+def test_the_first_harmonic_is_a_length_along_its_own_direction(towards):
+    """0.01 cos(angle - towards) on every ring at every force, wherever it points; a second one does not enter."""
     angle = np.arctan2(Y, X)
     found = press_profile(recording(lambda _: 0.01 * np.cos(angle - towards) + 0.02 * np.cos(2 * angle - towards)))
-    np.testing.assert_allclose(found.offset, 0.01, atol=5e-4)
+    assert found.first_harmonic.shape == (len(PROFILE_FORCES_N), len(RING_RADII_MM) - 1)
+    np.testing.assert_allclose(found.first_harmonic, 0.01, atol=5e-4)
+
+
+@pytest.mark.parametrize("towards", [0.0, 1.6, -2.5])
+def test_the_direction_is_that_of_the_bright_side_from_the_images_rows(towards):
+    angle = np.arctan2(Y, X)
+    found = press_profile(recording(lambda _: 0.01 * np.cos(angle - towards) + 0.02 * np.cos(2 * angle - 1.0)))
+    assert found.direction_rad == pytest.approx(towards, abs=0.02)
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_turned_frames_turn_the_direction_and_nothing_else(quarters):
+    """`numpy.rot90` turns from the image's columns, which run downwards, to its rows: by -90 degrees."""
+    spot = recording(lambda force_n: 0.3 * force_n * np.exp(-((X - 1.2) ** 2 + (Y - 0.5) ** 2) / 18))
+    turned = replace(spot, frames=tuple(replace(f, counts=np.rot90(f.counts, quarters)) for f in spot.frames))
+    found, expected = press_profile(turned), press_profile(spot)
+    np.testing.assert_allclose(found.as_row(), expected.as_row(), atol=1e-6)
+    np.testing.assert_allclose(found.second_harmonic, expected.second_harmonic, atol=1e-6)
+    assert expected.direction_rad == pytest.approx(np.arctan2(0.5, 1.2), abs=0.01)
+    by_rad = expected.direction_rad - found.direction_rad - quarters * np.pi / 2
+    assert np.exp(1j * by_rad) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("towards", [0.0, 2.0])
+def test_the_first_harmonic_of_each_force_is_along_the_direction_of_all_of_them(towards):
+    """Waves of 0.02 (F - F0) across a constant one cancel in the mean over the forces, and so count nothing."""
+    angle = np.arctan2(Y, X) - towards
+
+    def contrast(force_n):
+        along = (0.01 + 0.02 * force_n) * np.cos(angle)
+        return along + 0.02 * (force_n - PROFILE_FORCES_N.mean()) * np.sin(angle)
+
+    found = press_profile(recording(contrast)).first_harmonic
+    expected = np.repeat((0.01 + 0.02 * PROFILE_FORCES_N)[:, None], len(RING_RADII_MM) - 1, axis=1)
+    np.testing.assert_allclose(found, expected, atol=5e-4)
 
 
 @pytest.mark.parametrize("bright", [0.0, 0.7, -2.5])
@@ -136,21 +181,107 @@ def test_the_mean_harmonic_is_to_the_bit_the_one_that_the_networks_have_learnt_f
     assert harmonic(rings, order).tobytes() == learnt.tobytes()
 
 
-def test_the_row_of_the_networks_is_contrast_reference_response_and_mean_offset_and_nothing_else():
+@pytest.mark.parametrize("turned", [0.0, 1.0, -2.0])
+def test_turning_the_face_turns_no_first_harmonic(turned):
+    """Waves of a face turned by an angle: cosine and sine are those of the old ones, turned."""
+    rings = random_rings(3)
+    cosine, sine = rings.cosine, rings.sine
+    other = RingMeans(
+        rings.mean,
+        cosine * np.cos(turned) - sine * np.sin(turned),
+        cosine * np.sin(turned) + sine * np.cos(turned),
+    )
+    np.testing.assert_allclose(first_harmonic(other), first_harmonic(rings), atol=1e-12)
+    by_rad = bright_side_rad(other) - bright_side_rad(rings) - turned
+    assert np.exp(1j * by_rad) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_first_harmonics_lie_along_one_direction_of_all_forces_in_which_the_cut_ring_has_no_say():
+    rings = random_rings(4)
+    cosine, sine = rings.cosine[:, 0, 1:], rings.sine[:, 0, 1:]
+    towards = np.arctan2(
+        sine[:, :-1].mean(axis=0) @ RING_RADII_MM[1:-1], cosine[:, :-1].mean(axis=0) @ RING_RADII_MM[1:-1]
+    )
+    np.testing.assert_allclose(first_harmonic(rings), cosine * np.cos(towards) + sine * np.sin(towards), atol=1e-14)
+    assert bright_side_rad(rings) == pytest.approx(towards, abs=1e-14)
+    rings.sine[:, 0, -1] += 100.0
+    assert bright_side_rad(rings) == pytest.approx(towards, abs=1e-14)
+    np.testing.assert_allclose(
+        first_harmonic(rings)[:, :-1], (cosine * np.cos(towards) + sine * np.sin(towards))[:, :-1], atol=1e-14
+    )
+
+
+def test_the_row_is_contrast_reference_response_and_both_harmonics_along_the_bright_side():
     found = press_profile(recording(lambda force_n: cone(force_n) + 0.01 * X / (1 + R)))
-    row = np.concatenate([found.contrast.ravel(), found.reference_response.ravel(), found.offset])
-    assert found.as_row().tobytes() == row.tobytes()
+    row = found.as_row()
+    assert row.shape == (COLUMNS,) == (153,)
+    parts = found.contrast, found.reference_response, found.first_harmonic, found.second_harmonic[0]
+    for columns, part in zip((CONTRAST, RESPONSE, FIRST, SECOND), parts, strict=True):
+        np.testing.assert_array_equal(row[columns], part.ravel())
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_networks_read_the_names_of_their_numbers(kind):
+    """Contrast and response as they are, the first harmonic's mean over the forces, and nothing of the second."""
+    found = press_profile(recording(lambda force_n: cone(force_n) + 0.01 * (1 + force_n) * X / (1 + R)))
+    read = network_rows(found.as_row().astype(kind))
+    assert read.dtype == kind
+    named = dict(zip(NETWORK_NAMES, read, strict=True))
+    assert named["contrast_0.25_n_1.8_mm"] == kind(found.contrast[1, 2])
+    assert named["growth_0.12_n_9.0_mm"] == kind(found.reference_response[0, -1])
+    assert named["offset_0.9_mm"] == pytest.approx(found.first_harmonic[:, 0].mean(), rel=1e-6)
+    assert named["offset_9.0_mm"] == pytest.approx(found.first_harmonic[:, -1].mean(), rel=1e-6)
+
+
+def test_rows_of_many_presses_are_read_as_each_alone():
+    rows = np.random.default_rng(1).normal(size=(2, 3, COLUMNS))
+    read = network_rows(rows)
+    assert read.shape == (2, 3, len(NETWORK_NAMES))
+    np.testing.assert_array_equal(read[1, 2], network_rows(rows[1, 2]))
+
+
+def test_the_committed_networks_read_these_names():
     card = json.loads((ROOT / "models" / "standard" / "model.json").read_text(encoding="utf-8"))
-    assert [feature["name"] for feature in card["features"]] == list(ROW_NAMES)
-    assert len(card["golden"]["features"][0]) == len(row)
+    assert [feature["name"] for feature in card["features"]] == list(NETWORK_NAMES)
 
 
-def test_a_row_has_a_name_for_every_number():
-    found = press_profile(recording())
-    row = dict(zip(ROW_NAMES, found.as_row(), strict=True))
-    assert row["contrast_0.25_n_1.8_mm"] == found.contrast[1, 2]
-    assert row["growth_0.12_n_9.0_mm"] == found.reference_response[0, -1]
-    assert row["offset_0.9_mm"] == found.offset[0]
+def scan_of(contrasts):
+    """Return one reference ramp, and a ramp on the lesion for each contrast: the last one first, as files may be."""
+    frames = [f for f in recording().frames if f.role != "press"]
+    for ramp, contrast in reversed(list(enumerate(contrasts))):
+        frames += [replace(f, ramp=ramp) for f in recording(contrast).frames if f.role == "press"]
+    return recording_of(frames)
+
+
+def test_each_ramp_of_a_scan_has_the_profile_that_it_has_alone():
+    contrasts = cone, lambda force_n: 0.5 * cone(force_n), lambda force_n: cone(force_n) + 0.01 * X / (1 + R)
+    found = press_profiles(scan_of(contrasts))
+    assert len(found) == len(contrasts)
+    for profile, contrast in zip(found, contrasts, strict=True):
+        np.testing.assert_array_equal(profile.as_row(), press_profile(recording(contrast)).as_row())
+
+
+def test_of_presses_rows_harmonics_and_directions_are_seen_in_their_order():
+    contrasts = [lambda _, t=t: 0.01 * np.cos(np.arctan2(Y, X) - t) for t in (0.5, -2.0)]
+    profiles = press_profiles(scan_of(contrasts))
+    seen = seen_presses(profiles)
+    assert seen.second_harmonics.shape == (2, 2, len(PROFILE_FORCES_N), len(RING_RADII_MM) - 2)
+    for number, profile in enumerate(profiles):
+        np.testing.assert_array_equal(seen.rows[number], profile.as_row())
+        np.testing.assert_array_equal(seen.second_harmonics[number], profile.second_harmonic)
+    np.testing.assert_allclose(seen.direction_rad, [0.5, -2.0], atol=0.02)
+
+
+def test_of_a_scan_the_first_ramps_profile_is_the_presses_own():
+    found = press_profile(scan_of((cone, lambda force_n: 0.5 * cone(force_n))))
+    np.testing.assert_array_equal(found.as_row(), press_profile(recording()).as_row())
+
+
+def test_a_ramp_of_a_scan_that_is_none_is_refused():
+    frames = list(scan_of((cone, cone)).frames)
+    short = [f for f in frames if f.ramp != 1 or f.force_n < 0.4]
+    with pytest.raises(InvalidQuantity, match="^largest press force is .*press slowly harder"):
+        press_profiles(recording_of(short))
 
 
 def test_frames_of_eight_and_of_sixteen_bits_agree():
@@ -210,3 +341,26 @@ def test_a_missing_role_is_refused_by_its_name(role):
 def test_a_press_that_is_no_ramp_is_refused_with_what_it_lacks(name, forces_n, quantity):
     with pytest.raises(InvalidQuantity, match=f"^{quantity.format(name)} is .*press slowly harder"):
         press_profile(recording(**{f"{name}_n": forces_n}))
+
+
+@pytest.mark.parametrize("times", [0.5, 1.4])
+def test_press_frames_under_another_brightness_give_the_same_profile(times):
+    """Half the LEDs' ratio, half the light above dark: a recording says how its frames were lit."""
+    usual = recording()
+    ratio = tuple(times * side for side in LIT)
+    dimmed = tuple(
+        replace(f, counts=np.rint(DARK + times * (f.counts.astype(float) - DARK)).astype(np.uint16), led_ratio=ratio)
+        if f.role == "press"
+        else f
+        for f in usual.frames
+    )
+    found = press_profile(replace(usual, frames=dimmed))
+    np.testing.assert_allclose(found.as_row(), press_profile(usual).as_row(), atol=2e-4)
+
+
+@pytest.mark.parametrize("ratio", [(0.0, 0.0, 0.0, 0.0), (0.6, 0.6, 0.6, 0.3)])
+def test_frames_that_say_they_were_dark_or_lit_from_other_sides_are_refused(ratio):
+    usual = recording()
+    frames = tuple(replace(f, led_ratio=ratio) if f.role == "press" else f for f in usual.frames)
+    with pytest.raises(InvalidQuantity, match=r"led_ratio of a frame is .* in the proportion of \(0\.6, 0\.6"):
+        press_profile(replace(usual, frames=frames))

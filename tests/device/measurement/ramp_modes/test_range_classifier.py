@@ -17,7 +17,8 @@ from device.measurement.bundle import BundleRefused
 from device.measurement.mode_models import ModeModels
 from device.measurement.parameters import PARAMETERS
 from device.measurement.ramp_modes.model import RAMP_MODES
-from device.measurement.ramp_modes.range_classifier import RANGE_FILE
+from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES
+from device.measurement.ramp_modes.range_classifier import OUTPUT, RANGE_FILE
 
 
 @pytest.fixture
@@ -32,23 +33,21 @@ def card_of(folder):
 @pytest.mark.parametrize("mode", RAMP_MODES)
 def test_an_inclusion_in_the_middle_of_the_ranges_lies_inside(ramp_model, mode):
     rows = ramp_model.answers.surrogate.rows(np.zeros((1, len(PARAMETERS))))
-    assert ramp_model.ranges.log_odds(rows, mode)[0] < min(0.0, ramp_model.critical[mode].outside_log_odds)
+    assert ramp_model.ranges.log_odds(rows)[0] < min(0.0, ramp_model.critical[mode].outside_log_odds)
 
 
-@pytest.mark.parametrize("mode", RAMP_MODES)
-def test_an_inclusion_is_the_likelier_outside_the_larger_it_is(ramp_model, mode):
+def test_an_inclusion_is_the_likelier_outside_the_larger_it_is(ramp_model):
     """Stiff and shallow ones, of 8.5, 13 and 15 mm."""
     normalised = np.zeros((3, len(PARAMETERS)))
     normalised[:, 0], normalised[:, 1], normalised[:, 2] = (0.0, 0.7, 1.0), -0.5, 0.5
-    odds = ramp_model.ranges.log_odds(ramp_model.answers.surrogate.rows(normalised), mode)
+    odds = ramp_model.ranges.log_odds(ramp_model.answers.surrogate.rows(normalised))
     assert odds[0] < odds[1] < odds[2]
 
 
 def test_it_goes_to_another_process_whole(ramp_model):
     again = pickle.loads(pickle.dumps(ramp_model.ranges))
-    rows = np.array(ramp_model.bundle.card["golden"]["features"])
-    for mode in RAMP_MODES:
-        np.testing.assert_array_equal(again.log_odds(rows, mode), ramp_model.ranges.log_odds(rows, mode))
+    rows = ramp_model.answers.surrogate.rows(np.random.default_rng(1).uniform(-1, 1, (5, len(PARAMETERS))))
+    np.testing.assert_array_equal(again.log_odds(rows), ramp_model.ranges.log_odds(rows))
 
 
 def test_a_missing_file_is_refused(folder):
@@ -76,13 +75,10 @@ def test_a_card_without_the_entry_is_refused(folder):
 @pytest.mark.parametrize(
     ("golden", "words"),
     [
-        (
-            {"standard": [0.0] * 8, "precise": [0.0] * 8},
-            r"\.standard is off by .*, but must be reproduced within 0\.0001",
-        ),
-        ({"standard": [0.0] * 3, "precise": [0.0] * 3}, r"\.standard is 3 rows, but must be 8 rows"),
-        ({"standard": [0.0] * 8}, r"\.precise is missing"),
-        ({"standard": "none", "precise": "none"}, r"\.standard is 'none'"),
+        ({"standard": [0.0] * 8}, r"\.standard is off by .*, but must be reproduced within 0\.0001"),
+        ({"standard": [0.0] * 3}, r"\.standard is 3 rows, but must be 8 rows"),
+        ({"precise": [0.0] * 8}, r"\.standard is missing"),
+        ({"standard": "none"}, r"\.standard is 'none'"),
         ([], r"\.standard is missing"),
     ],
 )
@@ -94,24 +90,25 @@ def test_golden_log_odds_that_it_does_not_give_are_refused(folder, golden, words
         read_ramp_model(folder)
 
 
-def network(modes: tuple[str, ...], *, rows: str | int = "n", columns: int = 1) -> bytes:
-    """Return a network whose log odds are the first of its 87 features."""
-    first = numpy_helper.from_array(np.eye(87, columns, dtype=np.float32), "first")
-    nodes = [helper.make_node("MatMul", ["features", "first"], [mode]) for mode in modes]
-    ports = [helper.make_tensor_value_info(mode, TensorProto.FLOAT, [rows, columns]) for mode in modes]
-    taken = helper.make_tensor_value_info("features", TensorProto.FLOAT, [rows, 87])
+def network(outputs: tuple[str, ...], *, rows: str | int = "n", columns: int = 1) -> bytes:
+    """Return a network whose log odds are the first of its features."""
+    features = len(NETWORK_NAMES)
+    first = numpy_helper.from_array(np.eye(features, columns, dtype=np.float32), "first")
+    nodes = [helper.make_node("MatMul", ["features", "first"], [name]) for name in outputs]
+    ports = [helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, columns]) for name in outputs]
+    taken = helper.make_tensor_value_info("features", TensorProto.FLOAT, [rows, features])
     graph = helper.make_graph(nodes, "ranges", [taken], ports, [first])
     return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8).SerializeToString()
 
 
 @pytest.mark.parametrize(
-    "other", [network(("standard",)), network(RAMP_MODES, rows=8), network(RAMP_MODES, columns=3), network(("a", "b"))]
+    "other", [network(("precise",)), network((OUTPUT,), rows=8), network((OUTPUT,), columns=3), network(("a", "b"))]
 )
 def test_a_network_of_other_outputs_or_of_so_many_rows_is_refused(folder, other):
     """Hash and golden log odds are right: what is wrong would show with the first press."""
     card = card_of(folder)
     first = [row[0] for row in card["golden"]["features"]]
-    card["range"] |= {"sha256": hashlib.sha256(other).hexdigest(), "golden": dict.fromkeys(RAMP_MODES, first)}
+    card["range"] |= {"sha256": hashlib.sha256(other).hexdigest(), "golden": {OUTPUT: first}}
     (folder / RANGE_FILE).write_bytes(other)
     write_card(folder, json.dumps(card))
     with pytest.raises(BundleRefused, match=r"(in|out)puts of range\.onnx"):
@@ -123,6 +120,6 @@ def test_it_is_proved_again_with_the_other_models(folder, bundle):
     models = ModeModels(bundle, ramp=ramp)
     models.prove()
     golden = ramp.ranges._golden
-    ramp.ranges._golden = replace(golden, outputs=dict.fromkeys(RAMP_MODES, np.zeros((8, 1))))
+    ramp.ranges._golden = replace(golden, outputs={OUTPUT: np.zeros((8, 1))})
     with pytest.raises(BundleRefused, match=r"range\.golden\.standard is off by"):
         models.prove()

@@ -1,5 +1,7 @@
 """A recording has one kind of frame, that of its camera, and gives those of a role in order."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,19 @@ def frames_of(counts):
 def test_frames_of_a_role_come_in_order():
     press = recording(frames_of(np.zeros((24, 32), np.uint8))).with_role("press")
     assert [frame.t_s for frame in press] == pytest.approx([0.2, 0.3])
+
+
+def test_the_presses_on_the_lesion_come_apart_by_their_number():
+    """What is of one alone is what a recording of that press would have been."""
+    frames = frames_of(np.zeros((24, 32), np.uint8))
+    scan = recording((*frames, replace(frames[2], ramp=2, t_s=5.0), replace(frames[2], ramp=1, t_s=4.0)))
+    times_s = {ramp: [frame.t_s for frame in of_ramp] for ramp, of_ramp in scan.ramps().items()}
+    assert list(times_s) == [0, 1, 2]
+    assert times_s == {0: pytest.approx([0.2, 0.3]), 1: [4.0], 2: [5.0]}
+    alone = scan.of_ramp(2)
+    assert alone.frames == (*frames[:2], replace(frames[2], t_s=5.0))
+    assert scan.of_ramp(0).frames == frames
+    assert recording(frames[:2]).ramps() == {}
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,169 @@
+"""What each further ramp of a scan tells: the same inclusions pressed once, twice, three and four times.
+
+Scans are drawn from the forward model and its noise. A hand puts the first ramp up to 2 mm off the axis and further
+ones where mode precise asks for them, give or take a millimetre. Beside the share of moduli that are determined stands
+the share that the Cramer-Rao bound at the truth would call so: hardly more can be asked for. Source of that bound:
+`host_tools/cramer_rao/information.py`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
+from device.measurement.parameters import COUNT, EVEN_STD, HIGH, denormalise_unknowns, normalise
+from device.measurement.quantities import Bound, require
+from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.model import RampAnswer, RampModel
+from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, OFFSET, SIZE
+from host_tools.cramer_rao.information import cramer_rao
+from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
+from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
+from host_tools.press_models.noisy_presses import random_scan
+from host_tools.press_models.press_samples import draw_parameters
+from host_tools.press_models.ramp_training import further_offsets_mm
+from host_tools.press_models.recorded_presses import in_parallel
+from host_tools.press_models.seeds import derived_seed
+
+SCENES, MOST_RAMPS = 160, 4
+"""So many tell a share of 60 % to 4 %."""
+DETERMINED_AT_LEAST, MEDIAN_PERCENT_AT_MOST = {2: 0.60, 4: 0.75}, {2: 25.0, 4: 18.0}
+RMSE_RATIO = 0.6
+"""Errors of size and depth over those of one press on the axis."""
+CENTRED = "1, on the axis"
+HEADER = ("ramps", "E determined", "by the bound", "median error of E (%)", "RMSE of size (mm)", "RMSE of depth (mm)",
+          "size over one on the axis", "depth over it", "size holds", "depth holds", "E holds",
+          "processor time (ms)")  # fmt: skip
+
+
+class AnsweredScan(NamedTuple):
+    """The answer to a scan, the processor's time it took, and the least spread [3] by the bound at the truth."""
+
+    answer: RampAnswer
+    cpu_s: float
+    least_spread: Array
+
+
+class ScansOfLength(NamedTuple):
+    """What scans of so many ramps are answered: see `AnsweredScan`; `least_spread` is [n, 3]."""
+
+    presses: EvaluatedPresses
+    cpu_s: Array
+    least_spread: Array
+
+    @property
+    def determined(self) -> float:
+        """Share of scans that determine the modulus."""
+        return float(self.presses.is_known[:, MODULUS].mean())
+
+    @property
+    def determinable(self) -> float:
+        """Share of scans of which the bound would say so."""
+        return float(np.mean(self.least_spread[:, MODULUS] < IDENTIFIABLE_RATIO * EVEN_STD))
+
+    @property
+    def median_percent(self) -> float:
+        """Median error of the modulus where it is determined; NaN where it never is."""
+        known = self.presses.is_known[:, MODULUS]
+        found, truth = (denormalise_unknowns(part)[known, MODULUS] for part in (self.presses.mean, self.presses.truth))
+        return float(100 * np.median(np.abs(found / truth - 1))) if known.any() else float("nan")
+
+    @property
+    def rmse(self) -> Array:
+        """Root mean square errors [3] in the unknowns' own units, determined or not."""
+        error = denormalise_unknowns(self.presses.mean) - denormalise_unknowns(self.presses.truth)
+        return np.asarray(np.sqrt(np.mean(error**2, axis=0)))
+
+    def held(self, unknown: int) -> str:
+        """Return how often the interval of an unknown holds the truth where it is determined."""
+        known = self.presses.is_known[:, unknown]
+        return f"{self.presses.is_covered[known, unknown].mean():.0%}" if known.any() else "-"
+
+
+def scan_chapter(model: RampModel, *, seed: int = 1, scenes: int = SCENES, jobs: int = -1) -> Chapter:
+    """Return what scans of one to four ramps tell of the same inclusions, beside one press on the axis."""
+    require("scenes", scenes, Bound(2, np.inf, "scans"), "ask for more")
+    found = answered_scans(model, seed=derived_seed(seed, "scans by their ramps"), scenes=scenes, jobs=jobs)
+    centred, by_ramps = found[0], dict(enumerate(found[1:], start=1))
+    rows = [_row(CENTRED, centred, centred), *(_row(f"{n}", one, centred) for n, one in by_ramps.items())]
+    return Chapter(
+        title="What each further ramp of a scan tells",
+        claim=(
+            f"{scenes} random inclusions over the trained ranges, the same ones for every number of ramps, drawn from "
+            "the forward model with camera noise, every drift and every nuisance."
+        ),
+        source="host_tools/scores/scan.py; device/measurement/ramp_modes/scan.py",
+        benchmarks=tuple(one for n in DETERMINED_AT_LEAST for one in _benchmarks(n, by_ramps[n], centred.rmse)),
+        tables=(Table("By the number of ramps", HEADER, tuple(rows)),),
+    )
+
+
+def answered_scans(model: RampModel, *, seed: int, scenes: int, jobs: int = -1) -> list[ScansOfLength]:
+    """Return answers to one press on the axis, then to scans of one to `MOST_RAMPS` ramps on the same inclusions."""
+    rng = np.random.default_rng(seed)
+    truth = normalise(draw_parameters(scenes, rng))
+    further = [further_offsets_mm(MOST_RAMPS, rng)[MOST_RAMPS - 1][: MOST_RAMPS - 1] for _ in range(scenes)]
+
+    def one(number: int) -> list[AnsweredScan]:
+        first_mm = float(HIGH[OFFSET]) * (truth[number, OFFSET] + 1) / 2
+        rng = np.random.default_rng([seed, number])
+        return [
+            *answers_by_ramps(model, truth[number], np.zeros(1), rng),
+            *answers_by_ramps(model, truth[number], np.append(first_mm, further[number]), rng),
+        ]
+
+    each = in_parallel(one, scenes, jobs)
+    return [_of_length(truth[:, :COUNT], of_length) for of_length in zip(*each, strict=True)]
+
+
+def answers_by_ramps(model: RampModel, truth: Array, offsets_mm: Array, rng: np.random.Generator) -> list[AnsweredScan]:
+    """Return the answers to the first ramp, the first two and so on, of one scan of coordinates [9] at offsets [N]."""
+    answers = model.answers
+    rows, direction_rad = random_scan(answers.surrogate, answers.noise, truth, offsets_mm, rng)
+    found = []
+    for count in range(1, len(rows) + 1):
+        began = time.process_time()
+        answer = model.answer(rows[:count], direction_rad[:count])
+        takes = time.process_time() - began
+        least_spread = _least_spread(model, rows[:count], direction_rad[:count], truth, offsets_mm[:count])
+        found.append(AnsweredScan(answer, takes, least_spread))
+    return found
+
+
+def _least_spread(model: RampModel, rows: Array, direction_rad: Array, truth: Array, offsets_mm: Array) -> Array:
+    """Return the bound [3] of the unknowns' coordinates at the truth, the ranges as Gaussian prior."""
+    reach_mm = model.answers.reach_mm(len(rows))
+    at = np.append(truth[:OFFSET], 2 * offsets_mm / reach_mm - 1)
+    posterior = PressPosterior(rows, model.answers.surrogate, model.answers.noise, reach_mm, direction_rad)
+    (jacobian,) = posterior.residuals_and_jacobian(at[None])[1]
+    return cramer_rao(jacobian, np.eye(len(jacobian)), np.full(len(at), EVEN_STD)).std[:COUNT]
+
+
+def _of_length(truth: Array, found: Sequence[AnsweredScan]) -> ScansOfLength:
+    answers, cpu_s, least = zip(*found, strict=True)
+    return ScansOfLength(evaluated(truth, answers), np.array(cpu_s), np.array(least))
+
+
+def _benchmarks(ramps: int, found: ScansOfLength, centred: Array) -> list[Benchmark]:
+    case = f"scan of {ramps}"
+    over = found.rmse / centred
+    return [
+        at_least(case, "share that determines E", found.determined, DETERMINED_AT_LEAST[ramps]),
+        at_most(case, "median error of E where determined (%)", found.median_percent, MEDIAN_PERCENT_AT_MOST[ramps]),
+        at_most(case, "RMSE of size over one press on the axis", float(over[SIZE]), RMSE_RATIO),
+        at_most(case, "RMSE of depth over one press on the axis", float(over[DEPTH]), RMSE_RATIO),
+    ]
+
+
+def _row(name: str, found: ScansOfLength, centred: ScansOfLength) -> tuple[str, ...]:
+    rmse, over = found.rmse, found.rmse / centred.rmse
+    return (
+        name, f"{found.determined:.0%}", f"{found.determinable:.0%}", f"{found.median_percent:.1f}",
+        f"{rmse[SIZE]:.2f}", f"{rmse[DEPTH]:.2f}", f"{over[SIZE]:.2f}", f"{over[DEPTH]:.2f}",
+        *(found.held(unknown) for unknown in range(COUNT)), f"{1e3 * np.median(found.cpu_s):.0f}",
+    )  # fmt: skip
