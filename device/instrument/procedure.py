@@ -1,4 +1,4 @@
-"""The press procedure: reference press beside the lesion, press on the lesion, estimate, keep.
+"""The press procedure: reference press beside the lesion, press or scan on the lesion, estimate, keep.
 
 One thread runs it and owns light and camera; a second only darkens when the daemon is to stop. A press begins by a
 request or by itself, when the force passes the contact threshold. Everything that ends a press has a reason that the
@@ -17,7 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from device.config import Config
-from device.errors import DeviceError, LightError, NoContrastError
+from device.errors import DeviceError, LightError, LightRestError, NoContrastError
 from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
@@ -25,8 +25,9 @@ from device.instrument.acquisition.light_check import DimmingWatch
 from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.encoded_frames import EncodedFrames
-from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Estimator, PressAnswers, PressBook
+from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Adviser, Estimator, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
+from device.instrument.press.scan import Scan, ScanTaken
 from device.instrument.press.states import Guidance, PressState, before_contact
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
@@ -37,10 +38,13 @@ from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
-from device.measurement.mode import Mode, ModeWorth
+from device.measurement.mode import FRAMES, Mode, ModeWorth
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
-from device.records.store import ENDED, Store
+from device.measurement.wanted_accuracy import WantedAccuracy
+from device.records.asked_once import AskedOnce
+from device.records.exams import AskedExam
+from device.records.store import ENDED, Store, StoredRecord
 
 log = logging.getLogger(__name__)
 
@@ -65,6 +69,7 @@ class Procedure:
         estimator: Estimator,
         store: Store,
         *,
+        adviser: Adviser,
         modes: tuple[Mode, ...],
         worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({}),
         calibration: CalibrationWatch,
@@ -77,14 +82,15 @@ class Procedure:
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
 
-        `worth` is what their answers are worth by the model cards; `folder_of` says where an installed model lies.
+        `adviser` says what a scan tells so far, `worth` what their answers are worth by the model cards, `folder_of`
+        where an installed model lies.
         """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
         self._encoded = EncodedFrames()
         self._answers = PressAnswers(
-            config, calibration, estimator, store, self.progress, simulated_truth, self._encoded.png_of
+            config, calibration, estimator, adviser, store, self.progress, simulated_truth, self._encoded.png_of
         )
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
@@ -97,8 +103,11 @@ class Procedure:
             modes=modes,
             mode=config.press.mode,
             cancelled=self._capture.cancelled,
+            finished=self._capture.finished,
             called_away=self._capture.called_away,
+            now=self._clock.now,
         )
+        self._obeying_once = threading.Lock()
         self._book = PressBook(self.board, store, bench.budget)
         self._worth, self._answer_times = worth, AnswerTimes(config.data / "answer_times.json")
         self._written_s, self._used_s = -math.inf, time.monotonic()
@@ -149,9 +158,37 @@ class Procedure:
         self._encoded.close()
         self._opened.close()
 
-    def request(self, mode: Mode | None = None) -> PressJob:
-        """Ask for a measurement in a mode, that of the settings unless given; see `PressRequests.ask`."""
-        return self._requests.ask(mode)
+    def request(
+        self,
+        mode: Mode | None = None,
+        wanted: WantedAccuracy | None = None,
+        *,
+        once: AskedOnce | None = None,
+        exam: AskedExam | None = None,
+    ) -> PressJob:
+        """Ask for a measurement in a mode, that of the settings unless given; see `PressRequests.ask`.
+
+        Raises `InvalidQuantity` for a wanted accuracy that the mode has not to offer.
+        """
+        mode = mode or self.config.press.mode
+        if wanted:
+            wanted.require_for(mode, self._worth.get(mode))
+        return self._requests.ask(mode, wanted, once=once, exam=exam)
+
+    def request_once(
+        self,
+        once: AskedOnce,
+        mode: Mode | None = None,
+        wanted: WantedAccuracy | None = None,
+        *,
+        exam: AskedExam | None = None,
+    ) -> StoredRecord:
+        """Ask for a measurement unless this very request was obeyed before; return what it was answered with then.
+
+        What was refused is not kept: sent again it is asked anew. Raises `ReusedKey` for another request's key.
+        """
+        with self._obeying_once:
+            return self.store.answer_to(once) or self.request(mode, wanted, once=once, exam=exam).as_record()
 
     def on_request(self, listener: Callable[[Mode], None]) -> None:
         """Call `listener` with the mode whenever a press is requested."""
@@ -160,6 +197,10 @@ class Procedure:
     def cancel(self, press_id: str) -> None:
         """Cancel the press under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
+
+    def finish(self, press_id: str) -> None:
+        """Answer the scan under way with what is there; see `PressRequests.finish`."""
+        self._requests.finish(press_id)
 
     def idle(self) -> AbstractContextManager[None]:
         """While it is held no press begins; raises `BusyError` while a press or a self-test is under way."""
@@ -265,19 +306,22 @@ class Procedure:
         started_at = self._clock.now()
         self.bench.budget.begin_press()
         self._capture.clear()
+        self.board.update(scan=None)
         try:
-            frames = [*unloaded, *self._press_frames(job)]
+            self.bench.budget.require_for_press(FRAMES[job.mode].most_ramps)
+            beside = [*unloaded, *self._frames_beside(job)]
+            frames, scan = self._frames_on_lesion(job, beside, started_at)
             with self._requests.deciding:  # whoever has cancelled until here was in time
                 if self._capture.cancelled.is_set():
                     raise PressEnded("cancelled", CANCELLED)
                 self._book.note(job, state="computing", progress=0.9)
-            answer = self._answers.answer(frames, job.mode, started_at, self.board.now.warnings)
+            answer = self._answers.answer([*beside, *frames], job, started_at, self.board.now.warnings, scan)
             self.board.update(answer=answer.shown)  # the operator need not wait for the disk
-            answered_s = time.monotonic() - frames[-1].t_s
+            answered_s = time.monotonic() - frames[-1].t_s - (scan.idle_s if scan else 0.0)
             measurement = self._answers.keep(answer)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
-        except NoContrastError as error:
+        except (LightRestError, NoContrastError) as error:
             self._reject(job, "rejected", str(error), error.code)
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
@@ -288,13 +332,15 @@ class Procedure:
             self.board.update(step="result", guidance=Guidance.DONE, measurement_id=identifier, answer=None)
             self._book.note(job, state="done", progress=1.0, measurement_id=identifier)
             self._answer_times.note(job.mode, answered_s)
+            if scan and scan.fault:
+                raise scan.fault
         finally:
             self._capture.forget_frames()
             if self.board.now.answer:  # it could not be kept
                 self.board.update(answer=None)
 
-    def _press_frames(self, job: PressJob) -> list[Frame]:
-        """Lead the hand through the press beside the lesion and the one on it; return the frames of both."""
+    def _frames_beside(self, job: PressJob) -> list[Frame]:
+        """Lead the hand through the press beside the lesion; return its frames once the probe is lifted."""
         self._book.note(job, state="capturing", progress=0.1)
         self.board.update(step="reference", measurement_id=None)
         reference = self._capture.loaded("reference", job.mode)
@@ -305,15 +351,39 @@ class Procedure:
         self._capture.release()
         self.board.update(guidance=Guidance.LIFT)
         self._capture.lifted()
+        return reference
+
+    def _frames_on_lesion(
+        self, job: PressJob, beside: list[Frame], started_at: str
+    ) -> tuple[list[Frame], ScanTaken | None]:
+        """Lead the hand through the press on the lesion, or all of a scan; return the frames, and what a scan took."""
         self._book.note(job, state="capturing", progress=0.5)
         self.board.update(step="lesion")
-        press = self._capture.loaded("press", job.mode)
-        self._capture.release()
+        if FRAMES[job.mode].is_scan:
+            scan = self._scan(job, beside, started_at).lead()
+            frames = scan.frames
+        else:
+            scan, frames = None, self._capture.loaded("press", job.mode)
+            self._capture.release()
         self._darken()
         self.board.update(step="computing", guidance=Guidance.LIFT)
         self._book.warn(self._clock.warning())
         self._warn_of_computer()
-        return [*reference, *press]
+        return frames, scan
+
+    def _scan(self, job: PressJob, beside: list[Frame], started_at: str) -> Scan:
+        def note(ramps: int) -> None:
+            progress = 0.5 + 0.4 * ramps / FRAMES[job.mode].most_ramps
+            self._book.note(job, state="capturing", progress=round(progress, 2), ramps=ramps)
+
+        return Scan(
+            job,
+            self._capture,
+            self.board,
+            advise=lambda frames: self._answers.advise([*beside, *frames], started_at),
+            darken=self._darken,
+            note=note,
+        )
 
     def _warn_of_computer(self) -> None:
         """Show what the computer's watch has seen since the last time; what is shown already is not logged again."""

@@ -11,6 +11,9 @@ from device.errors import DeviceError
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.scan_advice import ScanAdvice
+from device.measurement.wanted_accuracy import WantedAccuracy
 
 Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "self_test", "fault"]
 JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "cancelled", "failed"]
@@ -20,8 +23,10 @@ JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "can
 class PressJob:
     """One press as a resource: POSTed by a client or begun by the operator's hand, in a mode.
 
+    `asked_at`: when that was, RFC 3339; of releases before it was kept, None. `exam_id`: whose it is.
     `code` is that of the fault that ended it; `warnings` are the records of errors that did not. `light_on_s`: how
-    long the LEDs have been on in it.
+    long the LEDs have been on in it. Of a scan: `ramps`, how many presses on the lesion are complete; `until` and
+    `within_s`, how sure it is asked to be, as `WantedAccuracy`.
     """
 
     id: str
@@ -33,6 +38,16 @@ class PressJob:
     measurement_id: str | None = None
     warnings: tuple[dict[str, str], ...] = ()
     light_on_s: float = 0.0
+    ramps: int = 0
+    until: dict[str, float] | None = None
+    within_s: float | None = None
+    asked_at: str | None = None
+    exam_id: str | None = None
+
+    @property
+    def wanted(self) -> WantedAccuracy:
+        """How sure a scan is asked to be."""
+        return WantedAccuracy(self.until or {}, self.within_s)
 
     def as_record(self) -> dict[str, Any]:
         """Return the job as JSON object."""
@@ -40,13 +55,42 @@ class PressJob:
 
 
 @dataclass(frozen=True)
+class ScanProgress:
+    """How far a scan is: its complete presses on the lesion, what they tell, and where the next one goes.
+
+    `next_offset_mm`: beside the lesion's middle. `failed`: why a press since then does not count, "" when none failed.
+    """
+
+    ramps: int
+    most_ramps: int
+    advice: ScanAdvice
+    next_offset_mm: float
+    failed: str = ""
+
+    def as_record(self) -> dict[str, Any]:
+        """Return it as JSON object."""
+        of_unknowns = {name: getattr(self.advice.estimate, name) for name in UNKNOWNS}
+        return {
+            "ramps": self.ramps,
+            "most_ramps": self.most_ramps,
+            "value": {name: one.value for name, one in of_unknowns.items()},
+            "determined": {name: one.identifiable for name, one in of_unknowns.items()},
+            "half_width": dict(self.advice.half_width),
+            "expected_half_width": dict(self.advice.expected_half_width),
+            "next_offset_mm": self.next_offset_mm,
+            "reason": self.advice.estimate.reason,
+            "failed": self.failed,
+        }
+
+
+@dataclass(frozen=True)
 class ProcedureStatus:
     """One moment of the procedure.
 
     `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
-    frames. `warnings`: those of the last press, or of the time since, and the lasting ones. `stall`: a part that makes
-    no progress, by the watchdog's thread. `answer`: what the press says while that is being kept, without an id; from
-    then on `measurement_id`.
+    frames. `scan`: how far a scan is, once its first press on the lesion is complete. `warnings`: those of the last
+    press, or of the time since, and the lasting ones. `stall`: a part that makes no progress, by the watchdog's thread.
+    `answer`: what the press says while that is being kept, without an id; from then on `measurement_id`.
     """
 
     step: Step = "starting"
@@ -55,6 +99,7 @@ class ProcedureStatus:
     frames_taken: int = 0
     wanted_n: tuple[float, ...] = ()
     press: PressJob | None = None
+    scan: ScanProgress | None = None
     answer: dict[str, Any] | None = None
     measurement_id: str | None = None
     self_test: SelfTestJob | None = None

@@ -19,7 +19,10 @@ from device.errors import LightBudgetError, LightRestError
 WINDOW_RATIO = 1.5
 """The window, as a multiple of the light that it may hold: at most two thirds of the time are lit."""
 LEFT_RATIO = 0.1
-"""A press begins only with this part of the budget left, 30 s: those of a hand that knows the probe take 3 to 10 s."""
+"""A press begins only with this part of the budget left, 30 s: those of a hand that knows the probe take 3 to 10 s.
+
+A scan of five presses on the lesion is six where that is two, and begins with three times as much.
+"""
 
 
 class LightBudget:
@@ -73,12 +76,17 @@ class LightBudget:
             cause = f"The LEDs were on for {self.window_s:.0f} s {self._within}, above {self._max_on_s:g} s."
             raise LightBudgetError(cause, "Lift the probe and let the skin rest: the screen says how long.")
 
-    def require_for_press(self) -> None:
-        """Raise `LightRestError` when too little light is left to begin a press, with how long to wait."""
-        if self._too_much_s <= 0.0:
+    def require_for_press(self, ramps: int = 1) -> None:
+        """Raise `LightRestError` when too little light is left to begin, with how long to wait.
+
+        `ramps`: presses on the lesion there may be, after the one beside it.
+        """
+        too_much_s = self.window_s - (1 - LEFT_RATIO * (1 + ramps) / 2) * self._max_on_s
+        if not too_much_s > 0.0:
             return
         cause = f"The LEDs were on for {self.window_s:.0f} s {self._within}, of at most {self._max_on_s:g} s."
-        raise LightRestError(cause, f"Wait {math.ceil(self._wait_s())} s: the probe is ready again by itself.")
+        wait_s = math.ceil(self._wait_s(too_much_s))
+        raise LightRestError(cause, f"Wait {wait_s} s: the probe is ready again by itself.")
 
     @property
     def unsaved_s(self) -> float:
@@ -97,11 +105,6 @@ class LightBudget:
     def _window_from_s(self) -> float:
         return self._clock() - WINDOW_RATIO * self._max_on_s
 
-    @property
-    def _too_much_s(self) -> float:
-        """By how much the light of the window exceeds what a press may find."""
-        return self.window_s - (1 - LEFT_RATIO) * self._max_on_s
-
     def _inside(self) -> Iterator[tuple[float, float]]:
         """Yield from when until when it was lit within the window, oldest first."""
         begin_s, lit_s = self._window_from_s, self._lit_since_s
@@ -109,9 +112,9 @@ class LightBudget:
             if until_s > begin_s:
                 yield max(from_s, begin_s), until_s
 
-    def _wait_s(self) -> float:
-        """Return after how long in the dark enough of the window's light lies behind it."""
-        left_s, begin_s = self._too_much_s, self._window_from_s
+    def _wait_s(self, too_much_s: float) -> float:
+        """Return after how long in the dark so much of the window's light lies behind it."""
+        left_s, begin_s = too_much_s, self._window_from_s
         for from_s, until_s in self._inside():
             if left_s <= until_s - from_s:
                 return from_s + left_s - begin_s

@@ -3,14 +3,17 @@
 It drives the press machine: each frame becomes an observation, and what the machine makes of it goes to the board. A
 press that the machine rejects ends with `PressEnded`. The light of each side is looked at while the reference press is
 still held.
-When all frames are there, the bright spot's centroid tells where the inclusion lies under the face.
+When all frames are there, the bright spot's centroid tells where the inclusion lies under the face. A scan presses on
+the lesion again and again; the frames of its presses are numbered.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -30,7 +33,7 @@ from device.instrument.acquisition.light_check import (
 from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.frame_choice import WantedFrames, wanted_frames
 from device.instrument.press.machine import Ending, FrameSeen, PressRules, PressUnderWay
-from device.instrument.press.states import ACTIVE, Guidance, before_contact
+from device.instrument.press.states import ACTIVE, Guidance, PressState, before_contact
 from device.instrument.status import StatusBoard
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import Mode
@@ -61,6 +64,10 @@ class PressEnded(Exception):  # noqa: N818 - not every end is an error
         super().__init__(reason)
 
 
+class RampGivenUp(Exception):  # noqa: N818 - not an error: what is there is enough
+    """No further press on the lesion is wanted: that which was to come, or is not complete, is left out."""
+
+
 class CalledAway(Exception):  # noqa: N818 - not an error: something else is to be done first
     """The wait for an untouched probe was given up."""
 
@@ -81,11 +88,14 @@ class Capture:
         self.bench, self.config, self.press, self.light, self.board = bench, config, config.press, config.light, board
         self.lit = self.light.ratio
         self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
+        self.finished = threading.Event()
         self.machine = PressUnderWay()
         self._tears = TearWatch(config.camera.tear_counts)
         self._dark: list[Frame] = []
         self._untouched: list[Frame] = []
         self._reference: list[Frame] = []
+        self._pressed: list[Frame] = []
+        self._is_enough: Callable[[bool], bool] = _never
         self._dark_counts = self._before_s = self._untouched_s = 0.0
 
     def unloaded(self) -> list[Frame]:
@@ -135,8 +145,10 @@ class Capture:
         self.bench.light(DARK)
         return [frame for frame in unloaded if frame.role == "dark"] + lit
 
-    def loaded(self, role: Role, mode: Mode) -> list[Frame]:
-        """Return the frames of one press, as many as the mode needs.
+    def loaded(self, role: Role, mode: Mode, ramp: int = 0) -> list[Frame]:
+        """Return the frames of one press, as many as the mode needs; `ramp` is its number among those on the lesion.
+
+        Where the first of them stood, the inclusion is under the face; the others stand beside that on purpose.
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
         depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
@@ -145,20 +157,20 @@ class Capture:
         """
         wanted = wanted_frames(mode, role, self.press, self._tears)
         rules = PressRules.of(self.press, wanted.window_n, is_ramp=wanted.is_ramp)
-        begin = before_contact(role, mode)
+        begin = before_contact(role, mode, ramp)
         if role == "reference":
-            self._reference = []
+            self._reference, self._pressed = [], []
         self._before_s = time.monotonic()
         self._become(self.machine.begin(role, self._before_s))
         self.board.update(guidance=begin, frames_taken=0, wanted_n=wanted.wanted_n)
         self.bench.check_lights()
         lit_s = self.bench.budget.on_s
         while not wanted.is_complete:
-            self._require_going_on()
+            self._require_wanted()
             if self._untouched_s >= self.light.untouched_s:
                 self._wait_in_the_dark(rules)
             self.bench.light(self.lit)
-            frame = self.bench.take(role)
+            frame = self._numbered(self.bench.take(role), ramp)
             self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
             before_s, lit_s = lit_s, self.bench.budget.on_s
             self._untouched_s = 0.0 if self.machine.is_touching else self._untouched_s + lit_s - before_s
@@ -173,8 +185,14 @@ class Capture:
         require_lit(wanted.frames, self._dark_counts)
         if seen := wanted.light_and_hard():
             require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
-        self._become(self.machine.hold(self._spot_mm(role, wanted.frames), rules))
+        spot_mm = None if ramp else self._spot_mm(role, wanted.frames)
+        self._become(self.machine.hold(spot_mm, rules))
+        if role == "press":
+            self._pressed += wanted.frames
         return wanted.frames
+
+    def _numbered(self, frame: Frame, ramp: int) -> Frame:
+        return replace(frame, ramp=ramp) if ramp else frame
 
     def _wait_in_the_dark(self, rules: PressRules) -> None:
         """Return once the force says that the probe is about to touch; raises `PressEnded` when that takes too long.
@@ -184,7 +202,7 @@ class Capture:
         self.bench.light(DARK)
         lowest_n = force_n = self.bench.force.latest_n
         while force_n < rules.contact_n and force_n - lowest_n < rules.contact_n / 2:
-            self._require_going_on()
+            self._require_wanted()
             self._become(self.machine.see(FrameSeen(time.monotonic(), force_n, force_n, 0.0, 0.0), rules))
             time.sleep(POLL_S)
             force_n = self.bench.force.latest_n
@@ -194,7 +212,7 @@ class Capture:
     def _encode(self, frames: list[Frame], *, are_all: bool) -> None:
         """Let the frames that are kept by now be encoded while the hand goes on."""
         if self._encoded:
-            self._encoded.follow([*self._untouched, *self._reference, *frames], are_all=are_all)
+            self._encoded.follow([*self._untouched, *self._reference, *self._pressed, *frames], are_all=are_all)
 
     def _drop_outliers(self, wanted: WantedFrames) -> None:
         """Take the frames again that are unlike the others, once all are there."""
@@ -251,11 +269,25 @@ class Capture:
         """Let the hand lift: every frame is there."""
         self._become(self.machine.release(time.monotonic()))
 
+    def drop_ramp(self) -> None:
+        """Forget a press on the lesion that was not completed: the hand lifts, those before it stay."""
+        self.machine = PressUnderWay(PressState.RELEASING, contact_s=time.monotonic())
+        self.board.update(state=self.machine.state, frames_taken=0, wanted_n=())
+
+    @contextmanager
+    def unless(self, is_enough: Callable[[bool], bool]) -> Iterator[None]:
+        """Within it, raise `RampGivenUp` as soon as that is so; it is told whether the probe is being pressed."""
+        self._is_enough = is_enough
+        try:
+            yield
+        finally:
+            self._is_enough = _never
+
     def lifted(self) -> None:
-        """Return once the probe touches nothing between the two presses; raises `PressEnded` as `loaded` does."""
+        """Return once the probe touches nothing between two presses; raises `PressEnded` as `loaded` does."""
         self.bench.light(DARK)
         while (force_n := self.bench.force.latest_n) >= self.press.contact_n:
-            self._require_going_on()
+            self._require_wanted()
             self._become(self.machine.wait(time.monotonic(), force_n, self.press))
             time.sleep(POLL_S)
 
@@ -275,7 +307,7 @@ class Capture:
 
     def forget_frames(self) -> None:
         """Let go of the frames of a press that has ended."""
-        self._reference = []
+        self._reference, self._pressed = [], []
         if self._encoded:
             self._encoded.clear()
 
@@ -296,6 +328,11 @@ class Capture:
         self._become(self.machine.check(self._observation(frames[-1], is_ramp=False), self.press))
         return frames[-1]
 
+    def _require_wanted(self) -> None:
+        self._require_going_on()
+        if self._is_enough(self.machine.is_touching):
+            raise RampGivenUp
+
     def _require_going_on(self) -> None:
         self._progress.beat()
         self.bench.budget.require_left()
@@ -303,6 +340,10 @@ class Capture:
             self._become(self.machine.reject(CANCELLED, "cancelled"))
         if self.stopping.is_set():
             self._become(self.machine.reject("The daemon was stopped during the press.", "failed"))
+
+
+def _never(is_touching: bool) -> bool:
+    return False
 
 
 def inclusion_spot_mm(

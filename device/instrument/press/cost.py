@@ -1,6 +1,6 @@
 """What a press of a mode costs and what its answer is worth, for whoever chooses one.
 
-The time of a press is that of one of the two that make a measurement, from when its first frame may be taken. The time
+The time of a press is that of one of those that make a measurement, from when its first frame may be taken. The time
 to the answer, from the last frame until it is kept, is measured by the presses themselves: nothing else has frames to
 answer, and only they count the disk. A mode that was not pressed yet is expected to be as much slower than its model
 card says as the longest one that was; before the first press, to take what the card says. Errors are the card's,
@@ -33,7 +33,10 @@ LONGEST_ANSWER_S = 600.0
 
 @dataclass(frozen=True)
 class PressCost:
-    """One mode: `frames` of each press, at one force (from_n = to_n) or over a ramp, and `seconds` of one press."""
+    """One mode: `frames` of each press, at one force (from_n = to_n) or over a ramp, and `seconds` of one press.
+
+    `fewest_ramps` to `most_ramps` presses on the lesion follow the one beside it.
+    """
 
     mode: Mode
     frames: int
@@ -41,16 +44,19 @@ class PressCost:
     from_n: float
     to_n: float
     seconds: float
+    fewest_ramps: int = 1
+    most_ramps: int = 1
 
 
 def press_cost(mode: Mode, config: Config) -> PressCost:
     """Return what a press of a mode costs on a probe with these settings."""
-    press, frames = config.press, FRAMES[mode].count
-    frames_s = frames / config.camera.frame_rate_hz
-    if FRAMES[mode].is_ramp:
-        ramp_s = (RAMP_TO_N - RAMP_FROM_N) / (EASY_RATIO * press.max_rate_n_per_s)
-        return PressCost(mode, frames, "ramp", RAMP_FROM_N, RAMP_TO_N, round(max(ramp_s, frames_s), 1))
-    return PressCost(mode, frames, "hold", press.target_n, press.target_n, round(STEADY_WINDOW_S + frames_s, 1))
+    press, of_mode = config.press, FRAMES[mode]
+    frames_s, ramps = of_mode.count / config.camera.frame_rate_hz, (of_mode.fewest_ramps, of_mode.most_ramps)
+    if of_mode.is_ramp:
+        seconds = max((RAMP_TO_N - RAMP_FROM_N) / (EASY_RATIO * press.max_rate_n_per_s), frames_s)
+        return PressCost(mode, of_mode.count, "ramp", RAMP_FROM_N, RAMP_TO_N, round(seconds, 1), *ramps)
+    seconds = round(STEADY_WINDOW_S + frames_s, 1)
+    return PressCost(mode, of_mode.count, "hold", press.target_n, press.target_n, seconds, *ramps)
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,12 @@ class ModeOffer:
             "typical_error_percent": worth and dict(worth.median_percent),
             "answered_ratio": worth and worth.answered_ratio,
             "determined_ratio": worth and dict(worth.determined_ratio),
+            "reachable_half_width": _as_record(worth.reachable_half_width) if worth else None,
         }
+
+
+def _as_record(numbers: Mapping[str, float] | None) -> dict[str, float] | None:
+    return None if numbers is None else dict(numbers)
 
 
 class AnswerTimes:

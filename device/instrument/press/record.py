@@ -19,6 +19,7 @@ from device.errors import DeviceError
 from device.files.recording_file import FrameEncoder, png_of
 from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press.picture import tactile_png
+from device.instrument.press.scan import ScanTaken
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
@@ -27,10 +28,12 @@ from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
+from device.measurement.scan_advice import ScanAdvice
 from device.records.store import ENDED, Store
 
 log = logging.getLogger(__name__)
 Estimator = Callable[[Recording, Mode], Estimate]
+Adviser = Callable[[Recording], ScanAdvice]
 SAVE_LIGHT_EVERY_S = 10.0
 """So much light may be missing from the hours counter after a power cut, and that of the press under way."""
 
@@ -83,11 +86,12 @@ class PressAnswer:
 
     recording: Recording
     record: dict[str, Any]
+    exam_id: str | None = None
 
     @property
     def shown(self) -> dict[str, Any]:
         """What the screen shows of it before it is kept: nothing by which anybody could ask for it."""
-        return {name: self.record[name] for name in ("taken_at", "mode", "estimate", "truth")}
+        return {name: self.record[name] for name in ("taken_at", "mode", "estimate", "truth", "ramps", "reached")}
 
 
 class PressAnswers:
@@ -98,6 +102,7 @@ class PressAnswers:
         config: Config,
         calibration: CalibrationWatch,
         estimator: Estimator,
+        adviser: Adviser,
         store: Store,
         progress: ProgressBoard,
         truth: Inclusion | None,
@@ -105,29 +110,44 @@ class PressAnswers:
     ) -> None:
         """Take the inclusion that a simulated probe presses on as `truth`; `encode` may know PNGs of the frames."""
         self._config, self._calibration, self._truth = config, calibration, truth
-        self._estimator, self._store, self._progress, self._encode = estimator, store, progress, encode
+        self._estimator, self._adviser = estimator, adviser
+        self._store, self._progress, self._encode = store, progress, encode
 
     @property
     def is_simulated(self) -> bool:
         """Whether what is pressed on is known, as on the simulated probe alone."""
         return self._truth is not None
 
+    def advise(self, frames: Sequence[Frame], started_at: str) -> ScanAdvice:
+        """Return what the frames of a scan tell so far; raises as `answer` does."""
+        return self._adviser(self._recording(frames, started_at))
+
     def answer(
-        self, frames: Sequence[Frame], mode: Mode, started_at: str, warnings: Sequence[DeviceError]
+        self,
+        frames: Sequence[Frame],
+        job: PressJob,
+        started_at: str,
+        warnings: Sequence[DeviceError],
+        scan: ScanTaken | None = None,
     ) -> PressAnswer:
-        """Return what a press's frames say; it is kept nowhere yet.
+        """Return what a press's frames say, those of a scan what was its last advice; it is kept nowhere yet.
 
         Raises `InvalidQuantity` when an estimate cannot be made of them.
         """
-        recording = recording_of(
+        recording = self._recording(frames, started_at)
+        estimate = scan.advice.estimate if scan else self._estimator(recording, job.mode)
+        record = measurement_record(recording, estimate, job.mode, warnings)
+        asked = {"until": job.until, "within_s": job.within_s, "reached": scan.reached if scan else None}
+        return PressAnswer(recording, record | asked, job.exam_id)
+
+    def _recording(self, frames: Sequence[Frame], started_at: str) -> Recording:
+        return recording_of(
             frames,
             self._config,
             started_at=started_at,
             calibration_id=self._calibration.id,
             simulated_truth=self._truth,
         )
-        estimate = self._estimator(recording, mode)
-        return PressAnswer(recording, measurement_record(recording, estimate, mode, warnings))
 
     def keep(self, answer: PressAnswer) -> dict[str, Any]:
         """Return the measurement with its number, once it, its recording and its picture are on the disk.
@@ -136,13 +156,18 @@ class PressAnswers:
         """
         picture = _picture_of(answer.recording)
         with self._progress.inside("storage"):
-            return self._store.add_measurement(answer.record, answer.recording, encode=self._encode, picture=picture)
+            return self._store.add_measurement(
+                answer.record, answer.recording, exam_id=answer.exam_id, encode=self._encode, picture=picture
+            )
 
 
 def _picture_of(recording: Recording) -> bytes:
-    """Return the picture, or none: what cannot be shown is measured all the same."""
+    """Return the picture, or none: what cannot be shown is measured all the same.
+
+    Of a scan it is that of the first press, which has the lesion in the middle.
+    """
     try:
-        return tactile_png(recording)
+        return tactile_png(recording.of_ramp(0))
     except InvalidQuantity as error:
         log.warning("no picture of the recording %s: %s", recording.id, error)
         return b""
@@ -194,6 +219,7 @@ def measurement_record(
         "features": estimate.features,
         "force_n": sum(frame.force_n for frame in press) / len(press),
         "frames": len(press),
+        "ramps": len(recording.ramps()),
         "recording_id": recording.id,
         "truth": None if recording.truth is None else vars(recording.truth),
         "warnings": [warning.as_record() for warning in warnings],

@@ -10,11 +10,16 @@ import threading
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 
 from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
 from device.instrument.press.states import before_contact
+from device.instrument.self_test.report import SelfTestJob
 from device.instrument.status import PressJob, StatusBoard
-from device.measurement.mode import Mode
+from device.measurement.mode import FRAMES, Mode
+from device.measurement.wanted_accuracy import WantedAccuracy
+from device.records.asked_once import AskedOnce
+from device.records.exams import AskedExam
 from device.records.store import ENDED, Store
 
 
@@ -29,15 +34,20 @@ class PressRequests:
         modes: tuple[Mode, ...],
         mode: Mode,
         cancelled: threading.Event,
+        finished: threading.Event,
         called_away: threading.Event,
+        now: Callable[[], str],
     ) -> None:
         """Take `modes`, those that the probe has, `mode`, that of a press unless asked otherwise, and what ends one.
 
-        None begins while something else is to be done first: `called_away`.
+        `finished` ends a scan with what is there. None begins while something else is to be done first: `called_away`.
+        `now` is the wall clock, RFC 3339.
         """
         self._board, self._store, self._modes, self._mode = board, store, modes, mode
-        self._cancelled, self._called_away = cancelled, called_away
+        self._cancelled, self._finished, self._called_away = cancelled, finished, called_away
+        self._now = now
         self._waiting: PressJob | None = None
+        self._before: PressJob | None = None
         self._listeners: list[Callable[[Mode], None]] = []
         self._lock = threading.Lock()
 
@@ -45,11 +55,21 @@ class PressRequests:
         """Call `listener` with the mode whenever a press is requested."""
         self._listeners.append(listener)
 
-    def ask(self, mode: Mode | None) -> PressJob:
-        """Ask for a press in a mode, that of the settings unless given.
+    def ask(
+        self,
+        mode: Mode | None,
+        wanted: WantedAccuracy | None = None,
+        *,
+        once: AskedOnce | None = None,
+        exam: AskedExam | None = None,
+    ) -> PressJob:
+        """Ask for a press in a mode, that of the settings unless given, and a scan to be as sure as is `wanted`.
+
+        It is the press of the status from now on, with nothing of the one before; `once`: the request that is kept
+        together with it as obeyed; `exam`: what its measurement will belong to.
 
         Raises `ModeUnavailable`, `BusyError` when a press or the self-test is under way, or the `DeviceError` that
-        the probe is at fault by.
+        the probe is at fault by; of an exam `UnknownResource` or `StaleVersion`.
         """
         mode = mode or self._mode
         if mode not in self._modes:
@@ -60,9 +80,10 @@ class PressRequests:
             if status.hindrance:
                 raise status.hindrance
             self._require_idle()
-            job = self._new_job(mode)
-            self._store.save_press(job.as_record())
-            self._waiting = job
+            job = replace(self._new_job(mode, wanted), exam_id=exam.id if exam else None)
+            self._store.save_press(job.as_record(), once, exam)
+            self._waiting, self._before = job, status.press
+            self._board.update(press=job, measurement_id=None, answer=None, scan=None, frames_taken=0, wanted_n=())
         for listener in self._listeners:
             listener(mode)
         return job
@@ -77,6 +98,21 @@ class PressRequests:
                 raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
             self._cancelled.set()
 
+    def finish(self, press_id: str) -> None:
+        """Let the scan under way be answered with the presses that are complete.
+
+        Raises `UnknownResource` when it is not under way, `BusyError` when no press on the lesion is complete.
+        """
+        with self._lock:
+            job = self._waiting or self._board.now.press
+            if job is None or job.id != press_id or job.state in ENDED:
+                raise UnknownResource(f"Press {press_id} is not under way.", "Only a running scan can be finished.")
+            if not FRAMES[job.mode].is_scan:
+                raise BusyError(f"A press in mode {job.mode} ends by itself.", "Wait until it has ended, or cancel it.")
+            if not job.ramps:
+                raise BusyError("The first press on the lesion is not complete.", "Complete it, or cancel the scan.")
+            self._finished.set()
+
     @contextmanager
     def idle(self) -> Iterator[None]:
         """While it is held no press begins; raises `BusyError` when a press or the self-test is under way."""
@@ -86,10 +122,10 @@ class PressRequests:
 
     def _require_idle(self) -> None:
         status = self._board.now
-        if self._waiting or (status.press and status.press.state not in ENDED):
-            raise BusyError("A press is under way.", "Wait until it has ended, or cancel it.")
+        if (holder := self._waiting or status.press) and holder.state not in ENDED:
+            raise _held_by_press(holder)
         if status.self_test and status.self_test.is_under_way:
-            raise BusyError("The self-test is under way.", "Wait until it has ended.")
+            raise _held_by_self_test(status.self_test)
 
     @property
     def deciding(self) -> AbstractContextManager[bool]:
@@ -104,22 +140,39 @@ class PressRequests:
         with self._lock:
             if self._called_away.is_set() or not (self._waiting or is_touched):
                 return None
+            if not self._waiting:
+                self._before = self._board.now.press
             job, self._waiting = self._waiting or self._new_job(self._mode), None
             guidance = before_contact("reference", job.mode)
             self._board.update(press=job, guidance=guidance, warnings=self._warnings_since_last_press())
             return job
 
     def withdraw(self) -> PressJob | None:
-        """Return the press that waits and forget it: it will not begin."""
+        """Return the press that waits and forget it: it will not begin, and whoever withdraws it says how it ended."""
         with self._lock:
             job, self._waiting = self._waiting, None
             return job
 
-    def _new_job(self, mode: Mode) -> PressJob:
+    def _new_job(self, mode: Mode, wanted: WantedAccuracy | None = None) -> PressJob:
         self._cancelled.clear()  # here and not when the job begins: it may be cancelled before that
-        return PressJob(id=str(uuid.uuid4()), mode=mode)
+        self._finished.clear()
+        until = dict(wanted.until) if wanted and wanted.until else None
+        within_s = wanted.within_s if wanted else None
+        return PressJob(str(uuid.uuid4()), mode, until=until, within_s=within_s, asked_at=self._now())
 
     def _warnings_since_last_press(self) -> tuple[DeviceError, ...]:
-        last = self._board.now.press
-        told = last.warnings if last else ()
+        told = self._before.warnings if self._before else ()
         return tuple(one for one in self._board.now.warnings if one.is_lasting or one.as_record() not in told)
+
+
+def _held_by_press(job: PressJob) -> BusyError:
+    cause = f"A press is under way: {job.id} in mode {job.mode}, {job.state}, asked for at {job.asked_at}."
+    busy = BusyError(cause, "Wait until it has ended, or cancel it.")
+    busy.holder = {"kind": "press", "id": job.id, "mode": job.mode, "since": job.asked_at}
+    return busy
+
+
+def _held_by_self_test(job: SelfTestJob) -> BusyError:
+    busy = BusyError(f"The self-test is under way: {job.id}, since {job.started_at}.", "Wait until it has ended.")
+    busy.holder = {"kind": "self_test", "id": job.id, "mode": None, "since": job.started_at}
+    return busy

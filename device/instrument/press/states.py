@@ -1,7 +1,8 @@
 """The states of a press as one table: which follow which, what the operator is told in each, and why one is rejected.
 
-One measurement runs through them twice, beside the lesion and on it. Guidance is one code for machines and one sentence
-for the screen; a reason says what was seen, its bound, and what to do. docs/press.md shows the table; a test compares.
+One measurement runs through them twice, beside the lesion and on it; a scan once more for each further place. Guidance
+is one code for machines and one sentence for the screen; a reason says what was seen, its bound, and what to do.
+docs/press.md shows the table; a test compares.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ class PressState(Enum):
     UNSTEADY = "unsteady", "the force is right but varies, or changes too fast, for a frame to count"
     HOLDING = "holding", "the force is right and settles, or every frame is there and each side's light is looked at"
     CAPTURING = "capturing", "the force is right and steady: this frame counts"
-    RELEASING = "releasing", "the frames are there: the hand lifts, and after the second press the answer is computed"
+    RELEASING = (
+        "releasing",
+        "the frames are there: the hand lifts, and after a press on the lesion an answer is computed",
+    )
     DONE = "done", "the measurement is kept"
     REJECTED = "rejected", "the press ended without a measurement, and says why"
 
@@ -75,6 +79,7 @@ class Guidance(Enum):
     PRESS_LESION = "press_lesion", "Press on the lesion"
     TOUCH_BESIDE = "touch_beside", "Touch beside the lesion"
     TOUCH_LESION = "touch_lesion", "Touch the lesion"
+    MOVE_ASIDE = "move_aside", "Move the probe a little to the side, touch again"
     PRESS_HARDER = "press_harder", "Press harder"
     PRESS_SLOWLY = "press_slowly", "Press slowly harder"
     PRESS_LIGHTER = "press_lighter", "Press lighter"
@@ -93,9 +98,21 @@ class Guidance(Enum):
         self.code, self.text = code, text
 
 
-def before_contact(role: Role, mode: Mode) -> Guidance:
-    """Return how a press begins; a ramp begins with a touch, so that its small forces are not missed."""
+def spoken(guidance: Guidance, aside_mm: float | None) -> str:
+    """Return what the operator reads; of a move aside with how far (mm) it goes, where that is known."""
+    if guidance is Guidance.MOVE_ASIDE and aside_mm is not None:
+        return f"Move the probe about {aside_mm:.0f} mm to the side, touch again"
+    return guidance.text
+
+
+def before_contact(role: Role, mode: Mode, ramp: int = 0) -> Guidance:
+    """Return how a press begins; a ramp begins with a touch, so that its small forces are not missed.
+
+    From its second `ramp` on the lesion on, a scan wants another place first.
+    """
     is_ramp = FRAMES[mode].is_ramp
+    if ramp:
+        return Guidance.MOVE_ASIDE
     if role == "reference":
         return Guidance.TOUCH_BESIDE if is_ramp else Guidance.PRESS_BESIDE
     return Guidance.TOUCH_LESION if is_ramp else Guidance.PRESS_LESION

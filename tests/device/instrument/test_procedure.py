@@ -6,6 +6,7 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 from small_certificate import small_certificate
+from stand_in_adviser import no_advice
 
 from device.config import CameraSection, Config, PressSection
 from device.errors import (
@@ -19,6 +20,7 @@ from device.errors import (
     LightError,
     LightRestError,
     ModeUnavailable,
+    StaleVersion,
     StorageError,
     UnknownResource,
     ZeroShiftError,
@@ -38,6 +40,8 @@ from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.tactile_image import Frame
 from device.measurement.recording.untouched_face import UntouchedFace
+from device.records.asked_once import AskedOnce
+from device.records.exams import AskedExam, ExamContent
 from device.records.store import ENDED, Store
 
 AGELESS = Validity("1970-01-01T00:00:00Z", "2069-12-07T00:00:00Z")
@@ -114,6 +118,7 @@ class Rig:
             self.bench,
             self.estimate,
             self.store,
+            adviser=no_advice,
             modes=("paper", "quick", "standard"),
             calibration=CalibrationWatch(small_certificate(validity=AGELESS, untouched=DARK_FACE)),
             opened=opened,
@@ -436,10 +441,10 @@ def test_a_store_at_fault_does_not_leave_the_press_under_way_for_ever(rig, monke
 
     disk_is_full, save = threading.Event(), rig.store.save_press
 
-    def save_if_there_is_space(record):
+    def save_if_there_is_space(record, once=None, exam=None):
         if disk_is_full.is_set():
             raise StorageError("The disk is full.", "Free space.")
-        save(record)
+        save(record, once, exam)
 
     def fill_disk(recording):
         disk_is_full.set()
@@ -455,8 +460,55 @@ def test_a_store_at_fault_does_not_leave_the_press_under_way_for_ever(rig, monke
     assert rig.press()["state"] == "done"
 
 
+def test_one_request_sent_by_many_at_once_is_one_press(rig):
+    """Whoever comes second neither starts a press nor is told that the probe is busy."""
+    once, answers = AskedOnce("k-1", "POST presses"), []
+    rig.is_away = True
+    senders = [
+        threading.Thread(target=lambda: answers.append(rig.procedure.request_once(once, "quick"))) for _ in range(8)
+    ]
+    for sender in senders:
+        sender.start()
+    for sender in senders:
+        sender.join()
+    assert {one["id"] for one in answers} == {rig.board.now.press.id}
+    assert [one["state"] for one in answers] == ["waiting"] * 8
+    rig.procedure.cancel(answers[0]["id"])
+    rig.until(lambda: rig.board.now.press.state == "cancelled")
+    assert rig.procedure.request_once(once, "quick")["state"] == "waiting"
+
+
+def test_a_press_of_an_exam_ends_in_a_measurement_of_it_and_a_free_press_in_one_of_none(rig):
+    exam = rig.store.exams.make(ExamContent(kind="patient", patient_ref="A-1", operator="Ada"))
+    job = rig.procedure.request("quick", exam=AskedExam(exam["id"], version=1))
+    rig.until(lambda: not rig.bench.is_at_work and rig.board.now.press.state in ENDED)
+    kept = rig.store.measurement(rig.store.press(job.id)["measurement_id"])
+    assert (kept["exam_id"], rig.store.press(job.id)["exam_id"]) == (exam["id"], exam["id"])
+    free = rig.press("quick")
+    assert rig.store.measurement(free["measurement_id"])["exam_id"] is None
+    assert rig.store.measurements(before_seq=9, limit=9, exam_id=exam["id"]) == [kept]
+
+
+def test_a_press_of_an_exam_that_is_not_there_or_was_changed_since_it_was_shown_does_not_begin(rig):
+    """As from a tab that still shows the patient before."""
+    exam = rig.store.exams.make(ExamContent(kind="patient", patient_ref="A-1", operator="Ada"))
+    rig.store.exams.change(exam["id"], {"patient_ref": "B-2"}, version=1, by="Ada", reason="Another patient")
+    with pytest.raises(StaleVersion):
+        rig.procedure.request("quick", exam=AskedExam(exam["id"], version=1))
+    with pytest.raises(UnknownResource, match="no exam none"):
+        rig.procedure.request("quick", exam=AskedExam("none"))
+    assert rig.board.now.press is None
+
+
+def test_a_request_that_was_refused_may_be_sent_again_with_its_key(rig):
+    once = AskedOnce("k-1", "POST presses")
+    with pytest.raises(ModeUnavailable):
+        rig.procedure.request_once(once, "precise")
+    assert rig.procedure.request_once(once, "quick")["mode"] == "quick"
+
+
 def test_a_request_that_the_store_does_not_take_starts_no_press(rig, monkeypatch):
-    def full(record):
+    def full(record, once=None, exam=None):
         raise StorageError("The disk is full.", "Free space.")
 
     with monkeypatch.context() as broken:

@@ -80,6 +80,17 @@ def test_a_press_is_refused_for_as_long_as_it_takes_until_a_tenth_is_left(clock)
     budget.require_for_press()
 
 
+def test_a_scan_begins_only_with_light_for_all_the_presses_it_may_take(clock):
+    """Six presses instead of two: three tenths of the window's light, not one."""
+    budget = LightBudget(10.0, clock=clock)
+    lit(budget, clock, 0.0, 8.0)
+    budget.require_for_press()
+    with pytest.raises(LightRestError, match="Wait 8 s"):
+        budget.require_for_press(5)
+    clock.now_s = 16.0
+    budget.require_for_press(5)
+
+
 def test_presses_one_after_the_other_can_be_lit_for_two_thirds_of_the_time(clock):
     """For hours, a press of 7 s begun as soon as it may: what was used up never locks the probe for longer than it."""
     budget, lit_s = LightBudget(300.0, clock=clock), 0.0

@@ -25,9 +25,21 @@ def test_a_ramp_takes_as_long_as_a_hand_at_half_of_the_largest_rate():
 
 
 def test_a_slow_camera_makes_a_ramp_longer():
-    """40 frames at 5 Hz."""
-    config = replace(Config(), camera=CameraSection(frame_rate_hz=5.0))
-    assert press_cost("precise", config).seconds == 8.0
+    """10 frames at 2 Hz."""
+    config = replace(Config(), camera=CameraSection(frame_rate_hz=2.0))
+    assert press_cost("standard", config).seconds == 5.0
+
+
+def test_a_scan_costs_two_to_five_presses_on_the_lesion_each_as_one_of_mode_standard():
+    standard, precise = press_cost("standard", Config()), press_cost("precise", Config())
+    assert precise == replace(standard, mode="precise", fewest_ramps=2, most_ramps=5)
+
+
+def test_an_offer_says_what_cannot_be_surpassed_where_the_card_does(path):
+    times, reachable = AnswerTimes(path), {"size_mm": 0.8}
+    assert offer(times, WORTH).as_record()["reachable_half_width"] is None
+    told = offer(times, replace(WORTH, reachable_half_width=reachable)).as_record()
+    assert told["reachable_half_width"] == reachable
 
 
 WORTH = ModeWorth(0.1033, 0.9, {"size_mm": 3.3}, {"size_mm": 1.0})

@@ -2,7 +2,7 @@
 
 import pytest
 
-from device.instrument.press.states import HELD_GUIDANCE, TOUCHING, Guidance, PressState, before_contact
+from device.instrument.press.states import HELD_GUIDANCE, TOUCHING, Guidance, PressState, before_contact, spoken
 
 
 def test_every_state_of_a_touching_probe_has_its_guidance_in_a_hold():
@@ -23,6 +23,14 @@ def test_before_contact_the_operator_is_told_where_to_press(mode):
 def test_a_ramp_begins_with_a_touch(mode):
     assert before_contact("reference", mode) is Guidance.TOUCH_BESIDE
     assert before_contact("press", mode) is Guidance.TOUCH_LESION
+
+
+@pytest.mark.parametrize("ramp", [1, 4])
+def test_a_further_press_of_a_scan_begins_with_a_move_whose_way_is_told_where_it_is_known(ramp):
+    assert before_contact("press", "precise", ramp) is Guidance.MOVE_ASIDE
+    assert spoken(Guidance.MOVE_ASIDE, 4.4) == "Move the probe about 4 mm to the side, touch again"
+    assert spoken(Guidance.MOVE_ASIDE, None) == Guidance.MOVE_ASIDE.text
+    assert spoken(Guidance.LIFT, 4.4) == Guidance.LIFT.text
 
 
 def test_every_guidance_has_a_code_and_a_sentence_of_its_own():

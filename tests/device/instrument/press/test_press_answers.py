@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from small_certificate import small_certificate
+from stand_in_adviser import advice, no_advice
 
 from device.config import CameraSection, Config
 from device.errors import DeviceError, DimLightError
 from device.files.recording_file import read_picture, read_recording
-from device.instrument.press.record import Estimator, PressAnswers
+from device.instrument.press.record import Adviser, Estimator, PressAnswers
+from device.instrument.press.scan import ScanTaken
+from device.instrument.status import PressJob
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
@@ -27,12 +30,18 @@ ANSWER = Estimate(*[UNKNOWN_QUANTITY] * 3, "not_identifiable", "A stand-in.", "s
 STARTED_AT = "2026-01-02T03:04:05.000Z"
 
 
-def answers(store: Store, estimator: Estimator, truth: Inclusion | None = None) -> PressAnswers:
-    return PressAnswers(CONFIG, CalibrationWatch(small_certificate()), estimator, store, ProgressBoard(), truth)
+JOB = PressJob("p-1", "quick")
+
+
+def answers(
+    store: Store, estimator: Estimator, truth: Inclusion | None = None, adviser: Adviser = no_advice
+) -> PressAnswers:
+    watch = CalibrationWatch(small_certificate())
+    return PressAnswers(CONFIG, watch, estimator, adviser, store, ProgressBoard(), truth)
 
 
 def kept_by(probe: PressAnswers, *warnings: DeviceError) -> dict[str, Any]:
-    return probe.keep(probe.answer(FRAMES, "quick", STARTED_AT, warnings))
+    return probe.keep(probe.answer(FRAMES, JOB, STARTED_AT, warnings))
 
 
 def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Path) -> None:
@@ -48,8 +57,9 @@ def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Pa
 
 def test_an_answer_is_kept_nowhere_and_has_nothing_to_ask_for_it_by(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    answer = answers(store, lambda recording, mode: ANSWER).answer(FRAMES, "quick", STARTED_AT, [])
-    assert answer.shown == {"taken_at": STARTED_AT, "mode": "quick", "estimate": ANSWER.as_record(), "truth": None}
+    answer = answers(store, lambda recording, mode: ANSWER).answer(FRAMES, JOB, STARTED_AT, [])
+    told = {"taken_at": STARTED_AT, "mode": "quick", "estimate": ANSWER.as_record(), "truth": None}
+    assert answer.shown == told | {"ramps": 1, "reached": None}
     assert store.measurements(before_seq=1000, limit=10) == []
     assert list((tmp_path / "recordings").iterdir()) == []
     store.close()
@@ -60,9 +70,25 @@ def test_the_picture_is_kept_with_the_measurement_and_a_press_without_one_is_kep
     probe = answers(store, lambda recording, mode: ANSWER)
     paths = [store.recording_path(kept_by(probe)["recording_id"])]
     untouched = [replace(frame, force_n=0.0) for frame in FRAMES]
-    kept = probe.keep(probe.answer(untouched, "quick", STARTED_AT, []))
+    kept = probe.keep(probe.answer(untouched, JOB, STARTED_AT, []))
     paths.append(store.recording_path(kept["recording_id"]))
     assert [(read_picture(path) or b"")[1:4] for path in paths] == [b"PNG", b""]
+    store.close()
+
+
+def test_a_scan_is_kept_with_its_last_advice_what_was_asked_for_and_how_often_it_pressed(tmp_path: Path) -> None:
+    """Its estimate is that of the advice: nothing is computed twice."""
+    store, seen, last = Store(tmp_path), [], advice(1.5)
+    frames = [*FRAMES, replace(FRAMES[-1], ramp=1), replace(FRAMES[-1], ramp=1)]
+    probe = answers(store, lambda recording, mode: pytest.fail("asked"), adviser=lambda one: seen.append(one) or last)
+    assert probe.advise(frames, STARTED_AT) is last
+    assert {ramp: len(of_ramp) for ramp, of_ramp in seen[0].ramps().items()} == {0: 1, 1: 2}
+    job = PressJob("p-2", "precise", until={"size_mm": 1.0}, within_s=30.0)
+    kept = probe.keep(probe.answer(frames, job, STARTED_AT, [], ScanTaken(frames[2:], last, False, 0.0, None)))
+    assert (kept["mode"], kept["ramps"], kept["frames"]) == ("precise", 2, 3)
+    assert (kept["until"], kept["within_s"], kept["reached"]) == ({"size_mm": 1.0}, 30.0, False)
+    assert kept["estimate"] == last.estimate.as_record()
+    assert read_recording(store.recording_path(kept["recording_id"])).ramps().keys() == {0, 1}
     store.close()
 
 

@@ -1,5 +1,6 @@
 """At most one press waits or is under way; who asks for another finds out why not, and nothing else changes."""
 
+import json
 import threading
 from dataclasses import replace
 
@@ -9,7 +10,9 @@ from device.errors import BusyError, CameraError, ClockJumpError, LastGoodConfig
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.states import Guidance
 from device.instrument.self_test.report import SelfTestJob
-from device.instrument.status import StatusBoard
+from device.instrument.status import PressJob, StatusBoard
+from device.measurement.wanted_accuracy import WantedAccuracy
+from device.records.asked_once import AskedOnce
 from device.records.store import Store
 
 
@@ -36,9 +39,21 @@ def called_away():
 
 
 @pytest.fixture
-def requests(board, store, cancelled, called_away):
+def finished():
+    return threading.Event()
+
+
+@pytest.fixture
+def requests(board, store, cancelled, finished, called_away):
     return PressRequests(
-        board, store, modes=("paper", "quick"), mode="paper", cancelled=cancelled, called_away=called_away
+        board,
+        store,
+        modes=("paper", "quick", "precise"),
+        mode="paper",
+        cancelled=cancelled,
+        finished=finished,
+        called_away=called_away,
+        now=lambda: "2026-01-02T03:04:05.678Z",
     )
 
 
@@ -71,9 +86,54 @@ def test_a_second_press_is_refused_while_one_waits_and_while_one_is_under_way(re
         requests.begin(is_touched=False)
 
 
+def test_who_is_refused_is_told_who_holds_the_probe_and_since_when(requests, board):
+    job = requests.ask("quick")
+    since = "2026-01-02T03:04:05.678Z"
+    for state in ("waiting", "capturing"):
+        with pytest.raises(BusyError, match=f"{job.id} in mode quick, {state}, asked for at {since}") as refusal:
+            requests.ask(None)
+        assert refusal.value.holder == {"kind": "press", "id": job.id, "mode": "quick", "since": since}
+        board.update(press=replace(requests.begin(is_touched=False) or job, state="capturing"))
+    board.update(press=replace(job, state="done"), self_test=SelfTestJob("s-1", "2026-01-01T00:00:00Z"))
+    with pytest.raises(BusyError) as refusal:
+        requests.ask(None)
+    assert refusal.value.holder == {"kind": "self_test", "id": "s-1", "mode": None, "since": "2026-01-01T00:00:00Z"}
+
+
+def test_the_status_has_the_press_from_when_it_is_acknowledged_and_nothing_of_the_one_before(requests, board):
+    old = PressJob("p-0", "paper", "done", measurement_id="m-0")
+    of_old = {"measurement_id": "m-0", "answer": {}, "scan": object(), "frames_taken": 10, "wanted_n": (0.5,)}
+    board.update(press=old, step="result", guidance=Guidance.DONE, **of_old)
+    job = requests.ask("quick")
+    now = board.now
+    assert now.press == job
+    assert (now.measurement_id, now.answer, now.scan, now.frames_taken, now.wanted_n) == (None, None, None, 0, ())
+    # The operator's line is the procedure's own: it may be asking just now to lift the probe.
+    assert (now.step, now.guidance) == ("result", Guidance.DONE)
+
+
+def test_what_the_last_press_was_told_is_not_told_to_the_one_that_was_asked_for(requests, board):
+    once = ClockJumpError("The clock was set.", "Check it.")
+    later = ClockJumpError("It was set again.", "Check it.")
+    board.update(press=PressJob("p-0", "paper", "done", warnings=(once.as_record(),)), warnings=(once,))
+    requests.ask(None)
+    board.update(warnings=(once, later))
+    requests.begin(is_touched=False)
+    assert board.now.warnings == (later,)
+
+
+def test_a_press_is_kept_together_with_the_request_that_it_answers(requests, store):
+    once = AskedOnce("k-1", "POST presses")
+    job = requests.ask("quick", once=once)
+    assert store.answer_to(once) == json.loads(json.dumps(job.as_record()))
+    with pytest.raises(BusyError):
+        requests.ask("quick", once=AskedOnce("k-2", "POST presses"))
+    assert store.answer_to(AskedOnce("k-2", "POST presses")) is None
+
+
 def test_a_mode_that_the_probe_does_not_have_is_refused_with_those_it_has(requests):
-    with pytest.raises(ModeUnavailable, match="paper, quick"):
-        requests.ask("precise")
+    with pytest.raises(ModeUnavailable, match="paper, quick, precise"):
+        requests.ask("standard")
     assert requests.begin(is_touched=False) is None
 
 
@@ -94,11 +154,45 @@ def test_a_press_that_waits_can_be_cancelled_and_no_other(requests, cancelled):
     assert cancelled.is_set()
 
 
-def test_the_end_of_one_press_by_its_operator_does_not_end_the_next(requests, cancelled):
+def test_the_end_of_one_press_by_its_operator_does_not_end_the_next(requests, board, cancelled, finished):
     requests.cancel(requests.ask(None).id)
-    requests.withdraw()
+    finished.set()
+    board.update(press=replace(requests.withdraw(), state="cancelled"))
     requests.ask(None)
-    assert not cancelled.is_set()
+    assert [event.is_set() for event in (cancelled, finished)] == [False, False]
+
+
+def test_a_scan_is_asked_to_be_as_sure_as_somebody_wants_it_and_any_other_press_is_not(requests, board):
+    wanted = WantedAccuracy({"size_mm": 1.0}, 30.0)
+    job = requests.ask("precise", wanted)
+    assert (job.until, job.within_s, job.wanted) == ({"size_mm": 1.0}, 30.0, wanted)
+    board.update(press=replace(requests.withdraw(), state="failed"))
+    job = requests.ask("precise")
+    assert (job.until, job.within_s, job.wanted.is_asked) == (None, None, False)
+
+
+def test_a_scan_is_finished_once_its_first_press_is_complete_and_by_its_own_id_alone(requests, board, finished):
+    job = requests.ask("precise")
+    for _ in range(2):
+        with pytest.raises(BusyError, match="first press on the lesion is not complete"):
+            requests.finish(job.id)
+        requests.begin(is_touched=False)
+    board.update(press=replace(job, state="capturing", ramps=1))
+    with pytest.raises(UnknownResource):
+        requests.finish("another")
+    assert not finished.is_set()
+    requests.finish(job.id)
+    assert finished.is_set()
+    board.update(press=replace(job, state="done", ramps=1))
+    with pytest.raises(UnknownResource, match="not under way"):
+        requests.finish(job.id)
+
+
+def test_a_press_that_is_no_scan_ends_by_itself_and_not_by_enough(requests, finished):
+    job = requests.ask("quick")
+    with pytest.raises(BusyError, match="mode quick ends by itself"):
+        requests.finish(job.id)
+    assert not finished.is_set()
 
 
 def test_a_press_that_is_withdrawn_does_not_begin(requests):

@@ -38,7 +38,6 @@ def test_installed_models_pass_with_their_deviation_and_a_missing_one_is_not_tes
         ("paper", "model.onnx"),
         ("paper", "model.json"),
         ("standard", "surrogate.npz"),
-        ("standard", "round.npz"),
         ("standard", "range.onnx"),
     ],
 )
