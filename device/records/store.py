@@ -21,7 +21,9 @@ from typing import Any
 from device.errors import DiskFullError, NewerDataError, StorageError, UnknownResource
 from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
+from device.records.asked_once import ANSWERS_TABLE, AskedOnce, first_answer, keep_answer
 from device.records.disk import Disk, LocalDisk, read_uncached
+from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 
 StoredRecord = dict[str, Any]
@@ -47,6 +49,7 @@ class Store:
             self._db = self._open(opened)
             self._end_interrupted()
             self._remove_unfinished()
+            self.exams = Exams(self._transaction)
             self._opened = opened.pop_all()
 
     def _open(self, opened: ExitStack) -> sqlite3.Connection:
@@ -58,7 +61,7 @@ class Store:
             self._require_readable(db)
             db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = FULL")
-            db.executescript(TABLES)
+            db.executescript(TABLES + ANSWERS_TABLE + EXAM_TABLES)
             self._number(db)
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
@@ -157,20 +160,41 @@ class Store:
                     "(SELECT value FROM counter WHERE name = 'proofs'), 0))"
                 )
 
-    def save_press(self, job: StoredRecord) -> None:
-        """Keep the state of a press job."""
+    def save_press(self, job: StoredRecord, once: AskedOnce | None = None, exam: AskedExam | None = None) -> None:
+        """Keep the state of a press job, and with it that it is the answer to a request that is obeyed once.
+
+        Raises as `Exams.exam` when the exam that it is asked for is not there, or not as its client has seen it.
+        """
         with self._transaction() as db:
+            if exam:
+                exam_of(db, exam.id, exam.version)
             row = job["id"], job["state"] in ENDED, json.dumps(job)
             db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
+            if once:
+                keep_answer(db, once, job)
+
+    def answer_to(self, once: AskedOnce) -> StoredRecord | None:
+        """Return what a request was answered with the first time, or None; raise `ReusedKey` when it was another."""
+        with self._transaction() as db:
+            return first_answer(db, once)
 
     def press(self, press_id: str) -> StoredRecord:
         """Return a press job; raise `UnknownResource` when there is none of that id."""
-        return self._one("press", press_id)
+        found = self._records("SELECT record FROM press WHERE id = ?", press_id)
+        if not found:
+            raise _unknown("press", press_id)
+        return found[0]
 
     def add_measurement(
-        self, record: StoredRecord, recording: Recording, *, encode: FrameEncoder = png_of, picture: bytes = b""
+        self,
+        record: StoredRecord,
+        recording: Recording,
+        *,
+        exam_id: str | None = None,
+        encode: FrameEncoder = png_of,
+        picture: bytes = b"",
     ) -> StoredRecord:
-        """Keep a recording, its picture and its measurement; return the record with its sequence number.
+        """Keep a recording, its picture and its measurement, of an exam if given; return it with its sequence number.
 
         `encode` may know PNGs of the frames that were made before.
         """
@@ -181,10 +205,12 @@ class Store:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
                 whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
                 db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
+                if exam_id:
+                    db.execute("INSERT INTO filing VALUES (?, ?, NULL, 1)", (record["id"], exam_id))
         except StorageError:
             remove_recording(path)
             raise
-        return whole
+        return whole | UNFILED | {"exam_id": exam_id}
 
     def write_out(
         self, recording: Recording, path: Path, *, encode: FrameEncoder = png_of, picture: bytes = b""
@@ -198,12 +224,23 @@ class Store:
 
     def measurement(self, measurement_id: str) -> StoredRecord:
         """Return a measurement; raise `UnknownResource` when there is none of that id."""
-        return self._one("measurement", measurement_id)
+        found = self._measurements("id = ?", measurement_id)
+        if not found:
+            raise _unknown("measurement", measurement_id)
+        return found[0]
 
-    def measurements(self, *, before_seq: int, limit: int) -> list[StoredRecord]:
-        """Return the newest measurements before a sequence number, newest first."""
-        query = "SELECT record FROM measurement WHERE seq < ? ORDER BY seq DESC LIMIT ?"
-        return self._records(query, before_seq, limit)
+    def measurements(self, *, before_seq: int, limit: int, exam_id: str | None = None) -> list[StoredRecord]:
+        """Return the newest measurements before a sequence number, newest first, all or those of an exam."""
+        if exam_id is None:
+            return self._measurements("seq < ? ORDER BY seq DESC LIMIT ?", before_seq, limit)
+        return self._measurements("seq < ? AND exam_id = ? ORDER BY seq DESC LIMIT ?", before_seq, exam_id, limit)
+
+    def _measurements(self, where: str, *values: object) -> list[StoredRecord]:
+        """Return measurements as they were taken, each with what was said of it since."""
+        query = "SELECT record, exam_id, voided, version FROM measurement LEFT JOIN filing ON measurement_id = id"
+        with self._transaction() as db:
+            rows = db.execute(f"{query} WHERE {where}", values)
+            return [{**json.loads(record), **filed(*filing)} for record, *filing in rows]
 
     def add_light_on_s(self, seconds: float) -> None:
         """Add to the time that the LEDs have been on in their life."""
@@ -230,16 +267,14 @@ class Store:
     def _place_of(self, recording_id: str) -> Path:
         return self.folder / "recordings" / f"{recording_id}.zip"
 
-    def _one(self, table: str, identifier: str) -> StoredRecord:
-        found = self._records(f"SELECT record FROM {table} WHERE id = ?", identifier)
-        if not found:
-            raise UnknownResource(f"There is no {table} {identifier}.", "Use the id that the API gave.")
-        return found[0]
-
     def close(self) -> None:
         """Close the database and let go of the folder."""
         with self._lock:
             self._opened.close()
+
+
+def _unknown(what: str, identifier: str) -> UnknownResource:
+    return UnknownResource(f"There is no {what} {identifier}.", "Use the id that the API gave.")
 
 
 def _form(db: sqlite3.Connection) -> int:

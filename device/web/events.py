@@ -10,12 +10,13 @@ import json
 import math
 import time
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 from typing import Any
 
 from device import __version__
 from device.errors import DeviceError, LoadCellError
 from device.instrument.press.frame_choice import ramp_targets_n
-from device.instrument.press.states import Guidance
+from device.instrument.press.states import Guidance, PressState, before_contact, spoken
 from device.instrument.procedure import Procedure
 from device.instrument.status import ProcedureStatus
 from device.measurement.mode import FRAMES, RAMP_TO_N, Mode
@@ -31,16 +32,18 @@ STILL_N = 0.002
 
 def snapshot(procedure: Procedure) -> dict[str, Any]:
     """Return the present status as a JSON object."""
-    status, press = procedure.board.now, procedure.config.press
+    press, (force_n, silent) = procedure.config.press, _latest(procedure)
+    is_touched = force_n is not None and force_n >= press.contact_n
+    status = _since_asked(procedure.board.now, is_touched=is_touched)
     job = status.press if status.press and status.press.state not in ENDED else None
     mode = job.mode if job else press.mode
     ramp_n = _ramp_n(mode, status) if FRAMES[mode].is_ramp else None
     faults: list[DeviceError] = [fault for fault in (status.fault, status.stall) if fault]
     step, guidance = ("fault", Guidance.FAULT) if status.stall else (status.step, status.guidance)
-    force_n, silent = _latest(procedure)
     if silent:
         faults = faults or [silent]
     faults += status.warnings
+    aside_mm = status.scan.next_offset_mm if status.scan else None
     return {
         "simulated": procedure.is_simulated,
         "serial": procedure.config.serial,
@@ -48,7 +51,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "release": RUNNING,
         "step": step,
         "press_state": status.state.code,
-        "guidance": {"code": guidance.code, "text": guidance.text},
+        "guidance": {"code": guidance.code, "text": spoken(guidance, aside_mm)},
         "force_n": None if force_n is None else round(force_n, 4),
         "mode": mode,
         "kind": "ramp" if ramp_n else "hold",
@@ -59,11 +62,26 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
         "frames_taken": status.frames_taken,
         "frames_needed": FRAMES[mode].count,
         "press": status.press.as_record() if status.press else None,
+        "scan": status.scan.as_record() if status.scan and job else None,
         "answer": status.answer,
         "measurement_id": status.measurement_id,
         "self_test": status.self_test.summary() if status.self_test else None,
         "faults": [fault.as_record() for fault in faults],
     }
+
+
+def _since_asked(status: ProcedureStatus, *, is_touched: bool) -> ProcedureStatus:
+    """Return the status without how the press before ended, once another is asked for and has not begun.
+
+    It begins when the probe is free: whoever still holds it from the press before is told to lift it.
+    """
+    job = status.press
+    if not job or job.state != "waiting" or status.step not in ("result", "rejected"):
+        return status
+    is_over = status.guidance in (Guidance.DONE, Guidance.REJECTED)
+    first = Guidance.LIFT if is_touched else before_contact("reference", job.mode)
+    guidance = first if is_over else status.guidance
+    return replace(status, step="ready", state=PressState.IDLE, guidance=guidance)
 
 
 def _latest(procedure: Procedure) -> tuple[float | None, LoadCellError | None]:

@@ -6,8 +6,13 @@ is refused is never read.
 
 from __future__ import annotations
 
+import json
 import logging
+from collections.abc import Callable, Coroutine
+from typing import Any
 
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from device.access.known_hosts import KnownHosts
@@ -41,6 +46,37 @@ class RequestGuard:
             await problem(error)(scope, receive, _with_safe_headers(send))
         else:
             await self._app(scope, bounded, _with_safe_headers(send))
+
+
+class StrictRoute(APIRoute):
+    """A route whose JSON body must say each thing once: of a key that is there twice, parsers take either."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return what answers a request of the route."""
+        handle = super().get_route_handler()
+
+        async def handle_strictly(request: Request) -> Response:
+            return await handle(_StrictRequest(request.scope, request.receive))
+
+        return handle_strictly
+
+
+class _StrictRequest(Request):
+    async def json(self) -> Any:
+        body = await self.body()
+        try:
+            return json.loads(body, object_pairs_hook=_each_key_once)
+        except (UnicodeDecodeError, RecursionError) as error:
+            raise json.JSONDecodeError(f"it is no JSON that can be read ({type(error).__name__})", "", 0) from None
+
+
+def _each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise json.JSONDecodeError(f"the key {twice!a} is there twice", "", 0)
+    return found
 
 
 def asked(scope: Scope) -> AskedRequest:

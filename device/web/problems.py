@@ -10,8 +10,9 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import Match, Route
 
-from device.errors import DeviceError, InvalidRequest, UnknownPath
+from device.errors import BusyError, DeviceError, InvalidRequest, UnknownPath
 from device.measurement.quantities import InvalidQuantity
 
 log = logging.getLogger(__name__)
@@ -27,10 +28,12 @@ def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
         "status": status,
-        "detail": error.cause,
+        "detail": error.cause.encode("utf-8", "backslashreplace").decode(),  # a client's own words may be no text
         "code": error.code,
         "remedy": error.remedy,
     }
+    if isinstance(error, BusyError) and error.holder:
+        body["holder"] = error.holder
     return JSONResponse(body, status_code=status, media_type="application/problem+json")
 
 
@@ -45,12 +48,27 @@ def _invalid_quantity(request: Request, error: InvalidQuantity) -> JSONResponse:
 def _invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"])
-    return problem(InvalidRequest(f"{where}: {first['msg']}.", f"Correct the field. {REMEDY}"))
+    why = f" ({first['ctx']['error']})" if first["type"] == "json_invalid" else ""
+    return problem(InvalidRequest(f"{where}: {first['msg']}{why}.", f"Correct the field. {REMEDY}"))
 
 
 def _http_error(request: Request, error: HTTPException) -> JSONResponse:
     unknown = UnknownPath(f"{request.method} {request.url.path}: {error.detail}.", REMEDY)
-    return problem(unknown, error.status_code)
+    answer = problem(unknown, error.status_code)
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        answer.headers["Allow"] = ", ".join(sorted(_methods(request)))
+    return answer
+
+
+def _methods(request: Request) -> set[str]:
+    """Return every method that the path takes: several routes may share it, and the framework names but one's."""
+    routes = [route for route in request.app.routes if isinstance(route, Route)]
+    return {
+        method
+        for route in routes
+        if route.matches(request.scope)[0] is not Match.NONE
+        for method in route.methods or ()
+    }
 
 
 def _unexpected(request: Request, error: Exception) -> JSONResponse:

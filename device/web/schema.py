@@ -8,14 +8,16 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, RootModel
 
 from device.fault_table import FaultCode
 from device.instrument.press.states import PressState
 from device.instrument.self_test.report import SelfTestState, Verdict
 from device.instrument.status import JobState, Step
 from device.instrument.watch.readiness import HealthPart
+from device.measurement.estimate import EstimateStatus
 from device.measurement.mode import Mode
+from device.records.exams import ExamKind
 
 PressStateCode = StrEnum("PressStateCode", [(state.name, state.code) for state in PressState])  # type: ignore[misc]
 """Every state of a press. (The type check cannot see members that a table makes.)"""
@@ -25,8 +27,17 @@ class _Body(BaseModel):
     model_config = ConfigDict(extra="allow")
 
 
+class Holder(_Body):
+    """Who has the probe: a press in its mode, or the self-test, and since when."""
+
+    kind: Literal["press", "self_test"]
+    id: str
+    mode: Mode | None
+    since: str | None
+
+
 class Problem(_Body):
-    """An error, RFC 9457: `detail` is the cause, `remedy` what to do."""
+    """An error, RFC 9457: `detail` is the cause, `remedy` what to do; `holder` says who has a probe that is busy."""
 
     type: str
     title: str
@@ -34,6 +45,7 @@ class Problem(_Body):
     detail: str
     code: FaultCode
     remedy: str
+    holder: Holder | None = None
 
 
 class Fault(_Body):
@@ -47,7 +59,11 @@ class Fault(_Body):
 
 
 class PressResource(_Body):
-    """A press; `code` is that of the fault that ended it."""
+    """A press; `code` is that of the fault that ended it.
+
+    Of a scan: `ramps`, how many presses on the lesion are complete; `until`, how sure it is asked to be, as half of the
+    90 % interval by unknown; `within_s`, in how many seconds.
+    """
 
     id: str
     mode: Mode
@@ -58,6 +74,154 @@ class PressResource(_Body):
     measurement_id: str | None
     warnings: list[Fault]
     light_on_s: float
+    ramps: int
+    until: dict[str, float] | None
+    within_s: float | None
+    asked_at: str | None = None
+    exam_id: str | None = None
+
+
+class EstimatedUnknown(_Body):
+    """One unknown: its value, 90 % interval and standard deviation, null where there are none.
+
+    `identifiable`: whether the press determines it. An open end is that of the trained range: the truth may lie beyond.
+    """
+
+    value: float | None
+    low: float | None
+    high: float | None
+    std: float | None
+    identifiable: bool
+    low_is_open: bool = False
+    high_is_open: bool = False
+
+
+class EstimateResource(_Body):
+    """What a press says of the lesion, by which model and certificate; `reason` is that of the status, in words."""
+
+    size_mm: EstimatedUnknown
+    depth_mm: EstimatedUnknown
+    youngs_modulus_kpa: EstimatedUnknown
+    status: EstimateStatus
+    reason: str
+    mode: Mode
+    model: str
+    model_sha256: str
+    calibration_id: str
+    simulated: bool
+
+
+class MeasuredFeatures(RootModel[dict[str, float]]):
+    """The features of the tactile image that the estimate was computed from, by their names."""
+
+
+class KnownTruth(_Body):
+    """What a phantom, real or simulated, is known to hold."""
+
+    size_mm: float
+    depth_mm: float
+    youngs_modulus_kpa: float
+
+
+class Voided(_Body):
+    """Since when, by whom and why a measurement does not count."""
+
+    at: str
+    by: str
+    reason: str
+
+
+class Exam(_Body):
+    """An exam as it is now; its `version` grows with every change, and is what its ETag says."""
+
+    id: str
+    seq: int
+    version: int
+    made_at: str
+    changed_at: str
+    kind: ExamKind
+    patient_ref: str | None
+    order_number: str | None
+    side: Literal["left", "right"] | None
+    clock_position: int | None
+    nipple_distance_mm: float | None
+    operator: str
+    note: str
+
+
+class ExamList(_Body):
+    """Exams, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+
+    exams: list[Exam]
+
+
+class AuditEntry(_Body):
+    """What somebody has changed of an exam or a measurement, `subject`: the fields before and after, and why."""
+
+    seq: int
+    at: str
+    by: str
+    what: Literal["exam_made", "exam_changed", "measurement_moved", "measurement_voided"]
+    subject: str
+    reason: str
+    before: dict[str, Any] | None
+    after: dict[str, Any]
+
+
+class AuditList(_Body):
+    """Entries of the audit, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+
+    entries: list[AuditEntry]
+
+
+class Measurement(_Body):
+    """A press that was answered and kept: the answer, what it was computed from, and what was noticed meanwhile.
+
+    `exam_id` is the exam that it belongs to now, `voided` why it does not count; its `version` grows when either
+    changes, and is what its ETag says. All else stays as it was measured.
+    `force_n` is the mean over `frames`, of `ramps` presses on the lesion; `reached`: whether a scan is as sure as was
+    asked (`until`, `within_s`), null when nothing was. Fields that have a default are missing in older ones.
+    """
+
+    id: str
+    seq: int
+    taken_at: str
+    mode: Mode
+    estimate: EstimateResource
+    features: MeasuredFeatures
+    force_n: float
+    frames: int
+    recording_id: str
+    truth: KnownTruth | None
+    warnings: list[Fault]
+    exam_id: str | None
+    voided: Voided | None
+    version: int
+    ramps: int = 1
+    until: dict[str, float] | None = None
+    within_s: float | None = None
+    reached: bool | None = None
+
+
+class MeasurementList(_Body):
+    """Measurements, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+
+    measurements: list[Measurement]
+
+
+class Certificate(_Body):
+    """A calibration certificate, or the name of its file and the problem of reading it, "" when there is none."""
+
+    id: str
+    problem: str
+
+
+class CalibrationList(_Body):
+    """The certificates there are; `active` is the next start's, `in_use` that of this one."""
+
+    active: str | None
+    in_use: str | None
+    calibrations: list[Certificate]
 
 
 class Check(_Body):
@@ -75,11 +239,13 @@ class Check(_Body):
 
 
 class OfferedMode(_Body):
-    """A mode: what one of its two presses takes (frames, s, N), and what its answer takes and is worth.
+    """A mode: what one of its presses takes (frames, s, N), how often the lesion is pressed, and what its answer takes
+    and is worth.
 
     `answer_s`: from the last frame to the answer, median of `answer_presses` on this probe; when there was none yet,
     what is expected by the model card and the other modes' presses. Errors and shares are the model card's, of
-    simulated presses; null where it says nothing.
+    simulated presses; null where it says nothing. `reachable_half_width`: half of the narrowest 90 % interval that can
+    be had, by unknown in its own unit.
     """
 
     mode: Mode
@@ -88,11 +254,14 @@ class OfferedMode(_Body):
     from_n: float
     to_n: float
     seconds: float
+    fewest_ramps: int
+    most_ramps: int
     answer_s: float | None
     answer_presses: int
     typical_error_percent: dict[str, float] | None
     answered_ratio: float | None
     determined_ratio: dict[str, float] | None
+    reachable_half_width: dict[str, float] | None
 
 
 class Device(_Body):
@@ -133,6 +302,18 @@ class Tare(_Body):
 
     moved_n: float
     zero_shift_n: float
+
+
+class Liveness(_Body):
+    """The daemon runs."""
+
+    status: Literal["live"]
+
+
+class Readiness(_Body):
+    """A press can be measured."""
+
+    status: Literal["ready"]
 
 
 class HealthOfPart(_Body):
@@ -180,8 +361,29 @@ class ShownAnswer(_Body):
 
     taken_at: str
     mode: Mode
-    estimate: dict[str, Any]
-    truth: dict[str, float] | None
+    estimate: EstimateResource
+    truth: KnownTruth | None
+    ramps: int
+    reached: bool | None
+
+
+class ScanStatus(_Body):
+    """A scan under way, once a press on the lesion is complete: what all of them tell, each by unknown in its own unit.
+
+    `half_width`: half of each 90 % interval now, `expected_half_width` after the next press; unknowns without numbers
+    are left out. `next_offset_mm`: how far beside the lesion's middle that goes. `reason`: that of the estimate so far.
+    `failed`: why a press since then does not count.
+    """
+
+    ramps: int
+    most_ramps: int
+    value: dict[str, float | None]
+    determined: dict[str, bool]
+    half_width: dict[str, float]
+    expected_half_width: dict[str, float]
+    next_offset_mm: float
+    reason: str
+    failed: str
 
 
 class Status(_Body):
@@ -207,24 +409,8 @@ class Status(_Body):
     frames_taken: int
     frames_needed: int
     press: PressResource | None
+    scan: ScanStatus | None
     answer: ShownAnswer | None
     measurement_id: str | None
     self_test: SelfTestSummary | None
     faults: list[Fault]
-
-
-def answers(status: int, model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
-    """Return the description of a route's good answer, for FastAPI's `responses`."""
-    return {status: {"model": model}}
-
-
-def _problem_schema() -> dict[str, Any]:
-    """Return the problem's schema; its codes are those of the faults, which the schema names elsewhere already."""
-    schema = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-    return {key: value for key, value in schema.items() if key != "$defs"}
-
-
-PROBLEM: dict[int | str, dict[str, Any]] = {
-    "default": {"description": "Any error", "content": {"application/problem+json": {"schema": _problem_schema()}}}
-}
-"""What every route may answer instead."""

@@ -19,28 +19,32 @@ from device.instrument.procedure import Procedure
 from device.instrument.watch.readiness import health_record
 from device.records.release_head import ReleaseHead
 from device.records.updates import IncomingRelease, Updates
-from device.web.schema import Health, UpdateResource, answers
+from device.web.contract import BYTES, answers
+from device.web.schema import Health, UpdateResource
 
 PART_BYTES = 1_000_000
 """So much is collected before it is written: each write changes threads."""
+RELEASE_BODY = {"requestBody": {"required": True, "content": {"application/octet-stream": {"schema": BYTES}}}}
 
 
 def add_updates(app: FastAPI, api: str, procedure: Procedure, updates: Updates) -> None:
     """Add the routes below `api` that tell of releases and take them."""
     location = f"{api}/updates"
 
-    @app.get(f"{api}/health/parts", responses=answers(200, Health))
-    def parts() -> dict[str, Any]:
+    @app.get(f"{api}/health/parts", responses=answers(200, Health), tags=["health"])
+    def get_parts_health() -> dict[str, Any]:
         """Say which parts were seen working within the last seconds, and which release runs; always 200."""
         return health_record(updates.running, procedure.parts())
 
-    @app.get(location, responses=answers(200, UpdateResource))
-    def releases() -> dict[str, Any]:
+    @app.get(location, responses=answers(200, UpdateResource), tags=["updates"])
+    def get_updates() -> dict[str, Any]:
         """Return which releases there are, how far an update is, and how the last ones ended."""
         return updates.now().as_record()
 
-    @app.post(location, status_code=202, responses=answers(202, UpdateResource))
-    async def upload(request: Request) -> JSONResponse:
+    accepted = answers(202, UpdateResource, "Location")
+
+    @app.post(location, status_code=202, responses=accepted, openapi_extra=RELEASE_BODY, tags=["updates"])
+    async def upload_release(request: Request) -> JSONResponse:
         """Take a release file as body, from the probe's own screen only, and hand it to the updater."""
         incoming = await asyncio.to_thread(_begin, procedure, updates, _announced_bytes(request))
         try:
@@ -50,7 +54,7 @@ def add_updates(app: FastAPI, api: str, procedure: Procedure, updates: Updates) 
             await asyncio.to_thread(incoming.discard)
         return JSONResponse(updates.now().as_record(), status_code=202, headers={"Location": location})
 
-    @app.post(f"{location}/roll-back", status_code=202, responses=answers(202, UpdateResource))
+    @app.post(f"{location}/roll-back", status_code=202, responses=accepted, tags=["updates"])
     def roll_back() -> JSONResponse:
         """Ask for the release before this one, from the probe's own screen only."""
         with procedure.idle():

@@ -19,6 +19,7 @@ from chromium import chromium_page
 from daemon_process import PATIENT, QUICK_HAND, ROOT, Daemon, wait_for
 from playwright.sync_api import Page, expect
 from small_release import tar
+from stand_in_adviser import no_advice
 
 from device.assembly import probe as assembly
 from device.assembly.answers import Answers
@@ -30,6 +31,7 @@ from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, 
 from device.measurement.mode import MODES, Mode, ModeWorth
 from device.measurement.ramp_modes.estimate import REASONS
 from device.measurement.recording.recording import Recording
+from device.measurement.scan_advice import ScanAdvice, half_widths
 from device.records.updates import Updates
 from device.simulation import virtual_probe
 from device.simulation.hand import HandSettings, VirtualHand
@@ -57,6 +59,7 @@ class WaitingHand(VirtualHand):
     def __init__(self, settings: HandSettings) -> None:
         super().__init__(settings)
         self._goes_on, self._waits_since_s, self._waited_s = False, math.inf, 0.0
+        self._aside_mm = self._more_n = 0.0
 
     def _own_s(self, t_s: float) -> float:
         return t_s - self._waited_s if self._goes_on else min(t_s, self._waits_since_s)
@@ -69,13 +72,21 @@ class WaitingHand(VirtualHand):
         force_n = super().force_n(self._own_s(t_s))
         if force_n >= WAITS_AT_N and not self._goes_on:
             self._waits_since_s = min(t_s, self._waits_since_s)
-        return force_n
+        return force_n + (self._more_n if force_n >= WAITS_AT_N else 0.0)
 
     def place(self, t_s: float) -> ProbePlacement:
         return super().place(self._own_s(t_s))
 
-    def follow(self, guidance: str, now_s: float) -> None:
-        super().follow(guidance, self._own_s(now_s))
+    def follow(self, guidance: str, now_s: float, aside_mm: float | None = None) -> None:
+        if guidance == "move_aside":
+            self._aside_mm = aside_mm or 0.0
+        else:
+            super().follow(guidance, self._own_s(now_s))
+
+    def go_aside(self, *, too_hard: bool = False) -> None:
+        """Go on with a scan: the hand waits before it moves to another place, where it may lean on the probe."""
+        self._more_n = 1.2 if too_hard else 0.0
+        super().follow("move_aside", self._own_s(time.monotonic()), self._aside_mm)
 
 
 @dataclass
@@ -139,7 +150,33 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
             ("precise", 0.9, 3.1, 2.4),
         )
     }
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, worth=worth))
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, no_advice, worth=worth))
+
+
+@pytest.fixture
+def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To be asked for before the probe: each further press on the lesion makes the intervals narrower.
+
+    Size and depth cannot be surer than 0.8 mm, and the modulus is not known by the first press.
+    """
+    reachable = {"size_mm": 0.8, "depth_mm": 0.8, "youngs_modulus_kpa": 9.0}
+    errors = {"size_mm": 2.0, "depth_mm": 2.2, "youngs_modulus_kpa": 19.0}
+    worth = {"precise": ModeWorth(0.4, 0.9, errors, {}, reachable)}
+
+    def advise(recording: Recording) -> ScanAdvice:
+        ramps = len(recording.ramps())
+        of_unknowns = [
+            Quantity(value, value - width / ramps, value + width / ramps, 0.1, is_known)
+            for value, width, is_known in ((12.2, 2.6, True), (6.1, 1.4, True), (63.0, 33.0, ramps > 1))
+        ]
+        estimate = Estimate(*of_unknowns, "ok", "", "precise", "stand-in", "00", "c", True, {})
+        now = half_widths(estimate)
+        return ScanAdvice(estimate, now, 4.0, {name: width * ramps / (ramps + 1) for name, width in now.items()})
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        return advise(recording).estimate
+
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, advise, worth=worth))
 
 
 @pytest.fixture
@@ -150,7 +187,7 @@ def no_numbers_in_any_mode(monkeypatch: pytest.MonkeyPatch) -> None:
         reason = " ".join([*REASONS.values(), NO_NUMBERS])
         return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "c", True))
 
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate))
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, no_advice))
 
 
 def _shoot(page: Page, name: str) -> None:
@@ -167,6 +204,12 @@ def _require_fits(page: Page) -> None:
         inner + " && e.clientWidth > 0 && !e.closest('.strip')).map(e => e.id))"
     )
     assert spilling == []
+
+
+def _require_whole_scan(page: Page) -> None:
+    """Nothing of how sure a scan is is cut off."""
+    cut = "nodes => nodes.filter(n => n.scrollHeight > n.clientHeight + 1).map(n => n.className)"
+    assert page.locator("#scan, .scan-rows").evaluate_all(cut) == []
 
 
 def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page, probe: Served):
@@ -190,7 +233,9 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     size = newest["estimate"]["size_mm"]
     expect(page.locator("#size-value")).to_have_text(f"{size['value']:.1f} mm")
     expect(page.locator("#truth-size")).to_have_text("12.0 mm")
-    expect(page.locator("#modulus-value")).to_have_text("not determined")
+    modulus = newest["estimate"]["youngs_modulus_kpa"]
+    shown = f"{modulus['value']:.0f} kPa" if modulus["identifiable"] else "not determined"
+    expect(page.locator("#modulus-value")).to_have_text(shown)
     expect(page.locator("#simulated-badge")).to_be_visible()
 
 
@@ -205,7 +250,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#modes input:checked")).to_have_value("standard")
     expect(page.locator(".mode-headings")).to_contain_text("press + answersize, depth off byanswered")
     expect(modes.nth(0)).to_have_text("quick0.2 s + ~0.05 s5 %, 7 %90 %")
-    expect(modes.nth(2)).to_have_text(re.compile(r"precise3 s \+ ~[0-9.]+ s3 %, 2 %90 %"))
+    expect(modes.nth(2)).to_have_text(re.compile(r"precise2–5 × 3 s \+ ~[0-9.]+ s3 %, 2 %90 %"))
     expect(modes.nth(3)).to_have_text("paper0.5 s + ?not statednot stated")
     _shoot(page, "modes")
     _require_fits(page)
@@ -231,6 +276,64 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")
     _shoot(page, "result-standard")
     _require_fits(page)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("narrowing_scan")
+def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_it_is_enough(page: Page, probe: Served):
+    """Asked for 1 mm, content with 1.3 mm: what cannot be had is not offered, and the result says what was reached."""
+    page.goto(probe.url)
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    expect(page.locator("#until")).to_be_hidden()
+    page.locator("#modes label").filter(has_text="precise").click()
+    steps = page.locator("#until label")
+    expect(steps).to_have_text(["can be", "± 2 mm", "± 1 mm", "± 0.5 mm"])
+    expect(steps.nth(3).locator("input")).to_be_disabled()
+    expect(page.locator("#status-reason")).to_have_text(re.compile("^A scan: one press beside the lesion, then two to"))
+    steps.nth(2).click()
+    _shoot(page, "scan-asked")
+    _require_fits(page)
+    page.locator("#press-button").click()
+    probe.hand.go_on()
+    expect(page.locator("#instruction")).to_have_text("Move the probe about 4 mm to the side, touch again")
+    expect(page.locator("#scan-count")).to_have_text("1 of at most 5 presses")
+    values, told = page.locator("#scan .scan-value"), page.locator("#scan .scan-told")
+    expect(values).to_have_text(["12.2 ± 2.6 mm", "6.1 ± 1.4 mm", "not known yet"])
+    expect(told.nth(0)).to_have_text("next press: ± 1.3 mm asked: ± 1.0 mm")
+    _shoot(page, "scan-after-one-press")
+    _require_fits(page)
+    _require_whole_scan(page)
+    probe.hand.go_aside(too_hard=True)
+    expect(page.locator("#status-word")).to_have_text("That press does not count.")
+    expect(page.locator("#status-reason")).to_contain_text("above 1.00 N: lift and press more gently.")
+    expect(page.locator("#instruction")).to_have_text("Move the probe about 4 mm to the side, touch again")
+    _shoot(page, "scan-press-that-does-not-count")
+    _require_fits(page)
+    _require_whole_scan(page)
+    probe.hand.go_aside()
+    expect(page.locator("#instruction")).to_have_text("Press slowly harder")
+    expect(page.locator("#status-reason")).to_have_text(
+        re.compile("^Press 2 on the lesion: about 4 mm from its middle")
+    )
+    _shoot(page, "scan-second-press")
+    _require_fits(page)
+    expect(page.locator("#scan-count")).to_have_text("2 of at most 5 presses")
+    expect(values).to_have_text(["12.2 ± 1.3 mm", "6.1 ± 0.70 mm", "63 ± 17 kPa"])
+    expect(page.locator('.scan-row[data-reached="true"]')).to_have_count(1)
+    expect(page.locator("#instruction")).to_have_text("Move the probe about 4 mm to the side, touch again")
+    _shoot(page, "scan-after-two-presses")
+    _require_whole_scan(page)
+    page.locator("#enough-button").click()
+    expect(page.locator("#image-title")).to_have_text("Measurement 1, precise")
+    expect(page.locator("#status-reason")).to_contain_text("2 presses on the lesion: not as sure as asked for.")
+    expect(page.locator("#enough-button")).to_be_hidden()
+    _shoot(page, "scan-result")
+    _require_fits(page)
+    tiles = page.locator(".tile").evaluate_all("tiles => tiles.map(t => t.getBoundingClientRect().bottom)")
+    assert max(tiles) <= page.locator("#until").bounding_box()["y"]
+    kept = probe.procedure.store.measurement(probe.procedure.board.now.measurement_id)
+    assert (kept["ramps"], kept["frames"], kept["reached"]) == (2, 20, False)
+    assert kept["until"] == {"size_mm": 1.0, "depth_mm": 1.0}
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 // probe with one mode asks nothing.
 
 import { byId, element, setAttribute } from "./dom.js";
+import { isScan, offerAccuracy } from "./scan.js";
 
 const box = byId("modes");
 
@@ -18,11 +19,12 @@ function answerWords({ answer_s: answer, answer_presses: presses }) {
   return `${presses === 0 ? "~" : answer < LEAST_S ? "<" : ""}${seconds}`;
 }
 
-/** Time of one of the two presses and of the answer; typical error of size and depth; share of presses answered. */
+/** Time of one of its presses, of a scan how many there are on the lesion, and of the answer; error; share answered. */
 function lines(offer) {
   const { seconds, typical_error_percent: error, answered_ratio: answered } = offer;
+  const { fewest_ramps: fewest, most_ramps: most } = offer;
   return [
-    `${seconds} s + ${answerWords(offer)}`,
+    `${isScan(offer) ? `${fewest}–${most} × ` : ""}${seconds} s + ${answerWords(offer)}`,
     error ? `${Math.round(error.size_mm)} %, ${Math.round(error.depth_mm)} %` : "not stated",
     answered === null ? "not stated" : percent(answered),
   ];
@@ -53,6 +55,7 @@ export function offerModes({ modes, default_mode: byDefault }) {
   const old = [...box.querySelectorAll("label, .mode-headings")];
   old.forEach((one) => one.remove());
   box.append(headings(), ...modes.map((offer) => choice(offer, offer.mode === chosen)));
+  offerAccuracy(modes);
 }
 
 /** Show the choice while there is one. */

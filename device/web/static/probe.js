@@ -60,7 +60,8 @@ async function ask(method, path, body, { type = "application/json", withinMs = A
   return response;
 }
 
-export const startPress = (mode) => ask("POST", "/presses", JSON.stringify(mode ? { mode } : {}));
+export const startPress = (wish) => ask("POST", "/presses", JSON.stringify(wish));
+export const finishScan = (id) => ask("POST", `/presses/${encodeURIComponent(id)}/finish`);
 export const cancelPress = (id) => ask("DELETE", `/presses/${encodeURIComponent(id)}`);
 export const imageUrl = (id) => `${API}/measurements/${encodeURIComponent(id)}/image.png`;
 

@@ -14,6 +14,7 @@ const STATUS_WORDS = {
   outside_range: "No numbers.",
   no_contact: "No contact.",
   saturated: "Image too bright.",
+  partly_identifiable: "Measured in part.",
   not_identifiable: "Not determined.",
   rejected: "Rejected.",
 };
@@ -90,11 +91,22 @@ export function showMeasurement(measurement) {
   setText(byId("image-caption"), measurement.taken_at.slice(0, 16).replace("T", " ") + " UTC");
 }
 
+const REACHED_WORDS = { true: ": as sure as asked for", false: ": not as sure as asked for" };
+
+/** What a measurement says in words, of a scan also by how many presses, and whether it is as sure as asked for. */
+export function describeMeasurement({ estimate, ramps, reached }) {
+  const said = describeEstimate(estimate);
+  if (!(ramps > 1 || reached in REACHED_WORDS)) return said;
+  const presses = `${ramps} ${ramps > 1 ? "presses" : "press"} on the lesion${REACHED_WORDS[reached] ?? ""}.`;
+  return { ...said, reason: `${said.reason} ${presses}`, tone: reached === false ? "caution" : said.tone };
+}
+
 /** The status of an estimate in words, its reason, and whether it is "good" as it stands or a "caution". */
-export function describeEstimate({ status, reason, ...quantities }) {
+function describeEstimate({ status, reason, ...quantities }) {
   const known = TILES.filter(({ key }) => quantities[key].identifiable === true).length;
+  // Measurements of before say not_identifiable also where only a part is.
   const inPart = known > 0 && known < TILES.length && (status === "ok" || status === "not_identifiable");
-  if (status !== "ok" && !inPart) return { word: STATUS_WORDS[status] ?? status, reason, tone: "caution" };
-  if (inPart) return { word: "Measured in part.", reason, tone: "caution" };
+  const said = inPart ? "partly_identifiable" : status;
+  if (said !== "ok") return { word: STATUS_WORDS[said] ?? said, reason, tone: "caution" };
   return { word: "Measured.", reason: reason || "Size, depth and Young's modulus are determined.", tone: "good" };
 }

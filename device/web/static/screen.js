@@ -4,8 +4,11 @@
 import { byId, element, setAttribute, setText } from "./dom.js";
 import { showGauge } from "./gauge.js";
 import { chosenMode, offerModes, showModes } from "./modes.js";
-import { cancelPress, fetchDevice, fetchMeasurement, followStatus, startPress, takeTare } from "./probe.js";
-import { describeEstimate, showMeasurement } from "./result.js";
+import {
+  cancelPress, fetchDevice, fetchMeasurement, finishScan, followStatus, startPress, takeTare,
+} from "./probe.js";
+import { describeMeasurement, showMeasurement } from "./result.js";
+import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./scan.js";
 import { showSelfTest } from "./self_test.js";
 import { absenceWords, updateLine } from "./software.js";
 
@@ -13,7 +16,7 @@ const UNDER_WAY = new Set(["waiting", "capturing", "computing"]);
 const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
 const ICONS = {
   press_beside: "press", press_lesion: "press", press_harder: "harder", press_lighter: "lighter",
-  touch_beside: "press", touch_lesion: "press", press_slowly: "harder", slower: "wait",
+  touch_beside: "press", touch_lesion: "press", move_aside: "aside", press_slowly: "harder", slower: "wait",
   keep_free: "lift", hold_block: "press", put_weight: "press", take_weight_off: "lift",
   hold_still: "hold", lift: "lift", done: "done", rejected: "rejected", fault: "fault",
 };
@@ -38,6 +41,7 @@ const TOLD_MS = 5000;
 
 const panel = byId("panel");
 const button = byId("press-button");
+const enoughButton = byId("enough-button");
 const tareButton = byId("tare");
 const LOST_WORDS = [byId("lost-title").textContent, byId("lost-words").textContent];
 let status = null;
@@ -78,7 +82,7 @@ function showSteps() {
 
 function showInstruction() {
   const { code, text } = status.guidance;
-  setText(byId("instruction"), text);
+  setText(byId("instruction"), text.replace(/(\d) (?=mm\b)/, "$1\u00a0"));
   setAttribute(byId("instruction-icon"), "href", `#icon-${ICONS[code] ?? WAIT_ICONS[status.step] ?? "wait"}`);
   byId("instruction").classList.toggle("long", text.length > LONG_INSTRUCTION);
   panel.dataset.tone = TONES[code] ?? "calm";
@@ -86,13 +90,15 @@ function showInstruction() {
 
 /** The one sentence under the instruction: a refused command first, then what became of the press, then the result. */
 function describeStatus() {
-  const hint = (status.kind === "ramp" && RAMP_HINTS[status.step]) || (STEP_HINTS[status.step] ?? "");
+  const scan = scanHint(status, pressUnderWay() ? status.mode : chosenMode());
+  const hint = scan || (status.kind === "ramp" && RAMP_HINTS[status.step]) || (STEP_HINTS[status.step] ?? "");
   const pressWord = PRESS_WORDS[status.press?.state];
   if (problem) return { word: "Not done.", reason: problem, tone: "caution" };
   if (updateLine()) return updateLine();
   if (tared) return { word: "Tared.", reason: tared, tone: "good" };
   if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
-  if (shownResult()) return describeEstimate(shownResult().estimate);
+  if (scanTrouble(status)) return scanTrouble(status);
+  if (shownResult()) return describeMeasurement(shownResult());
   return { word: "", reason: hint, tone: "calm" };
 }
 
@@ -135,10 +141,18 @@ function showFaults() {
   panel.classList.toggle("with-faults", status.faults.length > 0);
 }
 
+/** What is asked for: a mode, and of a scan how sure it is to be. */
+function wish() {
+  const mode = chosenMode();
+  return mode ? { mode, ...chosenAccuracy(mode) } : {};
+}
+
 function showButton() {
   const start = status.simulated ? "Press the simulated probe" : "New measurement";
   setText(button, pressUnderWay() ? "Cancel" : start);
   button.classList.toggle("button-cancel", pressUnderWay());
+  enoughButton.hidden = !(status.scan && status.press?.state === "capturing");
+  enoughButton.disabled = sending;
   button.disabled = sending || status.step === "starting" || status.step === "self_test";
   tareButton.disabled = sending || pressUnderWay() || status.step === "self_test";
 }
@@ -154,6 +168,8 @@ function show() {
   showFaults();
   showButton();
   showModes(!pressUnderWay());
+  showAccuracy(!pressUnderWay() && chosenMode());
+  showScan(status);
   showGauge(status);
   showSelfTest(status);
 }
@@ -225,7 +241,7 @@ function receive(next) {
 async function send(command) {
   sending = true;
   problem = tared = "";
-  button.disabled = tareButton.disabled = true;
+  button.disabled = enoughButton.disabled = tareButton.disabled = true;
   try {
     await command();
   } catch (error) {
@@ -236,8 +252,9 @@ async function send(command) {
 }
 
 button.addEventListener("click", () => {
-  send(() => (pressUnderWay() ? cancelPress(status.press.id) : startPress(chosenMode())));
+  send(() => (pressUnderWay() ? cancelPress(status.press.id) : startPress(wish())));
 });
+enoughButton.addEventListener("click", () => send(() => finishScan(status.press.id)));
 tareButton.addEventListener("click", () => {
   send(async () => {
     tared = `The zero has moved by ${(await takeTare()).moved_n.toFixed(3)} N.`;

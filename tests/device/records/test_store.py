@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from device.errors import DiskFullError, StorageError, UnknownResource
+from device.errors import DiskFullError, ReusedKey, StorageError, UnknownResource
 from device.files.recording_file import read_picture, read_recording, write_recording
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
+from device.records.asked_once import AskedOnce
+from device.records.exams import ExamContent
 from device.records.store import Store
 
 CAMERA = CameraSettings(
@@ -42,7 +44,8 @@ def job(press_id, state):
 
 def test_a_measurement_comes_back_with_its_sequence_number(store):
     kept = add(store, 1)
-    assert kept == {"id": "m-1", "seq": 1, "recording_id": "r-1", "force_n": 0.5}
+    unfiled = {"exam_id": None, "voided": None, "version": 1}
+    assert kept == {"id": "m-1", "seq": 1, "recording_id": "r-1", "force_n": 0.5} | unfiled
     assert store.measurement("m-1") == kept
 
 
@@ -136,6 +139,51 @@ def test_all_is_there_again_after_a_restart_and_numbers_go_on(tmp_path):
     assert second.press("p-1") == job("p-1", "done")
     assert add(second, 2)["seq"] == 2
     second.close()
+
+
+def test_a_measurement_of_an_exam_is_kept_with_it_in_one_transaction(store):
+    exam = store.exams.make(ExamContent(kind="phantom", operator="Ada"))
+    kept = store.add_measurement({"id": "m-1"}, RECORDING, exam_id=exam["id"])
+    assert kept["exam_id"] == exam["id"]
+    assert store.measurement("m-1") == kept
+    add(store, 2)
+    assert [one["id"] for one in store.measurements(before_seq=9, limit=9, exam_id=exam["id"])] == ["m-1"]
+    store._db.execute("CREATE TRIGGER no_filing BEFORE INSERT ON filing BEGIN SELECT RAISE(ABORT, 'full'); END")
+    with pytest.raises(StorageError, match="full"):
+        store.add_measurement({"id": "m-3"}, replace(RECORDING, id="r-3"), exam_id=exam["id"])
+    assert [one["id"] for one in store.measurements(before_seq=9, limit=9)] == ["m-2", "m-1"]
+    assert not (store.folder / "recordings" / "r-3.zip").exists()
+
+
+def test_a_request_that_is_obeyed_once_has_its_first_answer_after_a_restart_too(tmp_path):
+    once, answer = AskedOnce("k-1", "POST presses {}"), job("p-1", "waiting")
+    first = Store(tmp_path)
+    assert first.answer_to(once) is None
+    first.save_press(answer, once)
+    first.save_press(job("p-1", "done"))
+    first.close()
+    second = Store(tmp_path)
+    assert second.answer_to(once) == answer
+    assert second.press("p-1")["state"] == "done"
+    second.close()
+
+
+def test_a_key_that_came_with_another_request_is_refused_by_its_name(store):
+    store.save_press(job("p-1", "waiting"), AskedOnce("k-1", "POST presses {}"))
+    with pytest.raises(ReusedKey, match="'k-1' was sent before with another request") as refusal:
+        store.answer_to(AskedOnce("k-1", 'POST presses {"mode": "quick"}'))
+    assert (refusal.value.code, refusal.value.status) == ("E810", 409)
+
+
+def test_a_press_whose_key_is_taken_is_not_kept(store):
+    """One transaction: neither is there without the other."""
+    once = AskedOnce("k-1", "POST presses {}")
+    store.save_press(job("p-1", "waiting"), once)
+    with pytest.raises(StorageError):
+        store.save_press(job("p-2", "waiting"), once)
+    with pytest.raises(UnknownResource):
+        store.press("p-2")
+    assert store.answer_to(once)["id"] == "p-1"
 
 
 @pytest.mark.parametrize("ask", ["measurement", "press"])

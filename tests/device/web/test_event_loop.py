@@ -16,7 +16,7 @@ from device.web import kept_files
 from device.web.app import create_app
 from device.web.events import StatusFeed, status_events
 
-MEASUREMENT = {"id": "m-1", "recording_id": "r-1", "features": {"total": 1.0}}
+MEASUREMENT = {"id": "m-1", "recording_id": "r-1", "features": {"total": 1.0}, "version": 1}
 
 
 class Witness:
@@ -35,7 +35,7 @@ class Witness:
     def measurement(self, measurement_id):
         return self.note("measurement", MEASUREMENT)
 
-    def measurements(self, *, before_seq, limit):
+    def measurements(self, *, before_seq, limit, exam_id):
         return self.note("measurements", [MEASUREMENT])
 
     def recording_path(self, recording_id):

@@ -2,28 +2,30 @@
 
 import asyncio
 import types
+from dataclasses import replace
 
 import pytest
+from stand_in_adviser import advice
 
 from device.config import PressSection
 from device.errors import ClockJumpError, LightBusError, StalledError, UnpluggedCellError
 from device.instrument.press.states import Guidance, PressState
-from device.instrument.status import PressJob, ProcedureStatus, StatusBoard
+from device.instrument.status import PressJob, ProcedureStatus, ScanProgress, StatusBoard
 from device.web import events, schema
 from device.web.events import ALIVE_S, EVENT_INTERVAL_S, STILL_N, StatusFeed, snapshot, status_events
 
 
 class Force:
-    """A load cell at 0.25 N, or at fault."""
+    """A load cell at 0.25 N or another force, or at fault."""
 
-    def __init__(self, fault=None):
-        self.fault = fault
+    def __init__(self, fault=None, force_n=0.25):
+        self.fault, self.force_n = fault, force_n
 
     @property
     def latest_n(self):
         if self.fault:
             raise self.fault
-        return 0.25
+        return self.force_n
 
 
 @pytest.fixture
@@ -88,6 +90,34 @@ def test_a_ramp_has_the_forces_at_which_frames_are_still_wanted(told):
     assert status["wanted_n"] == (0.6,)
     reference = told(ProcedureStatus(step="reference", press=job, wanted_n=(0.62,)), Force())
     assert reference["band_n"] == pytest.approx((0.06, 0.62))
+
+
+def test_a_scan_says_how_sure_it_is_and_how_far_aside_to_go_as_long_as_it_is_under_way(told):
+    scan, job = ScanProgress(1, 5, advice(2.0, 6.0), 6.0), PressJob("p-1", "precise", "capturing", ramps=1)
+    under_way = ProcedureStatus(step="lesion", press=job, guidance=Guidance.MOVE_ASIDE, scan=scan)
+    status = told(under_way, Force())
+    assert schema.Status.model_validate(status).scan == schema.ScanStatus(**scan.as_record())
+    assert status["scan"]["next_offset_mm"] == 6.0
+    assert status["guidance"] == {
+        "code": "move_aside", "text": "Move the probe about 6 mm to the side, touch again"
+    }  # fmt: skip
+    assert told(replace(under_way, press=replace(job, state="done")), Force())["scan"] is None
+    assert told(ProcedureStatus(), Force())["scan"] is None
+
+
+@pytest.mark.parametrize(
+    ("step", "state", "guidance"),
+    [("result", PressState.DONE, Guidance.DONE), ("rejected", PressState.REJECTED, Guidance.REJECTED)],
+)
+def test_a_press_that_was_asked_for_is_not_told_with_how_the_one_before_ended(told, step, state, guidance):
+    over = ProcedureStatus(step=step, state=state, guidance=guidance, press=PressJob("p-2", "quick"))
+    status = told(over, Force(force_n=0.001))
+    assert (status["press"]["id"], status["press"]["state"], status["mode"]) == ("p-2", "waiting", "quick")
+    assert (status["step"], status["press_state"], status["guidance"]["code"]) == ("ready", "idle", "press_beside")
+    held = told(replace(over, guidance=Guidance.LIFT), Force())
+    assert held["guidance"]["code"] == "lift"
+    still_pressed = told(over, Force(force_n=0.3))
+    assert (still_pressed["step"], still_pressed["guidance"]["code"]) == ("ready", "lift")
 
 
 def test_the_state_of_the_press_is_told_by_its_code(told):

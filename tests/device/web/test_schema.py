@@ -36,11 +36,10 @@ def test_the_states_of_a_press_are_an_enumeration(schema):
     assert models["Status"]["properties"]["press_state"]["$ref"] == "#/components/schemas/PressStateCode"
 
 
-def test_every_route_may_answer_with_a_problem_of_the_enumeration(schema):
-    for path in schema["paths"].values():
-        for route in path.values():
-            problem = route["responses"]["default"]["content"]["application/problem+json"]["schema"]
-            assert problem["properties"]["code"]["$ref"] == CODES
+def test_a_problem_has_a_code_of_the_enumeration_and_says_who_holds_a_busy_probe(schema):
+    problem = schema["components"]["schemas"]["Problem"]["properties"]
+    assert problem["code"]["$ref"] == CODES
+    assert problem["holder"]["anyOf"] == [{"$ref": "#/components/schemas/Holder"}, {"type": "null"}]
 
 
 def test_a_press_is_as_described_and_an_unknown_code_is_not():

@@ -1,0 +1,271 @@
+"""Exams, to which exam a measurement belongs, and the audit of all that people change of either.
+
+A measurement stays as it was measured: where it belongs, and that it does not count, stands beside it. Whoever changes
+something names the version that he has seen; each such act is one transaction with its entry in the audit, which SQLite
+itself keeps from being changed. A patient is known by an opaque reference alone: no name and no date of birth.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import uuid
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from device.errors import InvalidRequest, StaleVersion, UnknownResource
+from device.records.asked_once import AskedOnce, first_answer, keep_answer
+
+_Record = dict[str, Any]
+ExamKind = Literal["patient", "phantom"]
+EXAM_TABLES = """
+CREATE TABLE IF NOT EXISTS exam
+  (seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, version INTEGER NOT NULL, record TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS filing
+  (measurement_id TEXT PRIMARY KEY, exam_id TEXT, voided TEXT, version INTEGER NOT NULL);
+CREATE INDEX IF NOT EXISTS filing_by_exam ON filing (exam_id);
+CREATE TABLE IF NOT EXISTS audit
+  (seq INTEGER PRIMARY KEY AUTOINCREMENT, subject TEXT NOT NULL, record TEXT NOT NULL);
+CREATE INDEX IF NOT EXISTS audit_by_subject ON audit (subject);
+CREATE TRIGGER IF NOT EXISTS audit_is_never_changed BEFORE UPDATE ON audit
+  BEGIN SELECT RAISE(ABORT, 'an entry of the audit is never changed'); END;
+CREATE TRIGGER IF NOT EXISTS audit_is_never_deleted BEFORE DELETE ON audit
+  BEGIN SELECT RAISE(ABORT, 'an entry of the audit is never deleted'); END;
+"""
+JOINERS = "\u200c\u200d"
+"""What some scripts need within a word, though it prints nothing."""
+UNFILED = {"exam_id": None, "voided": None, "version": 1}
+"""A measurement of which nobody has said anything."""
+OF_A_PATIENT = ("patient_ref", "side", "clock_position", "nipple_distance_mm")
+
+
+def _one_line(text: str) -> str:
+    """Return text that a screen shows whole, and that two programs compare alike; raise `ValueError` for any other."""
+    if not text.translate(dict.fromkeys(map(ord, JOINERS))).isprintable():
+        raise ValueError("must be of characters that can be printed, on one line")
+    if text != text.strip():
+        raise ValueError("must not begin or end with a space")
+    return text
+
+
+def _lines(text: str) -> str:
+    for line in text.split("\n"):
+        _one_line(line.strip(" "))
+    return text
+
+
+Identifier = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_one_line)]
+"""An identifier or a person, as somebody typed or scanned it."""
+Reason = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_one_line)]
+ExamId = Annotated[str, Field(pattern="^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}$")]
+
+
+@dataclass(frozen=True)
+class AskedExam:
+    """The exam that a press is asked for, and the version of it that whoever asks has seen, None when he says none."""
+
+    id: str
+    version: int | None = None
+
+
+class ExamFields(BaseModel):
+    """What may be said of an exam. The side, the clock position and the distance (mm) from the nipple are the lesion's.
+
+    `patient_ref` is opaque: what the hospital's PC knows the patient by. `order_number`: the order's or accession
+    number.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    kind: ExamKind | None = None
+    patient_ref: Identifier | None = None
+    order_number: Identifier | None = None
+    side: Literal["left", "right"] | None = None
+    clock_position: Annotated[int, Field(ge=1, le=12)] | None = None
+    nipple_distance_mm: Annotated[float, Field(ge=0.0, le=250.0, allow_inf_nan=False)] | None = None
+    operator: Identifier | None = None
+    note: Annotated[str, Field(max_length=2000), AfterValidator(_lines)] = ""
+
+
+class ExamContent(ExamFields):
+    """A whole exam: of a patient, who has a reference, or of a phantom, which has nothing of a patient's."""
+
+    kind: ExamKind
+    operator: Identifier
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> ExamContent:
+        said = [name for name in OF_A_PATIENT if getattr(self, name) is not None]
+        if self.kind == "phantom" and said:
+            raise ValueError(f"an exam of a phantom has no {said[0]}: leave it out")
+        if self.kind == "patient" and self.patient_ref is None:
+            raise ValueError("an exam of a patient needs a patient_ref")
+        return self
+
+
+class Exams:
+    """The exams of a store; all methods may be called from any thread."""
+
+    def __init__(self, transaction: Callable[[], AbstractContextManager[sqlite3.Connection]]) -> None:
+        """Take how a transaction of the store is begun."""
+        self._transaction = transaction
+
+    def make(self, content: ExamContent, once: AskedOnce | None = None) -> _Record:
+        """Keep a new exam and return it; of a request that was obeyed before, what it was answered with then.
+
+        Raises `ReusedKey` for another request's key.
+        """
+        with self._transaction() as db:
+            if once and (kept := first_answer(db, once)):
+                return kept
+            said, at = content.model_dump(), _utc_now()
+            cursor = db.execute("INSERT INTO exam (id, version, record) VALUES (?, 1, '{}')", (str(uuid.uuid4()),))
+            [(exam_id,)] = db.execute("SELECT id FROM exam WHERE seq = ?", (cursor.lastrowid,))
+            exam = {"id": exam_id, "seq": cursor.lastrowid, "version": 1, "made_at": at, "changed_at": at, **said}
+            db.execute("UPDATE exam SET record = ? WHERE id = ?", (json.dumps(exam), exam_id))
+            self._note(db, "exam_made", exam_id, content.operator, "", None, said)
+            if once:
+                keep_answer(db, once, exam)
+        return exam
+
+    def exam(self, exam_id: str, version: int | None = None) -> _Record:
+        """Return an exam; raise `UnknownResource`, or `StaleVersion` when it is not of the version that was seen."""
+        with self._transaction() as db:
+            return exam_of(db, exam_id, version)
+
+    def exams(
+        self,
+        *,
+        kind: ExamKind = "patient",
+        patient_ref: str | None = None,
+        order_number: str | None = None,
+        before_seq: int,
+        limit: int,
+    ) -> list[_Record]:
+        """Return the exams of one kind, of a patient or an order where one is given, newest first."""
+        asked = {"kind": kind, "patient_ref": patient_ref, "order_number": order_number}
+        wanted = {name: value for name, value in asked.items() if value is not None}
+        where = "".join(f" AND json_extract(record, '$.{name}') = ?" for name in wanted)
+        query = f"SELECT record FROM exam WHERE seq < ?{where} ORDER BY seq DESC LIMIT ?"
+        with self._transaction() as db:
+            return [json.loads(row[0]) for row in db.execute(query, (before_seq, *wanted.values(), limit))]
+
+    def change(self, exam_id: str, changes: _Record, *, version: int, by: str, reason: str) -> _Record:
+        """Change fields of an exam; return it as it is then, with the next version.
+
+        Raises as `exam`, and `InvalidRequest` when the whole is no exam any more.
+        """
+        with self._transaction() as db:
+            exam = exam_of(db, exam_id, version)
+            before = {name: exam[name] for name in ExamContent.model_fields}
+            after = _content({**before, **changes})
+            changed = [name for name in before if after[name] != before[name]]
+            if not changed:
+                return exam
+            exam = {**exam, **after, "version": version + 1, "changed_at": _utc_now()}
+            db.execute("UPDATE exam SET version = ?, record = ? WHERE id = ?", (version + 1, json.dumps(exam), exam_id))
+            was, now = ({name: one[name] for name in changed} for one in (before, after))
+            self._note(db, "exam_changed", exam_id, by, reason, was, now)
+        return exam
+
+    def move(self, measurement_id: str, exam_id: str | None, *, version: int, by: str, reason: str) -> None:
+        """Say that a measurement belongs to another exam, or to none; what was measured stays.
+
+        Raises `UnknownResource` for either, and `StaleVersion` when the measurement was moved or voided meanwhile.
+        """
+        with self._transaction() as db:
+            filing = _filing(db, measurement_id, version)
+            if exam_id is not None:
+                exam_of(db, exam_id)
+            _file(db, measurement_id, {**filing, "exam_id": exam_id})
+            was, now = {"exam_id": filing["exam_id"]}, {"exam_id": exam_id}
+            self._note(db, "measurement_moved", measurement_id, by, reason, was, now)
+
+    def void(self, measurement_id: str, *, version: int, by: str, reason: str) -> None:
+        """Say that a measurement does not count, and why; it stays readable.
+
+        Raises as `move`, and `InvalidRequest` for one that is void already.
+        """
+        with self._transaction() as db:
+            filing = _filing(db, measurement_id, version)
+            if filing["voided"]:
+                raise InvalidRequest(f"The measurement {measurement_id} is void already.", "Nothing is left to do.")
+            voided = {"at": _utc_now(), "by": by, "reason": reason}
+            _file(db, measurement_id, {**filing, "voided": voided})
+            self._note(db, "measurement_voided", measurement_id, by, reason, {"voided": None}, {"voided": voided})
+
+    def audit(self, *, subject: str | None = None, before_seq: int, limit: int) -> list[_Record]:
+        """Return what people have changed, of one exam or measurement or of all, newest first."""
+        where, values = ("AND subject = ? ", (subject,)) if subject else ("", ())
+        query = f"SELECT seq, record FROM audit WHERE seq < ? {where}ORDER BY seq DESC LIMIT ?"
+        with self._transaction() as db:
+            return [{"seq": row[0], **json.loads(row[1])} for row in db.execute(query, (before_seq, *values, limit))]
+
+    def _note(
+        self,
+        db: sqlite3.Connection,
+        what: str,
+        subject: str,
+        by: str,
+        reason: str,
+        before: _Record | None,
+        after: _Record,
+    ) -> None:
+        told = {"at": _utc_now(), "by": by, "what": what, "subject": subject, "reason": reason}
+        record = json.dumps({**told, "before": before, "after": after})
+        db.execute("INSERT INTO audit (subject, record) VALUES (?, ?)", (subject, record))
+
+
+def filed(exam_id: str | None, voided: str | None, version: int | None) -> _Record:
+    """Return what a row of `filing` says of its measurement, also when there is none."""
+    if version is None:
+        return dict(UNFILED)
+    return {"exam_id": exam_id, "voided": voided and json.loads(voided), "version": version}
+
+
+def _content(said: _Record) -> _Record:
+    try:
+        return ExamContent.model_validate(said).model_dump()
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, ("exam", *first["loc"])))
+        raise InvalidRequest(f"{where}: {first['msg']}.", "Correct the field; the exam stays as it was.") from None
+
+
+def exam_of(db: sqlite3.Connection, exam_id: str, version: int | None = None) -> _Record:
+    """Return an exam; raises as `Exams.exam`."""
+    row = db.execute("SELECT record FROM exam WHERE id = ?", (exam_id,)).fetchone()
+    if row is None:
+        raise UnknownResource(f"There is no exam {exam_id}.", "Use the id that the API gave.")
+    exam: _Record = json.loads(row[0])
+    _require_version("exam", exam_id, exam["version"], version)
+    return exam
+
+
+def _filing(db: sqlite3.Connection, measurement_id: str, version: int) -> _Record:
+    if not db.execute("SELECT 1 FROM measurement WHERE id = ?", (measurement_id,)).fetchone():
+        raise UnknownResource(f"There is no measurement {measurement_id}.", "Use the id that the API gave.")
+    query = "SELECT exam_id, voided, version FROM filing WHERE measurement_id = ?"
+    filing = filed(*(db.execute(query, (measurement_id,)).fetchone() or (None, None, None)))
+    _require_version("measurement", measurement_id, filing["version"], version)
+    return filing
+
+
+def _file(db: sqlite3.Connection, measurement_id: str, filing: _Record) -> None:
+    voided = json.dumps(filing["voided"]) if filing["voided"] else None
+    row = measurement_id, filing["exam_id"], voided, filing["version"] + 1
+    db.execute("INSERT OR REPLACE INTO filing VALUES (?, ?, ?, ?)", row)
+
+
+def _require_version(what: str, identifier: str, present: int, seen: int | None) -> None:
+    if seen is not None and seen != present:
+        cause = f"The {what} {identifier} has the version {present}: it was changed since the version {seen} was read."
+        raise StaleVersion(cause, "Look at it as it is now, and decide anew.")
+
+
+def _utc_now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

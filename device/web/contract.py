@@ -1,0 +1,76 @@
+"""The API as its OpenAPI document, docs/openapi.json: what each route answers, and in which media type.
+
+Every operation has a name of its own, its handler's, by which a generated client calls it; any may answer with a
+problem instead, which is described once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from pydantic import BaseModel
+
+from device.web.schema import Problem
+
+Responses = dict[int | str, dict[str, Any]]
+
+PNG, ZIP, EVENTS = "image/png", "application/zip", "text/event-stream"
+BYTES = {"type": "string", "format": "binary"}
+"""How the schema of a body says that it is no text: generated clients then hand out bytes."""
+TAGS = [
+    {"name": "device", "description": "Which probe this is, its certificates, and the zero of its load cell."},
+    {"name": "health", "description": "Whether it runs, can measure, and which part cannot."},
+    {"name": "status", "description": "What the probe is doing now, asked for or streamed."},
+    {"name": "presses", "description": "Start, follow, finish and cancel measurements."},
+    {"name": "exams", "description": "Whose measurement it is, and the audit of what was changed."},
+    {"name": "measurements", "description": "What was measured, with picture and recording."},
+    {"name": "self-test", "description": "Test every part."},
+    {"name": "updates", "description": "Releases, and what became of updates."},
+]
+PROBLEM: Responses = {"default": {"description": "Any error", "model": Problem}}
+"""What every route may answer instead."""
+
+
+HEADERS = {"Location": "Where to find it.", "ETag": "Its version: what If-Match wants when it is changed."}
+
+
+def answers(status: int, model: type[BaseModel], *headers: str) -> Responses:
+    """Return the description of a route's good answer and of its headers, for FastAPI's `responses`."""
+    described = {name: {"description": HEADERS[name], "schema": {"type": "string"}} for name in headers}
+    return {status: {"model": model, **({"headers": described} if headers else {})}}
+
+
+def media(media_type: str, description: str) -> Responses:
+    """Return the description of an answer that is no JSON."""
+    schema = {"type": "string"} if media_type == EVENTS else BYTES
+    return {200: {"description": description, "content": {media_type: {"schema": schema}}}}
+
+
+def install_contract(app: FastAPI) -> None:
+    """Make an app's document say of every operation that it may answer with the one problem, in its media type."""
+    made = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        return app.openapi_schema or _as_described(made())
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _as_described(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the document with one problem for all, and of each answer its model alone, not the handler's `dict`."""
+    schema = {"$ref": "#/components/schemas/Problem"}
+    problem = {**PROBLEM["default"], "content": {"application/problem+json": {"schema": schema}}}
+    del problem["model"]
+    document["components"]["responses"] = {"Problem": problem}
+    for path in document["paths"].values():
+        for operation in path.values():
+            for answer in operation["responses"].values():
+                for content in answer["content"].values():
+                    content["schema"] = _named(content["schema"])
+            operation["responses"]["default"] = {"$ref": "#/components/responses/Problem"}
+    return document
+
+
+def _named(schema: dict[str, Any]) -> dict[str, Any]:
+    return {"$ref": schema["$ref"]} if "$ref" in schema else schema

@@ -1,0 +1,144 @@
+"""Exams over REST: make, list, read and change them, and move or void measurements; what anybody changes is audited.
+
+A change names the version that its client has seen (If-Match), so that nobody changes what somebody else has changed
+meanwhile. Who it was the client says: nobody is asked for a password yet.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Header, Query, Response
+from pydantic import BaseModel, ConfigDict
+
+from device.records.asked_once import AskedOnce
+from device.records.exams import ExamContent, ExamFields, ExamId, ExamKind, Identifier, Reason
+from device.records.store import Store, StoredRecord
+from device.web.contract import answers
+from device.web.schema import AuditList, Exam, ExamList, Measurement
+
+NEWEST = 2**63 - 1
+"""Above every sequence number: the largest integer SQLite holds."""
+BeforeSeq = Annotated[int, Query(ge=1, le=NEWEST)]
+PageLimit = Annotated[int, Query(ge=1, le=200)]
+OnceKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=255,
+        pattern="^[!-~]*$",
+        description="What the client calls this one request, such as a UUID: sent again it does nothing more.",
+    ),
+]
+VERSION_TAG = '^"[1-9][0-9]{0,17}"$'
+SeenVersion = Annotated[
+    str, Header(alias="If-Match", pattern=VERSION_TAG, description="The ETag of what the client has seen.")
+]
+SeenExam = Annotated[
+    str | None, Header(alias="If-Match", pattern=VERSION_TAG, description="The ETag of the exam that the client shows.")
+]
+
+
+class Act(BaseModel):
+    """Who changes something, and why."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    by: Identifier
+    reason: Reason
+
+
+class ExamChange(Act):
+    """Which fields of an exam become what; those that are not named stay."""
+
+    changes: ExamFields
+
+
+class MeasurementMove(Act):
+    """The exam that a measurement belongs to from now on, null for none."""
+
+    exam_id: ExamId | None
+
+
+def tagged(response: Response, record: StoredRecord) -> StoredRecord:
+    """Return a record that is being answered with, with its version as the answer's ETag."""
+    response.headers["ETag"] = f'"{record["version"]}"'
+    return record
+
+
+def version_of(tag: str) -> int:
+    """Return the version that an ETag says."""
+    return int(tag.strip('"'))
+
+
+def asked_once(key: str, what: str, request: BaseModel) -> AskedOnce:
+    """Return a request with its key so that two that ask for the same are equal, whatever the order of their fields."""
+    return AskedOnce(key, f"{what} {json.dumps(request.model_dump(mode='json'), sort_keys=True)}")
+
+
+def add_exams(app: FastAPI, api: str, store: Store) -> None:
+    """Add the routes below `api` of exams, of what belongs to them, and of the audit."""
+    _add_exams(app, f"{api}/exams", store)
+    _add_acts(app, f"{api}/measurements/{{measurement_id}}", store)
+
+    @app.get(f"{api}/audit", responses=answers(200, AuditList), tags=["exams"])
+    def list_audit(
+        before_seq: BeforeSeq = NEWEST, limit: PageLimit = 20, subject: str | None = None
+    ) -> dict[str, list[dict[str, Any]]]:
+        """Return what people have changed, newest first, all or of one exam or measurement."""
+        return {"entries": store.exams.audit(subject=subject, before_seq=before_seq, limit=limit)}
+
+
+def _add_exams(app: FastAPI, path: str, store: Store) -> None:
+    @app.post(path, status_code=201, responses=answers(201, Exam, "Location", "ETag"), tags=["exams"])
+    def make_exam(content: ExamContent, response: Response, idempotency_key: OnceKey = None) -> dict[str, Any]:
+        """Begin an exam of a patient or of a phantom; with an Idempotency-Key it is one, however often this is sent."""
+        once = None if idempotency_key is None else asked_once(idempotency_key, f"POST {path}", content)
+        exam = store.exams.make(content, once)
+        response.headers["Location"] = f"{path}/{exam['id']}"
+        return tagged(response, exam)
+
+    @app.get(path, responses=answers(200, ExamList), tags=["exams"])
+    def list_exams(
+        kind: ExamKind = "patient",
+        patient_ref: str | None = None,
+        order_number: str | None = None,
+        before_seq: BeforeSeq = NEWEST,
+        limit: PageLimit = 20,
+    ) -> dict[str, list[dict[str, Any]]]:
+        """Return the exams of patients, or those of phantoms, newest first."""
+        found = store.exams.exams(
+            kind=kind, patient_ref=patient_ref, order_number=order_number, before_seq=before_seq, limit=limit
+        )
+        return {"exams": found}
+
+    @app.get(f"{path}/{{exam_id}}", responses=answers(200, Exam, "ETag"), tags=["exams"])
+    def get_exam(exam_id: str, response: Response) -> dict[str, Any]:
+        """Return one exam."""
+        return tagged(response, store.exams.exam(exam_id))
+
+    @app.patch(f"{path}/{{exam_id}}", responses=answers(200, Exam, "ETag"), tags=["exams"])
+    def change_exam(exam_id: str, change: ExamChange, if_match: SeenVersion, response: Response) -> dict[str, Any]:
+        """Change fields of an exam."""
+        changes = change.changes.model_dump(exclude_unset=True)
+        seen = version_of(if_match)
+        exam = store.exams.change(exam_id, changes, version=seen, by=change.by, reason=change.reason)
+        return tagged(response, exam)
+
+
+def _add_acts(app: FastAPI, path: str, store: Store) -> None:
+    @app.post(f"{path}/move", responses=answers(200, Measurement, "ETag"), tags=["measurements"])
+    def move_measurement(
+        measurement_id: str, move: MeasurementMove, if_match: SeenVersion, response: Response
+    ) -> dict[str, Any]:
+        """Say that a measurement belongs to another exam, or to none."""
+        seen = version_of(if_match)
+        store.exams.move(measurement_id, move.exam_id, version=seen, by=move.by, reason=move.reason)
+        return tagged(response, store.measurement(measurement_id))
+
+    @app.post(f"{path}/void", responses=answers(200, Measurement, "ETag"), tags=["measurements"])
+    def void_measurement(measurement_id: str, act: Act, if_match: SeenVersion, response: Response) -> dict[str, Any]:
+        """Say that a measurement does not count; it stays readable."""
+        store.exams.void(measurement_id, version=version_of(if_match), by=act.by, reason=act.reason)
+        return tagged(response, store.measurement(measurement_id))

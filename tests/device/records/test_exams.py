@@ -1,0 +1,232 @@
+"""Exams and the audit: what anybody changes is said with before and after, and nothing is changed unseen."""
+
+import json
+import sqlite3
+import threading
+from contextlib import closing
+
+import pytest
+from probe_card import add_measurement
+from pydantic import ValidationError
+
+from device.errors import InvalidRequest, StaleVersion, StorageError, UnknownResource
+from device.records.asked_once import AskedOnce
+from device.records.exams import ExamContent
+from device.records.store import Store
+
+ACT = {"by": "Ada", "reason": "Mixed up"}
+OF_A_PATIENT = {
+    "kind": "patient", "patient_ref": "A-17", "order_number": "2026/1", "side": "left", "clock_position": 10,
+    "nipple_distance_mm": 35.0, "operator": "Ada Byron", "note": "Two lines\nof what was felt",
+}  # fmt: skip
+PAGE = {"before_seq": 2**62, "limit": 99}
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def exam(store):
+    return store.exams.make(ExamContent(**OF_A_PATIENT))
+
+
+def of_phantom(store, **said):
+    return store.exams.make(ExamContent(kind="phantom", operator="Ada", **said))
+
+
+def test_an_exam_comes_back_as_it_was_made_also_after_a_restart(store, exam):
+    assert {name: exam[name] for name in OF_A_PATIENT} == OF_A_PATIENT
+    assert (exam["seq"], exam["version"], exam["made_at"]) == (1, 1, exam["changed_at"])
+    assert exam["made_at"].endswith("Z")
+    store.close()
+    again = Store(store.folder)
+    assert again.exams.exam(exam["id"]) == exam
+    assert [entry["what"] for entry in again.exams.audit(**PAGE)] == ["exam_made"]
+    again.close()
+
+
+def test_exams_are_listed_newest_first_by_patient_and_order_and_phantoms_apart(store, exam):
+    second = store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
+    other = store.exams.make(ExamContent(kind="patient", patient_ref="17", order_number="2026/1", operator="Ada"))
+    phantom = of_phantom(store, order_number="2026/1")
+
+    def ids(**asked):
+        return [one["id"] for one in store.exams.exams(**{**PAGE, **asked})]
+
+    assert ids() == [other["id"], second["id"], exam["id"]]
+    assert ids(kind="phantom") == [phantom["id"]]
+    assert ids(patient_ref="A-17") == [second["id"], exam["id"]]
+    assert ids(order_number="2026/1") == [other["id"], exam["id"]]
+    assert ids(patient_ref="A-17", order_number="2026/1") == [exam["id"]]
+    assert ids(before_seq=second["seq"]) == [exam["id"]]
+    assert ids(patient_ref="x' OR '1'='1") == []
+
+
+def test_an_exam_is_made_once_for_one_key(store):
+    once = AskedOnce("k-1", "POST exams")
+    first = store.exams.make(ExamContent(**OF_A_PATIENT), once)
+    assert store.exams.make(ExamContent(**OF_A_PATIENT), once) == first
+    assert store.exams.exams(**PAGE) == [first]
+    assert len(store.exams.audit(**PAGE)) == 1
+
+
+def test_a_change_is_the_next_version_and_its_entry_has_before_and_after(store, exam):
+    changes = {"side": "right", "clock_position": 2, "note": exam["note"]}
+    changed = store.exams.change(exam["id"], changes, version=1, by="Bo", reason="Wrong side")
+    assert changed == exam | changes | {"version": 2, "changed_at": changed["changed_at"]}
+    assert store.exams.exam(exam["id"]) == changed
+    entry, made = store.exams.audit(subject=exam["id"], **PAGE)
+    assert (entry["by"], entry["what"], entry["reason"]) == ("Bo", "exam_changed", "Wrong side")
+    assert entry["before"] == {"side": "left", "clock_position": 10}
+    assert entry["after"] == {"side": "right", "clock_position": 2}
+    assert (made["by"], made["before"], made["after"]) == ("Ada Byron", None, OF_A_PATIENT)
+
+
+def test_what_changes_nothing_is_no_version(store, exam):
+    assert store.exams.change(exam["id"], {"side": "left"}, version=1, **ACT) == exam
+    assert len(store.exams.audit(**PAGE)) == 1
+
+
+def test_a_change_of_what_somebody_else_has_changed_meanwhile_is_refused(store, exam):
+    changed = store.exams.change(exam["id"], {"patient_ref": "B-1"}, version=1, by="Bo", reason="Another patient")
+    with pytest.raises(StaleVersion, match="has the version 2: it was changed since the version 1") as refusal:
+        store.exams.change(exam["id"], {"side": "right"}, version=1, **ACT)
+    assert (refusal.value.code, refusal.value.status) == ("E811", 412)
+    with pytest.raises(StaleVersion):
+        store.exams.exam(exam["id"], version=1)
+    assert store.exams.exam(exam["id"], version=2) == changed
+    assert len(store.exams.audit(**PAGE)) == 2
+
+
+def test_of_many_who_change_one_version_at_once_one_does(store, exam):
+    outcomes = []
+
+    def change(hour):
+        try:
+            outcomes.append(store.exams.change(exam["id"], {"clock_position": hour}, version=1, **ACT))
+        except StaleVersion:
+            outcomes.append(None)
+
+    threads = [threading.Thread(target=change, args=(hour,)) for hour in range(1, 9)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    [changed] = [one for one in outcomes if one]
+    assert store.exams.exam(exam["id"]) == changed
+    assert len(store.exams.audit(**PAGE)) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [({"patient_ref": None}, "needs a patient_ref"), ({"kind": "phantom"}, "of a phantom has no patient_ref"),
+     ({"kind": None}, "exam.kind"), ({"operator": None}, "exam.operator")],
+)  # fmt: skip
+def test_a_change_after_which_it_is_no_exam_is_refused_and_nothing_is_changed(store, exam, changes, told):
+    with pytest.raises(InvalidRequest, match=told):
+        store.exams.change(exam["id"], changes, version=1, **ACT)
+    assert store.exams.exam(exam["id"]) == exam
+    assert len(store.exams.audit(**PAGE)) == 1
+
+
+@pytest.mark.parametrize(
+    "said",
+    [{"patient_ref": "A-1"}, {"side": "left"}, {"clock_position": 3}, {"nipple_distance_mm": 0.0}],
+)
+def test_a_phantom_has_nothing_of_a_patients(said):
+    with pytest.raises(ValidationError, match=f"has no {next(iter(said))}"):
+        ExamContent(kind="phantom", operator="Ada", **said)
+
+
+@pytest.mark.parametrize("text", ["Zoë Ångström", "李小龍", "مریم می\u200cروم", "A-1/2026 #4", "x" * 64])
+def test_a_reference_is_kept_as_it_was_typed_in_any_script(store, text):
+    made = store.exams.make(ExamContent(kind="patient", patient_ref=text, operator=text))
+    assert store.exams.exams(patient_ref=text, **PAGE) == [made]
+
+
+def test_a_measurement_is_moved_and_voided_beside_what_was_measured(store, exam):
+    """The row of the measurement stays as it was, to the last byte."""
+    kept = add_measurement(store, 1)
+    with closing(sqlite3.connect(store.folder / "tsis.sqlite")) as db:
+        row = db.execute("SELECT * FROM measurement").fetchall()
+        store.exams.move(kept["id"], exam["id"], version=1, **ACT)
+        store.exams.void(kept["id"], version=2, by="Bo", reason="The probe slipped")
+        store.exams.move(kept["id"], None, version=3, **ACT)
+        assert db.execute("SELECT * FROM measurement").fetchall() == row
+    found = store.measurement(kept["id"])
+    voided = {"at": found["voided"]["at"], "by": "Bo", "reason": "The probe slipped"}
+    assert found == kept | {"exam_id": None, "voided": voided, "version": 4}
+    told = [
+        (one["by"], one["what"], one["before"], one["after"]) for one in store.exams.audit(subject=kept["id"], **PAGE)
+    ]
+    assert told == [
+        ("Ada", "measurement_moved", {"exam_id": exam["id"]}, {"exam_id": None}),
+        ("Bo", "measurement_voided", {"voided": None}, {"voided": voided}),
+        ("Ada", "measurement_moved", {"exam_id": None}, {"exam_id": exam["id"]}),
+    ]
+
+
+def test_the_measurements_of_an_exam_are_those_that_are_in_it_now(store, exam):
+    first, second = add_measurement(store, 1), add_measurement(store, 2)
+    other = of_phantom(store)
+    for one in (first, second):
+        store.exams.move(one["id"], exam["id"], version=1, **ACT)
+    store.exams.move(first["id"], other["id"], version=2, **ACT)
+    assert [one["id"] for one in store.measurements(exam_id=exam["id"], **PAGE)] == [second["id"]]
+    assert [one["id"] for one in store.measurements(exam_id=other["id"], **PAGE)] == [first["id"]]
+    assert len(store.measurements(**PAGE)) == 2
+
+
+def test_a_measurement_is_not_moved_to_nowhere_nor_unseen_nor_voided_twice(store, exam):
+    kept = add_measurement(store, 1)
+    with pytest.raises(UnknownResource, match="no exam none"):
+        store.exams.move(kept["id"], "none", version=1, **ACT)
+    with pytest.raises(UnknownResource, match="no measurement none"):
+        store.exams.move("none", exam["id"], version=1, **ACT)
+    for act in (store.exams.void, lambda *told, **more: store.exams.move(*told, exam["id"], **more)):
+        with pytest.raises(StaleVersion):
+            act(kept["id"], version=2, **ACT)
+    assert store.measurement(kept["id"]) == kept
+    store.exams.void(kept["id"], version=1, **ACT)
+    with pytest.raises(InvalidRequest, match="void already"):
+        store.exams.void(kept["id"], version=2, **ACT)
+    assert [entry["what"] for entry in store.exams.audit(**PAGE)] == ["measurement_voided", "exam_made"]
+
+
+@pytest.mark.parametrize("act", ["UPDATE audit SET record = '{}'", "DELETE FROM audit"])
+def test_an_entry_of_the_audit_is_neither_changed_nor_deleted(store, exam, act):
+    before = store.exams.audit(**PAGE)
+    with closing(sqlite3.connect(store.folder / "tsis.sqlite")) as db, pytest.raises(sqlite3.IntegrityError):
+        db.execute(act)
+    assert store.exams.audit(**PAGE) == before
+
+
+def test_what_cannot_be_audited_is_not_done(store, exam):
+    kept = add_measurement(store, 1)
+    before = store.exams.audit(**PAGE)
+    store._db.execute("CREATE TRIGGER audit_is_full BEFORE INSERT ON audit BEGIN SELECT RAISE(ABORT, 'full'); END")
+    acts = [
+        lambda: of_phantom(store),
+        lambda: store.exams.change(exam["id"], {"side": "right"}, version=1, **ACT),
+        lambda: store.exams.move(kept["id"], exam["id"], version=1, **ACT),
+        lambda: store.exams.void(kept["id"], version=1, **ACT),
+    ]
+    for act in acts:
+        with pytest.raises(StorageError, match="full"):
+            act()
+    assert store.exams.exams(**PAGE) == [exam]
+    assert store.exams.exams(kind="phantom", **PAGE) == []
+    assert store.measurement(kept["id"]) == kept
+    assert store.exams.audit(**PAGE) == before
+
+
+def test_the_audit_is_read_in_pages(store, exam):
+    for hour in range(1, 5):
+        store.exams.change(exam["id"], {"clock_position": hour}, version=hour, **ACT)
+    first = store.exams.audit(before_seq=2**62, limit=2)
+    rest = store.exams.audit(before_seq=first[-1]["seq"], limit=9)
+    assert [json.dumps(one["after"].get("clock_position")) for one in first + rest] == ["4", "3", "2", "1", "10"]

@@ -1,0 +1,89 @@
+"""The OpenAPI document is committed, names every operation, and says of every answer what it is."""
+
+import json
+import re
+import types
+
+import pytest
+from daemon_process import ROOT
+
+from device.web.app import create_app
+from device.web.contract import TAGS
+
+DOCUMENT = json.loads((ROOT / "docs" / "openapi.json").read_text(encoding="utf-8"))
+OPERATIONS = {
+    f"{method.upper()} {path.removeprefix('/api/v1/')}": operation
+    for path, methods in DOCUMENT["paths"].items()
+    for method, operation in methods.items()
+}
+PICTURE, RECORDING = "GET measurements/{measurement_id}/image.png", "GET measurements/{measurement_id}/recording.zip"
+
+
+def good(operation):
+    """Return status, media types with their schemas, and headers of the good answer."""
+    [(status, answer)] = ((status, answer) for status, answer in operation["responses"].items() if status != "default")
+    return int(status), {name: one["schema"] for name, one in answer["content"].items()}, answer.get("headers", {})
+
+
+def test_the_committed_document_is_the_api():
+    """`make check` compares it, too. Meant to change? `python -m device openapi > docs/openapi.json`."""
+    assert create_app(types.SimpleNamespace(), types.SimpleNamespace()).openapi() == DOCUMENT
+
+
+def test_every_operation_has_a_name_of_its_own_and_a_known_tag():
+    names = [operation["operationId"] for operation in OPERATIONS.values()]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[a-z]+(_[a-z]+)+", name) for name in names)
+    assert {tag for operation in OPERATIONS.values() for tag in operation["tags"]} == {tag["name"] for tag in TAGS}
+
+
+@pytest.mark.parametrize("name", sorted(OPERATIONS))
+def test_an_answer_is_a_named_model_or_says_its_media_type_and_may_be_a_problem(name):
+    _, media, _ = good(OPERATIONS[name])
+    [(media_type, schema)] = media.items()
+    if media_type == "application/json":
+        assert list(schema) == ["$ref"]
+    else:
+        assert schema["type"] == "string"
+    assert OPERATIONS[name]["responses"]["default"] == {"$ref": "#/components/responses/Problem"}
+
+
+def test_what_is_no_json_says_what_it_is():
+    binary = {"type": "string", "format": "binary"}
+    assert good(OPERATIONS[PICTURE])[1] == {"image/png": binary}
+    assert good(OPERATIONS[RECORDING])[1] == {"application/zip": binary}
+    assert good(OPERATIONS["GET events"])[1] == {"text/event-stream": {"type": "string"}}
+    upload = OPERATIONS["POST updates"]["requestBody"]["content"]
+    assert upload == {"application/octet-stream": {"schema": binary}}
+
+
+def test_the_one_problem_is_a_problem_document():
+    content = DOCUMENT["components"]["responses"]["Problem"]["content"]
+    assert content == {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+
+
+def test_who_starts_something_is_told_where_to_follow_it():
+    asked = ("POST presses", "POST self-test", "POST updates", "POST updates/roll-back")
+    assert {name for name in OPERATIONS if "Location" in good(OPERATIONS[name])[2]} == {*asked, "POST exams"}
+
+
+def test_what_changes_something_wants_the_version_that_was_seen_and_what_starts_something_may_have_a_key():
+    headers = {
+        name: {one["name"]: one["required"] for one in operation.get("parameters", ()) if one["in"] == "header"}
+        for name, operation in OPERATIONS.items()
+    }
+    acts = ("PATCH exams/{exam_id}", *(f"POST measurements/{{measurement_id}}/{act}" for act in ("move", "void")))
+    assert {name: wanted for name, wanted in headers.items() if wanted} == {
+        "POST presses": {"Idempotency-Key": False, "If-Match": False},
+        "POST exams": {"Idempotency-Key": False},
+        **{act: {"If-Match": True} for act in acts},
+    }
+    for name in (*acts, "GET exams/{exam_id}", "GET measurements/{measurement_id}", "POST exams"):
+        assert "ETag" in good(OPERATIONS[name])[2]
+
+
+def test_every_reference_leads_somewhere():
+    named = set(re.findall(r'"\$ref": "#/components/(\w+/\w+)"', json.dumps(DOCUMENT)))
+    there = {f"{kind}/{name}" for kind, parts in DOCUMENT["components"].items() for name in parts}
+    assert named <= there
+    assert {f"schemas/{name}" for name in ("Measurement", "EstimateResource", "Device", "Health", "Problem")} <= named
