@@ -18,6 +18,8 @@ DEPLOY_KEY ?= $(HOME)/.ssh/id_ed25519.pub
 PY := .venv/bin/python
 HOST_TOOLS := .venv/bin/host_tools
 export OPENBLAS_NUM_THREADS ?= 1
+# The tests start hundreds of interpreters: without its cache each would compile the sources anew.
+unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
 .PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes tradeoff pages measure lock clean
 
@@ -84,7 +86,7 @@ deploy: .venv/all.stamp ## build a release and send it to a probe: make deploy H
 	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
 	@$(HOST_TOOLS) deploy "$(RELEASE)" --host "$(HOST)" --signers "$(TRUSTED)" $(if $(SSH),--ssh "$(SSH)")
 
-check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates
+check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, shell scripts, dead links, pages that are their results in their templates, the API's document
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
@@ -92,6 +94,7 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 	$(PY) -m pytest -rs --durations 0 --durations-min 9 tests/test_systemd_units.py tests/test_shell_scripts.py
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
+	$(PY) -m device openapi --check docs/openapi.json
 
 bench: .venv/all.stamp ## time everything that somebody waits for, in one table that fails where a bound is missed: make bench [ONLY="work darkness"] [JSON=FILE] [COMPARE=FILE]
 	$(PY) tests/bench.py $(ONLY) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE))

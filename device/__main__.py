@@ -35,6 +35,7 @@ VERBS = {
     "config": "check or show the settings",
     "calibration": "list, show or activate certificates",
     "faults": "list the fault codes",
+    "openapi": "print the REST API as an OpenAPI document",
     "self-test": "test every part and name the one that fails",
     "update": "install a signed release, go back",
     "backup": "save measurements, settings, certificates and own models to a file",
@@ -126,6 +127,10 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.faults import run_faults_command
 
             return run_faults_command(options)
+        case "openapi":
+            from device.commands.openapi import run_openapi_command
+
+            return run_openapi_command(options)
         case "self-test":
             return _self_test(options)
         case "update":

@@ -448,6 +448,8 @@ class BusyError(DeviceError):
     code = "E801"
     title = "Busy"
     status = 409
+    holder: dict[str, str | None] | None = None
+    """Who has the probe, where that is known: `kind` press or self_test, its `id`, `mode` and `since`."""
 
 
 class UnknownResource(DeviceError):  # noqa: N818 - the name is what the caller reads
@@ -512,6 +514,22 @@ class BodyTooLarge(DeviceError):  # noqa: N818 - the name is what the caller rea
     code = "E809"
     title = "Body too large"
     status = 413
+
+
+class ReusedKey(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """An Idempotency-Key came before with another request; that one was obeyed, and this one is not."""
+
+    code = "E810"
+    title = "Key used before"
+    status = 409
+
+
+class StaleVersion(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """An exam or a measurement was changed by somebody else since the client read it; it is left as it is."""
+
+    code = "E811"
+    title = "Changed meanwhile"
+    status = 412
 
 
 class StalledError(DeviceError):

@@ -124,7 +124,7 @@ for name in ("size_mm", "depth_mm", "youngs_modulus_kpa"):
 # ## What this means, and what it does not
 #
 # - **Size and depth are found, the modulus is not.** Three numbers of one press at one force do not determine three
-#   unknowns; the answer says so itself (`not_identifiable`) instead of showing a number as if it were known.
+#   unknowns; the answer says so itself (`partly_identifiable`) instead of showing a number as if it were known.
 # - **The training world is not the recorded one.** The network has learnt from small strain; the recording comes from
 #   finite strain and scattered light. The three lines of the calibration take up part of that, and the intervals are
 #   wide because of the rest.

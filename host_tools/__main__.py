@@ -16,13 +16,14 @@ from host_tools.commands.optics import optics
 from host_tools.commands.output import note
 from host_tools.commands.pages import pages
 from host_tools.commands.paper import paper
-from host_tools.commands.probe_by_ssh import deploy, provision
-from host_tools.commands.release import release
+from host_tools.commands.probe import probe
+from host_tools.commands.release import deploy, provision, release
 from host_tools.commands.simulate import simulate
 from host_tools.commands.sweep import sweep
 from host_tools.commands.tradeoff import tradeoff
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
+from host_tools.commands.worlds import worlds
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -36,6 +37,7 @@ app.command(epilog="Example: host_tools sweep --scenes 134 --seed 1 --out build/
 app.command(epilog="Example: host_tools train --mode standard --out models/standard")(train)
 app.command(epilog="Example: host_tools table --out models/simulated_probe")(table)
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
+app.command(epilog="Example: host_tools worlds --count 20 --seed 1 --out scenarios/worlds")(worlds)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)
@@ -46,6 +48,7 @@ app.command(epilog="Example: host_tools limits scene.toml --protocol protocols/p
 app.command(epilog="Example: host_tools provision RELEASE --host raspberrypi.local --serial TSIS-0007")(provision)
 app.command(epilog="Example: host_tools deploy RELEASE --host tsis-0007.local")(deploy)
 app.add_typer(optics, name="optics")
+app.add_typer(probe, name="probe")
 app.add_typer(release, name="release")
 
 

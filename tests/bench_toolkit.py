@@ -23,7 +23,7 @@ ROUNDS = 3
 TRACED = """
 import numpy as np
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
+from host_tools.scenes.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
 from host_tools.optics.tracer import trace
 x = np.linspace(-11.0, 11.0, 45)

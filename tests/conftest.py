@@ -65,9 +65,9 @@ def recording(tables: ProbeTables) -> Recording:
     return phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=3, protocol=PhantomProtocol(frames=3))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A running simulated probe with a quick hand."""
+    """A running simulated probe with a quick hand; left idle to the end of the run it costs more than a start does."""
     running = Daemon(tmp_path_factory.mktemp("daemon"), QUICK_HAND)
     yield running
     running.stop()

@@ -85,10 +85,12 @@ class Daemon:
         self.greeting = greeting
         self.url = greeting.split()[-1].rstrip("/")
 
-    def ask(self, path: str, method: str = "GET", body: object = None) -> Answer:
+    def ask(
+        self, path: str, method: str = "GET", body: object = None, *, headers: Mapping[str, str] | None = None
+    ) -> Answer:
         data = None if body is None else json.dumps(body).encode()
-        headers = {"content-type": "application/json"}
-        request = urllib.request.Request(self.url + path, method=method, data=data, headers=headers)
+        of_all = {"content-type": "application/json", **(headers or {})}
+        request = urllib.request.Request(self.url + path, method=method, data=data, headers=of_all)
         try:
             with urllib.request.urlopen(request, timeout=WAIT_S) as response:
                 return Answer(response.status, dict(response.headers), response.read())

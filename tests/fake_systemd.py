@@ -1,25 +1,19 @@
-"""A `systemctl` and a daemon for tests of updates, in the standard library alone: a real process, real HTTP.
+"""A `systemctl` for tests of updates, in the standard library alone: it starts and kills tests/fake_daemon.py.
 
-`fake_systemd.py systemctl VERB...` is the command; it starts and kills `fake_systemd.py daemon`, which answers as the
-release under `opt/tsis/current` tells it to (`tsis_fake.json`): `{"mute": true}` never answers, `{"dies_after": 2}`
-ends after so many answers, `{"falls_back_after": 2}` gives way to the page that stands in for it,
-`{"faults": {"camera": "E101"}}` is not ready, `{"says": "..."}` is of another release.
+`fake_systemd.py VERB...` is the command. An update calls it many times: it imports no more than it needs.
 """
 
-import json
 import os
 import signal
-import subprocess
 import sys
 import time
-from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 ROOT = Path(os.environ["TSIS_FAKE_ROOT"])
-PORT = int(os.environ["TSIS_FAKE_PORT"])
 PID = Path(os.environ["TSIS_FAKE_STATE"]) / "daemon.pid"
 CALLS = PID.with_name("systemctl.log")
 REFUSED = PID.with_name("refused")
+DAEMON = Path(__file__).with_name("fake_daemon.py")
 
 
 def systemctl(words):
@@ -32,14 +26,19 @@ def systemctl(words):
         print("Failed to stop tsis.service: Unit tsis.service not loaded.", file=sys.stderr)
         sys.exit(5)
     if verb == "start" and not alive():
-        subprocess.run(os.environ.get("TSIS_FAKE_ON_START", "true").split(), check=True)
-        command = [sys.executable, "-S", "-E", __file__, "daemon"]
-        quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-        PID.write_text(str(subprocess.Popen(command, start_new_session=True, **quiet).pid))
+        if before := os.environ.get("TSIS_FAKE_ON_START"):
+            assert os.system(before) == 0
+        PID.write_text(str(started([sys.executable, "-S", "-E", str(DAEMON)])))
     if verb == "stop" and alive():
         os.kill(alive(), signal.SIGKILL)
         while alive():
             time.sleep(0.005)
+
+
+def started(command):
+    """Start a process of its own session with nothing to read or write; return its number."""
+    quiet = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in range(3)]
+    return os.posix_spawn(command[0], command, os.environ, file_actions=quiet, setsid=True)
 
 
 def alive():
@@ -52,47 +51,5 @@ def alive():
     return 0 if state in "ZX" else pid
 
 
-class Answers(BaseHTTPRequestHandler):
-    left = None
-    good = None
-    record = None
-
-    def do_GET(self):
-        if self.path != "/api/v1/health/parts":
-            self.send_error(404)
-            return
-        body = json.dumps(self.record if self.good is None or self.good > 0 else {"status": 503}).encode()
-        if self.good is not None:
-            Answers.good -= 1
-        self.send_response(200)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-        if self.left is not None:
-            Answers.left -= 1
-            if not self.left:
-                self.wfile.flush()
-                os._exit(1)
-
-    def log_message(self, *words):
-        pass
-
-
-def daemon():
-    current = ROOT / "opt/tsis/current"
-    name = Path(os.readlink(current)).name
-    behaviour = json.loads(next(current.glob("lib/python3*/site-packages/tsis_fake.json")).read_text())
-    if behaviour.get("mute"):
-        time.sleep(600)
-    faults = behaviour.get("faults", {})
-    parts = {
-        part: {"ready": part not in faults, "code": faults.get(part)}
-        for part in ("camera", "light", "force", "answers", "store")
-    }
-    Answers.left, Answers.record = behaviour.get("dies_after"), {"release": behaviour.get("says", name), "parts": parts}
-    Answers.good = behaviour.get("falls_back_after")
-    HTTPServer(("127.0.0.1", PORT), Answers).serve_forever()
-
-
 if __name__ == "__main__":
-    daemon() if sys.argv[1] == "daemon" else systemctl(sys.argv[2:])
+    systemctl(sys.argv[1:])

@@ -6,13 +6,13 @@ import numpy as np
 from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
 from device.measurement.parameters import PARAMETERS
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, RESPONSE_COLUMNS
+from device.measurement.ramp_modes.radial_profile import RESPONSE as RESPONSE
+from device.measurement.ramp_modes.surrogate import MODULUS, RESPONSE_COLUMNS
 
 STD = 0.05
 NOISE = white_noise(STD)
 TOLD = np.arange(len(PARAMETERS)) != MODULUS
 """The modulus' slope is 0."""
-RESPONSE = slice(CONTRAST_COLUMNS, CONTRAST_COLUMNS + RESPONSE_COLUMNS)
 TRUTH = np.array([0.2, -0.3, 0.4, 0.1, -0.2, 0.3, 0.0, -0.1, 0.25])
 START = np.zeros(len(PARAMETERS))
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from stand_in_adviser import advice
 
 from device.config import CameraSection, Config
 from device.errors import DeviceError
@@ -20,9 +21,11 @@ from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.force_recorder import force_range_n
 from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press import capture as capture_module
+from device.instrument.press import scan as scan_module
 from device.instrument.press.capture import Capture, PressEnded
-from device.instrument.status import StatusBoard
-from device.measurement.mode import Mode
+from device.instrument.press.scan import Scan
+from device.instrument.status import PressJob, StatusBoard
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Frame
 from device.simulation.hand import HandSettings, VirtualHand
@@ -136,7 +139,7 @@ class SimulatedTimePress:
         """Return the same on a probe that remembers the presses before, and what the next one is to remember."""
         probe = SimulatedTimeProbe(settings)
         clock = types.SimpleNamespace(monotonic=lambda: probe.now_s, sleep=probe.sleep)
-        for module in (bench_module, capture_module):
+        for module in (bench_module, capture_module, scan_module):
             self._monkeypatch.setattr(module, "time", clock)
         budget = LightBudget(self.config.light.max_on_s, clock=lambda: probe.now_s)
         bench, board = Bench(probe, probe, probe, budget=budget), StatusBoard()
@@ -152,7 +155,7 @@ class SimulatedTimePress:
 
 
 def _measure(capture: Capture, budget: LightBudget, probe: SimulatedTimeProbe, mode: Mode) -> list[Frame]:
-    """Go through a measurement as `Procedure` does; return the frames of both presses."""
+    """Go through a measurement as `Procedure` does, a scan with all its presses; return the frames of all presses."""
     capture.unloaded()
     probe.hand.begin()
     budget.begin_press()
@@ -161,8 +164,19 @@ def _measure(capture: Capture, budget: LightBudget, probe: SimulatedTimeProbe, m
     capture.release()
     probe.hand.follow("lift", probe.now_s)
     capture.lifted()
-    press = capture.loaded("press", mode)
-    capture.release()
+    if FRAMES[mode].is_scan:
+        press = _scan(capture, mode)
+    else:
+        press = capture.loaded("press", mode)
+        capture.release()
     capture.bench.light(DARK)
     capture.done()
     return [*reference, *press]
+
+
+def _scan(capture: Capture, mode: Mode) -> list[Frame]:
+    def darken() -> None:
+        capture.bench.light(DARK)
+
+    job, advise = PressJob("p-1", mode), lambda frames: advice(1.0)
+    return Scan(job, capture, capture.board, advise=advise, darken=darken, note=lambda ramps: None).lead().frames

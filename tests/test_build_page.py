@@ -18,7 +18,7 @@ from device.hardware.pca9685 import IDENTITY as PCA9685_IDENTITY
 from device.hardware.pca9685 import Pca9685Register
 from device.hardware.tlc59116 import IDENTITY as TLC59116_IDENTITY
 from device.measurement.recording.led_sides import SIDES
-from host_tools.optics.light_block import LightBlock
+from host_tools.scenes.light_block import LightBlock
 from host_tools.scenes.scene import Waveguide
 
 PAGE = (ROOT / "docs" / "build.md").read_text(encoding="utf-8")

@@ -1,4 +1,7 @@
-"""README and results are executed: their commands exist, and what a page prints of them is what they print."""
+"""README, results and the page of a probe of one's own are executed.
+
+Their commands exist, and what a page prints of them is what they print.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ import sys
 import pytest
 from daemon_process import ROOT
 
-PAGES = ("README.md", "docs/results.md")
+PAGES = ("README.md", "docs/results.md", "docs/own_probe.md")
 TEXTS = {page: (ROOT / page).read_text(encoding="utf-8") for page in PAGES}
 BLOCKS = [block for text in TEXTS.values() for block in re.findall(r"```console\n\$ (.*)\n((?:.*\n)*?)```", text)]
 PYTHON_BLOCKS = re.findall(r"```python\n((?:.*\n)*?)```", TEXTS["README.md"])

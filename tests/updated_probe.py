@@ -37,7 +37,7 @@ class UpdatedProbe:
         (self.root / "etc/tsis/config.toml").write_text(f"[server]\nport = {self.port}\n")
         fake = PROJECT / "tests" / "fake_systemd.py"
         command = folder / "bin" / "systemctl"
-        command.write_text(f'#!/bin/sh\nexec {sys.executable} -S -E {fake} systemctl "$@"\n')
+        command.write_text(f'#!/bin/sh\nexec {sys.executable} -S -E {fake} "$@"\n')
         command.chmod(0o755)
         self.environment = {
             **os.environ, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "TSIS_FAKE_ROOT": str(self.root),

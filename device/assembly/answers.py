@@ -14,7 +14,7 @@ from typing import NamedTuple
 from device.config import Config
 from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
 from device.files.bundle_file import read_models
-from device.instrument.press.record import Estimator
+from device.instrument.press.record import Adviser, Estimator
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
@@ -23,6 +23,7 @@ from device.measurement.mode import Mode, ModeWorth
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
+from device.measurement.scan_advice import ScanAdvice
 from device.records.calibrations import Calibrations
 
 
@@ -65,11 +66,12 @@ def _nothing_to_prove() -> None:
 
 
 class Answers(NamedTuple):
-    """The modes in which this probe has a model, what answers in them, what proves that it still does,
-    and what each mode's answers are worth by its model card."""
+    """The modes in which this probe has a model, what answers in them, what advises on a scan, what proves that both
+    still do, and what each mode's answers are worth by its model card."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
+    adviser: Adviser
     prove: Callable[[], None] = _nothing_to_prove
     worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
 
@@ -87,12 +89,17 @@ class Answers(NamedTuple):
                 begin()
                 return self.estimator(recording, mode)
 
+        def adviser(recording: Recording) -> ScanAdvice:
+            with progress.inside("inference"):
+                begin()
+                return self.adviser(recording)
+
         def prove() -> None:
             with progress.inside("inference"):
                 begin()
                 self.prove()
 
-        return Answers(self.modes, estimator, prove, self.worth)
+        return Answers(self.modes, estimator, adviser, prove, self.worth)
 
 
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
@@ -102,13 +109,19 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     """
     models = read_models(bundle, config.quick_model, config.standard_model).for_probe(config.serial)
 
-    def estimate(recording: Recording, mode: Mode) -> Estimate:
+    def certificate() -> Calibration:
         if calibration is None:
             raise MissingCalibration("The probe is not calibrated.", "Calibrate it and activate the certificate.")
-        return models.estimate(recording, mode, calibration)
+        return calibration
+
+    def estimate(recording: Recording, mode: Mode) -> Estimate:
+        return models.estimate(recording, mode, certificate())
+
+    def advise(recording: Recording) -> ScanAdvice:
+        return models.advise(recording, certificate())
 
     worth = {mode: models.worth(mode) for mode in models.modes}
-    return Answers(models.modes, estimate, lambda: _prove(models), worth)
+    return Answers(models.modes, estimate, advise, lambda: _prove(models), worth)
 
 
 def _prove(models: ModeModels) -> None:

@@ -75,7 +75,8 @@ def lead_by_hand(guide: Guide, probe: VirtualProbe) -> None:
     """Let the virtual hand read the screen: it takes up the probe when a press is requested."""
 
     def follow(guidance: Guidance) -> None:
-        probe.hand.follow(guidance.code, time.monotonic())
+        scan = guide.board.now.scan
+        probe.hand.follow(guidance.code, time.monotonic(), scan.next_offset_mm if scan else None)
 
     def begin(mode: Mode) -> None:
         probe.hand.begin()
@@ -269,6 +270,7 @@ def _render(probe: VirtualProbe, faults: FaultTimeline, exposure: ExposureReques
         exposure_us=exposure.exposure_us,
         gain=exposure.gain,
         frame_number=exposure.frame_number,
+        pressed_s=probe.hand.pressed_s(exposure.t_s),
         wet_ratio=faults.wet_ratio(exposure.t_s),
         ambient_ratio=faults.ambient_ratio(exposure.t_s) + faults.stray_ratio(exposure.led_ratio, exposure.t_s),
     )
@@ -295,6 +297,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         bench,
         answers.estimator,
         store,
+        adviser=answers.adviser,
         modes=answers.modes,
         worth=answers.worth,
         calibration=watch,

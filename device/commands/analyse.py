@@ -11,7 +11,8 @@ from device.config import Config, simulated_config
 from device.files.bundle_file import read_paper_model
 from device.files.recording_file import read_recording
 from device.instrument.watch.calibration_watch import CalibrationWatch
-from device.measurement.mode import mode_named, mode_of
+from device.measurement.mode import mode_named
+from device.measurement.mode_models import mode_of_recording
 from device.records.calibrations import Calibrations
 from device.settings.layers import read_config
 
@@ -35,7 +36,7 @@ def run_analyse_command(options: argparse.Namespace) -> int:
             of_probe[recording.serial] = _answers_of(recording.serial, stated)
         calibration, answers = of_probe[recording.serial]
         calibration.require_valid(recording.started_at)
-        mode = mode_named(options.mode) if options.mode else mode_of([f.force_n for f in recording.with_role("press")])
+        mode = mode_named(options.mode) if options.mode else mode_of_recording(recording)
         estimate = answers.estimator(recording, mode)
         print(json.dumps({"recording": str(path), **estimate.as_record()}))
     return 0

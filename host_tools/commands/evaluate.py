@@ -1,7 +1,7 @@
 """`host_tools evaluate`: scores of recordings with truth, or of random presses of the simulated probe, in any mode.
 
-With --noise-free and --posterior it prints modes standard and precise beside the best: the chapters are those of
-`host_tools modes`, on presses of another seed.
+With --noise-free and --posterior it prints mode standard beside the best, with --scan what each further ramp of mode
+precise tells: the chapters are those of `host_tools modes`, on presses of another seed.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 SCENES = 100
+REFERENCES: dict[str, Mode] = {"noise-free": "standard", "posterior": "standard", "scan": "precise"}
+"""Chapters that are printed instead of a score, and the mode that each is of."""
 
 
 def evaluate(
@@ -44,7 +46,8 @@ def evaluate(
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables and certificates.")] = SIMULATED_PROBE,
     light: Annotated[str, typer.Option(help="physical, or linear for the paper's straight line.")] = "physical",
     scenes: Annotated[
-        int | None, typer.Option(help="Random presses; 100, 160 without noise, 50 beside the posterior by default.")
+        int | None,
+        typer.Option(help="Random presses; 100, 160 without noise, 200 beside the posterior, 160 scans by default."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of scenes, camera and hand.")] = 1000,
     noise_free: Annotated[
@@ -53,24 +56,28 @@ def evaluate(
     posterior: Annotated[
         bool, typer.Option("--posterior", help="Instead: errors over those of the reference posterior; minutes.")
     ] = False,
+    scan: Annotated[
+        bool, typer.Option("--scan", help="Instead: scans of one to four ramps, simulated by the surrogate; minutes.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print every number as one JSON object.")] = False,
     scheduler: Scheduler = None,
 ) -> None:
     """Score what the device answers: on recordings, or on random presses with every drift.
 
     In mode paper without recordings: the model's nine phantoms, noise-free and through the camera, and random scenes.
-    With --noise-free or --posterior, of modes standard and precise: exit code 1 when a figure misses its bound.
+    With --noise-free, --posterior or --scan: exit code 1 when a figure misses its bound.
 
     Example: host_tools evaluate --mode precise --scenes 50
     """
     asked = mode_named(mode) if mode else None
     with workers(scheduler):
-        if noise_free or posterior:
+        if named := [
+            name for name, is_asked in zip(REFERENCES, (noise_free, posterior, scan), strict=True) if is_asked
+        ]:
             if recordings:
-                raise InvalidQuantity("recordings", len(recordings), "none", "leave out --noise-free and --posterior")
-            chapters = _reference(
-                standard_model, table, asked, noise_free=noise_free, posterior=posterior, scenes=scenes, seed=seed
-            )
+                options = ", ".join(f"--{name}" for name in REFERENCES)
+                raise InvalidQuantity("recordings", len(recordings), "none", f"leave out {options}")
+            chapters = _reference(named, standard_model, table, asked, scenes=scenes, seed=seed)
             _show_reference(measure_chapters(chapters), as_json=as_json)
             return
         count = SCENES if scenes is None else scenes
@@ -82,37 +89,30 @@ def evaluate(
 
 
 def _reference(
-    model: Path, table: Path, mode: Mode | None, *, noise_free: bool, posterior: bool, scenes: int | None, seed: int
+    named: list[str], model: Path, table: Path, mode: Mode | None, *, scenes: int | None, seed: int
 ) -> dict[str, Callable[[], Chapter]]:
-    """Return the chapters that are asked for, on `scenes` presses or as many as `host_tools modes` takes.
+    """Return the chapters of these names, on `scenes` presses or as many as `host_tools modes` takes.
 
-    Both modes unless one is given. Raises `InvalidQuantity` for one that fits no forward model.
+    Raises `InvalidQuantity` for a mode that one of them is not of.
     """
     from device.files.bundle_file import read_ramp_model
     from device.simulation.virtual_probe import ProbeTables
-    from host_tools.scores.noise_free import PRESSES, noise_free_chapter
-    from host_tools.scores.posterior import SCENES, posterior_chapter
+    from host_tools.scores.noise_free import noise_free_chapter
+    from host_tools.scores.posterior import posterior_chapter
+    from host_tools.scores.scan import scan_chapter
 
-    modes = _ramp_modes(mode)
+    for name in named:
+        if mode not in (None, REFERENCES[name]):
+            raise InvalidQuantity("mode", mode, REFERENCES[name], f"leave out --mode: --{name} is of no other")
     trained, tables = read_ramp_model(model), ProbeTables.load(table)
-    chapters: dict[str, Callable[[], Chapter]] = {}
-    if noise_free:
-        presses = PRESSES if scenes is None else scenes
-        chapters["noise-free"] = lambda: noise_free_chapter(trained.answers, tables, presses=presses, seed=seed)
-    if posterior:
-        count = SCENES if scenes is None else scenes
-        chapters["posterior"] = lambda: posterior_chapter(trained, modes=modes, scenes=count, seed=seed)
-    return chapters
-
-
-def _ramp_modes(mode: Mode | None) -> tuple[Mode, ...]:
-    from device.measurement.ramp_modes.model import RAMP_MODES
-
-    if mode is None:
-        return RAMP_MODES
-    if mode not in RAMP_MODES:
-        raise InvalidQuantity("mode", mode, " or ".join(RAMP_MODES), "only they have a forward model to compare with")
-    return (mode,)
+    count: dict[str, int] = {} if scenes is None else {"scenes": scenes}
+    presses: dict[str, int] = {} if scenes is None else {"presses": scenes}
+    known: dict[str, Callable[[], Chapter]] = {
+        "noise-free": lambda: noise_free_chapter(trained.answers, tables, seed=seed, **presses),
+        "posterior": lambda: posterior_chapter(trained, seed=seed, **count),
+        "scan": lambda: scan_chapter(trained, seed=seed, **count),
+    }
+    return {name: known[name] for name in named}
 
 
 def _show_reference(measured: dict[str, Timed], *, as_json: bool) -> None:
@@ -205,21 +205,26 @@ def _named(paths: list[Path] | None) -> Iterator[Sample]:
 
 
 def _random_presses(mode: Mode, table: Path, scenes: int, seed: int) -> Iterator[Sample]:
-    """Yield presses over the trained ranges that no training has seen, with every drift."""
+    """Yield presses over the trained ranges that no training has seen, with every drift; scans in mode precise."""
     import numpy as np
 
+    from device.measurement.mode import FRAMES
     from device.measurement.parameters import PARAMETERS
     from device.measurement.ramp_modes.noise import ErrorLevels
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.press_samples import draw_parameters
+    from host_tools.press_models.ramp_training import further_offsets_mm
     from host_tools.press_models.recorded_presses import recorded_press
     from host_tools.press_models.seeds import press_seed
     from host_tools.scores.score_recordings import Sample
 
     tables = ProbeTables.load(table)
+    further_mm = further_offsets_mm(scenes if FRAMES[mode].is_scan else 0, np.random.default_rng([seed, 4]))
     for number, parameters in enumerate(draw_parameters(scenes, np.random.default_rng([seed, 3]))):
+        places = further_mm[number] if further_mm else ()
+        press = partial(recorded_press, tables, parameters, mode, levels=ErrorLevels(), further_mm=places)
         yield Sample(
             f"press {number}",
-            partial(recorded_press, tables, parameters, mode, press_seed(seed, number), levels=ErrorLevels()),
+            partial(press, press_seed(seed, number)),
             dict(zip(PARAMETERS, map(float, parameters), strict=True)),
         )

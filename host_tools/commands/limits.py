@@ -12,6 +12,7 @@ from device.files.shipped import MODELS, PROTOCOLS
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from host_tools.commands.measured_chapters import shown
 from host_tools.commands.output import Scheduler, note, progress, require_writable
+from host_tools.commands.probe import ProbeOption, with_probe
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
@@ -33,13 +34,17 @@ def limits(
     out: Annotated[
         Path | None, typer.Option(help="With --map: Markdown file; results and figure go beside it.")
     ] = None,
+    probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Print the Cramer-Rao bound: the least error of size, depth and modulus that any method can have."""
+    """Print the Cramer-Rao bound: the least error of size, depth and modulus that any method can have.
+
+    Of --probe the waveguide counts; light and camera are the simulated probe's.
+    """
     given = (size_mm, depth_mm, modulus_kpa)
     if whole_map:
         with workers(scheduler):
-            _write_map(out, [scene, *given])
+            _write_map(out, [scene, *given, probe])
         return
     if out is not None:
         raise InvalidQuantity("out", out, "given with --map", "add --map, or print with --json")
@@ -47,7 +52,7 @@ def limits(
     from host_tools.cramer_rao.protocol import read_protocol
 
     asked = read_protocol(protocol)
-    found = bounds(_scene(scene, given), asked)
+    found = bounds(with_probe(_scene(scene, given), probe), asked)
     if as_json:
         print(json.dumps(_record(found)))
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,8 @@ import typer
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.commands.output import Scheduler, note, own_models, progress
+from host_tools.commands.output import Scheduler, note, progress
+from host_tools.commands.probe import ProbeOption, own_folder, probe_with_tables
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
@@ -25,23 +27,29 @@ def table(
         Path | None,
         typer.Option(help="Folder of the tables: models/simulated_probe, or build/wide_table of part wide."),
     ] = None,
-    part: Annotated[str, typer.Option(help="centred, off-axis or all, which are both; or wide.")] = "all",
+    part: Annotated[str, typer.Option(help="centred, off-axis, layers, motion, or all of these; or wide.")] = "all",
+    probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Build the virtual probe's tables of the pressed face: force ramps of centred inclusions, and inclusions off the
-    axis.
+    """Build the virtual probe's tables of the pressed face: force ramps of centred inclusions, inclusions off the
+    axis, what other layers of waveguide and tissue change, and how far the face moves outwards.
 
-    The first hold tissue of 4-6.25 kPa and 27-36 mm, the second is carried over to it. A quarter of an hour on two
-    cores.
+    The first hold tissue of 4-6.25 kPa and 27-36 mm, the others are carried over to it. Half an hour on two cores.
     Part wide, some ten minutes, is of inclusions around the trained ranges: `train --mode standard` needs it.
     """
+    from host_tools.probe_tables.face_motion import build_face_motion, write_face_motion
+    from host_tools.probe_tables.layer_table import build_layer_table, write_layer_table
     from host_tools.probe_tables.off_axis_table import build_off_axis_table, write_off_axis_table
     from host_tools.probe_tables.out_of_range_table import build_wide_table
     from host_tools.probe_tables.surface_table import build_surface_table, write_surface_table
+    from host_tools.scenes.probe_file import probe_of
 
-    if part not in ("centred", "off-axis", "all", "wide"):
-        raise InvalidQuantity("part", part, "centred, off-axis, all or wide", "name one of them")
-    out = out or (WIDE if part == "wide" else own_models("simulated_probe"))
+    if part not in ("centred", "off-axis", "layers", "motion", "all", "wide"):
+        raise InvalidQuantity("part", part, "centred, off-axis, layers, motion, all or wide", "name one of them")
+    if probe and part == "wide":
+        raise InvalidQuantity("part", part, "of the simulated probe", "leave --probe out: train reads no other yet")
+    made_of = probe_of(probe)
+    out = own_folder(probe, out or (WIDE if part == "wide" else None))
     with workers(scheduler), progress("solves") as bar:
         task = bar.add_task("")
 
@@ -51,9 +59,13 @@ def table(
         if part == "wide":
             build_wide_table(on_point=on_point).save(out)
         if part in ("centred", "all"):
-            write_surface_table(build_surface_table(on_point=on_point), out)
+            write_surface_table(build_surface_table(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
         if part in ("off-axis", "all"):
-            write_off_axis_table(build_off_axis_table(on_point=on_point), out)
+            write_off_axis_table(build_off_axis_table(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
+        if part in ("layers", "all"):
+            write_layer_table(build_layer_table(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
+        if part in ("motion", "all"):
+            write_face_motion(build_face_motion(waveguide=made_of.waveguide, on_point=on_point), out, made_of)
 
 
 def phantom(
@@ -66,8 +78,14 @@ def phantom(
     model: Annotated[Path, typer.Option(help="Bundle whose phantom scenes to record.")] = MODELS / "paper",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
     seed: Annotated[int, typer.Option(help="Seed of scenes, camera, force and hand.")] = 100,
+    probe: ProbeOption = None,
+    phantoms: Annotated[
+        Path | None, typer.Option(help="File of the phantoms to record instead of a set, phantoms.toml.")
+    ] = None,
 ) -> None:
-    """Record the simulated probe on phantoms: the model's nine, eight published ones, or random ones.
+    """Record the simulated probe on phantoms: the model's nine, eight published ones, random ones or those of a file.
+
+    Another probe's recordings come from its own tables: name their folder with --table.
 
     Example: host_tools phantom --set random --scenes 5 --force-n 0.2 --force-n 0.4 --out build/random
     """
@@ -79,21 +97,37 @@ def phantom(
 
     made_of = read_scenario(scenario) if scenario else Scenario()
     protocol = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
-    tables = ProbeTables.load(table)
-    for i, one in enumerate(_phantom_set(which, model, scenes, seed)):
+    tables, made_by = ProbeTables.load(table), probe_with_tables(probe, table)
+    for i, one in enumerate(_phantom_set(which, model, scenes, seed, phantoms)):
         recording = phantom_recording(
-            one.inclusion, tables, seed=seed + i, protocol=protocol, scenario=made_of, ramps=one.ramps()
+            one.inclusion,
+            tables,
+            seed=seed + i,
+            protocol=protocol,
+            scenario=one.in_its_tissue(made_of),
+            ramps=one.ramps(),
+            probe=made_by,
         )
-        write_recording(recording, out / one.name)
-        d, h, E = one.inclusion.as_tuple()
-        note.print(f"{out / one.name}: size {d:.2f} mm, depth {h:.2f} mm, Young's modulus {E:.1f} kPa")
+        known = replace(recording, truth=one.truth, phantom_serial=one.set_serial)
+        write_recording(known, out / one.name)
+        note.print(f"{out / one.name}: {_told(one.truth)}")
 
 
-def _phantom_set(which: str, model: Path, scenes: int, seed: int) -> Iterator[Phantom]:
+def _told(inclusion: Inclusion | None) -> str:
+    if inclusion is None:
+        return "a bare block"
+    d, h, E = inclusion.as_tuple()
+    return f"size {d:.2f} mm, depth {h:.2f} mm, Young's modulus {E:.1f} kPa"
+
+
+def _phantom_set(which: str, model: Path, scenes: int, seed: int, phantoms: Path | None) -> Iterator[Phantom]:
     from device.files.bundle_file import read_paper_model
-    from host_tools.calibration.phantom_sets import Phantom, breast_imager, random_set
+    from host_tools.calibration.phantom_sets import Phantom, breast_imager, of_file, random_set
+    from host_tools.scenes.phantom_set import read_phantoms
 
     require("scenes", scenes, Bound(1, 100_000, "phantoms"), "record at least one")
+    if phantoms:
+        return of_file(read_phantoms(phantoms))
     if which == "breast-imager":
         return breast_imager()
     if which == "random":

@@ -51,3 +51,9 @@ def require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:
         raise InvalidQuantity("file", path, f"of type {', '.join(suffixes)}", "give it another name")
     if path and not path.parent.is_dir():
         raise InvalidQuantity("folder", path.parent, "a folder that exists", "make it first")
+
+
+def problem_record(problem: InvalidQuantity) -> dict[str, str]:
+    """Return what is wrong as JSON object."""
+    value = str(problem.value)
+    return {"quantity": problem.quantity, "value": value, "bound": problem.bound, "action": problem.action}

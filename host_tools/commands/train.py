@@ -17,6 +17,7 @@ from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from device.measurement.bundle import ModelBundle
+    from device.simulation.virtual_probe import ProbeTables
 
 CERTIFICATE = "calibration.json"
 SWEPT = Path("build/sweep.nc")
@@ -37,7 +38,7 @@ def train(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of weights, splits, presses and noise.")] = 1,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Of standard: a tenth of the presses, to try the chain, not to use.")
+        bool, typer.Option("--dry-run", help="Of standard: few presses, to try the chain; the model is a poor one.")
     ] = False,
     scheduler: Scheduler = None,
 ) -> None:
@@ -122,13 +123,12 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
     from device.measurement.ramp_modes.estimate import estimate_ramp
     from device.measurement.ramp_modes.model import RAMP_MODES
     from device.simulation.scenario import SERIALS
-    from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.export import export_ramp
     from host_tools.press_models.ramp_training import DRY_RUN, TrainingBudget, train_ramp
     from host_tools.probe_tables.out_of_range_table import load_wide_table
     from host_tools.scores.dial import publish_dial
 
-    tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
+    tables, calibration = _simulated_tables(table), read_calibration(table / CERTIFICATE)
     budget = DRY_RUN if dry_run else TrainingBudget()
     trained = train_ramp(tables, load_wide_table(wide or _wide()), budget=budget, seed=seed, say=note.print)
     with _refusals():
@@ -151,15 +151,14 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
     from device.files.certificate_file import read_calibration
     from device.measurement.quick_mode.model import estimate_quick
     from device.simulation.scenario import SERIALS
-    from device.simulation.virtual_probe import ProbeTables
     from host_tools.press_models.export import export_quick
     from host_tools.press_models.quick_training import train_quick
     from host_tools.scores.dial import publish_dial
 
-    tables, calibration = ProbeTables.load(table), read_calibration(table / CERTIFICATE)
+    tables, calibration = _simulated_tables(table), read_calibration(table / CERTIFICATE)
     standard = read_ramp_model(MODELS / "standard")
     ramps = standard.answers
-    trained = train_quick(tables, ramps.surrogate, ramps.noise["standard"], seed=seed, say=note.print)
+    trained = train_quick(tables, ramps.surrogate, ramps.noise, seed=seed, say=note.print)
     with _refusals():
         export_quick(
             trained,
@@ -173,6 +172,17 @@ def _quick(table: Path, out: Path, seed: int, command: str) -> None:
     model = read_quick_model(out)
     publish_dial(out, ("quick",), lambda recording, _: estimate_quick(recording, model, calibration), tables)
     _print_modes(out, read_quick_model(out).bundle)
+
+
+def _simulated_tables(folder: Path) -> ProbeTables:
+    """Return the tables of a folder; refuse another probe's, since bundles are written for the simulated one."""
+    from device.simulation.virtual_probe import SIMULATED_PROBE_SHA256, ProbeTables, probe_of_table
+
+    tables, found = ProbeTables.load(folder), probe_of_table(folder, "surface_table")
+    if found != SIMULATED_PROBE_SHA256:
+        bound = f"{SIMULATED_PROBE_SHA256[:12]}, the simulated probe"
+        raise InvalidQuantity("tables' probe", found[:12], bound, "train on the tables in models/simulated_probe")
+    return tables
 
 
 @contextmanager

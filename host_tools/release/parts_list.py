@@ -19,7 +19,6 @@ from cyclonedx.model.bom import Bom, BomMetaData
 from cyclonedx.model.component import Component, ComponentType
 from cyclonedx.output import make_outputter
 from cyclonedx.schema import OutputFormat, SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
 from packageurl import PackageURL
 from packaging.metadata import RawMetadata, parse_email
 from packaging.requirements import Requirement
@@ -87,6 +86,8 @@ def parts_list(own: Path, others: Sequence[Path], checkout: Checkout, target: Ta
     for name, wheel in wheels.items():
         bom.register_dependency(parts[name], [parts[need] for need in _met_needs(wheel, wheels, target)])
     written = make_outputter(bom, OutputFormat.JSON, SchemaVersion.V1_6).output_as_string(indent=1)
+    from cyclonedx.validation.json import JsonStrictValidator  # compiles its grammars for a second when imported
+
     wrong = JsonStrictValidator(SchemaVersion.V1_6).validate_str(written)
     assert wrong is None, wrong
     return written.encode() + b"\n"

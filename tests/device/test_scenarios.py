@@ -1,8 +1,8 @@
 """Every fault that a scenario injects is raised by its code, or found by the self-test; after it the device is ready.
 
 The daemon's whole procedure on emulated chips in simulated time, and in two fifths of it, for fewer frames to render:
-hand, camera and time limits are as much faster as the faults are shorter. A camera's process that hangs or dies is a
-process: those two are in real time, and their fault ends when the test has seen what it waits for.
+hand and time limits are as much faster as the faults are shorter, the camera a third. A camera's process that hangs or
+dies is a process: those two are in real time, and their fault ends when the test has seen what it waits for.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
     monkeypatch.setattr(self_test_run, "FREE_TIMEOUT_S", 2.0)
     monkeypatch.chdir(ROOT)  # a scene's settings name files from there
     watchdog_s, clock = watchdog.WITHOUT_SYSTEMD_S, simulate_time(monkeypatch)
-    camera = CameraSection(frame_rate_hz=60.0)
+    camera = CameraSection(frame_rate_hz=40.0)
     config = replace(simulated_config(), data=tmp_path, camera=camera, press=QUICK_PRESS)
 
     @contextmanager

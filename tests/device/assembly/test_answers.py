@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stand_in_adviser import no_advice
 
 from device.assembly.answers import Answers, answers_for
 from device.assembly.opened_parts import StartFailed
@@ -35,7 +36,7 @@ def test_a_probe_without_their_models_has_the_papers_mode_only(bundle, calibrati
 
 
 def test_a_mode_without_a_model_is_no_default():
-    answers = Answers(("quick", "paper"), lambda recording, mode: None)
+    answers = Answers(("quick", "paper"), lambda recording, mode: None, no_advice)
     answers.require("quick")
     with pytest.raises(ConfigError, match=r"press\.mode is precise, but .* models for quick, paper only") as refusal:
         answers.require("precise")
@@ -61,11 +62,15 @@ def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle
 def test_every_run_of_a_watched_answer_is_progress_of_the_inference():
     now_s, begun = [0.0], []
     progress = ProgressBoard(lambda: now_s[0])
-    answers = Answers(("paper",), lambda recording, mode: mode).watched(progress, lambda: begun.append(now_s[0]))
+    unwatched = Answers(("paper",), lambda recording, mode: mode, lambda recording: "advice")
+    answers = unwatched.watched(progress, lambda: begun.append(now_s[0]))
+    now_s[0] = 20.0
+    assert answers.adviser(None) == "advice"
+    assert "inference" not in progress.stall(15.0).parts
     now_s[0] = 40.0
     assert answers.estimator(None, "paper") == "paper"
     assert "inference" not in progress.stall(15.0).parts
     now_s[0] = 80.0
     answers.prove()
     assert "inference" not in progress.stall(15.0).parts
-    assert begun == [40.0, 80.0]
+    assert begun == [20.0, 40.0, 80.0]

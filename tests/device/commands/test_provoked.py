@@ -33,6 +33,8 @@ PROVOKED_BY = {
     "E807": "device/access/test_request_rules.py::test_a_page_of_another_origin_cannot_change_anything",
     "E808": "device/access/test_request_rules.py::test_what_a_page_may_send_anywhere_without_leave_is_refused",
     "E809": "device/web/test_guard.py::test_a_body_that_says_it_is_too_large_is_refused_without_being_read",
+    "E810": "device/records/test_store.py::test_a_key_that_came_with_another_request_is_refused_by_its_name",
+    "E811": "device/records/test_exams.py::test_a_change_of_what_somebody_else_has_changed_meanwhile_is_refused",
     "E903": "test_unclean_end.py::test_a_kill_is_a_warning_after_the_next_start_and_only_after_that",
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }

@@ -126,11 +126,28 @@ def test_the_file_on_disk_is_the_contract(folder):
     assert sorted(p.name for p in (folder / "frames").iterdir()) == ["000.png", "001.png", "002.png", "003.png"]
 
 
+@pytest.mark.parametrize("name", ["scan", "scan.zip"])
+def test_a_scan_comes_back_with_its_ramps_and_is_of_another_schema(tmp_path, name):
+    """Only a frame of a later press says of which: a recording of one press is what it was."""
+    one = small_recording()
+    scan = replace(one, frames=(*one.frames, replace(one.frames[-1], ramp=1), replace(one.frames[-1], ramp=4)))
+    write_recording(scan, tmp_path / name)
+    found = read_recording(tmp_path / name)
+    assert_same(found, scan)
+    assert {ramp: [frame.t_s for frame in frames] for ramp, frames in found.ramps().items()} == {
+        0: [0.2, 0.30000000000000004], 1: [0.30000000000000004], 4: [0.30000000000000004]
+    }  # fmt: skip
+    if name == "scan":
+        record = json.loads((tmp_path / name / "recording.json").read_text())
+        assert record["schema"] == "tsis.recording/2"
+        assert [frame.get("ramp") for frame in record["frames"]] == [None, None, None, None, 1, 4]
+
+
 @pytest.mark.parametrize(
     ("path", "value", "quantity"),
     [
         ("schema", ..., "schema"),
-        ("schema", "tsis.recording/2", "schema"),
+        ("schema", "tsis.recording/3", "schema"),
         ("id", ..., "id"),
         ("id", 7, "id"),
         ("device", ..., "device"),
@@ -171,6 +188,14 @@ def test_the_file_on_disk_is_the_contract(folder):
         ("frames.1.led_ratio", [0.6, 0.6, 0.6], "frames[1].led_ratio"),
         ("frames.1.led_ratio", [0.6, 0.6, 0.6, 1.2], "led_ratio"),
         ("frames.1.led_ratio", [0.6, 0.6, 0.6, "x"], "led_ratio"),
+        ("frames.2.ramp", None, "frames[2].ramp"),
+        ("frames.2.ramp", "1", "frames[2].ramp"),
+        ("frames.2.ramp", 1.0, "frames[2].ramp"),
+        ("frames.2.ramp", True, "frames[2].ramp"),
+        ("frames.2.ramp", -1, "ramp"),
+        ("frames.2.ramp", 8, "ramp"),
+        ("frames.1.ramp", 1, "ramp"),
+        ("frames.2.ramp", 1, "schema"),
         ("calibration_id", 3, "calibration_id"),
         ("position_mm", 3.0, "position_mm"),
         ("position_mm", [1.0], "position_mm"),
@@ -383,3 +408,17 @@ def test_a_zip_is_never_written_over(tmp_path):
         write_recording(replace(small_recording(), serial="another"), tmp_path / "press.zip")
     assert_same(read_recording(tmp_path / "press.zip"), small_recording())
     assert [path.name for path in tmp_path.iterdir()] == ["press.zip"]
+
+
+def test_a_recording_of_a_hundred_thousand_frames_is_refused_before_any_is_read(folder):
+    """Each entry names the one frame that is there: read, they would take some gigabytes."""
+    path = folder / "recording.json"
+    record = json.loads(path.read_text())
+    record["frames"] = record["frames"][:1] * 100_000
+    record["camera"] |= {"width_px": 640, "height_px": 480, "bits": 8}
+    path.write_text(json.dumps(record))
+    for png in (folder / "frames").iterdir():
+        png.unlink()
+    most = (1 << 30) // (640 * 480)
+    with pytest.raises(InvalidQuantity, match=f"^frames of the recording is 100000, .* at most {most} frames"):
+        read_recording(folder)

@@ -25,7 +25,7 @@ def test_a_disk_that_becomes_full_at_a_step_leaves_what_ran_and_no_leftovers(pro
     steps, ends = len(interrupted.count("install", file)), set()
     for at in range(1, steps + 1) if every else {1 + k * (steps - 1) // (SAMPLED - 1) for k in range(SAMPLED)}:
         interrupted.restore()
-        probe.run_code(str(ROOT / "tests" / "fake_systemd.py"), "systemctl", "start", "tsis.service")
+        probe.run_code(str(ROOT / "tests" / "fake_systemd.py"), "start", "tsis.service")
         done = interrupted.run(how, at, "install", file)
         whole = probe.require_whole()
         assert whole == ("1.1+11" if done.returncode else "1.2+12"), (at, done.stderr)

@@ -10,8 +10,10 @@ from toolkit_process import run_toolkit
 from typer.testing import CliRunner
 
 from device.files.recording_file import write_recording
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.parameters import NOMINAL
 from host_tools.__main__ import app
+from host_tools.commands.evaluate import _random_presses
 from host_tools.press_models.recorded_presses import recorded_press
 
 
@@ -86,3 +88,12 @@ def test_modes_quick_and_paper_have_no_bound(folder):
     assert done.exit_code == 0, done.output
     assert "skill against the range" in done.output
     assert "bound" not in done.output
+
+
+def test_random_presses_of_mode_precise_are_scans_of_two_to_five_ramps():
+    scans = list(_random_presses("precise", SIMULATED_PROBE, 4, seed=1))
+    assert [1 + len(one.read.keywords["further_mm"]) for one in scans] == [2, 3, 4, 5]
+    assert len(scans[0].read().ramps()) == 2
+    ramps = list(_random_presses("standard", SIMULATED_PROBE, 4, seed=1))
+    assert [one.read.args[1].tolist() for one in ramps] == [one.read.args[1].tolist() for one in scans]
+    assert not any(len(one.read.keywords["further_mm"]) for one in ramps)

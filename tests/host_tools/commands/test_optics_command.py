@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.optics import build_lookup
 from host_tools.pages.benchmark import Chapter, at_most
 from host_tools.pages.page import RESULTS
+from host_tools.scenes.probe import Probe
+from host_tools.scenes.probe_file import NAME, probe_text, simulated_probe
 from host_tools.verification.light import chapters, verdict
 
 Asked = list[dict[str, object]]
@@ -70,18 +74,27 @@ def test_what_cannot_be_done_is_refused_before_anything_runs(
 
 
 def test_build_writes_the_table_of_the_rays_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    calls: list[tuple[Path, int, int]] = []
+    calls: list[tuple[Path, int, int, str]] = []
 
-    def fake(folder: Path, rays: int, seed: int, on_step: Callable[[str], None]) -> None:
+    def fake(folder: Path, rays: int, seed: int, on_step: Callable[[str], None], probe: Probe) -> None:
         for step in build_lookup.STEPS:
             on_step(step)
-        calls.append((folder, rays, seed))
+        calls.append((folder, rays, seed, probe.serial))
 
     monkeypatch.setattr(build_lookup, "write_light_table", fake)
     result = run("build", "--out", tmp_path, "--rays", 20_000, "--seed", 3)
     assert result.exit_code == 0
-    assert calls == [(tmp_path, 20_000, 3)]
+    file = tmp_path / "probe.toml"
+    file.write_text(probe_text(replace(simulated_probe(), serial="TSIS-0007")))
+    assert run("build", "--out", tmp_path, "--rays", 20_000, "--probe", file).exit_code == 0
+    assert calls == [(tmp_path, 20_000, 3, "SIM-0001"), (tmp_path, 20_000, 1, "TSIS-0007")]
     assert "20000 rays" in result.stdout
+
+
+def test_another_probes_light_does_not_go_to_the_simulated_ones_by_itself() -> None:
+    refused = run("build", "--probe", SIMULATED_PROBE / NAME)
+    assert isinstance(refused.exception, InvalidQuantity)
+    assert "out is not given, but must be given with --probe" in str(refused.exception)
 
 
 @pytest.mark.parametrize("verb", ["build", "verify"])

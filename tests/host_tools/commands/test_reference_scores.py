@@ -1,18 +1,20 @@
-"""`host_tools evaluate --noise-free` and `--posterior`: which chapters are measured, on what, and what is printed."""
+"""`host_tools evaluate --noise-free`, `--posterior` and `--scan`: which chapters are measured, and what is printed."""
 
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import pytest
-from toolkit_process import run_toolkit
 from typer.testing import CliRunner
 
+from device.files import bundle_file
 from device.measurement.quantities import InvalidQuantity
 from host_tools.__main__ import app
 from host_tools.pages.benchmark import Chapter, Table, at_most
 from host_tools.scores import noise_free as mode_noise_free
 from host_tools.scores import posterior as mode_posterior
+from host_tools.scores import scan as mode_scan
 
 
 def chapter(title: str, error: float = 0.4) -> Chapter:
@@ -33,6 +35,12 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, dict[str, object]]
         kept.append(("posterior", options))
         return chapter("Beside the posterior")
 
+    def scan(model: object, **options: object) -> Chapter:
+        kept.append(("scan", options))
+        return chapter("Ramp by ramp")
+
+    monkeypatch.setattr(bundle_file, "read_ramp_model", lambda path: SimpleNamespace(answers=None))
+    monkeypatch.setattr(mode_scan, "scan_chapter", scan)
     monkeypatch.setattr(mode_noise_free, "noise_free_chapter", noise_free)
     monkeypatch.setattr(mode_posterior, "posterior_chapter", posterior)
     return kept
@@ -55,20 +63,26 @@ def test_both_chapters_are_printed_with_their_benchmarks_and_tables(asked):
     ):
         assert words in done.output
     assert asked == [
-        ("noise-free", {"presses": 160, "seed": 1000}),
-        ("posterior", {"modes": ("standard", "precise"), "scenes": 50, "seed": 1000}),
+        ("noise-free", {"seed": 1000}),
+        ("posterior", {"seed": 1000}),
     ]
 
 
 def test_json_holds_the_chapters(asked):
-    done = run_toolkit("evaluate", "--noise-free", "--json")
-    assert done.returncode == 0
+    done = evaluate("--noise-free", "--json")
+    assert done.exit_code == 0
     assert json.loads(done.stdout)["chapters"]["noise-free"]["benchmarks"][0]["measured"] == 0.4
 
 
-def test_mode_scenes_and_seed_are_those_asked_for(asked):
-    assert evaluate("--posterior", "--mode", "precise", "--scenes", "7", "--seed", "3").exit_code == 0
-    assert asked == [("posterior", {"modes": ("precise",), "scenes": 7, "seed": 3})]
+@pytest.mark.parametrize(("name", "mode"), [("posterior", "standard"), ("scan", "precise")])
+def test_scenes_and_seed_are_those_asked_for(asked, name, mode):
+    assert evaluate(f"--{name}", "--mode", mode, "--scenes", "7", "--seed", "3").exit_code == 0
+    assert asked == [(name, {"scenes": 7, "seed": 3})]
+
+
+def test_presses_without_noise_are_as_many_as_asked_for(asked):
+    assert evaluate("--noise-free", "--scenes", "50").exit_code == 0
+    assert asked == [("noise-free", {"presses": 50, "seed": 1000})]
 
 
 def test_a_figure_that_misses_its_bound_is_exit_code_1_and_is_still_printed(asked, monkeypatch):
@@ -79,11 +93,14 @@ def test_a_figure_that_misses_its_bound_is_exit_code_1_and_is_still_printed(aske
     assert "0.321" in done.output
 
 
-@pytest.mark.parametrize("mode", ["quick", "paper"])
-def test_a_mode_without_a_forward_model_is_refused(asked, mode):
-    done = evaluate("--noise-free", "--mode", mode)
+@pytest.mark.parametrize(
+    ("name", "mode", "expected"),
+    [("noise-free", "quick", "standard"), ("posterior", "precise", "standard"), ("scan", "standard", "precise")],
+)
+def test_a_mode_that_a_chapter_is_not_of_is_refused(asked, name, mode, expected):
+    done = evaluate(f"--{name}", "--mode", mode)
     assert isinstance(done.exception, InvalidQuantity)
-    assert f"mode is {mode}, but must be standard or precise" in str(done.exception)
+    assert f"mode is {mode}, but must be {expected}" in str(done.exception)
     assert asked == []
 
 

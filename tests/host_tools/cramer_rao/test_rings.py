@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from host_tools.cramer_rao.rings import PIXEL_MM, Rings, mean_between
+from host_tools.cramer_rao.rings import Rings, mean_between
+from host_tools.scenes.probe_file import simulated_probe
 
 R_MM = np.linspace(0.0, 11.0, 221)
 RINGS = Rings.within(9.9)
@@ -31,7 +32,7 @@ def test_a_map_has_the_means_of_its_profile():
 
 def test_pixels_cover_what_the_picture_shows():
     inside = RINGS.edges_mm[1:] < 8.9  # beyond, the picture's upper and lower edges cut the rings
-    pixel_mm2 = PIXEL_MM[0] * PIXEL_MM[1]
+    pixel_mm2 = simulated_probe().scale.area_mm2
     assert RINGS.pixels[inside].sum() == pytest.approx(RINGS.area_mm2[inside].sum() / pixel_mm2, rel=2e-3)
     assert (RINGS.pixels[~inside] < RINGS.area_mm2[~inside] / pixel_mm2).all()
 

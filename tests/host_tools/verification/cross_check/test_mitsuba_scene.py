@@ -12,8 +12,8 @@ import pytest
 
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.skin import Skin
-from host_tools.optics.light_block import LightBlock
 from host_tools.optics.traced import TracedFace
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.cross_check.mitsuba_scene import MitsubaCamera, write_mitsuba_scene
 
 BLOCK = LightBlock(led_coupling="embedded", glass_refractive_index=1.41, glass_thickness_mm=0.0)

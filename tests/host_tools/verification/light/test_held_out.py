@@ -7,7 +7,7 @@ import pytest
 
 from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.surface_table import load_surface_table
-from host_tools.optics.light_block import LightBlock
+from host_tools.scenes.light_block import LightBlock
 from host_tools.verification.light.lookup import cell_means, dimple_scenes, held_out_errors, pressed_scenes
 
 MODELS = Path(__file__).parents[4] / "models" / "simulated_probe"

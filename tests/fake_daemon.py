@@ -1,0 +1,61 @@
+"""The daemon of a release in tests of updates, in the standard library alone: a real process, real HTTP.
+
+It answers as the release under `opt/tsis/current` tells it to (`tsis_fake.json`): `{"mute": true}` never answers,
+`{"dies_after": 2}` ends after so many answers, `{"falls_back_after": 2}` gives way to the page that stands in for it,
+`{"faults": {"camera": "E101"}}` is not ready, `{"says": "..."}` is of another release.
+"""
+
+import json
+import os
+import time
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+ROOT = Path(os.environ["TSIS_FAKE_ROOT"])
+PORT = int(os.environ["TSIS_FAKE_PORT"])
+
+
+class Answers(BaseHTTPRequestHandler):
+    left = None
+    good = None
+    record = None
+
+    def do_GET(self):
+        if self.path != "/api/v1/health/parts":
+            self.send_error(404)
+            return
+        body = json.dumps(self.record if self.good is None or self.good > 0 else {"status": 503}).encode()
+        if self.good is not None:
+            Answers.good -= 1
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+        if self.left is not None:
+            Answers.left -= 1
+            if not self.left:
+                self.wfile.flush()
+                os._exit(1)
+
+    def log_message(self, *words):
+        pass
+
+
+def daemon():
+    current = ROOT / "opt/tsis/current"
+    name = Path(os.readlink(current)).name
+    behaviour = json.loads(next(current.glob("lib/python3*/site-packages/tsis_fake.json")).read_text())
+    if behaviour.get("mute"):
+        time.sleep(600)
+    faults = behaviour.get("faults", {})
+    parts = {
+        part: {"ready": part not in faults, "code": faults.get(part)}
+        for part in ("camera", "light", "force", "answers", "store")
+    }
+    Answers.left, Answers.record = behaviour.get("dies_after"), {"release": behaviour.get("says", name), "parts": parts}
+    Answers.good = behaviour.get("falls_back_after")
+    HTTPServer(("127.0.0.1", PORT), Answers).serve_forever()
+
+
+if __name__ == "__main__":
+    daemon()
