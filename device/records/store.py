@@ -24,6 +24,7 @@ from device.measurement.recording.recording import Recording
 from device.records.asked_once import ANSWERS_TABLE, AskedOnce, first_answer, keep_answer
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
+from device.records.listing import Listing
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 
 StoredRecord = dict[str, Any]
@@ -50,6 +51,7 @@ class Store:
             self._end_interrupted()
             self._remove_unfinished()
             self.exams = Exams(self._transaction)
+            self.listing = Listing(self._transaction)
             self._opened = opened.pop_all()
 
     def _open(self, opened: ExitStack) -> sqlite3.Connection:
