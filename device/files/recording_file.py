@@ -25,7 +25,7 @@ import numpy as np
 
 from device.files.durable import sync_directory, synced_file
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording.recording import REPAIR, CameraSettings, RecordedCell, Recording
+from device.measurement.recording.recording import GEOMETRY, REPAIR, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
 
 SCHEMA = "tsis.recording/1"
@@ -147,7 +147,7 @@ def _as_json(recording: Recording) -> dict[str, Any]:
         "device": {"serial": recording.serial, "software": recording.software},
         "started_at": recording.started_at,
         "simulated": recording.simulated,
-        "camera": asdict(recording.camera),
+        "camera": recording.camera.as_record(),
         "cell": asdict(recording.cell) if recording.cell else None,
         "frames": [
             {
@@ -197,7 +197,7 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         bound = f"{SCHEMA} or {SCAN_SCHEMA}"
         raise InvalidQuantity("schema", record["schema"], bound, "convert the recording with matching software")
     device, camera = _field(record, "device", dict), _field(record, "camera", dict)
-    names = CameraSettings.__dataclass_fields__
+    names = (n for n in CameraSettings.__dataclass_fields__ if n not in GEOMETRY or n in camera)
     settings = CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names})
     truth, entries = record.get("truth"), _field(record, "frames", list)
     _require_room_for(len(entries), settings)
