@@ -51,14 +51,14 @@ def test_a_list_is_followed_by_its_cursor_to_the_end(get, path):
     whole = get(path, limit=200).json()
     assert whole["next"] is None
     found, cursor = [], {}
-    for size in (2, 2, 1):
+    while cursor is not None:
         answer = get(path, limit=2, **cursor).json()
         model.model_validate(answer)
-        assert len(answer[name]) == size
+        assert len(answer[name]) == 2 or answer["next"] is None
         found += answer[name]
-        cursor = {"cursor": answer["next"]}
-    assert answer["next"] is None
+        cursor = {"cursor": answer["next"]} if answer["next"] else None
     assert found == whole[name]
+    assert len(found) >= 5
 
 
 def test_a_list_still_takes_the_number_of_the_last_record(get):
