@@ -84,6 +84,17 @@ class CameraSection(Section):
     mm_per_px_y: Annotated[float, Bound(1e-4, 1.0, "mm"), Doc("Height of a frame's pixel on the sensing face.")] = (
         0.03646
     )
+    axis_x_mm: Annotated[float, Bound(-2.0, 2.0, "mm"), Doc("Where the optical axis meets the face, along a row.")] = (
+        0.0
+    )
+    axis_y_mm: Annotated[
+        float, Bound(-2.0, 2.0, "mm"), Doc("Where the optical axis meets the face, down a column.")
+    ] = 0.0
+    rim_distortion_percent: Annotated[
+        float,
+        Bound(-10.0, 10.0, "%"),
+        Doc("How much farther from the axis than its pixel says the face is seen, where that says 11 mm."),
+    ] = 0.0
     raw_format: Annotated[RawFormat, Doc("Unpacked raw format of the sensor; frames have 8 bits all the same.")] = "R8"
     sensor_width_px: Annotated[
         SensorPixels | None, Doc("Columns of the sensor's mode; those of a frame unless given.")

@@ -25,7 +25,7 @@ import numpy as np
 
 from device.files.durable import sync_directory, synced_file
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
-from device.measurement.recording.recording import REPAIR, CameraSettings, RecordedCell, Recording
+from device.measurement.recording.recording import GEOMETRY, REPAIR, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
 
 SCHEMA = "tsis.recording/1"
@@ -166,7 +166,7 @@ def _as_json(recording: Recording) -> dict[str, Any]:
         "device": {"serial": recording.serial, "software": recording.software},
         "started_at": recording.started_at,
         "simulated": recording.simulated,
-        "camera": asdict(recording.camera),
+        "camera": recording.camera.as_record(),
         "cell": asdict(recording.cell) if recording.cell else None,
         "frames": [
             {
@@ -238,7 +238,7 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
 
 def _head(record: dict[str, Any]) -> RecordingHead:
     device, camera = _field(record, "device", dict), _field(record, "camera", dict)
-    names = CameraSettings.__dataclass_fields__
+    names = (n for n in CameraSettings.__dataclass_fields__ if n not in GEOMETRY or n in camera)
     return RecordingHead(
         serial=_field(device, "serial", str, "device."),
         software=_field(device, "software", str, "device."),
