@@ -7,14 +7,17 @@ that measures or serves is imported before the port is taken: the camera's proce
 from __future__ import annotations
 
 import errno
+import json
 import os
 import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from device import __version__
 from device.access.known_hosts import ANYWHERE
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError
@@ -44,9 +47,10 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
         from device.instrument.watch.watchdog import Watchdog
 
         note = RestartNote(config.data)
-        told = settings.warning, note.warning(), Updates(config.updates).warning()
+        told = settings.warning, note.warning(), Updates(config.updates).warning(), procedure.store.audit.warning()
         warnings = tuple(warning for warning in told if warning)
         procedure.board.update(warnings=warnings)
+        procedure.store.audit.note_in_use(in_use(config, procedure.calibration.id))
         watchdog = Watchdog(procedure.progress, procedure.board, note)
         with _noted(note), ExitStack() as ending:
             procedure.start()
@@ -58,6 +62,16 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
                 settings.keep()
             _run_server(procedure, port.listening())
     return 0
+
+
+def in_use(config: Config, calibration_id: str) -> dict[str, Any]:
+    """Return what a probe works by, for its audit: software, certificate, and each setting by its full name."""
+    said: dict[str, Any] = {"software": __version__, "calibration_id": calibration_id}
+    for name, value in asdict(config).items():
+        for inner, one in value.items() if isinstance(value, dict) else [("", value)]:
+            said[f"{name}.{inner}" if inner else name] = str(one) if isinstance(one, Path) else one
+    present: dict[str, Any] = json.loads(json.dumps(said, default=str))  # as it comes back: a tuple is a list
+    return present
 
 
 @contextmanager

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-STORE_WRITES = 4
+STORE_WRITES = 5
 """The form that this code leaves behind. Whoever changes tables or recordings raises it, and converts what it finds."""
-STORE_READS = (1, 2, 3, 4)
+STORE_READS = (1, 2, 3, 4, 5)
 """The forms that this code can open; one release long it reads and leaves the older one."""
 UNNUMBERED = 1
 """What a database without a number is: the form before it had one."""

@@ -22,9 +22,11 @@ from device.errors import DiskFullError, NewerDataError, StorageError, UnknownRe
 from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
 from device.records.asked_once import ANSWERS_TABLE, AskedOnce, first_answer, keep_answer
+from device.records.audit import Audit, append, prepare_audit
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
+from device.records.tokens import TOKENS_TABLE, Tokens
 
 StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
@@ -49,7 +51,8 @@ class Store:
             self._db = self._open(opened)
             self._end_interrupted()
             self._remove_unfinished()
-            self.exams = Exams(self._transaction)
+            self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
+            self.tokens = Tokens(self._transaction)
             self._opened = opened.pop_all()
 
     def _open(self, opened: ExitStack) -> sqlite3.Connection:
@@ -61,7 +64,8 @@ class Store:
             self._require_readable(db)
             db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = FULL")
-            db.executescript(TABLES + ANSWERS_TABLE + EXAM_TABLES)
+            db.executescript(TABLES + ANSWERS_TABLE + EXAM_TABLES + TOKENS_TABLE)
+            prepare_audit(db)
             self._number(db)
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
@@ -168,6 +172,7 @@ class Store:
         with self._transaction() as db:
             if exam:
                 exam_of(db, exam.id, exam.version)
+            _note_press(db, job)
             row = job["id"], job["state"] in ENDED, json.dumps(job)
             db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
             if once:
@@ -275,6 +280,17 @@ class Store:
 
 def _unknown(what: str, identifier: str) -> UnknownResource:
     return UnknownResource(f"There is no {what} {identifier}.", "Use the id that the API gave.")
+
+
+def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
+    """Write into the audit that a press began, and how it ended."""
+    kept = db.execute("SELECT ended FROM press WHERE id = ?", (job["id"],)).fetchone()
+    if kept is None:
+        append(db, "press_begun", job["id"], after={name: job.get(name) for name in ("mode", "exam_id")})
+    if job["state"] in ENDED and not (kept and kept[0]):
+        append(
+            db, "press_ended", job["id"], after={name: job.get(name) for name in ("state", "code", "measurement_id")}
+        )
 
 
 def _form(db: sqlite3.Connection) -> int:

@@ -23,6 +23,7 @@ PROVOKED_BY = {
     "E011": "device/update/test_refusals.py::test_what_is_not_for_this_probe_is_refused",
     "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
     "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
+    "E020": "device/records/test_audit.py::test_what_was_changed_is_found_and_its_row_named",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
