@@ -44,7 +44,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
         from device.instrument.watch.watchdog import Watchdog
 
         note = RestartNote(config.data)
-        told = settings.warning, note.warning(), Updates(config.updates).warning()
+        told = settings.warning, note.warning(), Updates(config.updates).warning(), *procedure.board.now.warnings
         warnings = tuple(warning for warning in told if warning)
         procedure.board.update(warnings=warnings)
         watchdog = Watchdog(procedure.progress, procedure.board, note)

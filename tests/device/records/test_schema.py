@@ -92,7 +92,9 @@ def test_what_a_newer_release_wrote_is_refused_and_left_as_it_is(tmp_path):
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "half.tmp").mkdir()
     before = file.read_bytes()
-    with pytest.raises(NewerDataError, match=r"have schema 5, and this release reads 1 and 2 and 3 and 4\.") as refusal:
+    with pytest.raises(
+        NewerDataError, match=r"have schema 6, and this release reads 1 and 2 and 3 and 4 and 5\."
+    ) as refusal:
         Store(tmp_path)
     assert (refusal.value.code, isinstance(refusal.value, StorageError)) == ("E014", True)
     assert file.read_bytes() == before
