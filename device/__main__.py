@@ -35,6 +35,7 @@ VERBS = {
     "config": "check or show the settings",
     "calibration": "list, show or activate certificates",
     "faults": "list the fault codes",
+    "audit": "verify that no entry of the audit was changed",
     "openapi": "print the REST API as an OpenAPI document",
     "self-test": "test every part and name the one that fails",
     "update": "install a signed release, go back",
@@ -127,6 +128,10 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.faults import run_faults_command
 
             return run_faults_command(options)
+        case "audit":
+            from device.commands.audit import run_audit_command
+
+            return run_audit_command(options, _start_settings(options, _scenario(options)).config)
         case "openapi":
             from device.commands.openapi import run_openapi_command
 

@@ -147,6 +147,15 @@ class ComputerHotError(DeviceError):
     severity = "warning"
 
 
+class AuditChanged(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """An entry of the audit was changed or removed by another program than the probe's; the probe still measures."""
+
+    code = "E020"
+    title = "Audit was changed"
+    severity = "warning"
+    is_lasting = True
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 

@@ -25,7 +25,7 @@ DATABASE = "tsis.sqlite"
 DURABLE = {"journal_mode": "wal", "synchronous": 2, "cell_size_check": 1}
 """What keeps acknowledged rows over a power cut, and finds a bad page when it is read; 2 is FULL."""
 SET = {"journal_mode": "WAL", "synchronous": "FULL", "cell_size_check": "ON"}
-SALVAGED = ("measurement", "press", "counter", "exam", "filing", "audit", "asked_once", "kept_recording")
+SALVAGED = ("measurement", "press", "counter", "exam", "filing", "audit", "asked_once", "token", "kept_recording")
 MOST_MISSED = 10_000
 """So many numbers of rows in a row may be unreadable before the rest of a table is given up."""
 MENDING = (
@@ -99,22 +99,22 @@ def _salvaged(db: sqlite3.Connection) -> sqlite3.Connection:
     bring_forward(kept)
     for table in SALVAGED:
         rows = list(_readable_rows(db, table))
-        if rows:
-            places = ", ".join("?" * len(rows[0]))
-            kept.executemany(f"INSERT OR IGNORE INTO {table} VALUES ({places})", rows)
+        for row in rows:
+            columns, places = ", ".join(row), ", ".join("?" * len(row))
+            kept.execute(f"INSERT OR IGNORE INTO {table} ({columns}) VALUES ({places})", tuple(row.values()))
         log.warning("of the damaged database's table %s %d rows were read", table, len(rows))
     kept.commit()
     kept.execute("PRAGMA query_only = ON")
     return kept
 
 
-def _readable_rows(db: sqlite3.Connection, table: str) -> Iterator[tuple[object, ...]]:
+def _readable_rows(db: sqlite3.Connection, table: str) -> Iterator[dict[str, object]]:
     """Yield the rows of a table by their numbers; those on a bad page are left out."""
     last, missed = 0, 0
     while missed < MOST_MISSED:
         try:
-            query = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT 1"
-            row = db.execute(query, (last,)).fetchone()
+            found = db.execute(f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT 1", (last,))
+            row = found.fetchone()
         except sqlite3.DatabaseError as error:
             if isinstance(error, sqlite3.OperationalError) and "no such table" in str(error):
                 return
@@ -123,20 +123,17 @@ def _readable_rows(db: sqlite3.Connection, table: str) -> Iterator[tuple[object,
         if row is None:
             return
         last, missed = row[0], 0
-        if _is_sound(row[1:]):
-            yield row[1:]
+        named = dict(zip((column[0] for column in found.description[1:]), row[1:], strict=True))
+        if _is_sound(named.get("record", "{}")):
+            yield named
 
 
-def _is_sound(row: tuple[object, ...]) -> bool:
-    """Return whether the last text of a row that looks like a record is one: a bad page may read as anything."""
-    last = row[-1]
-    if not (isinstance(last, str) and last.startswith("{")):
-        return True
+def _is_sound(record: object) -> bool:
+    """Return whether a record is one: a bad page may read as anything."""
     try:
-        json.loads(last)
+        return isinstance(record, str) and isinstance(json.loads(record), dict)
     except ValueError:
         return False
-    return True
 
 
 def _number_in_file(db: sqlite3.Connection, folder: Path) -> None:

@@ -1,8 +1,8 @@
-"""Exams, to which exam a measurement belongs, and the audit of all that people change of either.
+"""Exams, and to which exam a measurement belongs; all that people change of either is in the audit.
 
 A measurement stays as it was measured: where it belongs, and that it does not count, stands beside it. Whoever changes
-something names the version that he has seen; each such act is one transaction with its entry in the audit, which SQLite
-itself keeps from being changed. A patient is known by an opaque reference alone: no name and no date of birth.
+something names the version that he has seen; each such act is one transaction with its entry in the audit. A patient is
+known by an opaque reference alone: no name and no date of birth.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import uuid
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from device.errors import InvalidRequest, StaleVersion, UnknownResource
 from device.records.asked_once import AskedOnce, first_answer, keep_answer
+from device.records.audit import append, utc_now
 
 _Record = dict[str, Any]
 ExamKind = Literal["patient", "phantom"]
@@ -29,13 +29,6 @@ CREATE TABLE IF NOT EXISTS exam
 CREATE TABLE IF NOT EXISTS filing
   (measurement_id TEXT PRIMARY KEY, exam_id TEXT, voided TEXT, version INTEGER NOT NULL);
 CREATE INDEX IF NOT EXISTS filing_by_exam ON filing (exam_id);
-CREATE TABLE IF NOT EXISTS audit
-  (seq INTEGER PRIMARY KEY AUTOINCREMENT, subject TEXT NOT NULL, record TEXT NOT NULL);
-CREATE INDEX IF NOT EXISTS audit_by_subject ON audit (subject);
-CREATE TRIGGER IF NOT EXISTS audit_is_never_changed BEFORE UPDATE ON audit
-  BEGIN SELECT RAISE(ABORT, 'an entry of the audit is never changed'); END;
-CREATE TRIGGER IF NOT EXISTS audit_is_never_deleted BEFORE DELETE ON audit
-  BEGIN SELECT RAISE(ABORT, 'an entry of the audit is never deleted'); END;
 """
 JOINERS = "\u200c\u200d"
 """What some scripts need within a word, though it prints nothing."""
@@ -122,12 +115,12 @@ class Exams:
         with self._transaction() as db:
             if once and (kept := first_answer(db, once)):
                 return kept
-            said, at = content.model_dump(), _utc_now()
+            said, at = content.model_dump(), utc_now()
             cursor = db.execute("INSERT INTO exam (id, version, record) VALUES (?, 1, '{}')", (str(uuid.uuid4()),))
             [(exam_id,)] = db.execute("SELECT id FROM exam WHERE seq = ?", (cursor.lastrowid,))
             exam = {"id": exam_id, "seq": cursor.lastrowid, "version": 1, "made_at": at, "changed_at": at, **said}
             db.execute("UPDATE exam SET record = ? WHERE id = ?", (json.dumps(exam), exam_id))
-            self._note(db, "exam_made", exam_id, content.operator, "", None, said)
+            append(db, "exam_made", exam_id, by=content.operator, after=said)
             if once:
                 keep_answer(db, once, exam)
         return exam
@@ -166,10 +159,10 @@ class Exams:
             changed = [name for name in before if after[name] != before[name]]
             if not changed:
                 return exam
-            exam = {**exam, **after, "version": version + 1, "changed_at": _utc_now()}
+            exam = {**exam, **after, "version": version + 1, "changed_at": utc_now()}
             db.execute("UPDATE exam SET version = ?, record = ? WHERE id = ?", (version + 1, json.dumps(exam), exam_id))
             was, now = ({name: one[name] for name in changed} for one in (before, after))
-            self._note(db, "exam_changed", exam_id, by, reason, was, now)
+            append(db, "exam_changed", exam_id, by=by, reason=reason, before=was, after=now)
         return exam
 
     def move(self, measurement_id: str, exam_id: str | None, *, version: int, by: str, reason: str) -> None:
@@ -183,7 +176,7 @@ class Exams:
                 exam_of(db, exam_id)
             _file(db, measurement_id, {**filing, "exam_id": exam_id})
             was, now = {"exam_id": filing["exam_id"]}, {"exam_id": exam_id}
-            self._note(db, "measurement_moved", measurement_id, by, reason, was, now)
+            append(db, "measurement_moved", measurement_id, by=by, reason=reason, before=was, after=now)
 
     def void(self, measurement_id: str, *, version: int, by: str, reason: str) -> None:
         """Say that a measurement does not count, and why; it stays readable.
@@ -194,30 +187,17 @@ class Exams:
             filing = _filing(db, measurement_id, version)
             if filing["voided"]:
                 raise InvalidRequest(f"The measurement {measurement_id} is void already.", "Nothing is left to do.")
-            voided = {"at": _utc_now(), "by": by, "reason": reason}
+            voided = {"at": utc_now(), "by": by, "reason": reason}
             _file(db, measurement_id, {**filing, "voided": voided})
-            self._note(db, "measurement_voided", measurement_id, by, reason, {"voided": None}, {"voided": voided})
-
-    def audit(self, *, subject: str | None = None, before_seq: int, limit: int) -> list[_Record]:
-        """Return what people have changed, of one exam or measurement or of all, newest first."""
-        where, values = ("AND subject = ? ", (subject,)) if subject else ("", ())
-        query = f"SELECT seq, record FROM audit WHERE seq < ? {where}ORDER BY seq DESC LIMIT ?"
-        with self._transaction() as db:
-            return [{"seq": row[0], **json.loads(row[1])} for row in db.execute(query, (before_seq, *values, limit))]
-
-    def _note(
-        self,
-        db: sqlite3.Connection,
-        what: str,
-        subject: str,
-        by: str,
-        reason: str,
-        before: _Record | None,
-        after: _Record,
-    ) -> None:
-        told = {"at": _utc_now(), "by": by, "what": what, "subject": subject, "reason": reason}
-        record = json.dumps({**told, "before": before, "after": after})
-        db.execute("INSERT INTO audit (subject, record) VALUES (?, ?)", (subject, record))
+            append(
+                db,
+                "measurement_voided",
+                measurement_id,
+                by=by,
+                reason=reason,
+                before={"voided": None},
+                after={"voided": voided},
+            )
 
 
 def filed(exam_id: str | None, voided: str | None, version: int | None) -> _Record:
@@ -265,7 +245,3 @@ def _require_version(what: str, identifier: str, present: int, seen: int | None)
     if seen is not None and seen != present:
         cause = f"The {what} {identifier} has the version {present}: it was changed since the version {seen} was read."
         raise StaleVersion(cause, "Look at it as it is now, and decide anew.")
-
-
-def _utc_now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -7,12 +7,15 @@ one, never something between. What the forms are is said in `schema`; every olde
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Callable, Iterator
 from types import MappingProxyType
 
 from device.records.asked_once import ANSWERS_TABLE
+from device.records.audit import AUDIT_GUARDS, AUDIT_TABLE, chain_older_audit
 from device.records.exams import EXAM_TABLES
 from device.records.manifest import MANIFEST_TABLE
 from device.records.schema import STORE_WRITES
+from device.records.tokens import TOKENS_TABLE
 
 FIRST_TABLES = """
 CREATE TABLE IF NOT EXISTS measurement
@@ -20,7 +23,15 @@ CREATE TABLE IF NOT EXISTS measurement
 CREATE TABLE IF NOT EXISTS press (id TEXT PRIMARY KEY, ended INTEGER NOT NULL, record TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS counter (name TEXT PRIMARY KEY, value REAL NOT NULL);
 """
-STEPS = MappingProxyType({1: FIRST_TABLES, 4: ANSWERS_TABLE + EXAM_TABLES, 5: MANIFEST_TABLE})
+_Step = str | Callable[[sqlite3.Connection], None]
+STEPS: MappingProxyType[int, tuple[_Step, ...]] = MappingProxyType(
+    {
+        1: (FIRST_TABLES,),
+        4: (ANSWERS_TABLE, EXAM_TABLES),
+        5: (TOKENS_TABLE, AUDIT_TABLE, chain_older_audit, AUDIT_GUARDS),
+        6: (MANIFEST_TABLE,),
+    }
+)
 """What is done to reach each form; to reach 2 and 3 nothing, for only recordings changed."""
 
 
@@ -32,8 +43,26 @@ def form_of(db: sqlite3.Connection) -> int:
 def bring_forward(db: sqlite3.Connection) -> None:
     """Bring a database to the form that this code writes; raise `sqlite3.Error` when a step is refused."""
     for form in range(form_of(db) + 1, STORE_WRITES + 1):
-        try:
-            db.executescript(f"BEGIN IMMEDIATE; {STEPS.get(form, '')} PRAGMA user_version = {form:d}; COMMIT;")
-        except sqlite3.Error:
-            db.rollback()
-            raise
+        with db:
+            db.execute("BEGIN IMMEDIATE")
+            for step in STEPS.get(form, ()):
+                _take(db, step)
+            db.execute(f"PRAGMA user_version = {form:d}")
+
+
+def _take(db: sqlite3.Connection, step: _Step) -> None:
+    if not isinstance(step, str):
+        step(db)
+        return
+    for statement in _statements(step):
+        db.execute(statement)
+
+
+def _statements(script: str) -> Iterator[str]:
+    """Yield the statements of a script: `executescript` would end the transaction that is under way."""
+    statement = ""
+    for line in script.splitlines(keepends=True):
+        statement += line
+        if sqlite3.complete_statement(statement):
+            yield statement
+            statement = ""

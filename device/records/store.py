@@ -22,11 +22,13 @@ from device.errors import DamagedStoreError, DiskFullError, InterruptedPress, St
 from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
 from device.records.asked_once import AskedOnce, first_answer, keep_answer
+from device.records.audit import Audit, append
 from device.records.database import open_database
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.manifest import fingerprint_of, note_kept
 from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
+from device.records.tokens import Tokens
 
 log = logging.getLogger(__name__)
 StoredRecord = dict[str, Any]
@@ -47,7 +49,8 @@ class Store:
         self.findings, self._ended_late = StartFindings(), dict[str, StoredRecord]()
         with ExitStack() as opened:
             self._db, self._damage = self._open(opened)
-            self.exams = Exams(self._transaction)
+            self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
+            self.tokens = Tokens(self._transaction)
             self.recordings = KeptRecordings(folder, self._transaction)
             self.interrupted = tuple(map(_broken_off, self._records("SELECT record FROM press WHERE ended = 0")))
             if not self._damage:
@@ -171,6 +174,7 @@ class Store:
         with self._transaction() as db:
             if exam:
                 exam_of(db, exam.id, exam.version)
+            _note_press(db, job)
             row = job["id"], job["state"] in ENDED, json.dumps(job)
             db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
             if once:
@@ -282,6 +286,17 @@ def _unknown(what: str, identifier: str) -> UnknownResource:
 def _broken_off(job: StoredRecord) -> StoredRecord:
     """Return a press as it has ended when the daemon did before it."""
     return job | {"state": "failed", "code": InterruptedPress.code, "reason": f"{BROKEN_OFF} {PRESS_AGAIN}"}
+
+
+def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
+    """Write into the audit that a press began, and how it ended."""
+    kept = db.execute("SELECT ended FROM press WHERE id = ?", (job["id"],)).fetchone()
+    if kept is None:
+        append(db, "press_begun", job["id"], after={name: job.get(name) for name in ("mode", "exam_id")})
+    if job["state"] in ENDED and not (kept and kept[0]):
+        append(
+            db, "press_ended", job["id"], after={name: job.get(name) for name in ("state", "code", "measurement_id")}
+        )
 
 
 def _is_full(error: Exception) -> bool:

@@ -87,7 +87,7 @@ def add_exams(app: FastAPI, api: str, store: Store) -> None:
         before_seq: BeforeSeq = NEWEST, limit: PageLimit = 20, subject: str | None = None
     ) -> dict[str, list[dict[str, Any]]]:
         """Return what people have changed, newest first, all or of one exam or measurement."""
-        return {"entries": store.exams.audit(subject=subject, before_seq=before_seq, limit=limit)}
+        return {"entries": store.audit.entries(subject=subject, before_seq=before_seq, limit=limit)}
 
 
 def _add_exams(app: FastAPI, path: str, store: Store) -> None:

@@ -156,12 +156,28 @@ class ExamList(_Body):
 
 
 class AuditEntry(_Body):
-    """What somebody has changed of an exam or a measurement, `subject`: the fields before and after, and why."""
+    """What was done to an exam, a measurement, a press, a token or the settings, `subject`: before, after, and why.
+
+    `by` is who said he did it, `client` who asked: the own screen, a token's name, or the probe by itself. `hash` is
+    SHA-256 over the hash of the entry before and this one without it, as JSON with sorted keys and no spaces.
+    """
 
     seq: int
+    hash: str
     at: str
     by: str
-    what: Literal["exam_made", "exam_changed", "measurement_moved", "measurement_voided"]
+    client: str = ""
+    what: Literal[
+        "exam_made",
+        "exam_changed",
+        "measurement_moved",
+        "measurement_voided",
+        "press_begun",
+        "press_ended",
+        "token_made",
+        "token_revoked",
+        "settings_changed",
+    ]
     subject: str
     reason: str
     before: dict[str, Any] | None

@@ -23,6 +23,7 @@ PROVOKED_BY = {
     "E011": "device/update/test_refusals.py::test_what_is_not_for_this_probe_is_refused",
     "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
     "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
+    "E020": "device/records/test_audit.py::test_what_was_changed_is_found_and_its_row_named",
     "E603": "test_kept_over_restart.py::test_a_damaged_database_starts_at_fault_and_shows_what_can_be_read",
     "E604": "device/records/test_recordings.py::"
     "test_a_recording_that_was_changed_is_not_handed_out_while_its_numbers_are",

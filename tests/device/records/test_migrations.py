@@ -8,10 +8,12 @@ import pytest
 
 from device.errors import StorageError
 from device.records import migrations
+from device.records.audit import AUDIT_GUARDS, FIRST, chained
 from device.records.exams import EXAM_TABLES
 from device.records.migrations import bring_forward, form_of
 from device.records.schema import STORE_READS, STORE_WRITES
 from device.records.store import Store
+from device.records.tokens import TOKENS_TABLE
 
 TABLES_OF_1_TO_3 = """
 CREATE TABLE measurement (seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, record TEXT NOT NULL);
@@ -25,12 +27,22 @@ OF_4 = """
 CREATE TABLE asked_once (key TEXT PRIMARY KEY, request TEXT NOT NULL, answer TEXT NOT NULL);
 INSERT INTO asked_once VALUES ('k-7', 'POST presses {}', '{"id": "p-7"}');
 """
-ROWS_OF_4 = """
-INSERT INTO exam VALUES (3, 'e-3', 1, '{"id": "e-3", "seq": 3, "version": 1, "kind": "phantom"}');
+AUDIT_OF_4 = "CREATE TABLE audit (seq INTEGER PRIMARY KEY AUTOINCREMENT, subject TEXT NOT NULL, record TEXT NOT NULL);"
+ENTRY = {"seq": 1, "what": "measurement_moved", "subject": "m-7"}
+ROWS_OF_4 = f"""
+{AUDIT_OF_4}
+INSERT INTO exam VALUES (3, 'e-3', 1, '{{"id": "e-3", "seq": 3, "version": 1, "kind": "phantom"}}');
 INSERT INTO filing VALUES ('m-7', 'e-3', NULL, 2);
-INSERT INTO audit VALUES (5, 'm-7', '{"what": "measurement_moved", "subject": "m-7"}');
+INSERT INTO audit VALUES (1, 'm-7', '{{"what": "measurement_moved", "subject": "m-7"}}');
 """
-LEFT_BEHIND = dict.fromkeys((0, 1, 2, 3), TABLES_OF_1_TO_3) | {4: TABLES_OF_1_TO_3 + OF_4 + EXAM_TABLES + ROWS_OF_4}
+WHOLE_4 = TABLES_OF_1_TO_3 + OF_4 + EXAM_TABLES + ROWS_OF_4
+OF_5 = f"""
+{TOKENS_TABLE}
+ALTER TABLE audit ADD COLUMN hash TEXT;
+UPDATE audit SET hash = '{chained(FIRST, ENTRY)}';
+{AUDIT_GUARDS}
+"""
+LEFT_BEHIND = dict.fromkeys((0, 1, 2, 3), TABLES_OF_1_TO_3) | {4: WHOLE_4, 5: WHOLE_4 + OF_5}
 """What a release of each form has left; 0 is 1 without its number."""
 ASKED_BY_OLDER = {
     1: ("SELECT seq, record FROM measurement WHERE id = 'm-7'", "SELECT ended, record FROM press WHERE id = 'p-7'"),
@@ -60,10 +72,11 @@ def test_an_older_form_is_read_whole_and_goes_on(tmp_path, form):
     store = Store(tmp_path)
     found = store.measurement("m-7")
     assert (found["seq"], found["recording_id"]) == (7, "r-7")
-    assert (found["exam_id"], found["version"]) == (("e-3", 2) if form == 4 else (None, 1))
+    assert (found["exam_id"], found["version"]) == (("e-3", 2) if form >= 4 else (None, 1))
     assert store.press("p-7")["measurement_id"] == "m-7"
     assert store.light_on_s == 12.5
-    assert [entry["seq"] for entry in store.exams.audit(before_seq=99, limit=9)] == ([5] if form == 4 else [])
+    assert [entry["subject"] for entry in store.audit.entries(before_seq=99, limit=9)] == ["m-7"] * (form >= 4)
+    assert store.audit.warning() is None
     assert store.recordings.unnoted() == ["r-7"]
     store.close()
 
@@ -83,7 +96,7 @@ def test_a_release_of_an_older_form_finds_in_the_new_one_what_it_left_there(tmp_
 @pytest.mark.parametrize("form", sorted(LEFT_BEHIND))
 def test_a_step_that_breaks_off_leaves_the_form_before_it(tmp_path, monkeypatch, form):
     """One transaction a step: the number and the tables are there together or not at all."""
-    torn = {STORE_WRITES: migrations.STEPS[STORE_WRITES] + "SELECT no_such_function();"}
+    torn = {STORE_WRITES: (*migrations.STEPS[STORE_WRITES], "SELECT no_such_function();")}
     with closing(left_behind(tmp_path / "tsis.sqlite", form)) as db:
         with monkeypatch.context() as patched:
             patched.setattr(migrations, "STEPS", {**migrations.STEPS, **torn})
@@ -98,7 +111,7 @@ def test_a_step_that_breaks_off_leaves_the_form_before_it(tmp_path, monkeypatch,
 
 def test_a_step_that_the_disk_refuses_is_a_storage_error_and_changes_nothing(tmp_path, monkeypatch):
     left_behind(tmp_path / "tsis.sqlite", 4).close()
-    torn = {5: "CREATE TABLE half (x); SELECT no_such_function();"}
+    torn = {5: ("CREATE TABLE half (x);\nSELECT no_such_function();",)}
     monkeypatch.setattr(migrations, "STEPS", {**migrations.STEPS, **torn})
     with pytest.raises(StorageError, match="cannot be opened"):
         Store(tmp_path)

@@ -1,0 +1,58 @@
+"""`audit verify`: whole or which row, also beside a store that is open."""
+
+import json
+import sqlite3
+from contextlib import closing
+
+import pytest
+
+from device.__main__ import main
+from device.records.store import Store
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """A store that is open, with two entries, and its settings."""
+    store = Store(tmp_path / "var")
+    store.save_press({"id": "p-1", "state": "waiting"})
+    store.save_press({"id": "p-1", "state": "cancelled"})
+    settings = tmp_path / "probe.toml"
+    settings.write_text(f'data = "{store.folder}"\n')
+    yield store, ["--simulate", "--config", str(settings), "audit", "verify"]
+    store.close()
+
+
+def changed(store):
+    with closing(sqlite3.connect(store.folder / "tsis.sqlite")) as db:
+        db.executescript("DROP TRIGGER audit_is_never_changed; UPDATE audit SET record = '{}' WHERE seq = 2")
+
+
+def test_a_whole_audit_has_its_head_said(kept, capsys):
+    store, command = kept
+    assert main(command) == 0
+    head = str(store.audit.verify())
+    assert capsys.readouterr().out.split()[-1] == head
+    assert main([*command, "--head", head, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"whole": True, "entries": 2, "head": head}
+
+
+def test_a_changed_row_is_named(kept, capsys):
+    store, command = kept
+    changed(store)
+    assert main(command) == 1
+    assert "Row 2 of the audit is not as it was written" in capsys.readouterr().out
+    assert main([*command, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["code"] == "E020"
+
+
+def test_another_head_is_refused(kept, capsys):
+    _, command = kept
+    assert main([*command, "--head", f"2:{'0' * 64}"]) == 1
+    assert "Row 2 of the audit has not the hash" in capsys.readouterr().out
+
+
+def test_a_folder_without_a_database_is_said(tmp_path, capsys):
+    settings = tmp_path / "probe.toml"
+    settings.write_text(f'data = "{tmp_path}/none"\n')
+    assert main(["--simulate", "--config", str(settings), "audit", "verify"]) == 1
+    assert "cannot be read" in capsys.readouterr().err
