@@ -12,6 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
+from device.config import DicomSection
+from device.dicom.hospital import Hospital
+from device.instrument.press.picture import kept_or_drawn
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
 from device.measurement.mode import Mode
@@ -21,6 +24,7 @@ from device.records.exams import AskedExam, ExamId
 from device.records.store import Store
 from device.records.updates import Updates
 from device.web.contract import EVENTS, PNG, PROBLEM, TAGS, ZIP, answers, install_contract, media
+from device.web.dicom import add_dicom
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import (
     NEWEST,
@@ -85,9 +89,14 @@ class SelfTestRequest(BaseModel):
 
 
 def create_app(
-    procedure: Procedure, store: Store, *, hosts: KnownHosts | None = None, updates: Updates | None = None
+    procedure: Procedure,
+    store: Store,
+    *,
+    hosts: KnownHosts | None = None,
+    updates: Updates | None = None,
+    hospital: Hospital | None = None,
 ) -> FastAPI:
-    """Return the web application of a running procedure, with what says how its updates went.
+    """Return the web application of a running procedure, with what tells of its updates and of the hospital.
 
     It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
     device/access/request_rules.py first.
@@ -113,6 +122,7 @@ def create_app(
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
+    add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
     add_updates(app, API, procedure, updates or Updates())
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 

@@ -25,6 +25,7 @@ TAGS = [
     {"name": "presses", "description": "Start, follow, finish and cancel measurements."},
     {"name": "exams", "description": "Whose measurement it is, and the audit of what was changed."},
     {"name": "measurements", "description": "What was measured, with picture and recording."},
+    {"name": "hospital", "description": "Exams as DICOM, to download or to send to the hospital's archive."},
     {"name": "self-test", "description": "Test every part."},
     {"name": "updates", "description": "Releases, and what became of updates."},
 ]
