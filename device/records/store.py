@@ -26,6 +26,7 @@ from device.records.audit import Audit, append
 from device.records.database import open_database
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
+from device.records.listing import Listing
 from device.records.manifest import fingerprint_of, note_kept
 from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
 from device.records.tokens import Tokens
@@ -51,6 +52,7 @@ class Store:
             self._db, self._damage = self._open(opened)
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
             self.tokens = Tokens(self._transaction)
+            self.listing = Listing(self._transaction)
             self.recordings = KeptRecordings(folder, self._transaction)
             self.interrupted = tuple(map(_broken_off, self._records("SELECT record FROM press WHERE ended = 0")))
             if not self._damage:
