@@ -87,7 +87,7 @@ def create_app(
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
-    add_exports(app, API, store)
+    add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
     add_updates(app, API, procedure, updates or Updates())
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
