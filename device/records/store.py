@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import json
+import logging
 import os
 import sqlite3
 import threading
@@ -27,6 +28,8 @@ from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 from device.records.tokens import TOKENS_TABLE, Tokens
+
+log = logging.getLogger(__name__)
 
 StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
@@ -286,8 +289,11 @@ def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
     """Write into the audit that a press began, and how it ended."""
     kept = db.execute("SELECT ended FROM press WHERE id = ?", (job["id"],)).fetchone()
     if kept is None:
+        log.info("press id=%s state=%s mode=%s", job["id"], job["state"], job.get("mode"))
         append(db, "press_begun", job["id"], after={name: job.get(name) for name in ("mode", "exam_id")})
     if job["state"] in ENDED and not (kept and kept[0]):
+        ended = (*(job.get(name) for name in ("id", "state", "mode", "code", "measurement_id")),)
+        log.info("press id=%s state=%s mode=%s code=%s measurement_id=%s", *ended)
         append(
             db, "press_ended", job["id"], after={name: job.get(name) for name in ("state", "code", "measurement_id")}
         )

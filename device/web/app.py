@@ -21,6 +21,7 @@ from device.records.exams import AskedExam, ExamId
 from device.records.store import Store
 from device.records.updates import Updates
 from device.web.contract import EVENTS, PNG, PROBLEM, TAGS, ZIP, answers, install_contract, media
+from device.web.door import Door
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import (
     NEWEST,
@@ -35,6 +36,9 @@ from device.web.exams import (
 )
 from device.web.guard import RequestGuard, StrictRoute
 from device.web.kept_files import KeptFiles
+from device.web.network import ServedNetwork
+from device.web.open_answers import OpenAnswers
+from device.web.pairing import add_pairing
 from device.web.problems import install_problems
 from device.web.schema import (
     CalibrationList,
@@ -85,13 +89,22 @@ class SelfTestRequest(BaseModel):
 
 
 def create_app(
-    procedure: Procedure, store: Store, *, hosts: KnownHosts | None = None, updates: Updates | None = None
+    procedure: Procedure,
+    store: Store,
+    *,
+    hosts: KnownHosts | None = None,
+    updates: Updates | None = None,
+    door: Door | None = None,
+    answers: OpenAnswers | None = None,
+    network: ServedNetwork | None = None,
 ) -> FastAPI:
     """Return the web application of a running procedure, with what says how its updates went.
 
     It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
-    device/access/request_rules.py first.
+    device/access/request_rules.py first. Unless a `door` says otherwise, the own screen alone is let in; `answers` can
+    be ended, and `network` is how other machines reach the probe.
     """
+    door = door or Door()
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -106,14 +119,16 @@ def create_app(
     app.router.route_class = StrictRoute
     install_contract(app)
     install_problems(app)
-    app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
-    _add_state(app, procedure, store)
+    guarding = {"hosts": hosts or KnownHosts.of_machine(), "door": door, "answers": answers, "network": network}
+    app.add_middleware(RequestGuard, **guarding)  # type: ignore[arg-type]
+    _add_state(app, procedure, store, network)
     _add_presses(app, procedure, store)
     _add_measurements(app, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
     add_updates(app, API, procedure, updates or Updates())
+    add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)
@@ -123,7 +138,7 @@ def create_app(
     return app
 
 
-def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
+def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: ServedNetwork | None) -> None:
     @app.get(f"{API}/device", responses=answers(200, Device), tags=["device"])
     def get_device() -> dict[str, Any]:
         """Say which probe this is, how long its LEDs have been on, and what each of its modes costs and is worth."""
@@ -135,6 +150,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
             "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
             "modes": [offer.as_record() for offer in procedure.offers()],
+            "network": network and network.as_record(),
         }
 
     @app.get(f"{API}/calibrations", responses=answers(200, CalibrationList), tags=["device"])

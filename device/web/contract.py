@@ -26,6 +26,7 @@ TAGS = [
     {"name": "exams", "description": "Whose measurement it is, and the audit of what was changed."},
     {"name": "measurements", "description": "What was measured, with picture and recording."},
     {"name": "self-test", "description": "Test every part."},
+    {"name": "access", "description": "Pair other machines, and revoke their tokens."},
     {"name": "updates", "description": "Releases, and what became of updates."},
 ]
 PROBLEM: Responses = {"default": {"description": "Any error", "model": Problem}}
@@ -66,7 +67,7 @@ def _as_described(document: dict[str, Any]) -> dict[str, Any]:
     for path in document["paths"].values():
         for operation in path.values():
             for answer in operation["responses"].values():
-                for content in answer["content"].values():
+                for content in answer.get("content", {}).values():
                     content["schema"] = _named(content["schema"])
             operation["responses"]["default"] = {"$ref": "#/components/responses/Problem"}
     return document
