@@ -19,7 +19,7 @@ from device.assembly.camera import emulated_camera, real_camera, require_open
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.light import emulated_line
 from device.assembly.opened_parts import OpenedParts
-from device.config import Config, LightSection
+from device.config import CameraSection, Config, LightSection
 from device.config_chips import RAW_BITS
 from device.errors import ConfigError
 from device.files.bundle_file import read_paper_model
@@ -43,6 +43,7 @@ from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion
+from device.measurement.recording.pixel_scale import PixelScale
 from device.records.disk import Disk
 from device.records.store import Store
 from device.simulation.chips.camera_server import CameraServer
@@ -197,7 +198,7 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     config = replace(commissioned(config), paper_model=bundles.folder(config.paper_model))
     parts.open(lambda: _require_own_serial(config, scenario))
     width_px, height_px = config.camera.raw_mode.sensor_px
-    shape, scale = (height_px, width_px), config.camera.sensor_scale
+    shape, scale = (height_px, width_px), designed_scale(config.camera)
     probe: VirtualProbe | None = None
 
     def render(exposure: ExposureRequest) -> Any:
@@ -232,6 +233,18 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     guide.on_request(lambda mode: faults.begin_press())
     lead_by_hand(guide, probe)
     return guide
+
+
+def designed_scale(camera: CameraSection) -> PixelScale:
+    """Return the size of a sensor's pixel on the face by the simulated probe's design, whatever the settings believe.
+
+    What is true against that is the scenario's `[world.camera]`: pixel sizes that were found from it and are set since
+    must not count once more.
+    """
+    designed = CameraSection()
+    x_mm = designed.mm_per_px_x * (designed.width_px / camera.width_px)
+    y_mm = designed.mm_per_px_y * (designed.height_px / camera.height_px)
+    return replace(camera, mm_per_px_x=x_mm, mm_per_px_y=y_mm).sensor_scale
 
 
 def _emulated_lights(

@@ -30,7 +30,7 @@ from device.settings.last_good import StartSettings
 
 if TYPE_CHECKING:
     from device.instrument.procedure import Procedure
-    from device.web.network import NetworkPort
+    from device.web.entrance.network import NetworkPort
 
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
 LOOPBACK_ADDRESS = "127.0.0.1"
@@ -169,7 +169,7 @@ def faults_of(error: Exception) -> list[DeviceError]:
 
 def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:
     """Open what else listens: by TLS for other machines, and by loopback where the daemon's port is not for that."""
-    from device.web.network import listen, open_network
+    from device.web.entrance.network import listen, open_network
 
     network, local = open_network(config), list[socket.socket]()
     if network:

@@ -218,7 +218,7 @@ def certificate_id(calibration: Calibration) -> str:
 
 
 def _content(calibration: Calibration) -> dict[str, Any]:
-    record = asdict(calibration)
+    record = asdict(calibration) | {"camera": calibration.camera.as_record()}
     record["held_out"] = {k: np.round(v, 3).tolist() for k, v in record["held_out"].items()}
     return record
 

@@ -26,6 +26,7 @@ from device.records.asked_once import ANSWERS_TABLE, AskedOnce, first_answer, ke
 from device.records.audit import Audit, append, prepare_audit
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
+from device.records.listing import Listing
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 from device.records.tokens import TOKENS_TABLE, Tokens
 
@@ -56,6 +57,7 @@ class Store:
             self._remove_unfinished()
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
             self.tokens = Tokens(self._transaction)
+            self.listing = Listing(self._transaction)
             self._opened = opened.pop_all()
 
     def _open(self, opened: ExitStack) -> sqlite3.Connection:

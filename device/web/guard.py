@@ -1,8 +1,8 @@
 """Stands before every route: refuses what no own page and no program sends, who has no token, and too large bodies.
 
-What is refused, and why: device/access/request_rules.py, and who is asked for a token: device/web/door.py. Each request
-is a line of the log, without its query, which may say whom it is about. It is pure ASGI, so that a stream stays one and
-a body that is refused is never read.
+What is refused, and why: device/access/request_rules.py; who is asked for a token: device/web/entrance/door.py. Each
+request is a line of the log, without its query, which may say whom it is about. It is pure ASGI, so that a stream stays
+one and a body that is refused is never read.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from device.access.safe_headers import SAFE_HEADERS
 from device.access.scopes import OPEN_FOLDER
 from device.errors import DeviceError, TokenNeeded, UnencryptedRequest
 from device.records.audit import done_for
-from device.web.door import Door
-from device.web.network import ServedNetwork
-from device.web.open_answers import OpenAnswers
+from device.web.entrance.door import Door
+from device.web.entrance.network import ServedNetwork
+from device.web.entrance.open_answers import OpenAnswers
+from device.web.entrance.request_line import RequestLine
 from device.web.problems import problem
-from device.web.request_line import RequestLine
 
 log = logging.getLogger(__name__)
 NO_STORE = (b"cache-control", b"no-store")

@@ -17,8 +17,8 @@ from device.records.audit import done_for
 from device.records.exams import Identifier
 from device.records.tokens import TokenRecord
 from device.web.contract import answers
-from device.web.door import COOKIE, Door
-from device.web.network import ServedNetwork
+from device.web.entrance.door import COOKIE, Door
+from device.web.entrance.network import ServedNetwork
 from device.web.schema import NetworkResource
 
 NO_CODE = "Ask for one at the probe's own screen."

@@ -22,10 +22,10 @@ from device.config import ServerSection
 from device.instrument.procedure import Procedure
 from device.records.updates import Updates
 from device.web.app import create_app
-from device.web.connection import PatientProtocol
-from device.web.door import Door
-from device.web.network import NetworkPort
-from device.web.open_answers import OpenAnswers
+from device.web.entrance.connection import PatientProtocol
+from device.web.entrance.door import Door
+from device.web.entrance.network import NetworkPort
+from device.web.entrance.open_answers import OpenAnswers
 
 log = logging.getLogger(__name__)
 

@@ -39,6 +39,7 @@ from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import Mode
 from device.measurement.paper_mode.features import FeatureSettings, extract_features
 from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid
+from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.led_sides import SIDES, LedRatio
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.reference_light import Image, reference_light
@@ -226,7 +227,9 @@ class Capture:
             return None
         if not (self._dark and self._reference):
             return None
-        return inclusion_spot_mm(self._dark, self._reference, frames, self.config.camera.scale)
+        camera = self.config.camera
+        geometry = CameraGeometry(camera.scale, camera.axis_x_mm, camera.axis_y_mm, camera.rim_distortion_percent)
+        return inclusion_spot_mm(self._dark, self._reference, frames, geometry)
 
     def _observation(self, frame: Frame, *, is_ramp: bool) -> FrameSeen:
         since_s, self._before_s = self._before_s, frame.t_s
@@ -347,14 +350,15 @@ def _never(is_touching: bool) -> bool:
 
 
 def inclusion_spot_mm(
-    dark: Sequence[Frame], reference: Sequence[Frame], press: Sequence[Frame], scale: PixelScale
+    dark: Sequence[Frame], reference: Sequence[Frame], press: Sequence[Frame], geometry: CameraGeometry
 ) -> tuple[float, float] | None:
     """Return x (right) and y (down) in mm of the bright spot's centroid from the middle of the face.
 
-    Frames of one shape, at least one of each; pixels of `scale`. None when nothing stands out. Frames are binned before
-    anything is divided, and only the hardest of the press are looked at, where the inclusion is brightest.
+    Frames of one shape, at least one of each, of a camera of `geometry`. None when nothing stands out. They are binned
+    before anything is divided, and only the hardest of the press are looked at, where the inclusion is brightest.
     Source: centroid of the paper's features, docs/measurement.md.
     """
+    scale = geometry.scale
     factor = _factor(scale.mm_per_px_x), _factor(scale.mm_per_px_y)
     base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
     lit = [_binned(frame, factor) - base for frame in reference]
@@ -368,7 +372,8 @@ def inclusion_spot_mm(
     features = extract_features(image, FeatureSettings())
     if features.centroid_intensity < SPOT_CONTRAST:
         return None
-    return features.centroid_x_mm, features.centroid_y_mm
+    x_mm, y_mm = geometry.face_mm(np.array(features.centroid_x_mm), np.array(features.centroid_y_mm))
+    return float(x_mm), float(y_mm)
 
 
 def _factor(mm_per_px: float) -> int:

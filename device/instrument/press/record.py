@@ -191,6 +191,9 @@ def recording_of(
         mm_per_px_y=camera.mm_per_px_y,
         exposure_us=camera.exposure_us,
         gain=camera.gain,
+        axis_x_mm=camera.axis_x_mm,
+        axis_y_mm=camera.axis_y_mm,
+        rim_distortion_percent=camera.rim_distortion_percent,
     )
     return Recording(
         id=str(uuid.uuid4()),

@@ -9,7 +9,7 @@ Source: docs/measurement.md; that the ramp and the whole profile are what the un
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
 import cv2
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
+from device.measurement.recording.camera_geometry import face_map
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import Recording
@@ -123,11 +124,15 @@ NETWORK_NAMES = _network_names()
 
 @dataclass(frozen=True, eq=False)
 class RampLights:
-    """Light above dark of lit frames, binned: forces [n] and images [n, height, width] of a pixel scale."""
+    """Light above dark of lit frames, binned: forces [n] and images [n, height, width] of a pixel scale.
+
+    `seen` [height, width] of the face, where the camera did not see all of the image.
+    """
 
     force_n: Array
     images: Sequence[Image]
     scale: PixelScale
+    seen: NDArray[np.bool_] | None = None
 
 
 def press_profile(recording: Recording) -> RadialProfile:
@@ -148,6 +153,7 @@ def press_profiles(recording: Recording) -> list[RadialProfile]:
 def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
     """Return the light of the touched reference frames and of the press frames, all as bright as the first of them.
 
+    The camera's axis and distortion are undone in it: its images are of the face, about its middle.
     Raises `InvalidQuantity` without dark frames, and for a frame whose sides are not lit in the first one's proportion.
     """
     dark = recording.with_role("dark")
@@ -159,13 +165,16 @@ def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
     lit = {role: _touched(recording, role) for role in ("reference", "press")}
     first = next((frame.led_ratio for frames in lit.values() for frame in frames), None)
     scale = binned_scale(recording.camera.scale)
+    on_face = face_map(recording.camera.geometry, base.shape, scale)
 
     def light(frame: Frame) -> Image:
         assert first is not None  # of a frame that is there
-        return (_binned(frame, factor) - base) * np.float32(per_count / _brightness(frame.led_ratio, first))
+        image = (_binned(frame, factor) - base) * np.float32(per_count / _brightness(frame.led_ratio, first))
+        return on_face(image) if on_face else image
 
+    seen = on_face.seen if on_face else None
     reference, press = (
-        RampLights(np.array([frame.force_n for frame in frames]), [light(frame) for frame in frames], scale)
+        RampLights(np.array([frame.force_n for frame in frames]), [light(frame) for frame in frames], scale, seen)
         for frames in lit.values()
     )
     return reference, press
@@ -180,7 +189,8 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile
     rings, residual = _at_profile_forces(press.force_n, rings_of(press, light))
     baseline_light = np.array([light.at(force) for force in PROFILE_FORCES_N])
     weights = ring_weights(press.images[0].shape, press.scale)
-    baseline = weights.means(baseline_light, np.ones(baseline_light.shape, dtype=bool)).mean
+    everywhere = np.ones(baseline_light.shape, dtype=bool)
+    baseline = weights.means(baseline_light, everywhere if press.seen is None else everywhere & press.seen).mean
     return RadialProfile(
         force_n=PROFILE_FORCES_N,
         contrast=rings.mean,
@@ -196,7 +206,8 @@ def rings_of(press: RampLights, light: HeldLight | RampLight) -> RingMeans:
     """Return the ring means of press frames' contrast: means [n, J] and harmonics [n, 2, J]."""
     frames = zip(press.images, press.force_n, strict=True)
     contrast, valid = zip(*(contrast_and_valid(image, light, force) for image, force in frames), strict=True)
-    return ring_weights(press.images[0].shape, press.scale).means(np.array(contrast), np.array(valid))
+    seen = np.array(valid) if press.seen is None else np.array(valid) & press.seen
+    return ring_weights(press.images[0].shape, press.scale).means(np.array(contrast), seen)
 
 
 def contrast_and_valid(image: Image, light: HeldLight | RampLight, force_n: float) -> tuple[Image, NDArray[np.bool_]]:
@@ -278,7 +289,7 @@ def _within(press: RampLights, reference_n: Array) -> RampLights:
     low, high = BEYOND_RATIO
     kept = (press.force_n >= low * reference_n.min()) & (press.force_n <= high * reference_n.max())
     images = [image for image, keep in zip(press.images, kept, strict=True) if keep]
-    return RampLights(press.force_n[kept], images, press.scale)
+    return replace(press, force_n=press.force_n[kept], images=images)
 
 
 def _binning(scale: PixelScale) -> tuple[int, int]:

@@ -7,19 +7,22 @@ field's name. Its file is in device/files/recording_file.py. Source: docs/contra
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Frame, TactileImage, reference, require_one_shape, tactile_image
 
 REPAIR = "record the press again, or correct the file"
+GEOMETRY = ("axis_x_mm", "axis_y_mm", "rim_distortion_percent")
+"""What a recording says of its camera only where the camera is not ideal; absent, each is 0."""
 
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """How the frames were taken."""
+    """How the frames were taken; the last three are those of `CameraGeometry`."""
 
     width_px: int
     height_px: int
@@ -28,6 +31,9 @@ class CameraSettings:
     mm_per_px_y: float
     exposure_us: float
     gain: float
+    axis_x_mm: float = 0.0
+    axis_y_mm: float = 0.0
+    rim_distortion_percent: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("width_px", "height_px"):
@@ -36,12 +42,27 @@ class CameraSettings:
             raise InvalidQuantity("camera.bits", self.bits, "8 or 16", REPAIR)
         require("camera.exposure_us", self.exposure_us, Bound(0.0, 1e7, "us", low_included=False), REPAIR)
         require("camera.gain", self.gain, Bound(0.0, 1e3, "", low_included=False), REPAIR)
-        self.scale  # noqa: B018 - refuses an impossible pixel size
+        self.geometry  # noqa: B018 - refuses an impossible pixel size, axis or distortion
 
     @property
     def scale(self) -> PixelScale:
         """Size of a pixel on the face."""
         return PixelScale(self.mm_per_px_x, self.mm_per_px_y)
+
+    @property
+    def geometry(self) -> CameraGeometry:
+        """Where on the face the pixels look."""
+        return CameraGeometry(self.scale, self.axis_x_mm, self.axis_y_mm, self.rim_distortion_percent)
+
+    def seen_as(self, geometry: CameraGeometry) -> CameraSettings:
+        """Return the settings of the same frames where another geometry is known of their camera."""
+        told = {name: getattr(geometry, name) for name in GEOMETRY}
+        return replace(self, **asdict(geometry.scale), **told)
+
+    def as_record(self) -> dict[str, float]:
+        """Return the settings as a JSON object; axis and distortion only where one of them is not 0."""
+        record = asdict(self)
+        return {name: value for name, value in record.items() if name not in GEOMETRY or not self.geometry.is_ideal}
 
 
 @dataclass(frozen=True)

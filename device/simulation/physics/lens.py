@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, require
+from device.measurement.recording.camera_geometry import RIM_MM
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Image
 
 ACTION = "use a real lens's data sheet"
 REACH = 4
 """Standard deviations of the blur that are kept."""
-RIM_MM = 11.0
-"""Radius at which a distortion is stated: the face's rim."""
 FINER = 2
 """Cells of the undistorted plane along one render cell."""
 

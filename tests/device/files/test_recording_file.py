@@ -17,7 +17,7 @@ import pytest
 from device.files.durable import synced_file
 from device.files.recording_file import png_of, read_picture, read_recording, write_recording
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
+from device.measurement.recording.recording import GEOMETRY, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
 
 CAMERA = CameraSettings(
@@ -42,6 +42,17 @@ def small_recording(bits=8):
         cell=RecordedCell(100_000.0, -8200.0),
         phantom_serial="PH-3",
     )
+
+
+def test_axis_and_distortion_are_said_of_a_camera_that_has_them(tmp_path):
+    """Of another they are absent, as in a recording of before, and then they are 0."""
+    askew = replace(CAMERA, axis_x_mm=0.3, rim_distortion_percent=-2.0)
+    for name, camera, said in (("plain", CAMERA, set()), ("askew", askew, set(GEOMETRY))):
+        write_recording(replace(small_recording(), camera=camera), tmp_path / name)
+        written = json.loads((tmp_path / name / "recording.json").read_text())["camera"]
+        assert set(written) & set(GEOMETRY) == said
+        assert read_recording(tmp_path / name).camera == camera
+    assert written["axis_x_mm"] == 0.3
 
 
 @pytest.fixture
@@ -167,6 +178,9 @@ def test_a_scan_comes_back_with_its_ramps_and_is_of_another_schema(tmp_path, nam
         ("camera.width_px", 15, "camera.width_px"),
         ("camera.width_px", 33, "frame shape"),
         ("camera.mm_per_px_x", 0.0, "mm_per_px_x"),
+        ("camera.axis_x_mm", 2.5, "camera.axis_x_mm"),
+        ("camera.axis_y_mm", None, "camera.axis_y_mm"),
+        ("camera.rim_distortion_percent", "1", "camera.rim_distortion_percent"),
         ("frames", ..., "frames"),
         ("frames", {}, "frames"),
         ("frames.1", "frames/001.png", "frames[1].file"),

@@ -10,8 +10,8 @@ import pytest
 from device.records.store import Store
 from device.web import pairing
 from device.web.app import create_app
-from device.web.door import COOKIE, Door
-from device.web.network import ServedNetwork
+from device.web.entrance.door import COOKIE, Door
+from device.web.entrance.network import ServedNetwork
 from device.web.schema import AuditList
 
 FAR = "192.0.2.7"

@@ -26,6 +26,8 @@ from device.measurement.ramp_modes.radial_profile import (
     press_profiles,
     seen_presses,
 )
+from device.measurement.recording.camera_geometry import CameraGeometry
+from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RingMeans
 from device.measurement.recording.tactile_image import Frame
@@ -68,6 +70,45 @@ def recording_of(frames, pitch_mm=PITCH_MM):
 
 def without(asked, role):
     return replace(asked, frames=tuple(f for f in asked.frames if f.role != role))
+
+
+GEOMETRY = CameraGeometry(PixelScale(PITCH_MM, PITCH_MM), 0.4, -0.3, 3.0)
+
+
+def test_a_camera_off_the_axis_that_distorts_gives_the_profile_of_an_ideal_one():
+    """The same face drawn where that camera sees it: its profile is the ideal camera's as soon as it is known."""
+
+    def seen(contrast, geometry):
+        x_mm, y_mm = geometry.face_mm(X, Y)
+        r_mm = np.hypot(x_mm, y_mm)
+
+        def counts(force_n, is_press):
+            light_of = (60_000 * force_n - 25_000 * force_n**2 * (1 + 2e-3 * r_mm**2)) * (1 - 2e-3 * r_mm**2)
+            return DARK + light_of * (1 + is_press * contrast(x_mm, y_mm, force_n))
+
+        frames = [frame("dark", 0.0, np.full(R.shape, DARK))] * 2
+        frames += [frame(role, f, counts(f, role == "press")) for role in ("reference", "press") for f in RAMP_N]
+        return recording_of(frames)
+
+    def bump(x_mm, y_mm, force_n):
+        return 0.6 * np.exp(-((x_mm - 1) ** 2 + (y_mm - 0.5) ** 2) / 8) * force_n
+
+    ideal = press_profile(seen(bump, CameraGeometry(GEOMETRY.scale))).as_row()
+    askew = seen(bump, GEOMETRY)
+    known = replace(askew, camera=askew.camera.seen_as(GEOMETRY))
+    assert np.abs(press_profile(askew).as_row() - ideal).max() > 5e-3
+    assert np.abs(press_profile(known).as_row() - ideal).max() < 2e-4
+
+
+def test_what_a_camera_does_not_see_of_a_ring_does_not_count():
+    """Its middle is 2 mm beside the face's: of an even face a ring that is seen in part has the same mean."""
+    frames = [frame("dark", 0.0, np.full(R.shape, DARK))] * 2
+    frames += [frame(role, f, np.full(R.shape, DARK + 40_000 * f)) for role in ("reference", "press") for f in RAMP_N]
+    aside = recording_of(frames)
+    narrow = CameraGeometry(PixelScale(0.07, 0.07), axis_x_mm=2.0)
+    found = press_profile(replace(aside, camera=aside.camera.seen_as(narrow)))
+    grown = np.log(PROFILE_FORCES_N[:-1] / PROFILE_FORCES_N[-1])
+    np.testing.assert_allclose(found.reference_response, np.repeat(grown[:, None], len(RING_RADII_MM), 1), atol=1e-3)
 
 
 def test_a_contrast_linear_in_force_and_radius_comes_back_at_every_force_and_ring():

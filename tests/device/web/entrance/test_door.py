@@ -13,7 +13,7 @@ from device.access.scopes import SCOPES, may, need_of
 from device.errors import DeviceError, ScopeNeeded, TokenNeeded, TooManyTries, UnencryptedRequest
 from device.records.store import Store
 from device.web.app import create_app
-from device.web.door import COOKIE, Door, bearer, cookie
+from device.web.entrance.door import COOKIE, Door, bearer, cookie
 
 DOCUMENT = json.loads((ROOT / "docs" / "openapi.json").read_text())
 OPERATIONS = sorted((method.upper(), path) for path, found in DOCUMENT["paths"].items() for method in found)
