@@ -6,11 +6,14 @@ It is asked at this machine's own address; the own screen at loopback.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import http.client
+import os
 import socket
 import ssl
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 
 import httpx
@@ -18,9 +21,10 @@ import pytest
 from daemon_process import ROOT, WAIT_S, wait_for
 from networked_daemon import NetworkedDaemon
 
-from device.access.certificate import own_certificate
+from device.access.certificate import ServerCertificate, own_certificate
 
 pytestmark = pytest.mark.real_time
+SHELL = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +68,6 @@ def test_the_own_screen_is_asked_for_nothing_and_says_how_others_reach_it(probe)
 
 
 def sha256(pem):
-    import hashlib
-
     return hashlib.sha256(ssl.PEM_cert_to_DER_cert(pem)).hexdigest()
 
 
@@ -130,7 +132,8 @@ def test_no_old_tls_and_no_weak_cipher_is_spoken(probe):
             handshake(probe, context)
     old = tls(probe)
     old.set_ciphers("ALL:@SECLEVEL=0")
-    old.minimum_version, old.maximum_version = ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+        old.minimum_version, old.maximum_version = ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1
     with pytest.raises((ssl.SSLError, OSError)):
         handshake(probe, old)
 
@@ -139,7 +142,7 @@ def test_pair_and_tokens_of_the_command_line_ask_the_daemon(probe):
     def run(*arguments):
         options = ["--simulate", "--config", "probe.toml", "--port", str(probe.port), *arguments]
         command = [sys.executable, "-m", "device", *options]
-        return subprocess.run(command, cwd=probe.folder, capture_output=True, text=True, check=False)
+        return subprocess.run(command, cwd=probe.folder, env=SHELL, capture_output=True, text=True, check=False)
 
     code = run("pair", "--name", "Shell PC", "--scope", "admin")
     assert code.returncode == 0, code.stderr
@@ -160,7 +163,7 @@ def test_no_secret_is_in_the_log_the_data_folder_or_a_backup(probe):
     wait_for(probe.daemon.log_text, lambda log: log.count("route=/api/v1/exams ") >= 2)
     backup = probe.folder / "probe.backup"
     command = [sys.executable, "-m", "device", "--simulate", "--config", "probe.toml", "backup", str(backup)]
-    subprocess.run(command, cwd=probe.folder, check=True, capture_output=True)
+    subprocess.run(command, cwd=probe.folder, env=SHELL, check=True, capture_output=True)
     key = (probe.folder / "var" / "tls" / "key.pem").read_bytes().splitlines()[1]
     kept = [path for path in probe.folder.rglob("*") if path.is_file() and path.name != "key.pem"]
     content = {path.name: path.read_bytes() for path in kept}
@@ -173,7 +176,10 @@ def test_no_secret_is_in_the_log_the_data_folder_or_a_backup(probe):
 def test_a_hospitals_certificate_is_shown_and_a_client_without_one_of_its_authority_is_refused(tmp_path):
     """The authority is a certificate of its own here: a client shows that very one."""
     server = own_certificate(tmp_path / "hospital", ["probe"])
-    client = own_certificate(tmp_path / "client", ["ward-pc"])
+    client = ServerCertificate(tmp_path / "client.pem", tmp_path / "client_key.pem")
+    made = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-noenc", "-days", "1", "-subj", "/CN=ward-pc"]
+    files = ["-keyout", str(client.key), "-out", str(client.certificate), "-addext", "extendedKeyUsage=clientAuth"]
+    subprocess.run([*made, *files], check=True, capture_output=True)
     more = f'certificate = "{server.certificate}"\ncertificate_key = "{server.key}"\n'
     probe = NetworkedDaemon(tmp_path, f'{more}client_authority = "{client.certificate}"\n')
     try:

@@ -67,6 +67,7 @@ def test_files_that_are_none_or_do_not_belong_together_are_refused(own, tmp_path
     ):
         with pytest.raises(CertificateRefused, match="cannot be used") as refusal:
             ServerCertificate(certificate, key).require_usable()
+        assert refusal.value.code == "E021"
         assert "server.certificate" in refusal.value.remedy
 
 

@@ -103,8 +103,9 @@ def test_a_wrong_code_a_used_one_and_none_are_answered_alike(ask):
 
 
 def test_who_guesses_waits(ask):
-    answers = [ask("POST", "pairing/claim", {"code": "AAAA-AAAA"}, client=FAR).status_code for _ in range(8)]
-    assert answers == [403] * 5 + [429] * 3
+    answers = [ask("POST", "pairing/claim", {"code": "AAAA-AAAA"}, client=FAR) for _ in range(8)]
+    assert [one.status_code for one in answers] == [403] * 5 + [429] * 3
+    assert answers[-1].json()["code"] == "E823"
     assert ask("POST", "pairing/claim", {"code": code(ask)}, client="192.0.2.8").status_code == 201
 
 

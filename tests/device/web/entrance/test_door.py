@@ -56,8 +56,9 @@ def test_each_scope_is_let_in_to_what_it_may_and_to_nothing_else(door, secrets, 
     if may(scope, need_of(method, path)):
         assert door.require(asked).name == f"{scope} PC"
     else:
-        with pytest.raises(ScopeNeeded):
+        with pytest.raises(ScopeNeeded) as refusal:
             door.require(asked)
+        assert refusal.value.code == "E821"
 
 
 @pytest.mark.parametrize(("method", "path"), OPERATIONS, ids=" ".join)
@@ -73,8 +74,9 @@ def test_without_a_token_that_holds_nothing_is_answered_but_what_is_open(store, 
     if need_of(method, path) == "nothing":
         assert Door(store.tokens).require(asked).scope is None
     else:
-        with pytest.raises(TokenNeeded):
+        with pytest.raises(TokenNeeded) as refusal:
             Door(store.tokens).require(asked)
+        assert refusal.value.code == "E820"
 
 
 def test_the_own_screen_may_all_and_a_token_on_loopback_only_what_it_may(door, secrets):
@@ -97,8 +99,9 @@ def test_by_loopback_but_not_as_the_own_screen_a_token_is_needed(door, secrets):
 @pytest.mark.parametrize("path", ["/", "/api/v1/status", "/api/v1/health/live", "/api/v1/pairing/claim"])
 def test_in_clear_no_other_machine_is_answered_with_whatever_token(door, secrets, path):
     for headers in ({}, with_token(secrets["admin"])):
-        with pytest.raises(UnencryptedRequest):
+        with pytest.raises(UnencryptedRequest) as refusal:
             door.require(request(path=path, is_encrypted=False, **headers))
+        assert refusal.value.code == "E824"
 
 
 def test_a_cookie_is_a_token_too(door, secrets):
