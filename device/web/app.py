@@ -28,6 +28,7 @@ from device.web.entrance.network import ServedNetwork
 from device.web.entrance.open_answers import OpenAnswers
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import add_exams
+from device.web.exports import add_exports
 from device.web.guard import RequestGuard
 from device.web.measurements import add_measurements
 from device.web.pairing import add_pairing
@@ -96,6 +97,7 @@ def create_app(
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
+    add_exports(app, API, store)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
