@@ -27,7 +27,7 @@ from device.measurement.quantities import InvalidQuantity
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
 
-PictureOf = Callable[[Path], bytes]
+_PictureOf = Callable[[Path], bytes]
 NAMES = {"size_mm": "Size", "depth_mm": "Depth of its top", "youngs_modulus_kpa": "Young's modulus"}
 UNITS = {"size_mm": "mm", "depth_mm": "mm", "youngs_modulus_kpa": "kPa"}
 DECIMALS = {"size_mm": 1, "depth_mm": 1, "youngs_modulus_kpa": 0}
@@ -51,7 +51,7 @@ NOT_A_DIAGNOSIS = (
 )
 
 
-def report_of(store: Store, exam_id: str, serial: str, picture_of: PictureOf) -> bytes:
+def report_of(store: Store, exam_id: str, serial: str, picture_of: _PictureOf) -> bytes:
     """Return the PDF of an exam, as it is now; raises as `Exams.exam`.
 
     `serial` is the probe's that prints it; `picture_of` the PNG of a kept recording.
@@ -125,7 +125,7 @@ def _counted(counting: int, measured: int) -> list[Flowable]:
     return [Spacer(0, 4 * mm), paragraph(" ".join(said), STRONG)]
 
 
-def _measurement(store: Store, one: Exported, picture_of: PictureOf) -> list[Flowable]:
+def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Flowable]:
     measurement, estimate = one.measurement, one.measurement["estimate"]
     of_what = f"Mode {measurement['mode']}, {measurement['force_n']:.2f} N, {measurement['frames']} frames"
     right: list[Flowable] = [paragraph(local_time(one.taken_at), HEADING), paragraph(of_what, SMALL), Spacer(0, 2 * mm)]
@@ -176,7 +176,7 @@ def _interval(name: str, quantity: dict[str, Any]) -> str:
     return of_ends[opens]
 
 
-def _picture(store: Store, measurement: StoredRecord, picture_of: PictureOf) -> list[Flowable]:
+def _picture(store: Store, measurement: StoredRecord, picture_of: _PictureOf) -> list[Flowable]:
     """Return the tactile image with its scale, or why there is none: the numbers stand without it."""
     try:
         path = store.recording_path(measurement["recording_id"])
