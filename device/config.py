@@ -36,6 +36,13 @@ SensorPixels = Annotated[int, Bound(64, 8192, "px")]
 LightRatio = Annotated[float, Bound(0.01, 0.9, "")]
 
 
+NetworkHost = Annotated[str, Field(min_length=1)]
+DICOM_LINE = r"^[^\\\x00-\x1f\x7f]*$"
+"""Text that DICOM takes for one value: a backslash would begin the next one (PS3.5 section 6.2)."""
+AeTitle = Annotated[str, Field(pattern=r"^[!-\[\]-~]([ -\[\]-~]{0,14}[!-\[\]-~])?$")]
+"""Name of a program in DICOM's network, 1 to 16 characters of ASCII without a backslash."""
+
+
 class Conflict(InvalidQuantity):
     """A value that holds alone but not beside `others`, the full names of the settings it has to fit."""
 
@@ -363,13 +370,88 @@ class ServerSection(Section):
     host: Annotated[
         str,
         Field(min_length=1),
-        Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network."),
+        Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network, by TLS and with tokens."),
     ] = "127.0.0.1"
-    port: Annotated[int, Bound(0, 65535, ""), Doc("Port of screen and REST API; 0 takes any free one.")] = 8000
+    port: Annotated[
+        int, Bound(0, 65535, ""), Doc("Port of screen and REST API at the probe itself; 0 takes any free one.")
+    ] = 8000
+    tls_port: Annotated[
+        int, Bound(0, 65535, ""), Doc("Port of both for other machines, by TLS; 0 takes any free one.")
+    ] = 8443
+    certificate: Annotated[
+        str, Doc("File of the certificate for other machines with those above it, PEM; unless given the probe's own.")
+    ] = ""
+    certificate_key: Annotated[str, Doc("File of that certificate's key, PEM.")] = ""
+    client_authority: Annotated[
+        str, Doc("File of certificates, PEM, of which one must vouch for a client's; unless given none is asked for.")
+    ] = ""
     hosts: Annotated[
         tuple[str, ...],
         Doc("More names by which the probe is asked, as a proxy's; its addresses and its host name are known."),
     ] = ()
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a certificate without its key, and a key without its certificate."""
+        given = {"server.certificate": self.certificate, "server.certificate_key": self.certificate_key}
+        for (name, path), other in zip(given.items(), reversed(given), strict=True):
+            if not path and given[other]:
+                yield Conflict(name, path, f"a file beside {other}", (other,), f"name it, or leave out {other}")
+
+
+@dataclass(frozen=True, config=STRICT)
+class DicomSection(Section):
+    """The hospital's archive and worklist: where they are, and what the probe is called there.
+
+    Without a host of either nothing is sent or asked.
+    """
+
+    archive_host: Annotated[
+        NetworkHost | None, Doc("Name or address of the archive that results are sent to; unless given none are.")
+    ] = None
+    archive_port: Annotated[int, Bound(1, 65535, ""), Doc("Port of the archive.")] = 104
+    archive_title: Annotated[AeTitle, Doc("Application entity title of the archive.")] = "ARCHIVE"
+    worklist_host: Annotated[
+        NetworkHost | None, Doc("Name or address of what keeps the modality worklist; unless given it is not asked.")
+    ] = None
+    worklist_port: Annotated[int, Bound(1, 65535, ""), Doc("Port of the worklist.")] = 104
+    worklist_title: Annotated[AeTitle, Doc("Application entity title of the worklist.")] = "WORKLIST"
+    own_title: Annotated[AeTitle, Doc("Application entity title of this probe.")] = "TSIS"
+    commitment_port: Annotated[
+        int | None,
+        Bound(1, 65535, ""),
+        Doc(
+            "Port at which the probe hears the archive's storage commitment, open only while one is awaited; "
+            "unless given it asks the archive what it has."
+        ),
+    ] = None
+    institution: Annotated[
+        str, Field(max_length=64, pattern=DICOM_LINE), Doc("Name of the hospital in every object.")
+    ] = ""
+    send_phantoms: Annotated[bool, Doc("Whether exams of phantoms, marked as such, may be sent, too.")] = False
+    demographics_days: Annotated[
+        int,
+        Bound(0, 365, "days"),
+        Doc("A name and date of birth from the worklist are erased so long after the archive has the exam."),
+    ] = 7
+    tls_authority: Annotated[
+        Path | None, Doc("Certificates (PEM) that the archive's and worklist's have to be signed by; then TLS is used.")
+    ] = None
+    tls_certificate: Annotated[Path | None, Doc("This probe's own certificate (PEM), if they ask for one.")] = None
+    tls_key: Annotated[Path | None, Doc("Key (PEM) of this probe's certificate.")] = None
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a certificate without its key, a key without it, and either without TLS."""
+        given = {name: getattr(self, name) is not None for name in ("tls_authority", "tls_certificate", "tls_key")}
+        if given["tls_certificate"] != given["tls_key"]:
+            name, other = sorted(("tls_certificate", "tls_key"), key=lambda one: given[one])
+            yield Conflict(f"dicom.{name}", "not set", "set", (f"dicom.{other}",))
+        elif given["tls_certificate"] and not given["tls_authority"]:
+            yield Conflict("dicom.tls_authority", "not set", "set", ("dicom.tls_certificate",))
+
+    @property
+    def is_configured(self) -> bool:
+        """Whether there is anybody to talk to."""
+        return self.archive_host is not None or self.worklist_host is not None
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -399,6 +481,7 @@ class Config(Section):
     store: StoreSection = field(default_factory=StoreSection)
     clock: ClockSection = field(default_factory=ClockSection)
     server: ServerSection = field(default_factory=ServerSection)
+    dicom: DicomSection = field(default_factory=DicomSection)
 
     def conflicts(self) -> Iterator[Conflict]:
         """Yield exposure and frame rate that the light does not allow, and a chip at the bus and address of another."""

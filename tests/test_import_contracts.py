@@ -42,6 +42,10 @@ FORBIDDEN = {
         "device.hardware.camera",
     ),
     "Records keep, and know nobody who asks": ("device.records.store", "device.instrument.status"),
+    "The hospital's formats read records, and know nothing of the instrument or the web": (
+        "device.dicom.objects",
+        "device.instrument.press.picture",
+    ),
     "Care saves and restores what lies on the disk, whether a daemon runs or not": (
         "device.care.support",
         "device.instrument.status",
@@ -64,6 +68,7 @@ FORBIDDEN = {
         "host_tools.forward.plan",
     ),
     "Only the drivers touch hardware libraries": ("device.assembly.probe", "serial"),
+    "Only the hospital's formats touch DICOM's libraries": ("device.web.dicom", "pydicom"),
     "Only the toolkit touches the workstation's libraries": ("device.assembly.probe", "scipy"),
     "The rooms of the device stand in one order, and a new one has its place": ("device.errors", "device.config"),
     "The rooms of the toolkit stand in one order, and a new one has its place": (

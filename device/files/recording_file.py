@@ -15,7 +15,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
@@ -45,6 +45,16 @@ FileOpener = Callable[[Path], AbstractContextManager[BinaryIO]]
 FrameEncoder = Callable[[Frame], bytes]
 Files = Iterator[tuple[str, bytes]]
 """Names and contents; each content is made when it is asked for."""
+
+
+@dataclass(frozen=True)
+class RecordingHead:
+    """Which probe took a recording, with which software and camera, and whether it was a simulated one."""
+
+    serial: str
+    software: str
+    simulated: bool
+    camera: CameraSettings
 
 
 def png_of(frame: Frame) -> bytes:
@@ -125,6 +135,15 @@ def read_recording(path: Path) -> Recording:
         return _from_json(record, read)
 
 
+def read_head(path: Path) -> RecordingHead:
+    """Read how a recording was taken, and no frame of it; raise `InvalidQuantity` naming what is wrong."""
+    with _files(path) as read:
+        try:
+            return _head(json.loads(read("recording.json")))
+        except (*UNREADABLE, ValueError) as error:
+            raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
+
+
 def read_picture(path: Path) -> bytes | None:
     """Return the picture that lies in a recording, None when it has none; raise `InvalidQuantity` for a damaged one."""
     with _files(path) as read:
@@ -196,28 +215,36 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
     if _field(record, "schema", str) not in (SCHEMA, SCAN_SCHEMA):
         bound = f"{SCHEMA} or {SCAN_SCHEMA}"
         raise InvalidQuantity("schema", record["schema"], bound, "convert the recording with matching software")
-    device, camera = _field(record, "device", dict), _field(record, "camera", dict)
-    names = (n for n in CameraSettings.__dataclass_fields__ if n not in GEOMETRY or n in camera)
-    settings = CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names})
-    truth, entries = record.get("truth"), _field(record, "frames", list)
-    _require_room_for(len(entries), settings)
+    head, truth, entries = _head(record), record.get("truth"), _field(record, "frames", list)
+    _require_room_for(len(entries), head.camera)
     recording = Recording(
         id=_field(record, "id", str),
-        serial=_field(device, "serial", str, "device."),
-        software=_field(device, "software", str, "device."),
+        serial=head.serial,
+        software=head.software,
         started_at=_time(record),
-        camera=settings,
+        camera=head.camera,
         frames=tuple(_frame(entry, i, read) for i, entry in enumerate(entries)),
         calibration_id=_optional(record, "calibration_id", str, None),
         position_mm=_position_mm(_optional(record, "position_mm", list, [0.0, 0.0])),
         truth=Inclusion(*(_field(truth, n, NUMBER, "truth.") for n in UNKNOWNS)) if truth is not None else None,
-        simulated=_optional(record, "simulated", bool, False),
+        simulated=head.simulated,
         cell=_cell(_optional(record, "cell", dict, None)),
         phantom_serial=_optional(record, "phantom_serial", str, ""),
     )
     if record["schema"] == SCHEMA and len(recording.ramps()) > 1:
         raise InvalidQuantity("schema", SCHEMA, f"{SCAN_SCHEMA} with frames of several ramps", REPAIR)
     return recording
+
+
+def _head(record: dict[str, Any]) -> RecordingHead:
+    device, camera = _field(record, "device", dict), _field(record, "camera", dict)
+    names = (n for n in CameraSettings.__dataclass_fields__ if n not in GEOMETRY or n in camera)
+    return RecordingHead(
+        serial=_field(device, "serial", str, "device."),
+        software=_field(device, "software", str, "device."),
+        simulated=_optional(record, "simulated", bool, False),
+        camera=CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names}),
+    )
 
 
 def _require_room_for(frames: int, camera: CameraSettings) -> None:

@@ -57,6 +57,8 @@ class Known:
         if isinstance(value, str | Path):
             # JSON escapes as TOML does, but for DEL, which only TOML forbids.
             return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
+        if isinstance(value, bool):
+            return str(value).lower()
         return f"{value:#04x}" if self._is_hexadecimal else str(value)
 
     @property

@@ -81,6 +81,13 @@ class PressResource(_Body):
     exam_id: str | None = None
 
 
+class PressList(_Body):
+    """Presses, newest first; `next` is the `cursor` of the next page, null on the last one."""
+
+    presses: list[PressResource]
+    next: str | None
+
+
 class EstimatedUnknown(_Body):
     """One unknown: its value, 90 % interval and standard deviation, null where there are none.
 
@@ -150,9 +157,10 @@ class Exam(_Body):
 
 
 class ExamList(_Body):
-    """Exams, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+    """Exams, newest first; `next` is the `cursor` of the next page, null on the last one."""
 
     exams: list[Exam]
+    next: str | None
 
 
 class AuditEntry(_Body):
@@ -185,9 +193,10 @@ class AuditEntry(_Body):
 
 
 class AuditList(_Body):
-    """Entries of the audit, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+    """Entries of the audit, newest first; `next` is the `cursor` of the next page, null on the last one."""
 
     entries: list[AuditEntry]
+    next: str | None
 
 
 class Measurement(_Body):
@@ -220,9 +229,10 @@ class Measurement(_Body):
 
 
 class MeasurementList(_Body):
-    """Measurements, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+    """Measurements, newest first; `next` is the `cursor` of the next page, null on the last one."""
 
     measurements: list[Measurement]
+    next: str | None
 
 
 class Certificate(_Body):
@@ -280,8 +290,15 @@ class OfferedMode(_Body):
     reachable_half_width: dict[str, float] | None
 
 
+class NetworkResource(_Body):
+    """Where other machines ask, and the SHA-256 of the certificate that they see there: compare it before pairing."""
+
+    url: str
+    certificate_sha256: str
+
+
 class Device(_Body):
-    """Which probe it is, how long its LEDs have been on, and in which modes it measures."""
+    """Which probe it is, how long its LEDs have been on, in which modes it measures, and how it is reached."""
 
     serial: str
     software: str
@@ -289,6 +306,7 @@ class Device(_Body):
     light_on_s: float
     default_mode: Mode
     modes: list[OfferedMode]
+    network: NetworkResource | None
 
 
 class SelfTest(_Body):

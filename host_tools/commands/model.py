@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from host_tools.scenes.probe import Probe
 
 WIDE = Path("build/wide_table")
+FARTHEST_MM = 40.0
+"""Largest offset of a press from the lesion: farther, the face comes near the edge of a phantom's slab."""
 
 
 def table(
@@ -103,13 +105,18 @@ def phantom(
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 
+    require(
+        "offset_mm", offset_mm, Bound(-FARTHEST_MM, FARTHEST_MM, "mm"), "press on the lesion, or a little beside it"
+    )
     made_of = read_scenario(scenario) if scenario else Scenario()
     protocol = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
     tables, made_by = ProbeTables.load(table), probe_with_tables(probe, table)
     if grid is not None:
         _record_grid(out, grid, pitch_mm, play_mm, made_of, tables, seed, made_by)
         return
-    for i, one in enumerate(_phantom_set(which, model, scenes, seed, phantoms)):
+    chosen = list(_phantom_set(which, model, scenes, seed, phantoms))
+    _require_room([out / one.name for one in chosen])
+    for i, one in enumerate(chosen):
         recording = phantom_recording(
             one.inclusion,
             tables,
@@ -141,10 +148,18 @@ def _record_grid(
     require("grid", count, Bound(1, 1000, "recordings"), "record at least one")
     require("play_mm", play_mm, Bound(0.0, 1.0, "mm"), "give the play of the cap")
     target = GridTarget(pitch_mm, dot_mm=0.4 * pitch_mm, middle_dot_mm=0.6 * pitch_mm)
+    _require_room([out / f"grid{number}" for number in range(1, count + 1)])
     made = grid_recordings(count, target, tables, play_mm=play_mm, seed=seed, scenario=scenario, probe=probe)
     for number, recording in enumerate(made, start=1):
         write_recording(recording, out / f"grid{number}")
         note.print(f"{out / f'grid{number}'}: dots every {pitch_mm:g} mm")
+
+
+def _require_room(recordings: list[Path]) -> None:
+    """Refuse to record where a recording is, before any is made."""
+    for path in recordings:
+        if path.exists():
+            raise InvalidQuantity("recording", path, "a new folder", "name another one with --out, or delete it first")
 
 
 def _told(inclusion: Inclusion | None) -> str:

@@ -6,9 +6,12 @@ bin them: light spreads further in the skin than a binned pixel is wide.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 
+from device.files.recording_file import read_picture, read_recording
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid, lights_of
 from device.measurement.recording.pixel_scale import PixelScale
@@ -48,3 +51,8 @@ def _png(contrast: Image, valid: np.ndarray, scale: PixelScale) -> bytes:
     colour = cv2.applyColorMap(np.clip(large / peak * 255, 0, 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     colour[cv2.resize(valid.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) == 0] = 0
     return cv2.imencode(".png", colour)[1].tobytes()
+
+
+def kept_or_drawn(path: Path) -> bytes:
+    """Return the picture that lies in a kept recording; it is drawn anew where an earlier release kept none."""
+    return read_picture(path) or tactile_png(read_recording(path))

@@ -9,7 +9,7 @@ import pytest
 from daemon_process import ROOT
 
 from device.config import Config, LightSection
-from device.files.toml_record import table_problems
+from device.files.toml_record import annotation_parts, table_problems
 from device.settings.catalogue import SETTINGS, Known
 from device.settings.page import markdown
 
@@ -30,8 +30,8 @@ def test_every_field_of_every_section_is_a_setting():
 @pytest.mark.parametrize("known", SETTINGS.values(), ids=lambda known: known.name)
 def test_a_setting_has_a_sentence_and_a_number_has_a_range(known):
     assert known.sentence.endswith(".")
-    is_number = isinstance(known.default, int | float | tuple) and known.default != ()  # () may hold names
-    numbers = is_number or known.default is None
+    kinds = {type(known.default)} if known.default is not None else {*annotation_parts(known.kind)}
+    numbers = bool(kinds & {int, float, tuple}) and known.default != ()  # () may hold names
     assert numbers == (known.bound is not None)
 
 

@@ -1,0 +1,55 @@
+"""A measurement of the store as DICOM objects, and objects as files."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydicom import dcmwrite
+from pydicom.dataset import Dataset
+
+from device.dicom.image import image_of
+from device.dicom.report import report_of
+from device.dicom.subject import DicomSubject, OrderedStudy, require_writable
+from device.files.recording_file import read_head
+from device.records.store import Store
+
+PictureOf = Callable[[Path], bytes]
+"""Returns the picture of a recording as PNG, drawn anew where an earlier release kept none."""
+
+
+class DicomWriter:
+    """Writes measurements of a store. Raises as `Store.measurement` and `recording_path`."""
+
+    def __init__(self, store: Store, picture_of: PictureOf, institution: str = "") -> None:
+        """Take the store, who draws pictures, and the hospital's name."""
+        self._store, self._picture_of, self._institution = store, picture_of, institution
+
+    def subject(
+        self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None, written_at: str
+    ) -> DicomSubject:
+        """Return what is written of a measurement as it was measured, of an exam as it is given.
+
+        Raises `InvalidRequest` when an identifier of the exam cannot be written.
+        """
+        require_writable(exam)
+        measurement = self._store.measurement(measurement_id)
+        head = read_head(self._store.recording_path(measurement["recording_id"]))
+        return DicomSubject(measurement, exam, head, written_at, self._institution, order)
+
+    def image(self, subject: DicomSubject) -> Dataset:
+        """Return the image of a measurement."""
+        return image_of(subject, self._picture_of(self._store.recording_path(subject.measurement["recording_id"])))
+
+    def report(self, subject: DicomSubject) -> Dataset:
+        """Return the report of a measurement."""
+        return report_of(subject)
+
+
+def as_file(data: Dataset) -> bytes:
+    """Return an object as a file of DICOM part 10."""
+    content = io.BytesIO()
+    dcmwrite(content, data, enforce_file_format=True)
+    return content.getvalue()

@@ -1,0 +1,122 @@
+"""What is written of one measurement: whose it is, of which study, and how it was taken; and its identifiers.
+
+Every identifier is computed from what it names, so that an object that is written twice is the same object. It is
+another one as soon as it is said to be of another patient, order or side: an archive never takes a second content
+under one identifier. Standard library only.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from device.errors import InvalidRequest
+from device.files.recording_file import RecordingHead
+from device.records.exams import ExamContent
+
+ObjectKind = Literal["image", "report", "rejection"]
+NAMESPACE = uuid.UUID("5f0d5a53-6c1c-4c5f-9a8e-5b6a3e2d7c41")
+"""Makes identifiers of this program differ from all others' that are computed of the same names. Never changed."""
+PATIENT_LENGTH, ACCESSION_LENGTH = 64, 16
+"""Characters of VR LO and SH, PS3.5 section 6.2."""
+CORRECT = "Correct the exam with its reason, then send it again."
+
+
+def uid_of(*names: object) -> str:
+    """Return the identifier that stands for these names: a UUID below 2.25, which needs no registration (PS3.5 B.2)."""
+    return f"2.25.{uuid.uuid5(NAMESPACE, json.dumps(names, sort_keys=True)).int}"
+
+
+IMPLEMENTATION_UID = uid_of("implementation")
+
+
+@dataclass(frozen=True)
+class OrderedStudy:
+    """What the worklist says of an exam: its study, the patient it is ordered for, and who that is.
+
+    `patient`: `name`, `birth_date`, `sex` and `issuer` as DICOM writes them; empty once they were erased.
+    """
+
+    study_uid: str
+    patient_ref: str
+    order_number: str = ""
+    procedure_id: str = ""
+    step_id: str = ""
+    description: str = ""
+    patient: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class DicomSubject:
+    """One measurement of an exam, as it is written: records of both, and what is not in them.
+
+    `written_at`: when somebody asked for it, RFC 3339.
+    """
+
+    measurement: dict[str, Any]
+    exam: dict[str, Any]
+    head: RecordingHead
+    written_at: str
+    institution: str = ""
+    order: OrderedStudy | None = None
+
+    @property
+    def is_of_patient(self) -> bool:
+        """Whether it is of a patient's tissue, and not of a phantom or of a simulated press."""
+        return self.exam["kind"] == "patient" and not self.head.simulated
+
+    @property
+    def patient_id(self) -> str:
+        """The patient's reference; of a phantom what tells it from all patients."""
+        return self.exam["patient_ref"] or f"PHANTOM-{self.exam['seq']}"
+
+    @property
+    def demographics(self) -> dict[str, str]:
+        """Who the patient is, if the worklist has said so of this very one."""
+        return self.order.patient if self.order and is_ordered(self.exam, self.order) else {}
+
+    @property
+    def study_uid(self) -> str:
+        """The study: that of the order, else the exam's own."""
+        return study_uid(self.exam, self.order)
+
+    def uid(self, kind: ObjectKind) -> str:
+        """Return the identifier of one of its objects."""
+        return object_uid(kind, self.measurement["id"], self.exam, self.order)
+
+    def series_uid(self, kind: ObjectKind) -> str:
+        """Return the series that an object belongs to: what is said of a whole series is the same in all of it."""
+        return uid_of("series", kind, self.study_uid, self.exam["side"], self.exam["operator"], self.head.software)
+
+
+def is_ordered(exam: dict[str, Any], order: OrderedStudy | None) -> bool:
+    """Return whether an exam is still of the patient and order that the worklist had named."""
+    if order is None:
+        return False
+    return (exam["patient_ref"], exam["order_number"] or "") == (order.patient_ref, order.order_number)
+
+
+def study_uid(exam: dict[str, Any], order: OrderedStudy | None) -> str:
+    """Return the study of an exam: a patient's own, so that a correction never puts two into one study."""
+    if order and is_ordered(exam, order):
+        return order.study_uid
+    return uid_of("study", exam["id"], exam["patient_ref"], exam["order_number"])
+
+
+def object_uid(kind: ObjectKind, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> str:
+    """Return the identifier of an object: one for a measurement and all that its exam says."""
+    said = {name: exam[name] for name in ExamContent.model_fields}
+    return uid_of(kind, measurement_id, study_uid(exam, order), said)
+
+
+def require_writable(exam: dict[str, Any]) -> None:
+    """Raise `InvalidRequest` when an identifier of an exam cannot be written without being changed."""
+    for name, longest in (("patient_ref", PATIENT_LENGTH), ("order_number", ACCESSION_LENGTH)):
+        said = exam[name] or ""
+        if "\\" in said:
+            raise InvalidRequest(f"{name} of the exam has a backslash, which DICOM cannot write.", CORRECT)
+        if len(said) > longest:
+            cause = f"{name} of the exam has {len(said)} characters, but DICOM takes at most {longest}."
+            raise InvalidRequest(cause, CORRECT)

@@ -1,0 +1,35 @@
+"""A measurement's numbers in words and ASCII, for what every viewer shows: the rows below the picture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+NAMES = {"size_mm": "Size", "depth_mm": "Depth of top", "youngs_modulus_kpa": "Young's modulus"}
+UNITS = {"size_mm": "mm", "depth_mm": "mm", "youngs_modulus_kpa": "kPa"}
+DECIMALS = {"size_mm": 1, "depth_mm": 1, "youngs_modulus_kpa": 0}
+NOT_A_DIAGNOSIS = "Documents size, depth and modulus. Not a diagnosis."
+
+
+def is_determined(quantity: dict[str, Any]) -> bool:
+    """Return whether a press determines an unknown, so that its number may be shown."""
+    return bool(quantity["identifiable"]) and quantity["value"] is not None
+
+
+def spoken_quantity(name: str, quantity: dict[str, Any]) -> str:
+    """Return one unknown of an estimate: value and 90 % interval, an open end said as such."""
+    if not is_determined(quantity):
+        return f"{NAMES[name]}: not determined"
+    value, low, high = (f"{quantity[end]:.{DECIMALS[name]}f}" for end in ("value", "low", "high"))
+    low += " or less" if quantity.get("low_is_open") else ""
+    high += " or more" if quantity.get("high_is_open") else ""
+    return f"{NAMES[name]}: {value} {UNITS[name]} (90 %: {low} to {high})"
+
+
+def rows(measurement: dict[str, Any], *, simulated: bool, phantom: bool) -> list[str]:
+    """Return what stands below the picture; nothing in it tells who the patient is."""
+    estimate = measurement["estimate"]
+    of_what = "SIMULATED PRESS. " if simulated else "PHANTOM. " if phantom else ""
+    return [
+        *(spoken_quantity(name, estimate[name]) for name in NAMES),
+        f"{of_what}{NOT_A_DIAGNOSIS}",
+    ]

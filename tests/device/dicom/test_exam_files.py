@@ -1,0 +1,225 @@
+"""What is written of an exam, judged by dciodvfy: images with a scale, and reports of numbers."""
+
+import io
+import re
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pydicom
+import pytest
+from written_exam import ESTIMATE, OF_A_PATIENT, begin, measure, needs_dciodvfy, quantity, verdict
+
+from device.config import DicomSection
+from device.dicom import codes
+from device.dicom.hospital import Hospital
+from device.dicom.subject import OrderedStudy, study_uid
+from device.errors import InvalidRequest, UnknownResource
+from device.files.recording_file import read_picture
+from device.records.store import Store
+
+WITHOUT_ANYTHING = {**dict.fromkeys(("order_number", "side", "clock_position", "nipple_distance_mm")), "note": ""}
+NOTHING = {**ESTIMATE, **{name: quantity(None, None, None) for name in ("size_mm", "depth_mm", "youngs_modulus_kpa")}}
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def hospital(store):
+    return Hospital(DicomSection(institution="Klinik Süd"), store, read_picture)
+
+
+@pytest.fixture
+def files_of(hospital, tmp_path):
+    def files(exam):
+        folder = tmp_path / "written"
+        with zipfile.ZipFile(io.BytesIO(hospital.files_of(exam["id"]))) as archive:
+            archive.extractall(folder)
+            return {name.split("-")[0]: folder / name for name in archive.namelist()}
+
+    return files
+
+
+def items(data):
+    """Every item of a report below another, with its concept's words."""
+    for item in data.get("ContentSequence", ()):
+        concept = item.ConceptNameCodeSequence[0].CodeMeaning if "ConceptNameCodeSequence" in item else ""
+        yield concept, item
+        yield from items(item)
+
+
+def numbers(report):
+    """Concept, value, unit by UCUM and interval of each number of the measurement group."""
+    found = {}
+    for concept, item in items(report):
+        if item.ValueType == "NUM" and item.RelationshipType == "CONTAINS":
+            measured = [*item.MeasuredValueSequence]
+            unit = measured[0].MeasurementUnitsCodeSequence[0] if measured else None
+            below = {name: float(one.MeasuredValueSequence[0].NumericValue) for name, one in items(item)
+                     if one.ValueType == "NUM"}  # fmt: skip
+            found[concept] = (float(measured[0].NumericValue), unit.CodeValue, below) if measured else None
+            assert unit is None or unit.CodingSchemeDesignator == "UCUM"
+    return found
+
+
+@needs_dciodvfy
+@pytest.mark.parametrize("said", [{}, WITHOUT_ANYTHING, {"kind": "phantom"}], ids=["all", "nothing", "phantom"])
+@pytest.mark.parametrize("estimate", [ESTIMATE, NOTHING], ids=["numbers", "no numbers"])
+@pytest.mark.parametrize("simulated", [False, True], ids=["real", "simulated"])
+def test_dciodvfy_finds_nothing_but_what_is_known(store, files_of, said, estimate, simulated):
+    exam = begin(store, **said)
+    measure(store, exam, estimate=estimate, simulated=simulated, warnings=[{"title": "T", "cause": "C."}])
+    assert {kind: verdict(path) for kind, path in files_of(exam).items()} == {"image": [], "report": []}
+
+
+@needs_dciodvfy
+def test_dciodvfy_would_tell_of_an_object_that_lacks_something(store, files_of):
+    exam = begin(store)
+    measure(store, exam)
+    for path in files_of(exam).values():
+        data = pydicom.dcmread(path)
+        del data.StudyInstanceUID
+        data.save_as(path)
+        assert any("StudyInstanceUID" in line for line in verdict(path))
+
+
+def test_the_report_has_value_unit_and_interval_of_what_is_determined_and_nothing_of_what_is_not(store, files_of):
+    exam = begin(store)
+    measure(store, exam)
+    report = pydicom.dcmread(files_of(exam)["report"])
+    above, below = codes.ABOVE.meaning, codes.BELOW.meaning
+    found = numbers(report)
+    value, unit, interval = found["Diameter"]
+    assert (value, unit) == (9.8, "mm")
+    assert interval == pytest.approx({above: 0.8, below: 0.7, codes.INTERVAL_LEVEL.meaning: 90.0})
+    assert found[codes.TOP_DEPTH.meaning][:2] == (6.0, "mm")
+    assert found["Elasticity"] is None
+    assert found["Distance from nipple"][:2] == (35.0, "mm")
+    [unknown] = [item for concept, item in items(report) if concept == "Elasticity"]
+    assert unknown.NumericValueQualifierCodeSequence[0].CodeMeaning == "Value indeterminate"
+    [open_end] = [item for concept, item in items(report) if concept == codes.OPEN_END.meaning]
+    assert open_end.ConceptCodeSequence[0].CodeValue == "HIGH-END"
+    said = [item.TextValue for concept, item in items(report) if concept == "Comment"]
+    assert said == [ESTIMATE["reason"], OF_A_PATIENT["note"], "Documents size, depth and modulus. Not a diagnosis."]
+
+
+def test_both_objects_say_whose_they_are_and_who_took_them(store, files_of):
+    exam = begin(store)
+    measurement = measure(store, exam)
+    image, report = (pydicom.dcmread(files_of(exam)[kind]) for kind in ("image", "report"))
+    for data in (image, report):
+        told = (data.PatientID, data.AccessionNumber, data.InstitutionName, data.DeviceSerialNumber, data.PatientName)
+        assert told == ("Ä-17", "2026/1", "Klinik Süd", "TSIS-0042", "")
+        assert data.InstanceNumber == measurement["seq"]
+        assert "QualityControlSubject" not in data
+    assert image.StudyInstanceUID == report.StudyInstanceUID
+    assert (image.ImageLaterality, image.OperatorsName) == ("L", "Ada Byron^")
+    where = {concept: item.ConceptCodeSequence[0] for concept, item in items(report) if item.ValueType == "CODE"}
+    assert where["Laterality"].CodeMeaning == "Left"
+    assert where["Topographical modifier"].CodeValue == "129781005"
+    assert where["Finding"].CodeMeaning == "Lesion"
+
+
+def test_the_image_is_the_kept_picture_with_its_scale_and_rows_below(store, files_of):
+    exam = begin(store)
+    measure(store, exam)
+    image = pydicom.dcmread(files_of(exam)["image"])
+    assert [float(one) for one in image.PixelSpacing] == pytest.approx([64 * 0.05 / 240] * 2, rel=0.05)
+    pixels = image.pixel_array
+    assert (pixels[:240, :240] == np.arange(240)[:, None]).all()
+    assert pixels[240:].max() > 200  # the rows of text
+    assert "Size: 9.8 mm (90 %: 9.1 to 10.6); Depth of top: 6.0 mm (90 %: 5.5 to 6.7 or more)" in image.ImageComments
+    assert "Young's modulus: not determined" in image.ImageComments
+
+
+def test_phantoms_and_simulated_presses_are_marked_as_no_patients(store, files_of):
+    phantom = begin(store, kind="phantom")
+    measure(store, phantom)
+    of_phantom = pydicom.dcmread(files_of(phantom)["image"])
+    assert (of_phantom.QualityControlSubject, of_phantom.PatientID) == ("YES", f"PHANTOM-{phantom['seq']}")
+    patient = begin(store)
+    measure(store, patient, simulated=True)
+    written = files_of(patient)
+    simulated, report = pydicom.dcmread(written["image"]), pydicom.dcmread(written["report"])
+    assert simulated.QualityControlSubject == "YES"
+    assert "simulated" in simulated.SeriesDescription
+    assert any("Simulated press" in item.get("TextValue", "") for _, item in items(report))
+
+
+def test_what_is_void_is_not_written_and_an_exam_without_anything_is_refused(store, hospital):
+    exam = begin(store)
+    kept, void = measure(store, exam), measure(store, exam)
+    store.exams.void(void["id"], version=1, by="Ada", reason="Slipped")
+    with zipfile.ZipFile(io.BytesIO(hospital.files_of(exam["id"]))) as archive:
+        assert archive.namelist() == [f"image-{kept['seq']}.dcm", f"report-{kept['seq']}.dcm"]
+    with pytest.raises(InvalidRequest, match="no measurement that counts"):
+        hospital.files_of(begin(store)["id"])
+    with pytest.raises(UnknownResource):
+        hospital.files_of("nobody's")
+
+
+def test_an_object_is_the_same_one_until_the_exam_says_something_else(store, files_of):
+    exam = begin(store)
+    measure(store, exam)
+
+    def uids():
+        return {kind: pydicom.dcmread(path).SOPInstanceUID for kind, path in files_of(exam).items()}
+
+    first = uids()
+    assert uids() == first
+    assert len(set(first.values())) == 2
+    assert all(re.fullmatch(r"2\.25\.[1-9]\d*", uid) and len(uid) <= 64 for uid in first.values())
+    store.exams.change(exam["id"], {"patient_ref": "B-18"}, version=1, by="Ada", reason="Mixed up")
+    assert not set(uids().values()) & set(first.values())
+
+
+def test_a_corrected_patient_gets_a_study_of_his_own(store):
+    exam, order = begin(store), OrderedStudy("2.25.77", "Ä-17", "2026/1")
+    assert study_uid(exam, order) == "2.25.77"
+    others = {study_uid({**exam, name: "X"}, order) for name in ("patient_ref", "order_number")}
+    assert len({*others, study_uid(exam, None), "2.25.77"}) == 4
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [({"patient_ref": "A\\17"}, "backslash"), ({"order_number": "1" * 17}, "at most 16"),
+     ({"order_number": "1\\2"}, "backslash")],
+)  # fmt: skip
+def test_an_identifier_that_dicom_cannot_hold_is_refused_and_not_cut(store, hospital, said, why):
+    exam = begin(store, **said)
+    measure(store, exam)
+    with pytest.raises(InvalidRequest, match=why):
+        hospital.files_of(exam["id"])
+
+
+def test_a_name_is_no_family_name_by_guess_and_cannot_break_out_of_its_component(store, files_of):
+    exam = begin(store, operator="Ada=B^C\\D")
+    measure(store, exam)
+    assert pydicom.dcmread(files_of(exam)["image"]).OperatorsName == "Ada B C D^"
+
+
+def test_the_longest_texts_of_an_exam_are_written(store, files_of):
+    exam = begin(store, operator="Ä" * 64, patient_ref="Ü" * 64, order_number="1" * 16, note="ß" * 2000)
+    measure(store, exam)
+    image = pydicom.dcmread(files_of(exam)["image"])
+    assert image.PatientID == "Ü" * 64
+    assert len(str(image.OperatorsName)) == 64
+
+
+def test_every_own_term_is_short_enough_and_on_the_page(request):
+    page = (request.config.rootpath / "docs" / "dicom.md").read_text(encoding="utf-8")
+    for term in codes.OWN_TERMS:
+        assert len(term.value) <= 16
+        assert f"| `{term.value}` | {term.meaning} |" in page
+
+
+def test_nothing_of_dicom_is_imported_by_who_only_serves():
+    program = "import sys, device.web.app; print([m for m in sys.modules if m.startswith(('pydicom', 'pynetdicom'))])"
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "[]"
