@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
-from device.config import DicomSection
+from device.config import DicomSection, PressSection
 from device.dicom.hospital import Hospital
+from device.instrument.press.cost import ModeOffer
 from device.instrument.press.picture import kept_or_drawn
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
@@ -121,7 +122,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
             "simulated": procedure.is_simulated,
             "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
-            "modes": [offer.as_record() for offer in procedure.offers()],
+            "modes": [_offered(offer, config.press) for offer in procedure.offers()],
             "network": network and network.as_record(),
         }
 
@@ -159,6 +160,13 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
     async def stream_events() -> StreamingResponse:
         """Stream the status as server-sent events, one when something has changed and at least two a second."""
         return StreamingResponse(status_events(feed), media_type=EVENTS)
+
+
+def _offered(offer: ModeOffer, press: PressSection) -> dict[str, Any]:
+    """Return a mode with the forces (N) between which its frames are wanted: of a hold a band around its force."""
+    record = offer.as_record()
+    band_n = (record["from_n"], record["to_n"]) if record["kind"] == "ramp" else press.band_n
+    return {**record, "band_n": band_n}
 
 
 def _add_self_test(app: FastAPI, procedure: Procedure) -> None:
