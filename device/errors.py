@@ -156,6 +156,13 @@ class AuditChanged(DeviceError):  # noqa: N818 - the name is what the operator r
     is_lasting = True
 
 
+class CertificateRefused(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The server's certificate cannot be read, made or used, so the probe does not serve the network."""
+
+    code = "E021"
+    title = "Server certificate refused"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 
@@ -436,6 +443,33 @@ class DiskFullError(StorageError):
     title = "Disk full"
 
 
+class DamagedStoreError(StorageError):
+    """The database of measurements is damaged; what can still be read is shown, and nothing is measured or changed."""
+
+    code = "E603"
+    title = "Measurements damaged"
+    status = 500
+
+
+class DamagedRecordingError(StorageError):
+    """A recording is missing or is not as it was kept; it is not handed out, and the probe still measures."""
+
+    code = "E604"
+    title = "Recording damaged"
+    status = 500
+    severity = "warning"
+    is_lasting = True
+
+
+class OrphanedRecordings(StorageError):  # noqa: N818 - the name is what the operator reads
+    """Recordings were found that belong to no measurement, as a kill in the middle of keeping one leaves them."""
+
+    code = "E605"
+    title = "Recordings set aside"
+    severity = "warning"
+    is_lasting = True
+
+
 class NewerDataError(StorageError):
     """The data folder was written by a newer release than this one, which cannot read it."""
 
@@ -541,6 +575,46 @@ class StaleVersion(DeviceError):  # noqa: N818 - the name is what the caller rea
     status = 412
 
 
+class TokenNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """Whoever asks from another machine needs a token, and sent none that holds."""
+
+    code = "E820"
+    title = "No valid token"
+    status = 401
+
+
+class ScopeNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The token may not do this."""
+
+    code = "E821"
+    title = "Not allowed with this token"
+    status = 403
+
+
+class WrongCode(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The pairing code is not the one on the probe's screen, or it has ended."""
+
+    code = "E822"
+    title = "Wrong pairing code"
+    status = 403
+
+
+class TooManyTries(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A machine sent wrong codes or tokens too often, and has to wait; others need not."""
+
+    code = "E823"
+    title = "Too many wrong tries"
+    status = 429
+
+
+class UnencryptedRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A request from another machine came without TLS; a token that it sent may have been read on its way."""
+
+    code = "E824"
+    title = "Not encrypted"
+    status = 403
+
+
 class StalledError(DeviceError):
     """A part makes no progress any more; under systemd its watchdog restarts the daemon."""
 
@@ -562,4 +636,12 @@ class UncleanEndError(DeviceError):
 
     code = "E903"
     title = "Ended without a stop"
+    severity = "warning"
+
+
+class InterruptedPress(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The daemon ended in the middle of a press: it was not measured; shown until a press has told of it."""
+
+    code = "E904"
+    title = "Press broken off"
     severity = "warning"

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import errno
 import json
+import logging
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from device import __version__
 from device.access.known_hosts import ANYWHERE
 from device.config import Config
-from device.errors import ConfigError, DeviceError, ModelError
+from device.errors import ConfigError, DeviceError, ModelError, StorageError
 from device.fallback.handover import ask_for_port, is_fallback
 from device.fallback.start_note import write_note
 from device.instrument.watch.restart_note import RestartNote
@@ -30,8 +31,11 @@ from device.settings.last_good import StartSettings
 
 if TYPE_CHECKING:
     from device.instrument.procedure import Procedure
+    from device.web.entrance.network import NetworkPort
 
+log = logging.getLogger(__name__)
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
+LOOPBACK_ADDRESS = "127.0.0.1"
 START_AGAIN = "Then start the daemon again."
 
 
@@ -42,15 +46,22 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     raises when a part does not open.
     """
     config = settings.config
-    with DaemonPort(config) as port:
+    with DaemonPort(config) as port, ExitStack() as listening:
+        sockets, network = _beside(config, listening)
         procedure = opened()
         from device.instrument.watch.watchdog import Watchdog
 
         note = RestartNote(config.data)
-        told = settings.warning, note.warning(), Updates(config.updates).warning(), procedure.store.audit.warning()
+        told = (
+            settings.warning,
+            note.warning(),
+            Updates(config.updates).warning(),
+            procedure.store.audit.warning(),
+            *procedure.board.now.warnings,
+        )
         warnings = tuple(warning for warning in told if warning)
         procedure.board.update(warnings=warnings)
-        procedure.store.audit.note_in_use(in_use(config, procedure.calibration.id))
+        _note_in_use(procedure)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
         with _noted(note), ExitStack() as ending:
             procedure.start()
@@ -60,8 +71,16 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             ready()
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, port.listening())
+            _run_server(procedure, [port.listening(), *sockets], network)
     return 0
+
+
+def _note_in_use(procedure: Procedure) -> None:
+    """Write down what the probe works by; a store that takes nothing is the procedure's to tell, and stops no start."""
+    try:
+        procedure.store.audit.note_in_use(in_use(procedure.config, procedure.calibration.id))
+    except StorageError as error:
+        log.error("%s %s", error.code, error)
 
 
 def in_use(config: Config, calibration_id: str) -> dict[str, Any]:
@@ -164,11 +183,26 @@ def faults_of(error: Exception) -> list[DeviceError]:
     return [DeviceError(f"{type(error).__name__}: {error}.", "Report the daemon's log.")]
 
 
-def _run_server(procedure: Procedure, listening: socket.socket) -> None:
+def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:
+    """Open what else listens: by TLS for other machines, and by loopback where the daemon's port is not for that."""
+    from device.web.entrance.network import listen, open_network
+
+    network, local = open_network(config), list[socket.socket]()
+    if network:
+        opened.callback(network.listening.close)
+        if config.server.host not in ANYWHERE:
+            local.append(opened.enter_context(listen(LOOPBACK_ADDRESS, config.server.port, "server.port")))
+    return local, network
+
+
+def _run_server(procedure: Procedure, listening: Sequence[socket.socket], network: NetworkPort | None) -> None:
     from device.web.server import run_server
 
-    host, port = listening.getsockname()
+    port = listening[0].getsockname()[1]
     kind = "simulated probe" if procedure.is_simulated else "probe"
-    reached_at = socket.gethostname() if host in ANYWHERE else host
-    print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{reached_at}:{port}/", flush=True)
-    run_server(procedure, listening)
+    others = ""
+    if network:
+        others = f"{network.served.url} (certificate SHA-256 {network.served.certificate_sha256}), here "
+    local = LOOPBACK_ADDRESS if network else listening[0].getsockname()[0]
+    print(f"TSIS {kind} {procedure.config.serial}: screen and API at {others}http://{local}:{port}/", flush=True)
+    run_server(procedure, listening, network)

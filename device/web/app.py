@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
-from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
@@ -23,10 +25,15 @@ from device.records.updates import Updates
 from device.web.conditional import ConditionalRoute
 from device.web.contract import EVENTS, PROBLEM, TAGS, answers, install_contract, media
 from device.web.dicom import add_dicom
+from device.web.entrance.door import Door
+from device.web.entrance.network import ServedNetwork
+from device.web.entrance.open_answers import OpenAnswers
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import add_exams
+from device.web.exports import add_exports
 from device.web.guard import RequestGuard
 from device.web.measurements import add_measurements
+from device.web.pairing import add_pairing
 from device.web.presses import add_presses
 from device.web.problems import install_problems
 from device.web.schema import (
@@ -38,6 +45,7 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.updates import add_updates
 
 API = "/api/v1"
@@ -58,13 +66,18 @@ def create_app(
     *,
     hosts: KnownHosts | None = None,
     updates: Updates | None = None,
+    door: Door | None = None,
+    answers: OpenAnswers | None = None,
+    network: ServedNetwork | None = None,
     hospital: Hospital | None = None,
 ) -> FastAPI:
     """Return the web application of a running procedure, with what tells of its updates and of the hospital.
 
     It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
-    device/access/request_rules.py first.
+    device/access/request_rules.py first. Unless a `door` says otherwise, the own screen alone is let in; `answers` can
+    be ended, and `network` is how other machines reach the probe.
     """
+    door = door or Door()
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -79,15 +92,18 @@ def create_app(
     app.router.route_class = ConditionalRoute
     install_contract(app)
     install_problems(app)
-    app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
-    _add_state(app, procedure, store)
+    guarding = {"hosts": hosts or KnownHosts.of_machine(), "door": door, "answers": answers, "network": network}
+    app.add_middleware(RequestGuard, **guarding)  # type: ignore[arg-type]
+    _add_state(app, procedure, store, network)
     add_presses(app, API, procedure, store)
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
+    add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
     add_updates(app, API, procedure, updates or Updates())
+    add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)
@@ -97,7 +113,7 @@ def create_app(
     return app
 
 
-def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
+def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: ServedNetwork | None) -> None:
     @app.get(f"{API}/device", responses=answers(200, Device), tags=["device"])
     def get_device() -> dict[str, Any]:
         """Say which probe this is, how long its LEDs have been on, and what each of its modes costs and is worth."""
@@ -109,6 +125,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
             "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
             "modes": [offer.as_record() for offer in procedure.offers()],
+            "network": network and network.as_record(),
         }
 
     @app.get(f"{API}/calibrations", responses=answers(200, CalibrationList), tags=["device"])
@@ -138,13 +155,18 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
 
     @app.get(
         f"{API}/events",
-        response_class=StreamingResponse,
-        responses=media(EVENTS, "`status` events, each with a Status as its data."),
+        response_class=EventSourceResponse,
+        responses=media(EVENTS, "Events `status`, `measurement`, `exam`: a Status, Measurement or Exam each."),
         tags=["status"],
     )
-    async def stream_events() -> StreamingResponse:
-        """Stream the status as server-sent events, one when something has changed and at least two a second."""
-        return StreamingResponse(status_events(feed), media_type=EVENTS)
+    async def stream_events(last_event_id: LastEventId = None) -> AsyncIterator[ServerSentEvent]:
+        """Stream the status whenever it changes and twice a second, and each measurement and exam made or changed.
+
+        With Last-Event-ID those that were made or changed since are sent as well.
+        """
+        changes = ChangeFeed(store, None if last_event_id is None else int(last_event_id))
+        async for event in status_events(feed, changes):
+            yield event
 
 
 def _add_self_test(app: FastAPI, procedure: Procedure) -> None:

@@ -24,6 +24,13 @@ PROVOKED_BY = {
     "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
     "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
     "E020": "device/records/test_audit.py::test_what_was_changed_is_found_and_its_row_named",
+    "E021": "device/access/test_certificate.py::test_files_that_are_none_or_do_not_belong_together_are_refused",
+    "E603": "test_kept_over_restart.py::test_a_damaged_database_starts_at_fault_and_shows_what_can_be_read",
+    "E604": "device/records/test_recordings.py::"
+    "test_a_recording_that_was_changed_is_not_handed_out_while_its_numbers_are",
+    "E605": "device/records/test_recordings.py::"
+    "test_a_recording_that_a_kill_left_without_its_row_is_set_aside_and_told",
+    "E904": "test_kept_over_restart.py::test_a_press_that_a_kill_broke_off_and_the_last_result_are_told_after_it",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
@@ -36,10 +43,17 @@ PROVOKED_BY = {
     "E809": "device/web/test_guard.py::test_a_body_that_says_it_is_too_large_is_refused_without_being_read",
     "E810": "device/records/test_store.py::test_a_key_that_came_with_another_request_is_refused_by_its_name",
     "E811": "device/records/test_exams.py::test_a_change_of_what_somebody_else_has_changed_meanwhile_is_refused",
+    "E820": "device/web/entrance/test_door.py::test_without_a_token_that_holds_nothing_is_answered_but_what_is_open",
+    "E821": "device/web/entrance/test_door.py::test_each_scope_is_let_in_to_what_it_may_and_to_nothing_else",
+    "E822": "device/web/test_pairing.py::test_a_wrong_code_a_used_one_and_none_are_answered_alike",
+    "E823": "device/web/test_pairing.py::test_who_guesses_waits",
+    "E824": "device/web/entrance/test_door.py::test_in_clear_no_other_machine_is_answered_with_whatever_token",
     "E903": "test_unclean_end.py::test_a_kill_is_a_warning_after_the_next_start_and_only_after_that",
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
 """What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""
+FOUND_AT_START = {"E603", "E604", "E605"}
+"""What lies on the disk since an earlier run, before any scene begins."""
 NO_PARTS = {"0": "settings files and the daemon itself", "8": "requests", "9": "a restart"}
 
 
@@ -69,8 +83,8 @@ def test_a_test_that_is_named_for_a_code_exists_and_names_it(code):
 
 
 def test_every_fault_of_a_part_of_the_probe_has_a_scenario():
-    assert {code[1] for code in PROVOKED_BY} <= set(NO_PARTS)
-    assert {fault.code for fault in FAULTS if fault.code[1] not in NO_PARTS} <= codes_of_scenarios()
+    assert {code[1] for code in PROVOKED_BY.keys() - FOUND_AT_START} <= set(NO_PARTS)
+    assert {fault.code for fault in FAULTS if fault.code[1] not in NO_PARTS} <= (codes_of_scenarios() | FOUND_AT_START)
 
 
 def test_a_code_is_not_named_in_both_places_and_only_if_it_exists():
