@@ -1,15 +1,16 @@
 // The software's own page: which release runs, what became of the last update, and a release file from a stick.
 // While an update is under way the main view says so, too, and keeps saying it while the daemon is away.
 
-import { byId, setText } from "./dom.js";
-import { fetchUpdates, goBack, sendRelease } from "./probe.js";
+import { byId, setText } from "../base/dom.js";
+import { fetchUpdates, goBack, sendRelease } from "../base/probe.js";
+import { say } from "../base/words.js";
 
-const UNDER_WAY = { waiting: "beginning", verifying: "checking its signature", unpacking: "unpacking", switching: "starting it", checking: "testing it" };
+const UNDER_WAY = new Set(["waiting", "verifying", "unpacking", "switching", "checking"]);
+const ENDS = new Set(["rolled_back", "refused", "committed"]);
 const LOOK_MS = 1000;
 const GLANCE_MS = 5000; // while nobody looks at this page
 const BEGINNING = "manifest.json"; // of every release file
 const LOCAL = new Set(["127.0.0.1", "localhost", "[::1]"]);
-const OTHERWISE = "A release file can be sent from the probe's own screen, with `make deploy` over ssh, or at its command line: python -m device update install FILE.";
 
 const dialog = byId("releases");
 let updates = null;
@@ -18,28 +19,40 @@ let problem = "";
 let lookedAt = -Infinity;
 let asking = false;
 
-const installing = (release) => (release ? `Version ${version(release)} is being installed.` : "A release is being installed.");
 const version = (release) => (release ?? "").split("+")[0];
-const isUnderWay = () => updates !== null && updates.state in UNDER_WAY;
+const isUnderWay = () => updates !== null && UNDER_WAY.has(updates.state);
+
+function installing({ state, release }) {
+  return state === "waiting" || !release ? say("software.installing_one") : say("software.installing", { version: version(release) });
+}
+
+function stepWords({ state, progress }) {
+  const step = say(`software.${state}`);
+  if (progress === null || state === "waiting") return say("software.now", { step });
+  return say("software.now_percent", { step, percent: Math.round(100 * progress) });
+}
 
 /** What the main view says of an update under way, or null. */
 export function updateLine() {
-  if (!isUnderWay()) return null;
-  const percent = updates.progress === null || updates.state === "waiting" ? "" : `, ${Math.round(100 * updates.progress)} %`;
-  return { word: installing(updates.state === "waiting" ? null : updates.release), reason: `Now: ${UNDER_WAY[updates.state]}${percent}.`, tone: "caution" };
+  return isUnderWay() ? { word: installing(updates), reason: stepWords(updates), tone: "caution" } : null;
 }
 
 /** What to say while the daemon is away: title and sentence, null unless that is an update's doing. */
 export function absenceWords() {
-  if (!isUnderWay()) return null;
-  const title = "The probe is being updated";
-  return [title, "It comes back by itself within three minutes, with the new release or with the one before."];
+  return isUnderWay() ? [say("lost.updating"), say("lost.updating.words")] : null;
+}
+
+/** How the last update ended, and the updater's own reason. */
+function outcomeWords() {
+  if (!updates?.outcome || !ENDS.has(updates.state)) return updates?.outcome ?? "";
+  const told = { release: version(updates.release), version: version(updates.running) };
+  return [say(`software.${updates.state}`, told), updates.reason && `(${updates.reason})`].filter(Boolean).join(" ");
 }
 
 function lineWords() {
   if (problem) return problem;
-  if (sending) return "Reading the file.";
-  return updateLine()?.word ?? updates?.outcome ?? "";
+  if (sending) return say("software.reading");
+  return isUnderWay() ? installing(updates) : outcomeWords();
 }
 
 function showReleases() {
@@ -47,8 +60,8 @@ function showReleases() {
   setText(byId("releases-line"), lineWords());
   dialog.dataset.tone = problem ? "bad" : updates?.state === "rolled_back" || updates?.state === "refused" ? "caution" : "calm";
   setText(byId("release-running"), updates?.running ?? "");
-  setText(byId("release-previous"), updates?.previous ?? "none");
-  setText(byId("release-step"), isUnderWay() ? updates.step || UNDER_WAY[updates.state] : "");
+  setText(byId("release-previous"), updates?.previous ?? say("software.none"));
+  setText(byId("release-step"), isUnderWay() ? stepWords(updates) : "");
   byId("release-progress").hidden = !(isUnderWay() || sending);
   if (isUnderWay() && updates.progress !== null) byId("release-progress").value = updates.progress;
   else byId("release-progress").removeAttribute("value");
@@ -57,8 +70,8 @@ function showReleases() {
   byId("release-file").disabled = sending || isUnderWay();
   byId("release-back").hidden = !updates?.can_roll_back;
   byId("release-back").disabled = sending || isUnderWay();
-  setText(byId("release-back"), `Go back to ${version(updates?.previous)}`);
-  setText(byId("release-hint"), updates === null || installed ? OTHERWISE : updates.reason);
+  setText(byId("release-back"), say("software.back_to", { version: version(updates?.previous) }));
+  setText(byId("release-hint"), say(updates === null || installed ? "software.elsewhere" : "software.not_installed"));
 }
 
 async function look() {
@@ -94,11 +107,17 @@ async function wish(request) {
 
 async function send(file) {
   const begins = await file.slice(0, BEGINNING.length).text();
-  if (begins !== BEGINNING) throw new Error(`${file.name} is no release file: choose one that ends in .release.`);
+  if (begins !== BEGINNING) throw new Error(say("software.no_release", { name: file.name }));
   return sendRelease(file);
 }
 
-byId("releases-open").addEventListener("click", () => { problem = ""; dialog.showModal(); lookedAt = -Infinity; look(); });
+byId("releases-open").addEventListener("click", () => {
+  problem = "";
+  byId("menu").close();
+  dialog.showModal();
+  lookedAt = -Infinity;
+  look();
+});
 byId("releases-close").addEventListener("click", () => dialog.close());
 byId("release-file").addEventListener("change", ({ target }) => {
   const [file] = target.files;

@@ -1,7 +1,8 @@
 // The force gauge: one number against a narrow target band, or against a ramp whose open targets are marked. Positions
 // are ratios of the full scale, moved by CSS alone.
 
-import { byId, element, setAttribute, setQuantity, setText } from "./dom.js";
+import { byId, element, setAttribute, setQuantity, setText } from "../base/dom.js";
+import { figure, say } from "../base/words.js";
 
 const panel = byId("panel");
 const track = byId("gauge-track");
@@ -15,8 +16,8 @@ function tickStep(fullScale) {
 }
 
 function bandWords(kind, low, high) {
-  if (kind === "ramp") return `slowly from ${low.toFixed(2)} to ${high.toFixed(2)} N`;
-  return `target ${low.toFixed(3)} – ${high.toFixed(3)} N`;
+  const decimals = kind === "ramp" ? 2 : 3;
+  return say(`force.band.${kind}`, { low: figure(low, decimals), high: figure(high, decimals) });
 }
 
 function drawScale({ kind, full_scale_n: fullScale, band_n: [low, high] }) {
@@ -25,12 +26,13 @@ function drawScale({ kind, full_scale_n: fullScale, band_n: [low, high] }) {
   drawnScale = scale;
   panel.style.setProperty("--band-start", low / fullScale);
   panel.style.setProperty("--band-width", (high - low) / fullScale);
+  panel.style.setProperty("--band-middle", (low + high) / 2 / fullScale);
   setText(byId("force-band-text"), bandWords(kind, low, high));
   setAttribute(track, "aria-valuemax", fullScale);
   const step = tickStep(fullScale);
   const ticks = [];
   for (let tick = 0; tick <= fullScale * 1.001; tick += step) {
-    const node = element("span", "", step < 0.1 ? tick.toFixed(2) : tick.toFixed(1));
+    const node = element("span", "", figure(tick, step < 0.1 ? 2 : 1));
     node.style.setProperty("--at", tick / fullScale);
     ticks.push(node);
   }
@@ -61,24 +63,18 @@ function zoneOf(force, [low, high], fullScale) {
   return force < low ? "below" : "in";
 }
 
-const ZONE_WORDS = {
-  hold: { below: "below target", in: "in target band", above: "above target" },
-  ramp: { below: "below the ramp", in: "on the ramp", above: "above the ramp" },
-};
-const ANY_ZONE_WORDS = { unknown: "no force reading", over: "over full scale" };
-
 /** Show status.force_n (N, or null when the load cell is silent) on a scale from 0 to status.full_scale_n. */
 export function showGauge(status) {
-  const { force_n: force, band_n: band, full_scale_n: fullScale } = status;
+  const { kind, force_n: force, band_n: band, full_scale_n: fullScale } = status;
   drawScale(status);
   drawWanted(status);
   const zone = zoneOf(force, band, fullScale);
-  const word = ANY_ZONE_WORDS[zone] ?? ZONE_WORDS[status.kind][zone];
-  const figure = zone === "unknown" ? "–" : force.toFixed(2).replace("-0.00", "0.00");
+  const word = say(zone === "unknown" || zone === "over" ? `force.${zone}` : `force.${kind}.${zone}`);
+  const value = zone === "unknown" ? "–" : figure(force, 2);
   panel.dataset.zone = zone;
   panel.style.setProperty("--force-ratio", Math.min(Math.max(force / fullScale || 0, 0), 1).toFixed(4));
-  setQuantity(byId("force-value"), figure, "N");
+  setQuantity(byId("force-value"), value, "N");
   setText(byId("force-word"), word);
-  setAttribute(track, "aria-valuenow", zone === "unknown" ? 0 : figure);
-  setAttribute(track, "aria-valuetext", `${figure} N, ${word}`);
+  setAttribute(track, "aria-valuenow", zone === "unknown" ? 0 : force.toFixed(2));
+  setAttribute(track, "aria-valuetext", `${value} N, ${word}`);
 }

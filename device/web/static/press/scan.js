@@ -1,12 +1,13 @@
 // A scan: how sure each unknown is after every press on the lesion, and, before it begins, how sure it is to be.
 
-import { byId, element, setAttribute, setText } from "./dom.js";
+import { byId, element, setAttribute, setText } from "../base/dom.js";
+import { figure, say, understand } from "../base/words.js";
 
 const STEPS_MM = [2, 1, 0.5];
 const ROWS = [
-  { key: "size_mm", name: "Size", unit: "mm", full: 4 },
-  { key: "depth_mm", name: "Depth", unit: "mm", full: 4 },
-  { key: "youngs_modulus_kpa", name: "Modulus", unit: "kPa", full: 40 },
+  { key: "size_mm", name: "size", unit: "mm", full: 4 },
+  { key: "depth_mm", name: "depth", unit: "mm", full: 4 },
+  { key: "youngs_modulus_kpa", name: "modulus", unit: "kPa", full: 40 },
 ];
 const box = byId("until");
 let offers = [];
@@ -17,7 +18,7 @@ export const isScan = ({ most_ramps: most }) => most > 1;
 const offerOf = (mode) => offers.find((offer) => offer.mode === mode && isScan(offer));
 
 /** A half width with the digits that tell it from another: 0.45, 1.2, 14. */
-const width = (halfWidth) => halfWidth.toFixed(halfWidth < 0.995 ? 2 : halfWidth < 9.95 ? 1 : 0);
+const width = (halfWidth) => figure(halfWidth, halfWidth < 0.995 ? 2 : halfWidth < 9.95 ? 1 : 0);
 
 /** Whether a scan can be as sure as that, as far as the probe knows; only the sizes in mm are asked for here. */
 function canReach(offer, step) {
@@ -28,10 +29,10 @@ function canReach(offer, step) {
 function choice(step, isPossible) {
   const label = element("label", "until-step");
   const input = element("input", "");
-  const words = step === null ? "can be" : `± ${step} mm`;
+  const words = step === null ? say("until.any") : say("until.mm", { mm: figure(step, step < 1 ? 1 : 0) });
   Object.assign(input, { type: "radio", name: "until", value: step ?? "", checked: step === null, disabled: !isPossible });
   label.append(input, element("span", "", words));
-  if (!isPossible) setAttribute(label, "title", "No scan of this probe is as sure as that.");
+  if (!isPossible) setAttribute(label, "title", say("until.not"));
   return label;
 }
 
@@ -42,7 +43,7 @@ export function offerAccuracy(modes) {
   offers = modes;
   box.querySelectorAll("label, .until-words").forEach((one) => one.remove());
   if (!offer) return;
-  box.append(element("span", "until-words", "Press until size and depth are as sure as"));
+  box.append(element("span", "until-words", say("until.words")));
   box.append(choice(null, true), ...STEPS_MM.map((step) => choice(step, canReach(offer, step))));
   const again = [...box.querySelectorAll("input")].find(({ value, disabled }) => value === chosen && !disabled);
   if (again) again.checked = true;
@@ -62,18 +63,19 @@ export function chosenAccuracy(mode) {
 /** What a scan is doing, in words; "" when there is no scan, or nothing that differs from any other press. */
 export function scanHint({ step, scan, press_state: state }, mode) {
   if (!offerOf(mode)) return "";
-  if (step === "ready") return "A scan: one press beside the lesion, then two to five on it, each at another place.";
-  if (step === "lesion" && state === "releasing") return "All presses so far are being answered together.";
+  if (step === "ready") return say("hint.scan_ready");
+  if (step === "lesion" && state === "releasing") return say("hint.scan_answering");
   if (step !== "lesion" || !scan) return "";
-  return `Press ${scan.ramps + 1} on the lesion: about ${scan.next_offset_mm.toFixed(0)} mm from its middle, slowly harder.`;
+  return say("hint.scan_next", { n: scan.ramps + 1, mm: figure(scan.next_offset_mm, 0) });
 }
 
 /** What the operator has to know before the next press: that the last one does not count, or that nothing is known. */
 export function scanTrouble({ step, scan, guidance }) {
   if (step !== "lesion" || !scan || !["lift", "move_aside"].includes(guidance.code)) return null;
-  if (scan.failed) return { word: "That press does not count.", reason: scan.failed, tone: "caution" };
+  const why = (text) => understand(text)?.why ?? say("reason.other");
+  if (scan.failed) return { word: say("scan.not_counted"), reason: why(scan.failed), tone: "caution" };
   const hasNumbers = Object.keys(scan.half_width).length > 0;
-  return hasNumbers ? null : { word: "No numbers yet.", reason: scan.reason, tone: "caution" };
+  return hasNumbers ? null : { word: say("scan.no_numbers"), reason: why(scan.reason), tone: "caution" };
 }
 
 function bar(now, next, wanted, full) {
@@ -97,12 +99,11 @@ function row({ key, name, unit, full }, scan, until) {
   const isKnown = now !== undefined && scan.determined[key];
   item.dataset.reached = wanted !== undefined && now <= wanted;
   item.dataset.known = isKnown;
-  const digits = now >= 9.95 ? 0 : 1;
-  const words = isKnown ? `${value.toFixed(digits)} ± ${width(now)} ${unit}` : "not known yet";
-  item.append(element("span", "scan-name", name), element("strong", "scan-value", words));
+  const words = isKnown ? `${figure(value, now >= 9.95 ? 0 : 1)} ± ${width(now)} ${unit}` : say("scan.unknown");
+  item.append(element("span", "scan-name", say(name)), element("strong", "scan-value", words));
   if (now !== undefined) item.append(bar(now, next, wanted, full));
-  const told = element("span", "scan-told", next === undefined ? "" : `next press: ± ${width(next)} ${unit}`);
-  if (wanted !== undefined) told.append(" ", element("span", "scan-asked", `asked: ± ${width(wanted)} ${unit}`));
+  const told = element("span", "scan-told", next === undefined ? "" : say("scan.next", { width: width(next), unit }));
+  if (wanted !== undefined) told.append(" ", element("span", "scan-asked", say("scan.asked", { width: width(wanted), unit })));
   item.append(told);
   return item;
 }
@@ -116,5 +117,5 @@ export function showScan({ scan, press }) {
   byId("panel").dataset.scan = Boolean(scan);
   if (!scan) return;
   byId("scan-rows").replaceChildren(...ROWS.map((one) => row(one, scan, press?.until)));
-  setText(byId("scan-count"), `${scan.ramps} of at most ${scan.most_ramps} presses`);
+  setText(byId("scan-count"), say("scan.count", { n: scan.ramps, most: scan.most_ramps }));
 }
