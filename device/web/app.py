@@ -47,6 +47,7 @@ from device.web.schema import (
     Tare,
 )
 from device.web.streams.changes import ChangeFeed, LastEventId
+from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
 
 API = "/api/v1"
@@ -100,6 +101,7 @@ def create_app(
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_live_view(app, API, procedure)
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
