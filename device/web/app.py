@@ -34,6 +34,7 @@ from device.web.measurements import add_measurements
 from device.web.pairing import add_pairing
 from device.web.presses import add_presses
 from device.web.problems import install_problems
+from device.web.retention import add_retention
 from device.web.schema import (
     CalibrationList,
     Device,
@@ -99,6 +100,7 @@ def create_app(
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
+    add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
