@@ -279,6 +279,7 @@ class OfferedMode(_Body):
     kind: Literal["hold", "ramp"]
     from_n: float
     to_n: float
+    band_n: tuple[float, float]
     seconds: float
     fewest_ramps: int
     most_ramps: int
@@ -418,6 +419,34 @@ class ScanStatus(_Body):
     next_offset_mm: float
     reason: str
     failed: str
+
+
+class RetentionSettings(_Body):
+    """The rule: None of both is never."""
+
+    keep_days: float | None
+    free_mb: float | None
+    saved_first: bool
+
+
+class DueRecording(_Body):
+    """A recording that the rule deletes, and why."""
+
+    recording_id: str
+    measurement_id: str
+    taken_at: str
+    size_bytes: int
+    why: str
+
+
+class DueRecordings(_Body):
+    """What the rule deletes now, oldest first; `held_back` recordings wait for a backup, the last is of `saved_at`."""
+
+    rule: RetentionSettings
+    saved_at: str | None
+    removals: list[DueRecording]
+    held_back: int
+    size_bytes: int
 
 
 class Status(_Body):
