@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
+from host_tools.forward.error_estimates.stated_error import stated_error
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.plan import model_plan
 from host_tools.forward.press_model import Loaded
-from host_tools.forward.stated_error import stated_error
 from host_tools.scenes.scene import Scene, Waveguide
 
 PLAN = model_plan(Scene(Inclusion(10.0, 6.0, 80.0)))
