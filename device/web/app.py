@@ -47,6 +47,8 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.service.manual import add_manual
+from device.web.service.metrics import add_metrics
 from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
@@ -102,6 +104,8 @@ def create_app(
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_metrics(app, procedure, store)
+    add_manual(app)
     add_live_view(app, API, procedure)
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
