@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
-from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
@@ -43,6 +45,7 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.updates import add_updates
 
 API = "/api/v1"
@@ -152,13 +155,18 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
 
     @app.get(
         f"{API}/events",
-        response_class=StreamingResponse,
-        responses=media(EVENTS, "`status` events, each with a Status as its data."),
+        response_class=EventSourceResponse,
+        responses=media(EVENTS, "Events `status`, `measurement`, `exam`: a Status, Measurement or Exam each."),
         tags=["status"],
     )
-    async def stream_events() -> StreamingResponse:
-        """Stream the status as server-sent events, one when something has changed and at least two a second."""
-        return StreamingResponse(status_events(feed), media_type=EVENTS)
+    async def stream_events(last_event_id: LastEventId = None) -> AsyncIterator[ServerSentEvent]:
+        """Stream the status whenever it changes and twice a second, and each measurement and exam made or changed.
+
+        With Last-Event-ID those that were made or changed since are sent as well.
+        """
+        changes = ChangeFeed(store, None if last_event_id is None else int(last_event_id))
+        async for event in status_events(feed, changes):
+            yield event
 
 
 def _add_self_test(app: FastAPI, procedure: Procedure) -> None:
