@@ -41,7 +41,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--depth-mm", type=float, metavar="H", help="surface to the inclusion's top")
     parser.add_argument("--modulus-kpa", type=float, metavar="E", help="the inclusion's Young's modulus")
     without = parser.add_mutually_exclusive_group()
-    without.add_argument("--bare", action="store_true", help="a block of tissue without an inclusion")
+    without.add_argument(
+        "--bare", dest="inclusion_free", action="store_true", help="a block of tissue without an inclusion"
+    )
     without.add_argument("--grid", action="store_true", help="a grid target in oil, for `host_tools probe camera`")
     parser.add_argument("--mode", choices=MODES, default="paper", help="what is taken; paper, as calibrating needs")
     parser.add_argument("--phantom-serial", default="", metavar="S", help="serial number of the set of phantoms")
@@ -80,7 +82,7 @@ def _phantom(options: argparse.Namespace) -> PhantomTruth:
     """Return what is pressed: all three unknowns of an inclusion, or none of them; anything else is wrong usage."""
     unknowns = options.size_mm, options.depth_mm, options.modulus_kpa
     is_whole, is_without = None not in unknowns, set(unknowns) == {None}
-    if options.bare or options.grid:
+    if options.inclusion_free or options.grid:
         if not is_without:
             options.refuse("with --bare or --grid there is no --size-mm, --depth-mm or --modulus-kpa")
         return PhantomTruth(None, options.phantom_serial, is_grid=options.grid)

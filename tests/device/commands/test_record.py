@@ -86,7 +86,7 @@ def test_a_grid_target_is_recorded_in_oil_and_tells_the_camera(run):
     assert found.rim_distortion_percent == pytest.approx(-1.5, abs=0.05)
 
 
-def test_a_bare_block_is_recorded_without_truth(run):
+def test_a_block_without_an_inclusion_is_recorded_without_truth(run):
     code, _, told = run(command("--bare", "--phantom-serial", "PH-3", "--out", str(OUT)))
     assert code == 0, told
     recording = read_recording(OUT)
