@@ -101,7 +101,9 @@ class _StrictRequest(Request):
         body = await self.body()
         try:
             return json.loads(body, object_pairs_hook=_each_key_once)
-        except (UnicodeDecodeError, RecursionError) as error:
+        except json.JSONDecodeError:
+            raise
+        except (ValueError, RecursionError) as error:  # no text, a number of thousands of digits, or nested too deep
             raise json.JSONDecodeError(f"it is no JSON that can be read ({type(error).__name__})", "", 0) from None
 
 
