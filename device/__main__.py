@@ -23,9 +23,8 @@ from device.measurement.quantities import InvalidQuantity
 
 if TYPE_CHECKING:
     from device.config import Config
-    from device.instrument.press.phantom_press import PhantomPress
+    from device.instrument.press.phantom_press import PhantomPress, PhantomTruth
     from device.instrument.procedure import Procedure
-    from device.measurement.quantities import Inclusion
     from device.settings.last_good import StartSettings
     from device.simulation.scenario import Scenario
 
@@ -284,7 +283,7 @@ def _self_test(options: argparse.Namespace) -> int:
 
 
 def _record(options: argparse.Namespace) -> int:
-    """Record one press on a phantom: it is what a virtual probe is pressed on, whatever its scene says."""
+    """Record one press on a phantom or a grid: it is what a virtual probe is pressed on, whatever its scene says."""
     from device.assembly.probe import open_phantom_press
     from device.commands.record import run_record_command
 
@@ -293,8 +292,9 @@ def _record(options: argparse.Namespace) -> int:
     if settings.warning:
         print(f"{settings.warning.code} {settings.warning}", file=sys.stderr)
 
-    def opened(inclusion: Inclusion) -> PhantomPress:
-        return open_phantom_press(settings.config, scenario and replace(scenario, inclusion=inclusion))
+    def opened(phantom: PhantomTruth) -> PhantomPress:
+        pressed = scenario and scenario.on(phantom.inclusion, is_grid=phantom.is_grid)
+        return open_phantom_press(settings.config, pressed)
 
     return run_record_command(options, opened)
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
+from device.access.scopes import PAIRING_PAGE
 from device.config import DicomSection, PressSection
 from device.dicom.hospital import Hospital
 from device.instrument.press.cost import ModeOffer
@@ -114,6 +115,10 @@ def create_app(
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
+
+    @app.get(PAIRING_PAGE, include_in_schema=False)
+    def pairing_page() -> FileResponse:
+        return FileResponse(STATIC / "pair.html")
 
     @app.get("/", include_in_schema=False)
     def screen() -> FileResponse:
