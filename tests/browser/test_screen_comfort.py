@@ -1,4 +1,4 @@
-"""The screen for every hand and eye: touch without a keyboard, keyboard only, both schemes, forced colours, a reload."""
+"""The screen for every hand and eye: touch without keys, both schemes, forced colours, sound, a reload, the curtain."""
 
 from __future__ import annotations
 
