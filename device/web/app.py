@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
+from device.access.scopes import PAIRING_PAGE
 from device.config import DicomSection, PressSection
 from device.dicom.hospital import Hospital
 from device.instrument.press.cost import ModeOffer
@@ -33,6 +34,7 @@ from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import add_exams
 from device.web.exports import add_exports
 from device.web.guard import RequestGuard
+from device.web.kept_files import add_retention
 from device.web.measurements import add_measurements
 from device.web.pairing import add_pairing
 from device.web.presses import add_presses
@@ -109,9 +111,14 @@ def create_app(
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
+    add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
+
+    @app.get(PAIRING_PAGE, include_in_schema=False)
+    def pairing_page() -> FileResponse:
+        return FileResponse(STATIC / "pair.html")
 
     @app.get("/", include_in_schema=False)
     def screen() -> FileResponse:
