@@ -15,15 +15,20 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
 from daemon_process import ROOT, WAIT_S, wait_for
-from networked_daemon import NetworkedDaemon
+from networked_daemon import NetworkedDaemon, own_address
 
 from device.access.certificate import ServerCertificate, own_certificate
+from device.files.plain_settings import DaemonAddress
+from device.update.gate import ask_parts
 
 pytestmark = pytest.mark.real_time
+LOOPBACK = "0100007F"
+"""127.0.0.1 in the kernel's tables."""
 SHELL = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
@@ -75,8 +80,8 @@ def test_a_browser_is_led_from_the_clear_address_to_pairing(probe):
     clear = httpx.get(f"http://{probe.address}:{probe.port}/")
     assert (clear.status_code, clear.headers["location"]) == (307, f"{probe.url}/")
     encrypted = probe.ask("GET", "/")
-    assert (encrypted.status_code, encrypted.headers["location"]) == (303, "/static/pair.html")
-    assert "Pair with the probe" in probe.ask("GET", "/static/pair.html").text
+    assert (encrypted.status_code, encrypted.headers["location"]) == (303, "/pair")
+    assert "Pair with the probe" in probe.ask("GET", "/pair").text
 
 
 @contextlib.contextmanager
@@ -155,6 +160,29 @@ def test_pair_and_tokens_of_the_command_line_ask_the_daemon(probe):
     assert str(ROOT) not in code.stdout
 
 
+def listening_to_others(process_id):
+    """The ports at which a process and its children listen beside loopback, as the kernel tells."""
+    own = {process_id, *map(int, Path(f"/proc/{process_id}/task/{process_id}/children").read_text().split())}
+    sockets = set()
+    for one in own:
+        for link in Path(f"/proc/{one}/fd").iterdir():
+            with contextlib.suppress(OSError):
+                sockets.add(os.readlink(link))
+    ports = set()
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for row in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            _, at, _, state, *_, inode = row.split()[:10]
+            address, _, port = at.partition(":")
+            if f"socket:[{inode}]" in sockets and (state == "0A" or table.startswith("udp")) and address != LOOPBACK:
+                ports.add((table, int(port, 16)))
+    return ports
+
+
+def test_it_listens_at_its_two_ports_and_at_no_other(probe):
+    found = listening_to_others(probe.daemon.process.pid)
+    assert found == {("tcp", probe.port), ("tcp", probe.tls_port)}
+
+
 def test_no_secret_is_in_the_log_the_data_folder_or_a_backup(probe):
     token = probe.token("admin")
     probe.ask("GET", "/api/v1/exams?patient_ref=Canary-17&token=planted-secret", **bearer(token))
@@ -193,5 +221,18 @@ def test_a_hospitals_certificate_is_shown_and_a_client_without_one_of_its_author
         with httpx.Client(verify=context, timeout=WAIT_S) as known:
             assert known.get(url).status_code == 200
             assert known.get(f"{probe.url}/api/v1/status").status_code == 401
+    finally:
+        probe.daemon.stop()
+
+
+@pytest.mark.long
+def test_a_probe_that_serves_one_address_has_its_own_screen_at_loopback_all_the_same(tmp_path):
+    probe = NetworkedDaemon(tmp_path, host=own_address())
+    try:
+        assert probe.daemon.url.startswith("http://127.0.0.1:")
+        assert probe.daemon.ask("/api/v1/status").status == 200
+        assert probe.ask("GET", "/api/v1/status").status_code == 401
+        health = ask_parts(DaemonAddress(probe.port, probe.address))  # as the updater asks
+        assert health.release
     finally:
         probe.daemon.stop()

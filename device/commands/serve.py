@@ -198,7 +198,7 @@ def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], Net
 def _run_server(procedure: Procedure, listening: Sequence[socket.socket], network: NetworkPort | None) -> None:
     from device.web.server import run_server
 
-    port = listening[0].getsockname()[1]
+    port = listening[-1].getsockname()[1]  # of loopback, where there are two
     kind = "simulated probe" if procedure.is_simulated else "probe"
     others = ""
     if network:
