@@ -83,7 +83,7 @@ def effectivity_chapter() -> Chapter:
 
 
 def tolerances_chapter() -> Chapter:
-    """Return the chapter on tolerances that are asked for; ten minutes."""
+    """Return the chapter on tolerances that are asked for; minutes."""
     from host_tools.verification.tolerances import tolerances_chapter as measured_chapter
 
     return measured_chapter()

@@ -66,7 +66,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
     )
 
 
-def measure(scenes: int = 200, seed: int = 2027, jobs: int = -1) -> list[list[ToleranceAnswer]]:
+def measure(scenes: int = 30, seed: int = 2027, jobs: int = -1) -> list[list[ToleranceAnswer]]:
     """Return every scene's answers, one a tolerance; a process a scene."""
     rng = np.random.default_rng(seed)
     chosen = [random_scene(rng) for _ in range(scenes)]
@@ -109,7 +109,7 @@ def _numbers(solution: Solution) -> dict[str, float]:
     return numbers(solution.rays, solution.pressed, solution.baseline)
 
 
-def tolerances_chapter(scenes: int = 200, jobs: int = -1) -> Chapter:
+def tolerances_chapter(scenes: int = 30, jobs: int = -1) -> Chapter:
     """Return the chapter on tolerances asked for, held and refused, and on stated over true errors by order."""
     return as_chapter(measure(scenes, jobs=jobs))
 
