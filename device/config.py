@@ -428,6 +428,8 @@ class DicomSection(Section):
             yield Conflict(f"dicom.{name}", "not set", "set", (f"dicom.{other}",))
         elif given["tls_certificate"] and not given["tls_authority"]:
             yield Conflict("dicom.tls_authority", "not set", "set", ("dicom.tls_certificate",))
+        elif given["tls_authority"] and self.commitment_port and not given["tls_certificate"]:
+            yield Conflict("dicom.tls_certificate", "not set", "set", ("dicom.commitment_port",))
 
     @property
     def is_configured(self) -> bool:

@@ -436,6 +436,24 @@ class DiskFullError(StorageError):
     title = "Disk full"
 
 
+class ArchiveUnreachable(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's archive or worklist does not answer; results wait on the probe and are sent when it does."""
+
+    code = "E620"
+    title = "Archive not reached"
+    status = 502
+    severity = "warning"
+
+
+class ArchiveRefuses(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's archive has refused results; they are kept on the probe until somebody sends them again."""
+
+    code = "E621"
+    title = "Archive refuses results"
+    status = 502
+    severity = "warning"
+
+
 class NewerDataError(StorageError):
     """The data folder was written by a newer release than this one, which cannot read it."""
 

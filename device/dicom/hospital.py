@@ -3,23 +3,107 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from device.config import DicomSection
-from device.records.store import Store
+from device.dicom.sender import Sender, SenderState
+from device.errors import DeviceError, InvalidRequest
+from device.records.store import Store, StoredRecord
+
+if TYPE_CHECKING:
+    from device.dicom.delivery import Delivery
+    from device.dicom.objects import DicomWriter
+    from device.dicom.outgoing import Outgoing
 
 
 class Hospital:
-    """Exams in the hospital's formats; all methods may be called from any thread."""
+    """Exams in the hospital's formats, and the way to its archive; all methods may be called from any thread."""
 
-    def __init__(self, settings: DicomSection, store: Store, picture_of: Callable[[Path], bytes]) -> None:
-        """Take the settings, the store, and who returns the picture (a PNG) of a kept recording."""
+    def __init__(
+        self,
+        settings: DicomSection,
+        store: Store,
+        picture_of: Callable[[Path], bytes],
+        tell: Callable[[DeviceError | None], None] = lambda fault: None,
+    ) -> None:
+        """Take the settings, the store, who returns the picture (a PNG) of a kept recording, and whom to tell faults.
+
+        Nothing is sent before `start`.
+        """
         self._settings, self._store, self._picture_of = settings, store, picture_of
+        self._sender: Sender | None = None
+        if settings.archive_host is not None:
+            days = settings.demographics_days
+            self._sender = Sender(store.outbox, self._delivery, keep_patients_days=days, tell=tell)
+
+    def start(self) -> None:
+        """Begin to send what waits, if there is an archive."""
+        if self._sender:
+            self._sender.start()
+
+    def close(self) -> None:
+        """End sending; what waits is sent after the next start."""
+        if self._sender:
+            self._sender.close()
 
     def files_of(self, exam_id: str) -> bytes:
         """Return an exam as DICOM files in one .zip; raises as `exam_zip`."""
         from device.dicom.exam_files import exam_zip
+
+        return exam_zip(self._store, self._writer, exam_id)
+
+    def send(self, exam_id: str, *, version: int, by: str) -> list[StoredRecord]:
+        """Queue an exam as it was seen in a version; return its objects. Raises as `Outgoing.queue`.
+
+        Raises `InvalidRequest` when no archive is set.
+        """
+        if not self._sender:
+            raise InvalidRequest("No archive is set.", "Set dicom.archive_host, its port and its title.")
+        self._outgoing.queue(exam_id, version=version, by=by)
+        self._sender.wake()
+        return self.objects_of(exam_id)
+
+    def objects_of(self, exam_id: str) -> list[StoredRecord]:
+        """Return the objects of an exam that were ever to be at the archive, oldest first."""
+        self._store.exams.exam(exam_id)
+        rows = self._store.outbox.of_exam(exam_id)
+        return [{**row, "kind": row["about"]["kind"], "study_uid": row["about"]["study_uid"]} for row in rows]
+
+    def as_record(self) -> dict[str, Any]:
+        """Return where archive and worklist are, how many objects are in which state, and what is wrong."""
+        said, counts = self._settings, self._store.outbox.counts()
+        state = self._sender.state if self._sender else SenderState()
+        return {
+            "own_title": said.own_title,
+            "archive": _place(said.archive_host, said.archive_port, said.archive_title),
+            "worklist": _place(said.worklist_host, said.worklist_port, said.worklist_title),
+            "objects": counts,
+            "fault": state.fault.as_record() if state.fault else None,
+            "next_try_at": state.next_try_at,
+        }
+
+    @cached_property
+    def _writer(self) -> DicomWriter:
         from device.dicom.objects import DicomWriter
 
-        writer = DicomWriter(self._store, self._picture_of, self._settings.institution)
-        return exam_zip(self._store, writer, exam_id, None)
+        return DicomWriter(self._store, self._picture_of, self._settings.institution)
+
+    @cached_property
+    def _outgoing(self) -> Outgoing:
+        from device.dicom.outgoing import Outgoing
+
+        return Outgoing(self._store, self._writer, with_phantoms=self._settings.send_phantoms)
+
+    def _delivery(self) -> Delivery:
+        from device.dicom.association import archive_of
+        from device.dicom.delivery import Delivery
+
+        archive = archive_of(self._settings)
+        assert archive is not None  # or there were no sender
+        return Delivery(self._settings, archive, self._store, self._outgoing)
+
+
+def _place(host: str | None, port: int, title: str) -> dict[str, Any] | None:
+    return None if host is None else {"host": host, "port": port, "title": title}

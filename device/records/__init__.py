@@ -1,6 +1,6 @@
 """What must never be lost: exams, measurements and presses in SQLite, recordings and certificates on disk, releases.
 
-Modules in reading order: `schema`, `asked_once`, `audit`, `exams`, `tokens`, `store`, `calibrations`, `disk`,
+Modules in reading order: `schema`, `asked_once`, `audit`, `exams`, `outbox`, `tokens`, `store`, `calibrations`, `disk`,
 `updates`, `release_head`.
 
 No hardware, no web: it acknowledges only what is on the disk.
