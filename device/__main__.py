@@ -42,6 +42,7 @@ VERBS = {
     "backup": "save measurements, settings, certificates and own models to a file",
     "restore": "bring a backup to a card that holds no measurements yet",
     "support": "write a file for whoever helps, without patients' data",
+    "dicom": "ask the hospital's archive and worklist whether they are there",
     "led-off": "darken the LED chip of the real probe",
 }
 ONE_THREAD = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS")
@@ -154,6 +155,10 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.support import run_support_command
 
             return run_support_command(options)
+        case "dicom":
+            from device.commands.dicom import run_dicom_command
+
+            return run_dicom_command(options, _start_settings(options, _scenario(options)).config)
         case "led-off":
             from device.commands.led_off import led_off
 

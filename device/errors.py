@@ -156,6 +156,24 @@ class AuditChanged(DeviceError):  # noqa: N818 - the name is what the operator r
     is_lasting = True
 
 
+class ArchiveUnreachable(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's archive or worklist does not answer; results wait on the probe and are sent when it does."""
+
+    code = "E030"
+    title = "Archive not reached"
+    status = 502
+    severity = "warning"
+
+
+class ArchiveRefuses(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's archive has refused results; they are kept on the probe until somebody sends them again."""
+
+    code = "E031"
+    title = "Archive refuses results"
+    status = 502
+    severity = "warning"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 
@@ -434,24 +452,6 @@ class DiskFullError(StorageError):
 
     code = "E602"
     title = "Disk full"
-
-
-class ArchiveUnreachable(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """The hospital's archive or worklist does not answer; results wait on the probe and are sent when it does."""
-
-    code = "E620"
-    title = "Archive not reached"
-    status = 502
-    severity = "warning"
-
-
-class ArchiveRefuses(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """The hospital's archive has refused results; they are kept on the probe until somebody sends them again."""
-
-    code = "E621"
-    title = "Archive refuses results"
-    status = 502
-    severity = "warning"
 
 
 class NewerDataError(StorageError):

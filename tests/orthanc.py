@@ -18,8 +18,9 @@ from device.config import DicomSection
 
 TITLE, OWN_TITLE = "HOSPACS", "TSIS"
 PLUGIN = Path("/usr/share/orthanc/plugins/libModalityWorklists.so")
+PROGRAM = shutil.which("Orthanc", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
 needs_orthanc = pytest.mark.skipif(
-    not shutil.which("Orthanc") and "TSIS_REQUIRE_PEERS" not in os.environ,  # there its absence is a failure
+    not PROGRAM and "TSIS_REQUIRE_PEERS" not in os.environ,  # there its absence is a failure
     reason="Orthanc is not installed (Debian: orthanc)",
 )
 
@@ -54,7 +55,9 @@ class Orthanc:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> Orthanc:
-        self._process = subprocess.Popen(["Orthanc", str(self._settings)], stdout=self._log, stderr=self._log)
+        self._process = subprocess.Popen(
+            [PROGRAM or "Orthanc", str(self._settings)], stdout=self._log, stderr=self._log
+        )
         wait_for(self._answers, bool)
         return self
 

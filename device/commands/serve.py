@@ -29,6 +29,7 @@ from device.records.updates import Updates
 from device.settings.last_good import StartSettings
 
 if TYPE_CHECKING:
+    from device.dicom.hospital import Hospital
     from device.instrument.procedure import Procedure
 
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
@@ -58,9 +59,12 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             watchdog.start()
             ending.callback(watchdog.close)
             ready()
+            hospital = _hospital(procedure)
+            hospital.start()
+            ending.callback(hospital.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, port.listening())
+            _run_server(procedure, hospital, port.listening())
     return 0
 
 
@@ -164,11 +168,23 @@ def faults_of(error: Exception) -> list[DeviceError]:
     return [DeviceError(f"{type(error).__name__}: {error}.", "Report the daemon's log.")]
 
 
-def _run_server(procedure: Procedure, listening: socket.socket) -> None:
+def _hospital(procedure: Procedure) -> Hospital:
+    """Return what sends to the hospital's archive; the status tells when it does not get there."""
+    from device.dicom.hospital import Hospital
+    from device.instrument.press.picture import kept_or_drawn
+
+    def tell(fault: DeviceError | None) -> None:
+        if procedure.board.now.archive is not fault:
+            procedure.board.update(archive=fault)
+
+    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell)
+
+
+def _run_server(procedure: Procedure, hospital: Hospital, listening: socket.socket) -> None:
     from device.web.server import run_server
 
     host, port = listening.getsockname()
     kind = "simulated probe" if procedure.is_simulated else "probe"
     reached_at = socket.gethostname() if host in ANYWHERE else host
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{reached_at}:{port}/", flush=True)
-    run_server(procedure, listening)
+    run_server(procedure, hospital, listening)

@@ -68,8 +68,7 @@ class Hospital:
     def objects_of(self, exam_id: str) -> list[StoredRecord]:
         """Return the objects of an exam that were ever to be at the archive, oldest first."""
         self._store.exams.exam(exam_id)
-        rows = self._store.outbox.of_exam(exam_id)
-        return [{**row, "kind": row["about"]["kind"], "study_uid": row["about"]["study_uid"]} for row in rows]
+        return [_told(row) for row in self._store.outbox.of_exam(exam_id)]
 
     def as_record(self) -> dict[str, Any]:
         """Return where archive and worklist are, how many objects are in which state, and what is wrong."""
@@ -103,6 +102,11 @@ class Hospital:
         archive = archive_of(self._settings)
         assert archive is not None  # or there were no sender
         return Delivery(self._settings, archive, self._store, self._outgoing)
+
+
+def _told(row: StoredRecord) -> StoredRecord:
+    about = row.pop("about")  # what is written again is no answer to anybody
+    return {**row, "kind": about["kind"], "study_uid": about["study_uid"]}
 
 
 def _place(host: str | None, port: int, title: str) -> dict[str, Any] | None:

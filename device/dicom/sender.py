@@ -111,7 +111,9 @@ class Sender:
         if not refused:
             return None
         number = self._outbox.counts()["refused"]
-        return ArchiveRefuses(f"{number} objects were refused, the first one so: {refused[0]['problem']}", SEND_AGAIN)
+        return ArchiveRefuses(
+            f"Objects that were refused: {number}; the first one so: {refused[0]['problem']}", SEND_AGAIN
+        )
 
     def _say(self, fault: DeviceError | None, wait_s: float | None = None) -> None:
         next_at = datetime.now(UTC) + timedelta(seconds=wait_s or 0.0)

@@ -25,6 +25,7 @@ from device.records.asked_once import ANSWERS_TABLE, AskedOnce, first_answer, ke
 from device.records.audit import Audit, append, prepare_audit
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
+from device.records.listing import Listing
 from device.records.outbox import OUTBOX_TABLES, Outbox
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 from device.records.tokens import TOKENS_TABLE, Tokens
@@ -53,7 +54,9 @@ class Store:
             self._end_interrupted()
             self._remove_unfinished()
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
-            self.tokens, self.outbox = Tokens(self._transaction), Outbox(self._transaction)
+            self.tokens = Tokens(self._transaction)
+            self.listing = Listing(self._transaction)
+            self.outbox = Outbox(self._transaction)
             self._opened = opened.pop_all()
 
     def _open(self, opened: ExitStack) -> sqlite3.Connection:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fastapi import FastAPI, Response
+from fastapi import FastAPI
 from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
@@ -17,37 +17,22 @@ from device.dicom.hospital import Hospital
 from device.instrument.press.picture import kept_or_drawn
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
-from device.measurement.mode import Mode
-from device.measurement.wanted_accuracy import UNTIL_BOUNDS, WITHIN_BOUND, WantedAccuracy
 from device.records.calibrations import Calibrations
-from device.records.exams import AskedExam, ExamId
 from device.records.store import Store
 from device.records.updates import Updates
-from device.web.contract import EVENTS, PNG, PROBLEM, TAGS, ZIP, answers, install_contract, media
+from device.web.conditional import ConditionalRoute
+from device.web.contract import EVENTS, PROBLEM, TAGS, answers, install_contract, media
 from device.web.dicom import add_dicom
 from device.web.events import StatusFeed, snapshot, status_events
-from device.web.exams import (
-    NEWEST,
-    BeforeSeq,
-    OnceKey,
-    PageLimit,
-    SeenExam,
-    add_exams,
-    asked_once,
-    tagged,
-    version_of,
-)
-from device.web.guard import RequestGuard, StrictRoute
-from device.web.kept_files import KeptFiles
+from device.web.exams import add_exams
+from device.web.guard import RequestGuard
+from device.web.measurements import add_measurements
+from device.web.presses import add_presses
 from device.web.problems import install_problems
 from device.web.schema import (
     CalibrationList,
     Device,
     Liveness,
-    MeasuredFeatures,
-    Measurement,
-    MeasurementList,
-    PressResource,
     Readiness,
     SelfTest,
     Status,
@@ -57,27 +42,6 @@ from device.web.updates import add_updates
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
-
-
-class PressRequest(BaseModel):
-    """What a client may say when it starts a press: its mode, else that of the settings. Unknown fields are refused.
-
-    Of a scan also how sure it is to be and in how many seconds; these numbers are refused by `WantedAccuracy`.
-    """
-
-    model_config = ConfigDict(extra="forbid")
-    mode: Mode | None = None
-    until: dict[str, Any] | None = Field(
-        default=None,
-        description=f"Half of the 90 % interval by unknown: {', '.join(f'{n} {b}' for n, b in UNTIL_BOUNDS.items())}.",
-    )
-    within_s: Any = Field(default=None, description=f"Seconds from the first contact with the lesion: {WITHIN_BOUND}.")
-    exam_id: ExamId | None = None
-
-    @property
-    def wanted(self) -> WantedAccuracy:
-        """How sure a scan is to be; raises `InvalidQuantity` for what nothing can be."""
-        return WantedAccuracy(self.until or {}, self.within_s)
 
 
 class SelfTestRequest(BaseModel):
@@ -112,13 +76,13 @@ def create_app(
         servers=[{"url": "/", "description": "This probe"}],
         generate_unique_id_function=lambda route: route.name,
     )
-    app.router.route_class = StrictRoute
+    app.router.route_class = ConditionalRoute
     install_contract(app)
     install_problems(app)
     app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
     _add_state(app, procedure, store)
-    _add_presses(app, procedure, store)
-    _add_measurements(app, store)
+    add_presses(app, API, procedure, store)
+    add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
@@ -181,92 +145,6 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
     async def stream_events() -> StreamingResponse:
         """Stream the status as server-sent events, one when something has changed and at least two a second."""
         return StreamingResponse(status_events(feed), media_type=EVENTS)
-
-
-def _add_presses(app: FastAPI, procedure: Procedure, store: Store) -> None:
-    @app.post(f"{API}/presses", status_code=202, responses=answers(202, PressResource, "Location"), tags=["presses"])
-    def start_press(
-        request: PressRequest | None = None, idempotency_key: OnceKey = None, if_match: SeenExam = None
-    ) -> JSONResponse:
-        """Start a measurement, of an exam or of none; on the simulated probe the virtual hand takes up the probe.
-
-        With an Idempotency-Key it is started once, however often this is sent, and the first answer given again. With
-        If-Match it is refused when the exam was changed since the client has shown it.
-        """
-        request = request or PressRequest()
-        exam = AskedExam(request.exam_id, version_of(if_match) if if_match else None) if request.exam_id else None
-        if idempotency_key is None:
-            job = procedure.request(request.mode, request.wanted, exam=exam).as_record()
-        else:
-            once = asked_once(idempotency_key, f"POST {API}/presses", request)
-            job = procedure.request_once(once, request.mode, request.wanted, exam=exam)
-        return JSONResponse(job, status_code=202, headers={"Location": f"{API}/presses/{job['id']}"})
-
-    @app.get(f"{API}/presses/{{press_id}}", responses=answers(200, PressResource), tags=["presses"])
-    def get_press(press_id: str) -> dict[str, Any]:
-        """Return the state of a press."""
-        return store.press(press_id)
-
-    @app.post(
-        f"{API}/presses/{{press_id}}/finish", status_code=202, responses=answers(202, PressResource), tags=["presses"]
-    )
-    def finish_scan(press_id: str) -> dict[str, Any]:
-        """Answer the scan under way with the presses on the lesion that are complete."""
-        procedure.finish(press_id)
-        return store.press(press_id)
-
-    @app.delete(f"{API}/presses/{{press_id}}", status_code=202, responses=answers(202, PressResource), tags=["presses"])
-    def cancel_press(press_id: str) -> dict[str, Any]:
-        """Cancel the press under way."""
-        procedure.cancel(press_id)
-        return store.press(press_id)
-
-
-def _add_measurements(app: FastAPI, store: Store) -> None:
-    @app.get(f"{API}/measurements", responses=answers(200, MeasurementList), tags=["measurements"])
-    def list_measurements(
-        before_seq: BeforeSeq = NEWEST, limit: PageLimit = 20, exam_id: ExamId | None = None
-    ) -> dict[str, list[dict[str, Any]]]:
-        """Return measurements, newest first, all or those of an exam."""
-        return {"measurements": store.measurements(before_seq=before_seq, limit=limit, exam_id=exam_id)}
-
-    one = f"{API}/measurements/{{measurement_id}}"
-
-    @app.get(one, responses=answers(200, Measurement, "ETag"), tags=["measurements"])
-    def get_measurement(measurement_id: str, response: Response) -> dict[str, Any]:
-        """Return one measurement."""
-        return tagged(response, store.measurement(measurement_id))
-
-    @app.get(
-        f"{one}/features",
-        responses=answers(200, MeasuredFeatures),
-        tags=["measurements"],
-    )
-    def get_features(measurement_id: str) -> dict[str, float]:
-        """Return the features of one measurement."""
-        return dict(store.measurement(measurement_id)["features"])
-
-    kept = KeptFiles(store)
-
-    @app.get(
-        f"{one}/image.png",
-        response_class=Response,
-        responses=media(PNG, "A grey picture."),
-        tags=["measurements"],
-    )
-    async def get_image(measurement_id: str) -> Response:
-        """Return the tactile image as a picture."""
-        return await kept.picture(measurement_id)
-
-    @app.get(
-        f"{one}/recording.zip",
-        response_class=Response,
-        responses=media(ZIP, "A `tsis.recording`."),
-        tags=["measurements"],
-    )
-    def get_recording(measurement_id: str) -> Response:
-        """Return the recording that the measurement was computed from."""
-        return kept.recording(measurement_id)
 
 
 def _add_self_test(app: FastAPI, procedure: Procedure) -> None:

@@ -33,19 +33,36 @@ PROBLEM: Responses = {"default": {"description": "Any error", "model": Problem}}
 """What every route may answer instead."""
 
 
-HEADERS = {"Location": "Where to find it.", "ETag": "Its version: what If-Match wants when it is changed."}
+HEADERS = {
+    "Location": "Where to find it.",
+    "ETag": "Its version, or a hash: what If-None-Match takes, and If-Match where it can be changed.",
+}
+
+
+def _headers(names: tuple[str, ...]) -> dict[str, Any]:
+    described = {name: {"description": HEADERS[name], "schema": {"type": "string"}} for name in names}
+    return {"headers": described} if names else {}
+
+
+IF_NONE_MATCH = {
+    "name": "If-None-Match",
+    "in": "header",
+    "required": False,
+    "schema": {"type": "string"},
+    "description": "ETags of what the client has: is it one of them still, the answer is 304.",
+}
+UNCHANGED = {"description": "The client has it already, by its If-None-Match.", **_headers(("ETag",))}
 
 
 def answers(status: int, model: type[BaseModel], *headers: str) -> Responses:
     """Return the description of a route's good answer and of its headers, for FastAPI's `responses`."""
-    described = {name: {"description": HEADERS[name], "schema": {"type": "string"}} for name in headers}
-    return {status: {"model": model, **({"headers": described} if headers else {})}}
+    return {status: {"model": model, **_headers(headers)}}
 
 
-def media(media_type: str, description: str) -> Responses:
-    """Return the description of an answer that is no JSON."""
-    schema = {"type": "string"} if media_type == EVENTS else BYTES
-    return {200: {"description": description, "content": {media_type: {"schema": schema}}}}
+def media(media_type: str, description: str, *headers: str) -> Responses:
+    """Return the description of an answer that is no JSON, and of its headers."""
+    schema = {"type": "string"} if media_type.startswith("text/") else BYTES
+    return {200: {"description": description, **_headers(headers), "content": {media_type: {"schema": schema}}}}
 
 
 def install_contract(app: FastAPI) -> None:
@@ -65,11 +82,14 @@ def _as_described(document: dict[str, Any]) -> dict[str, Any]:
     del problem["model"]
     document["components"]["responses"] = {"Problem": problem}
     for path in document["paths"].values():
-        for operation in path.values():
+        for method, operation in path.items():
             for answer in operation["responses"].values():
                 for content in answer["content"].values():
                     content["schema"] = _named(content["schema"])
             operation["responses"]["default"] = {"$ref": "#/components/responses/Problem"}
+            if method == "get" and "ETag" in operation["responses"].get("200", {}).get("headers", {}):
+                operation.setdefault("parameters", []).append(IF_NONE_MATCH)
+                operation["responses"]["304"] = UNCHANGED
     return document
 
 

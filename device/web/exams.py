@@ -13,15 +13,13 @@ from fastapi import FastAPI, Header, Query, Response
 from pydantic import BaseModel, ConfigDict
 
 from device.records.asked_once import AskedOnce
-from device.records.exams import ExamContent, ExamFields, ExamId, ExamKind, Identifier, Reason
+from device.records.exams import ExamContent, ExamFields, ExamId, Identifier, Reason
+from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
 from device.web.contract import answers
+from device.web.paging import AuditQuery, ExamQuery, page_of, paged
 from device.web.schema import AuditList, Exam, ExamList, Measurement
 
-NEWEST = 2**63 - 1
-"""Above every sequence number: the largest integer SQLite holds."""
-BeforeSeq = Annotated[int, Query(ge=1, le=NEWEST)]
-PageLimit = Annotated[int, Query(ge=1, le=200)]
 OnceKey = Annotated[
     str | None,
     Header(
@@ -82,12 +80,11 @@ def add_exams(app: FastAPI, api: str, store: Store) -> None:
     _add_exams(app, f"{api}/exams", store)
     _add_acts(app, f"{api}/measurements/{{measurement_id}}", store)
 
-    @app.get(f"{api}/audit", responses=answers(200, AuditList), tags=["exams"])
-    def list_audit(
-        before_seq: BeforeSeq = NEWEST, limit: PageLimit = 20, subject: str | None = None
-    ) -> dict[str, list[dict[str, Any]]]:
+    @app.get(f"{api}/audit", responses=answers(200, AuditList, "ETag"), tags=["exams"])
+    def list_audit(asked: Annotated[AuditQuery, Query()]) -> dict[str, Any]:
         """Return what people have changed, newest first, all or of one exam or measurement."""
-        return {"entries": store.audit.entries(subject=subject, before_seq=before_seq, limit=limit)}
+        entries = store.audit.entries(subject=asked.subject, before_seq=asked.before, limit=asked.limit + 1)
+        return paged("entries", entries, asked.limit)
 
 
 def _add_exams(app: FastAPI, path: str, store: Store) -> None:
@@ -99,19 +96,18 @@ def _add_exams(app: FastAPI, path: str, store: Store) -> None:
         response.headers["Location"] = f"{path}/{exam['id']}"
         return tagged(response, exam)
 
-    @app.get(path, responses=answers(200, ExamList), tags=["exams"])
-    def list_exams(
-        kind: ExamKind = "patient",
-        patient_ref: str | None = None,
-        order_number: str | None = None,
-        before_seq: BeforeSeq = NEWEST,
-        limit: PageLimit = 20,
-    ) -> dict[str, list[dict[str, Any]]]:
+    @app.get(path, responses=answers(200, ExamList, "ETag"), tags=["exams"])
+    def list_exams(asked: Annotated[ExamQuery, Query()]) -> dict[str, Any]:
         """Return the exams of patients, or those of phantoms, newest first."""
-        found = store.exams.exams(
-            kind=kind, patient_ref=patient_ref, order_number=order_number, before_seq=before_seq, limit=limit
+        found = store.listing.exams(
+            Wanted(**asked.times),
+            kind=asked.kind,
+            patient_ref=asked.patient_ref,
+            order_number=asked.order_number,
+            before=asked.before,
+            limit=asked.limit,
         )
-        return {"exams": found}
+        return page_of("exams", found)
 
     @app.get(f"{path}/{{exam_id}}", responses=answers(200, Exam, "ETag"), tags=["exams"])
     def get_exam(exam_id: str, response: Response) -> dict[str, Any]:

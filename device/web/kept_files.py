@@ -38,9 +38,10 @@ class KeptFiles:
     def recording(self, measurement_id: str) -> Response:
         """Return the recording of a measurement, sent piece by piece."""
         path = self._path(measurement_id)
+        tag = {"ETag": f'"{path.stem}"'}  # a recording never changes
         if path.is_file():
-            return FileResponse(path, media_type="application/zip")
-        return StreamingResponse(packed(path), media_type="application/zip")
+            return FileResponse(path, media_type="application/zip", headers=tag)
+        return StreamingResponse(packed(path), media_type="application/zip", headers=tag)
 
     def _path(self, measurement_id: str) -> Path:
         return self._store.recording_path(self._store.measurement(measurement_id)["recording_id"])

@@ -81,6 +81,13 @@ class PressResource(_Body):
     exam_id: str | None = None
 
 
+class PressList(_Body):
+    """Presses, newest first; `next` is the `cursor` of the next page, null on the last one."""
+
+    presses: list[PressResource]
+    next: str | None
+
+
 class EstimatedUnknown(_Body):
     """One unknown: its value, 90 % interval and standard deviation, null where there are none.
 
@@ -150,9 +157,10 @@ class Exam(_Body):
 
 
 class ExamList(_Body):
-    """Exams, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+    """Exams, newest first; `next` is the `cursor` of the next page, null on the last one."""
 
     exams: list[Exam]
+    next: str | None
 
 
 class AuditEntry(_Body):
@@ -188,9 +196,10 @@ class AuditEntry(_Body):
 
 
 class AuditList(_Body):
-    """Entries of the audit, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+    """Entries of the audit, newest first; `next` is the `cursor` of the next page, null on the last one."""
 
     entries: list[AuditEntry]
+    next: str | None
 
 
 class Measurement(_Body):
@@ -223,9 +232,10 @@ class Measurement(_Body):
 
 
 class MeasurementList(_Body):
-    """Measurements, newest first; the `seq` of the last one is the `before_seq` of the next page."""
+    """Measurements, newest first; `next` is the `cursor` of the next page, null on the last one."""
 
     measurements: list[Measurement]
+    next: str | None
 
 
 class Certificate(_Body):

@@ -9,16 +9,18 @@ from types import FrameType
 import uvicorn
 
 from device.access.known_hosts import KnownHosts
+from device.dicom.hospital import Hospital
 from device.instrument.procedure import Procedure
 from device.records.updates import Updates
 from device.web.app import create_app
 
 
-def run_server(procedure: Procedure, listening: socket.socket) -> None:
+def run_server(procedure: Procedure, hospital: Hospital, listening: socket.socket) -> None:
     """Serve a running procedure on a port that listens, until SIGTERM or SIGINT."""
     stated = procedure.config.server
     hosts = KnownHosts.of_machine(stated.host, *stated.hosts)
-    app = create_app(procedure, procedure.store, hosts=hosts, updates=Updates(procedure.config.updates))
+    updates = Updates(procedure.config.updates)
+    app = create_app(procedure, procedure.store, hosts=hosts, updates=updates, hospital=hospital)
     # Open event streams never end by themselves; without the limit a stop would wait for them.
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server = DarkeningServer(settings, procedure)

@@ -28,9 +28,6 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
         solutions = _solve_loads(plan.scene(truth), plan.forces_n, plan.strain)
     except (NgException, ValueError, ArithmeticError, RuntimeError) as error:
         return empty_row(index, truth, reason=f"{type(error).__name__}: {error}")
-    for solution, force_n in zip(solutions, plan.forces_n, strict=True):
-        if not solution.pressure_is_positive:
-            return empty_row(index, truth, reason=f"the contact opens under {force_n:g} N")
     columns = [_columns(solution) for solution in solutions]
     if plan.has_load_axis:
         of_loads = {name: [column[name] for column in columns] for name in columns[0]}

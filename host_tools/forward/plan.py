@@ -13,6 +13,7 @@ from typing import Any, Literal
 from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.accuracy import Level, cheapest_level, small_strain_departure
 from host_tools.forward.materials import LOCKING_POISSON_RATIO, baseline, with_inclusion
+from host_tools.forward.meshes.mesh import PER_CONTACT, Resolution, touching_radius_mm
 from host_tools.forward.meshes.morph import reaches
 from host_tools.forward.meshes.solid_mesh import solid_symmetry
 from host_tools.forward.sampling import FaceSector
@@ -156,7 +157,8 @@ def _largest_poisson_ratio(scene: Scene) -> float:
 
 
 def _mesh(scene: Scene, symmetry: FaceSector, reasons: dict[str, str]) -> Literal["morphed", "remeshed"]:
-    if symmetry == "axisymmetric" and scene.has_inclusion and reaches(scene):
+    touches_wide = touching_radius_mm(scene) > PER_CONTACT * Resolution.face_mm
+    if symmetry == "axisymmetric" and scene.has_inclusion and reaches(scene) and touches_wide:
         reasons["mesh"] = "inside the training box: one mesh of fixed topology, smooth in size and depth"
         return "morphed"
     reasons["mesh"] = "outside what the fixed topology reaches: meshed anew (features jump by up to 1e-3)"

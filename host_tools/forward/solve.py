@@ -20,9 +20,11 @@ from ngsolve import SetNumThreads, ngsglobals
 from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.plan import ModelPlan, aligned, model_plan
+from host_tools.forward.press_model import Loaded, PressFailed
 from host_tools.forward.solution import Solution
+from host_tools.forward.soundness import require_sound
 from host_tools.forward.stated_error import stated_error
-from host_tools.forward.tiers import build
+from host_tools.forward.tiers import Meshed, build
 from host_tools.scenes.scene import Press, Scene
 
 ngsglobals.msg_level = 0
@@ -40,7 +42,7 @@ def solve_ramp(
     """Solve a scene at several presses, all by indentation or all by force, ascending; `scene.press` is not used.
 
     In small strain one solve serves all; in finite strain one load path does. Raise `PressFailed` when a press is
-    beyond what the model can reach.
+    beyond what the model can reach, or its solution is none (`soundness.py`).
     """
     return solve_ramps([scene], presses, plan, estimate_error=estimate_error)[0]
 
@@ -58,7 +60,7 @@ def solve_ramps(
     plan = plan or model_plan(scene.with_press(presses[-1]))
     turned, angle_rad = aligned(scene)
     meshed = build(turned, plan)
-    inclusion_free = meshed.model.press(baseline(turned), presses, estimate_error=estimate_error)
+    inclusion_free = _without_inclusion(meshed, turned, presses, plan, estimate_error)
     rays = replace(meshed.rays, angle_rad=meshed.rays.angle_rad + angle_rad)
 
     def solutions(one: Scene) -> tuple[Solution, ...]:
@@ -67,19 +69,33 @@ def solve_ramps(
             materials = with_inclusion(aligned(one)[0])
             pressed = meshed.model.press(materials, presses, estimate_error=estimate_error)
         return tuple(
-            Solution(
-                rays,
-                found.state,
-                without.state,
-                plan,
-                meshed.elements,
-                stated_error(plan, meshed.rays, found, without),
-                one.with_press(press),
+            require_sound(
+                Solution(
+                    rays,
+                    found.state,
+                    without.state,
+                    plan,
+                    meshed.elements,
+                    stated_error(plan, meshed.rays, found, without),
+                    one.with_press(press),
+                )
             )
             for press, found, without in zip(presses, pressed, inclusion_free, strict=True)
         )
 
     return tuple(solutions(one) for one in scenes)
+
+
+def _without_inclusion(
+    meshed: Meshed, scene: Scene, presses: Sequence[Press], plan: ModelPlan, estimate_error: bool
+) -> tuple[Loaded, ...]:
+    """Return the baseline at every press; where it gives way, raise the failure that says how far both can go."""
+    try:
+        return meshed.model.press(baseline(scene), presses, estimate_error=estimate_error)
+    except PressFailed:
+        if scene.has_inclusion and plan.strain == "small":
+            meshed.model.press(with_inclusion(scene), presses, estimate_error=False)
+        raise
 
 
 def _but_for_modulus(scene: Scene, other: Scene) -> Scene:

@@ -107,6 +107,15 @@ def _centred(size_mm: float, depth_mm: float, modulus_kpa: float = 80.0, indenta
     return Scene(Inclusion(size_mm, depth_mm, modulus_kpa), Press(indentation_mm=indentation_mm))
 
 
+def _forced(force_n: float, dome_mm: float = 0.0) -> Scene:
+    return Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=force_n), Waveguide(dome_mm=dome_mm))
+
+
+def _large(thickness_mm: float, half_width_mm: float) -> Scene:
+    tissue = Tissue(thickness_mm=thickness_mm, half_width_mm=half_width_mm)
+    return Scene(Inclusion(10.0, 6.0, 80.0), tissue=tissue)
+
+
 def _all_poisson(ratio: float) -> Scene:
     return Scene(
         Inclusion(10.0, 6.0, 80.0),
@@ -120,8 +129,10 @@ def _under(layer: TissueLayer) -> Scene:
     return Scene(Inclusion(10.0, 6.0, 80.0), tissue=Tissue(layers=(layer,)))
 
 
-def _slab(thickness_mm: float, size_mm: float, depth_mm: float, indentation_mm: float) -> Scene:
-    tissue = Tissue(thickness_mm=thickness_mm)
+def _slab(
+    thickness_mm: float, size_mm: float, depth_mm: float, indentation_mm: float, half_width_mm: float = 60.0
+) -> Scene:
+    tissue = Tissue(thickness_mm=thickness_mm, half_width_mm=half_width_mm)
     return Scene(Inclusion(size_mm, depth_mm, 80.0), Press(indentation_mm=indentation_mm), tissue=tissue)
 
 
@@ -146,7 +157,9 @@ def extreme_scenes() -> Iterator[tuple[str, Build, StrainName]]:
         *((f"depth {h:g} mm", partial(_centred, 10.0, h)) for h in (0.0, 1e-4, 0.01, 0.05, 0.2, 1.0, 15.0, 19.9, 20.0)),
         *((f"E ratio {ratio:g}", partial(_centred, 10.0, 6.0, 5.0 * ratio)) for ratio in (1e-3, 0.1, 1.0, 1e3, 1e6)),
         *((f"Poisson ratio {nu:g}", partial(_all_poisson, nu)) for nu in (0.0, 0.3, 0.499, 0.4999, 0.49999, 0.5)),
-        *((f"indentation {mm:g} mm", partial(_centred, 10.0, 6.0, 80.0, mm)) for mm in (1e-6, 6.0, 30.0)),
+        *((f"indentation {mm:g} mm", partial(_centred, 10.0, 6.0, 80.0, mm)) for mm in (1e-6, 6.0, 29.9, 30.0)),
+        *((f"force {force_n:g} N", partial(_forced, force_n)) for force_n in (1e-6, 0.5, 3.0, 7.0, 100.0, 1e4)),
+        *((f"E ratio 1 + {part:g}", partial(_centred, 10.0, 6.0, 5.0 * (1 + part))) for part in (1e-6, -1e-6)),
         ("skin 1000 times stiffer", partial(_under, TissueLayer("skin", 1.5, 5e3))),
         ("fat 1000 times softer", partial(_under, TissueLayer("fat", 3.0, 5e-3))),
         ("skin of 0.01 mm", partial(_under, TissueLayer("skin", 0.01, 50.0))),
@@ -155,11 +168,15 @@ def extreme_scenes() -> Iterator[tuple[str, Build, StrainName]]:
         ("waveguide layers 1000 apart", partial(_waveguide, 2e4, 20.0, 20.0)),
         ("slab thinner than the probe", partial(_slab, 8.0, 3.0, 2.0, 1.0)),
         ("slab of 1 mm", partial(_slab, 1.0, 0.3, 0.3, 0.1)),
+        ("slab of 1 mm, 999 mm wide", partial(_slab, 1.0, 0.3, 0.3, 0.1, 999.0)),
+        *((f"slab of {T:g} mm, {b:g} mm wide", partial(_large, T, b)) for T, b in ((999.0, 999.0), (999.0, 60.0))),
         ("press through the slab", partial(_slab, 8.0, 3.0, 2.0, 9.0)),
         ("inclusion wider than the probe", partial(_centred, 23.0, 3.0)),
         ("inclusion a flat disc of 25 mm", partial(_placed, Placement(width_ratio_x=5.0, width_ratio_y=5.0), 5.0)),
         ("dome of 1 mm at 6 mm", partial(_domed, 1.0, 6.0)),
         ("dome of 1 mm just touching", partial(_domed, 1.0, 0.01)),
+        ("dome of 1 mm, less than touching", partial(_domed, 1.0, 1e-5)),
+        *((f"dome of 1 mm, {force_n:g} N", partial(_forced, force_n, 1.0)) for force_n in (1e-5, 0.5, 100.0)),
         ("inclusion 30 mm off the axis", partial(_placed, Placement(offset_x_mm=30.0))),
         ("inclusion beyond the slab", partial(_placed, Placement(offset_x_mm=58.0))),
     ]
@@ -167,6 +184,8 @@ def extreme_scenes() -> Iterator[tuple[str, Build, StrainName]]:
     for mm in (0.01, 3.0, 6.0):
         yield f"finite strain, {mm:g} mm", partial(_centred, 10.0, 6.0, 80.0, mm), "finite"
     yield "finite strain, shallow inclusion, 3 mm", partial(_centred, 15.0, 2.0, 120.0, 3.0), "finite"
+    for force_n in (1.0, 100.0):
+        yield f"finite strain, {force_n:g} N", partial(_forced, force_n), "finite"
     yield "finite strain, E ratio 1e6", partial(_centred, 10.0, 6.0, 5e6, 2.0), "finite"
     yield "finite strain, void", partial(_centred, 10.0, 6.0, 5e-3, 2.0), "finite"
     yield "finite strain, Poisson ratio 0.4999", partial(_all_poisson, 0.4999), "finite"

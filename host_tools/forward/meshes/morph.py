@@ -27,6 +27,8 @@ REFERENCE_RADIUS_RATIO, REFERENCE_DEPTH_RATIO = 0.09, 0.4
 """The reference sphere's radius and its centre's depth, over the thickness of the slab."""
 SIZE_RATIO, DEPTH_RATIO = (2 / 30, 15 / 30), (4 / 30, 12 / 30)
 """Inclusions that the map reaches, over the slab's thickness: 2-15 mm wide and 4-12 mm deep in the default slab."""
+THIN_SLAB_RATIO = 100.0
+"""Half width over thickness above which the reference mesh cannot be made."""
 WIDE_SLAB_RATIO = 1.5
 """The slab must be at least so much wider (half width) than thick, or the side rays become too short."""
 
@@ -54,7 +56,7 @@ def reaches(scene: Scene) -> bool:
     T = scene.tissue.thickness_mm
     size, depth = scene.inclusion.size_mm / T, scene.inclusion.depth_mm / T
     inside = SIZE_RATIO[0] <= size <= SIZE_RATIO[1] and DEPTH_RATIO[0] <= depth <= DEPTH_RATIO[1]
-    return inside and scene.tissue.half_width_mm >= WIDE_SLAB_RATIO * T
+    return inside and WIDE_SLAB_RATIO <= scene.tissue.half_width_mm / T <= THIN_SLAB_RATIO
 
 
 def morphed_mesh(scene: Scene, *, order: int, resolution: Resolution | None = None) -> Any:

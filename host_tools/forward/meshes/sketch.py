@@ -71,9 +71,9 @@ class Sketch:
             self.geometry.SetMaterial(self._domains[region], region.partition("/")[0])
         return self._domains[region]
 
-    def mesh(self, grading: float) -> Any:
-        """Return the netgen mesh."""
-        return self.geometry.GenerateMesh(maxh=self.bulk_mm, grading=grading)
+    def mesh(self, grading: float, far_mm: float | None = None) -> Any:
+        """Return the netgen mesh, whose elements are nowhere larger than `far_mm`, or else `bulk_mm`."""
+        return self.geometry.GenerateMesh(maxh=far_mm or self.bulk_mm, grading=grading)
 
 
 def draw_waveguide(sketch: Sketch, waveguide: Waveguide, centre: int, rim: int, back_rim_mm: float) -> None:

@@ -18,6 +18,7 @@ from netgen.occ import Box, Cylinder, Glue, OCCGeometry, Pnt, Sphere, Z, gp_GTrs
 from ngsolve import HEX, PRISM, PYRAMID, TET, VOL, Det, IntegrationRule, Mesh, specialcf
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
+from host_tools.forward.meshes.mesh import spread
 from host_tools.scenes.scene import Scene
 
 SolidSymmetry = Literal["quarter", "half", "full"]
@@ -208,6 +209,8 @@ def _outer_name(centre: Shape, kind: str, scene: Scene, symmetry: SolidSymmetry)
 def _graded_mesh(body: Shape, scene: Scene, resolution: SolidResolution) -> Mesh:
     """Return the mesh, still straight, with the rims in layers."""
     body.faces["face"].maxh = resolution.face_mm
+    if spread(scene) > 1:
+        body.solids["layer.*"].maxh = resolution.bulk_mm
     _size_rims(body, scene, resolution)
     inclusion, place = scene.inclusion if scene.has_inclusion else None, scene.placement
     if inclusion is not None:
@@ -217,7 +220,7 @@ def _graded_mesh(body: Shape, scene: Scene, resolution: SolidResolution) -> Mesh
     if inclusion is not None:
         footprint_mm = FOOTPRINT_RATIO * (inclusion.depth_mm + inclusion.size_mm / 2)
         geometry.RestrictH((place.offset_x_mm, place.offset_y_mm, 0.0), footprint_mm)
-    sizes = {"maxh": resolution.bulk_mm, "grading": resolution.grading}
+    sizes = {"maxh": resolution.bulk_mm * spread(scene), "grading": resolution.grading}
     mesh = Mesh(geometry.GenerateMesh(**sizes, parallel_meshing=False))  # threads: another mesh at every call
     if resolution.rim_layers:
         mesh.RefineHP(resolution.rim_layers, resolution.rim_ratio)

@@ -22,7 +22,8 @@ from host_tools.forward.materials import Elasticity
 from host_tools.forward.press_model import Loaded, PressFailed
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import integral_over_face, pressure_of_forces
-from host_tools.forward.small_strain.linear_press import LinearPress
+from host_tools.forward.small_strain.folding import Folding
+from host_tools.forward.small_strain.linear_press import LinearPress, out_of_reach
 from host_tools.forward.symmetry import AXISYMMETRIC, Symmetry
 from host_tools.scenes.scene import Press
 
@@ -31,6 +32,8 @@ PENALTY_PER_MM = 2e4
 NEWTON_STEPS = 60
 TOLERANCE_RATIO = 1e-10
 """Newton has settled when its step, over the approach, is below this."""
+BISECTIONS = 12
+"""Contacts solved to find the largest press that can be had, to 1/4096 of the one asked for."""
 SLOPE_RATIO = 1e-3
 """A full step may leave the energy rising by so much of how steeply it fell: near the minimum that is rounding."""
 
@@ -88,10 +91,12 @@ class _Contact:
         form.Assemble()
         inverse = form.mat.Inverse(space.FreeDofs(), "sparsecholesky")
         push, u = form.mat.CreateColVector(), form.mat.CreateRowVector()
+        self.linear, self.inverse, self.pushed_dofs = linear, inverse, []
         found = []
         for component in linear.contact.normal_indices:
             # numbered otherwise than in the face's own space, but in the same order
             dofs = space.Range(component).start + self._dofs(space.components[component])
+            self.pushed_dofs.append(dofs)
             columns = []
             for dof in dofs:
                 push[:] = 0.0
@@ -110,7 +115,31 @@ class _Contact:
         return np.asarray(function.vec.FV().NumPy()[self.dofs])
 
     def at_all(self, presses: Sequence[Press]) -> list[FaceState]:
-        return [self._face_state(self._indentation_mm(press)) for press in presses]
+        """Return the face at every press; raise `PressFailed` for one that folds a body or touches too few elements."""
+        depths_mm = [self._indentation_mm(press) for press in presses]
+        if self._folds(max(depths_mm)):
+            slab_mm = self._folding(0.0).slab_mm
+            low_mm, high_mm = 0.0, min(max(depths_mm), slab_mm)
+            for _ in range(BISECTIONS):
+                middle_mm = (low_mm + high_mm) / 2
+                low_mm, high_mm = (low_mm, middle_mm) if self._folds(middle_mm) else (middle_mm, high_mm)
+            raise out_of_reach(presses, self._face_state(max(depths_mm)), self._face_state(low_mm), slab_mm)
+        return [self._face_state(indentation_mm) for indentation_mm in depths_mm]
+
+    def _folds(self, indentation_mm: float) -> bool:
+        folding = self._folding(indentation_mm)
+        return indentation_mm >= folding.slab_mm or folding.folds()
+
+    def _folding(self, indentation_mm: float) -> Folding:
+        """Return both bodies under the forces of the contact at an indentation."""
+        forces = self._forces(indentation_mm) if indentation_mm > 0 else 0 * self.gap
+        u = GridFunction(self.linear.contact.space)
+        push = u.vec.CreateVector()
+        push[:] = 0.0
+        for dofs, sign in zip(self.pushed_dofs, (1.0, -1.0), strict=True):
+            push.FV().NumPy()[dofs] = sign * forces
+        u.vec.data = self.inverse * push
+        return Folding(self.linear.contact, u)
 
     def _indentation_mm(self, press: Press) -> float:
         if press.indentation_mm is not None:

@@ -12,10 +12,11 @@ from ngsolve import BilinearForm, GridFunction, InnerProduct
 
 from host_tools.forward.face_state import MN_PER_N, FaceState
 from host_tools.forward.materials import Elasticity
-from host_tools.forward.press_model import Loaded
+from host_tools.forward.press_model import Loaded, PressFailed
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import Body, ContactSpace, contact_pressure_kpa, integral_over_face
 from host_tools.forward.small_strain.elasticity import Stress, lame_modulus_kpa, shear_modulus_kpa, stress, work
+from host_tools.forward.small_strain.folding import Folding
 from host_tools.forward.symmetry import Expression, Symmetry
 from host_tools.scenes.scene import Press
 
@@ -111,8 +112,11 @@ class LinearModel:
         self.order, self.other_order = order, other_order
 
     def press(self, elasticity: Elasticity, presses: Sequence[Press], *, estimate_error: bool) -> tuple[Loaded, ...]:
-        """Return the face at every press, at the model's order and at the other."""
-        unit = self._unit(elasticity, self.order)
+        """Return the face at every press, at the model's order and at the other; raise `PressFailed` where it folds."""
+        linear = LinearPress(self.mesh, self.symmetry, self.order, mixed=self.mixed)
+        u = linear.displacement(elasticity)
+        unit = linear.face_state(u, elasticity, self.sampler)
+        require_reach(presses, unit, Folding(linear.contact, u))
         other = self._unit(elasticity, self.other_order) if estimate_error else None
         return tuple(Loaded(at_press(press, unit), at_press(press, other) if other else None) for press in presses)
 
@@ -127,3 +131,25 @@ def at_press(press: Press, unit: FaceState) -> FaceState:
         return unit.scaled(press.indentation_mm / unit.indentation_mm)
     assert press.force_n is not None  # Press guarantees one of the two
     return unit.scaled(press.force_n / unit.force_n)
+
+
+def require_reach(presses: Sequence[Press], unit: FaceState, folding: Folding) -> None:
+    """Refuse a press that would turn matter inside out, with the largest one that does not."""
+    deepest = max((at_press(press, unit) for press in presses), key=lambda state: state.indentation_mm)
+    scale = deepest.indentation_mm / unit.indentation_mm
+    if deepest.indentation_mm < folding.slab_mm and not folding.folds(scale):
+        return
+    largest = unit.scaled(folding.largest_scale(min(scale, folding.slab_mm / unit.indentation_mm)))
+    raise out_of_reach(presses, deepest, largest, folding.slab_mm)
+
+
+def out_of_reach(presses: Sequence[Press], asked: FaceState, largest: FaceState, slab_mm: float) -> PressFailed:
+    """Return the exception that says what was asked for, and the largest press that can be had."""
+    by_force = any(press.force_n is not None for press in presses)
+    quantity = f"force_n is {asked.force_n:g} N" if by_force else f"indentation_mm is {asked.indentation_mm:g} mm"
+    limit = f"{largest.force_n:.3g} N" if by_force else f"{largest.indentation_mm:.3g} mm"
+    return PressFailed(
+        f"{quantity}, but must be below {limit}: at {largest.indentation_mm:.3g} mm of indentation and "
+        f"{largest.force_n:.3g} N small strain begins to turn probe or tissue inside out in this slab "
+        f"of {slab_mm:g} mm. Press less."
+    )

@@ -24,6 +24,8 @@ PROVOKED_BY = {
     "E012": "device/update/test_full_disk.py::test_a_disk_without_space_is_told_before_anything_is_written",
     "E014": "device/records/test_schema.py::test_what_a_newer_release_wrote_is_refused_and_left_as_it_is",
     "E020": "device/records/test_audit.py::test_what_was_changed_is_found_and_its_row_named",
+    "E030": "device/dicom/test_sender.py::test_an_archive_that_is_down_is_told_of_and_gets_all_once_it_is_there",
+    "E031": "device/dicom/test_sender.py::test_what_the_archive_refuses_is_told_of_until_it_is_sent_again",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",

@@ -179,7 +179,7 @@ def test_a_key_that_is_no_name_is_refused_and_nothing_is_done(ask, procedure, ke
 @pytest.mark.parametrize(
     ("method", "path", "allowed"),
     [
-        ("PATCH", "presses/p-1", "DELETE, GET"), ("DELETE", "presses", "POST"), ("PUT", "self-test", "GET, POST"),
+        ("PATCH", "presses/p-1", "DELETE, GET"), ("DELETE", "presses", "GET, POST"), ("PUT", "self-test", "GET, POST"),
         ("POST", "openapi.json", "GET, HEAD"),
     ],
 )  # fmt: skip

@@ -21,7 +21,9 @@ PICTURE, RECORDING = "GET measurements/{measurement_id}/image.png", "GET measure
 
 def good(operation):
     """Return status, media types with their schemas, and headers of the good answer."""
-    [(status, answer)] = ((status, answer) for status, answer in operation["responses"].items() if status != "default")
+    [(status, answer)] = (
+        (status, answer) for status, answer in operation["responses"].items() if status not in ("304", "default")
+    )
     return int(status), {name: one["schema"] for name, one in answer["content"].items()}, answer.get("headers", {})
 
 
@@ -69,17 +71,33 @@ def test_who_starts_something_is_told_where_to_follow_it():
 
 def test_what_changes_something_wants_the_version_that_was_seen_and_what_starts_something_may_have_a_key():
     headers = {
-        name: {one["name"]: one["required"] for one in operation.get("parameters", ()) if one["in"] == "header"}
+        name: {
+            one["name"]: one["required"]
+            for one in operation.get("parameters", ())
+            if one["in"] == "header" and one["name"] != "If-None-Match"
+        }
         for name, operation in OPERATIONS.items()
     }
     acts = ("PATCH exams/{exam_id}", *(f"POST measurements/{{measurement_id}}/{act}" for act in ("move", "void")))
     assert {name: wanted for name, wanted in headers.items() if wanted} == {
         "POST presses": {"Idempotency-Key": False, "If-Match": False},
         "POST exams": {"Idempotency-Key": False},
-        **{act: {"If-Match": True} for act in acts},
+        **{act: {"If-Match": True} for act in (*acts, "POST exams/{exam_id}/dicom")},
     }
     for name in (*acts, "GET exams/{exam_id}", "GET measurements/{measurement_id}", "POST exams"):
         assert "ETag" in good(OPERATIONS[name])[2]
+
+
+def test_what_has_a_tag_is_not_sent_again_to_who_has_it():
+    tagged = [name for name in OPERATIONS if name.startswith("GET") and "ETag" in good(OPERATIONS[name])[2]]
+    asking = [
+        name
+        for name, operation in OPERATIONS.items()
+        if "If-None-Match" in [one["name"] for one in operation.get("parameters", ())]
+    ]
+    assert asking == tagged == [name for name, operation in OPERATIONS.items() if "304" in operation["responses"]]
+    lists = {f"GET {name}" for name in ("measurements", "presses", "exams", "audit")}
+    assert {*lists, PICTURE, RECORDING, "GET exams/{exam_id}", "GET measurements/{measurement_id}"} <= set(tagged)
 
 
 def test_every_reference_leads_somewhere():

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 
 from device.config import Config
 from device.instrument.status import StatusBoard
+from device.records.listing import Page
 from device.web import kept_files
 from device.web.app import create_app
 from device.web.events import StatusFeed, status_events
@@ -35,8 +36,12 @@ class Witness:
     def measurement(self, measurement_id):
         return self.note("measurement", MEASUREMENT)
 
-    def measurements(self, *, before_seq, limit, exam_id):
-        return self.note("measurements", [MEASUREMENT])
+    @property
+    def listing(self):
+        def listed(what):
+            return lambda wanted, *, before, limit: self.note(what, Page([], None))
+
+        return types.SimpleNamespace(measurements=listed("measurements"), presses=listed("presses"))
 
     def recording_path(self, recording_id):
         return self.note("recording", self.folder)
@@ -59,6 +64,7 @@ def witness(tmp_path, monkeypatch):
 
 HEAVY = {
     "measurements": "measurements",
+    "presses": "presses",
     "measurements/m-1": "measurement",
     "measurements/m-1/features": "measurement",
     "measurements/m-1/image.png": "picture",

@@ -60,8 +60,8 @@ def test_an_exam_is_made_read_and_listed(ask):
     assert schema.Exam.model_validate(made.json()).clock_position == 10
     found = ask("GET", made.headers["location"].removeprefix("/api/v1/"))
     assert (found.status_code, found.headers["etag"], found.json()) == (200, '"1"', made.json())
-    assert ask("GET", "exams?patient_ref=A-17").json() == {"exams": [made.json()]}
-    assert ask("GET", "exams?kind=phantom").json() == {"exams": []}
+    assert ask("GET", "exams?patient_ref=A-17").json() == {"exams": [made.json()], "next": None}
+    assert ask("GET", "exams?kind=phantom").json() == {"exams": [], "next": None}
 
 
 def test_an_exam_with_a_key_is_made_once(ask, store):
@@ -153,7 +153,7 @@ def test_a_measurement_is_moved_and_voided_with_its_version_and_audited(ask, sto
     assert [one.headers["etag"] for one in (found, moved, voided)] == ['"1"', '"2"', '"3"']
     assert moved.json() == kept | {"exam_id": exam["id"], "version": 2}
     assert voided.json()["voided"]["reason"] == "Mixed up"
-    assert ask("GET", f"measurements?exam_id={exam['id']}").json() == {"measurements": [voided.json()]}
+    assert ask("GET", f"measurements?exam_id={exam['id']}").json() == {"measurements": [voided.json()], "next": None}
     audit = schema.AuditList.model_validate(ask("GET", f"audit?subject={kept['id']}").json())
     assert [entry.what for entry in audit.entries] == ["measurement_voided", "measurement_moved"]
     told = [entry["what"] for entry in ask("GET", "audit").json()["entries"]]

@@ -79,6 +79,7 @@ def test_finite_strain_on_request_is_true_sliding_with_its_plan_in_the_json():
             "strain is finite",
         ),
         (("--scene", "nowhere.toml"), "nowhere.toml"),
+        ((*INCLUSION, "--force-n", "100"), "force_n is 100 N, but must be below 3.0"),
     ],
 )
 def test_what_cannot_be_solved_is_refused_in_one_sentence(options, words):

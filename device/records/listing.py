@@ -1,0 +1,111 @@
+"""Measurements, presses and exams as lists: newest first, page by page, of an exam, a time, a mode or an outcome.
+
+Their order is that in which they were kept, never that of a clock, which may have been set.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any
+
+from device.records.exams import filed
+
+_Record = dict[str, Any]
+NEWEST = 2**63 - 1
+"""Above every number of a record: the largest integer SQLite holds."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which records a list is of; what is None does not matter.
+
+    `since` and `until`: RFC 3339 in UTC with milliseconds, as the records have it; the second is not in it any more.
+    `outcome`: the status of a measurement's estimate, or the state of a press.
+    """
+
+    exam_id: str | None = None
+    since: str | None = None
+    until: str | None = None
+    mode: str | None = None
+    outcome: str | None = None
+
+
+@dataclass(frozen=True)
+class Page:
+    """Records, and the number below which those of the next page are; None when there are no more."""
+
+    records: list[_Record]
+    next_before: int | None
+
+
+class Listing:
+    """The lists of a store; all methods may be called from any thread."""
+
+    def __init__(self, transaction: Callable[[], AbstractContextManager[sqlite3.Connection]]) -> None:
+        """Take how a transaction of the store is begun."""
+        self._transaction = transaction
+
+    def measurements(self, wanted: Wanted, *, before: int = NEWEST, limit: int) -> Page:
+        """Return measurements as `Store.measurement` does, of the exam that each belongs to now."""
+        where = {
+            "exam_id = ?": wanted.exam_id,
+            "json_extract(record, '$.taken_at') >= ?": wanted.since,
+            "json_extract(record, '$.taken_at') < ?": wanted.until,
+            "json_extract(record, '$.mode') = ?": wanted.mode,
+            "json_extract(record, '$.estimate.status') = ?": wanted.outcome,
+        }
+        table = "measurement LEFT JOIN filing ON measurement_id = id"
+        rows = self._rows("seq, record, exam_id, voided, version", table, "seq", where, before, limit)
+        return _page([(seq, {**json.loads(record), **filed(*filing)}) for seq, record, *filing in rows], limit)
+
+    def presses(self, wanted: Wanted, *, before: int = NEWEST, limit: int) -> Page:
+        """Return press jobs; one that is under way is the first. Those of releases that kept no time are in none."""
+        where = {
+            "json_extract(record, '$.exam_id') = ?": wanted.exam_id,
+            "json_extract(record, '$.asked_at') >= ?": wanted.since,
+            "json_extract(record, '$.asked_at') < ?": wanted.until,
+            "json_extract(record, '$.mode') = ?": wanted.mode,
+            "json_extract(record, '$.state') = ?": wanted.outcome,
+        }
+        rows = self._rows("rowid, record", "press", "rowid", where, before, limit)
+        return _page([(number, json.loads(record)) for number, record in rows], limit)
+
+    def exams(
+        self,
+        wanted: Wanted,
+        *,
+        kind: str,
+        patient_ref: str | None = None,
+        order_number: str | None = None,
+        before: int = NEWEST,
+        limit: int,
+    ) -> Page:
+        """Return the exams of one kind, of a patient or an order where one is given, by when they were made."""
+        where = {
+            "json_extract(record, '$.kind') = ?": kind,
+            "json_extract(record, '$.patient_ref') = ?": patient_ref,
+            "json_extract(record, '$.order_number') = ?": order_number,
+            "json_extract(record, '$.made_at') >= ?": wanted.since,
+            "json_extract(record, '$.made_at') < ?": wanted.until,
+        }
+        rows = self._rows("seq, record", "exam", "seq", where, before, limit)
+        return _page([(seq, json.loads(record)) for seq, record in rows], limit)
+
+    def _rows(
+        self, columns: str, table: str, number: str, where: Mapping[str, str | None], before: int, limit: int
+    ) -> list[Any]:
+        """Return one row more than the page has, if there is one: then there is a next page."""
+        asked = {condition: value for condition, value in where.items() if value is not None}
+        conditions = " AND ".join([f"{number} < ?", *asked])
+        query = f"SELECT {columns} FROM {table} WHERE {conditions} ORDER BY {number} DESC LIMIT ?"
+        with self._transaction() as db:
+            return db.execute(query, (before, *asked.values(), limit + 1)).fetchall()
+
+
+def _page(numbered: list[tuple[int, _Record]], limit: int) -> Page:
+    shown = numbered[:limit]
+    return Page([record for _, record in shown], shown[-1][0] if len(numbered) > limit else None)

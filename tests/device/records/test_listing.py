@@ -1,0 +1,98 @@
+"""Lists of what was kept: newest first, page by page without loss or repetition, and only what was asked for."""
+
+import pytest
+from kept_measurements import keep, taken
+
+from device.records.exams import ExamContent
+from device.records.listing import Wanted
+from device.records.store import Store
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def exam(store):
+    return store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
+
+
+@pytest.fixture
+def seven(store, exam):
+    """Seven measurements: the even ones of the exam, every third in mode quick, the last without an answer."""
+    for number in range(1, 8):
+        keep(
+            store, number, exam_id=None if number % 2 else exam["id"],
+            mode="standard" if number % 3 else "quick", status="no_contact" if number == 7 else "ok",
+        )  # fmt: skip
+    return store
+
+
+def ids(page):
+    return [int(one["id"].split("-")[1]) for one in page.records]
+
+
+@pytest.mark.parametrize("kind", ["measurements", "presses"])
+@pytest.mark.parametrize("limit", [1, 2, 3, 6, 7, 8])
+def test_pages_hold_everything_once_newest_first(seven, kind, limit):
+    listed, found, before = getattr(seven.listing, kind), [], {}
+    while True:
+        page = listed(Wanted(), limit=limit, **before)
+        found += ids(page)
+        if page.next_before is None:
+            break
+        before = {"before": page.next_before}
+        assert len(page.records) == limit
+    assert found == [7, 6, 5, 4, 3, 2, 1]
+
+
+@pytest.mark.parametrize("kind", ["measurements", "presses"])
+def test_a_list_is_of_an_exam_a_time_and_a_mode(seven, exam, kind):
+    def listed(**wanted):
+        return ids(getattr(seven.listing, kind)(Wanted(**wanted), limit=99))
+
+    assert listed(exam_id=exam["id"]) == [6, 4, 2]
+    assert listed(mode="quick") == [6, 3]
+    assert listed(since=taken(5)) == [7, 6, 5]
+    assert listed(until=taken(3)) == [2, 1]
+    assert listed(since=taken(3), until=taken(5), mode="standard", exam_id=exam["id"]) == [4]
+    assert listed(exam_id="none") == []
+
+
+def test_a_list_is_of_an_outcome(seven):
+    assert ids(seven.listing.measurements(Wanted(outcome="no_contact"), limit=99)) == [7]
+    seven.save_press({"id": "p-8", "state": "cancelled"})
+    assert ids(seven.listing.presses(Wanted(outcome="cancelled"), limit=99)) == [8]
+    assert ids(seven.listing.presses(Wanted(outcome="done"), limit=99)) == [7, 6, 5, 4, 3, 2, 1]
+
+
+def test_a_measurement_is_listed_in_the_exam_it_was_moved_to_as_it_is_read(seven, exam):
+    seven.exams.move("m-3", exam["id"], version=1, by="Ada", reason="Hers")
+    page = seven.listing.measurements(Wanted(exam_id=exam["id"]), limit=99)
+    assert ids(page) == [6, 4, 3, 2]
+    assert page.records == [seven.measurement(one["id"]) for one in page.records]
+
+
+def test_a_press_that_goes_on_comes_first(seven):
+    for state in ("waiting", "capturing"):
+        seven.save_press({"id": "p-9", "state": state})
+        page = seven.listing.presses(Wanted(), limit=1)
+        assert (ids(page), page.records[0]["state"]) == ([9], state)
+
+
+def test_exams_are_listed_by_patient_order_kind_and_time(store, exam):
+    other = store.exams.make(ExamContent(kind="patient", patient_ref="B-2", order_number="4711", operator="Ada"))
+    phantom = store.exams.make(ExamContent(kind="phantom", operator="Ada"))
+
+    def listed(wanted=None, kind="patient", **named):
+        return [one["id"] for one in store.listing.exams(wanted or Wanted(), kind=kind, limit=9, **named).records]
+
+    assert listed() == [other["id"], exam["id"]]
+    assert listed(patient_ref="A-17") == [exam["id"]]
+    assert listed(order_number="4711") == [other["id"]]
+    assert listed(kind="phantom") == [phantom["id"]]
+    assert listed(Wanted(since="9999-01-01T00:00:00.000Z")) == []
+    assert store.listing.exams(Wanted(), kind="patient", limit=1).next_before == other["seq"]
