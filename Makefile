@@ -13,6 +13,8 @@ LOGIN ?= pi
 SSH ?=
 TIME_ZONE ?=
 CHECK ?=
+KILLS ?= 200
+CUTS ?= 100
 TRUSTED ?= $(HOME)/.config/tsis/release_signers
 DEPLOY_KEY ?= $(HOME)/.ssh/id_ed25519.pub
 PY := .venv/bin/python
@@ -21,7 +23,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # The tests start hundreds of interpreters: without its cache each would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes tradeoff pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts torture test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes tradeoff pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -62,6 +64,10 @@ test-systemd: ## run the unit under a real systemd, in a Debian container under 
 
 test-power-cuts: .venv/all.stamp ## cut the power fifty times while releases are installed, on a disk in a file (root, three minutes)
 	$(PY) tests/deploy/power_cuts.py
+
+torture: .venv/all.stamp ## kill the daemon 200 times in presses and cut the power 100 times while it keeps them (root for the cuts, an hour): make torture [KILLS=200] [CUTS=100]
+	$(PY) tests/torture/kills.py --kills $(KILLS)
+	$(PY) tests/torture/cuts.py --cuts $(CUTS)
 
 test-arm: .venv/all.stamp ## install a release file for an arm in an emulated Debian under build, compare its answers with this machine's (root, 2 GB, a quarter of an hour)
 	tests/deploy/arm64.sh build/arm64

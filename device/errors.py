@@ -454,6 +454,33 @@ class DiskFullError(StorageError):
     title = "Disk full"
 
 
+class DamagedStoreError(StorageError):
+    """The database of measurements is damaged; what can still be read is shown, and nothing is measured or changed."""
+
+    code = "E603"
+    title = "Measurements damaged"
+    status = 500
+
+
+class DamagedRecordingError(StorageError):
+    """A recording is missing or is not as it was kept; it is not handed out, and the probe still measures."""
+
+    code = "E604"
+    title = "Recording damaged"
+    status = 500
+    severity = "warning"
+    is_lasting = True
+
+
+class OrphanedRecordings(StorageError):  # noqa: N818 - the name is what the operator reads
+    """Recordings were found that belong to no measurement, as a kill in the middle of keeping one leaves them."""
+
+    code = "E605"
+    title = "Recordings set aside"
+    severity = "warning"
+    is_lasting = True
+
+
 class NewerDataError(StorageError):
     """The data folder was written by a newer release than this one, which cannot read it."""
 
@@ -580,4 +607,12 @@ class UncleanEndError(DeviceError):
 
     code = "E903"
     title = "Ended without a stop"
+    severity = "warning"
+
+
+class InterruptedPress(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The daemon ended in the middle of a press: it was not measured; shown until a press has told of it."""
+
+    code = "E904"
+    title = "Press broken off"
     severity = "warning"

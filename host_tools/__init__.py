@@ -15,7 +15,7 @@
   `Estimate`, `ModeModels`, `installed_models`, `analyse`
 - refusals: `InvalidQuantity`, `PressFailed`, `BundleRefused`
 
-Modules in reading order: `door`, `workers`.
+Modules in reading order: `door`, `workers`, `interrupts`.
 
 Rooms in the order of a scene: `scenes`, `forward`, `data`, `optics`, `probe_tables`, `calibration`, `paper_network`,
 `press_models`, `cramer_rao`, `scores`, `verification`, `replication`, `tradeoff`; `pages` writes documents, `release`

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from host_tools import interrupts  # noqa: F401 - before all that takes time
+
+# isort: split
 import sys
 
 import typer

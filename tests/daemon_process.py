@@ -49,6 +49,7 @@ class Daemon:
     To its scene comes that no frame is late, unless that has settings of the camera: on a busy machine many are.
     `program` is what Python runs instead of `-m device`; `environment` comes on top of that of the tests. With
     `arguments` it is not simulated: they are its whole command line. `root` stands for / where it looks for files.
+    `own_group`: it and its camera's process can be killed together, by the group of its number.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class Daemon:
         environment: Mapping[str, str] | None = None,
         arguments: Sequence[str] = (),
         root: Path | None = None,
+        own_group: bool = False,
     ) -> None:
         if not arguments:
             (folder / "scene.toml").write_text(scene if "[settings.camera]" in scene else scene + PATIENT)
@@ -78,6 +80,7 @@ class Daemon:
             stdout=subprocess.PIPE,
             stderr=self.log,
             text=True,
+            start_new_session=own_group,
         )
         assert self.process.stdout is not None
         greeting = self.process.stdout.readline()

@@ -92,3 +92,15 @@ def test_what_is_refused_is_the_one_problem(client):
     problem = route("exams.get_exam").sync("none", client=client)
     assert (type(problem).__name__, problem.code, problem.status) == ("Problem", "E802", 404)
     assert problem.remedy
+
+
+def test_it_downloads_the_measurements_as_table_arrays_and_recordings(client, exam, measurement):
+    rows = asked("exports.export_table", client, exam_id=exam.id).splitlines()
+    assert [row.split(",")[0] for row in rows] == ["measurement_id", measurement.id]
+    arrays = asked("exports.export_arrays", client, exam_id=exam.id).payload
+    with np.load(arrays, allow_pickle=False) as file:
+        assert file["size_mm"] == [measurement.estimate.size_mm.value]
+        assert list(file["feature_names"]) == sorted(measurement.features.additional_properties)
+    recordings = asked("exports.export_recordings", client, exam_id=exam.id).payload
+    with zipfile.ZipFile(recordings) as archive:
+        assert f"recordings/{measurement.recording_id}.zip" in archive.namelist()

@@ -239,7 +239,7 @@ def test_a_press_with_a_key_is_started_once_also_over_a_kill(tmp_path):
     answers = {(one.status, one.headers["location"], one.body) for one in (first, again, replayed)}
     assert answers == {(202, f"/api/v1/presses/{job['id']}", first.body)}
     assert (other.status, other.json["code"]) == (409, "E810")
-    assert (status["press"], job["state"]) == (None, "failed")
+    assert (status["press"], job["state"]) == (job, "failed")
 
 
 def test_a_daemon_whose_certificate_has_expired_serves_and_refuses_presses_with_its_code(tmp_path):

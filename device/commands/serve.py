@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import json
+import logging
 import os
 import socket
 import time
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from device import __version__
 from device.access.known_hosts import ANYWHERE
 from device.config import Config
-from device.errors import ConfigError, DeviceError, ModelError
+from device.errors import ConfigError, DeviceError, ModelError, StorageError
 from device.fallback.handover import ask_for_port, is_fallback
 from device.fallback.start_note import write_note
 from device.instrument.watch.restart_note import RestartNote
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from device.dicom.hospital import Hospital
     from device.instrument.procedure import Procedure
 
+log = logging.getLogger(__name__)
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
 START_AGAIN = "Then start the daemon again."
 
@@ -48,10 +50,16 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
         from device.instrument.watch.watchdog import Watchdog
 
         note = RestartNote(config.data)
-        told = settings.warning, note.warning(), Updates(config.updates).warning(), procedure.store.audit.warning()
+        told = (
+            settings.warning,
+            note.warning(),
+            Updates(config.updates).warning(),
+            procedure.store.audit.warning(),
+            *procedure.board.now.warnings,
+        )
         warnings = tuple(warning for warning in told if warning)
         procedure.board.update(warnings=warnings)
-        procedure.store.audit.note_in_use(in_use(config, procedure.calibration.id))
+        _note_in_use(procedure)
         watchdog = Watchdog(procedure.progress, procedure.board, note)
         with _noted(note), ExitStack() as ending:
             procedure.start()
@@ -66,6 +74,14 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
                 settings.keep()
             _run_server(procedure, hospital, port.listening())
     return 0
+
+
+def _note_in_use(procedure: Procedure) -> None:
+    """Write down what the probe works by; a store that takes nothing is the procedure's to tell, and stops no start."""
+    try:
+        procedure.store.audit.note_in_use(in_use(procedure.config, procedure.calibration.id))
+    except StorageError as error:
+        log.error("%s %s", error.code, error)
 
 
 def in_use(config: Config, calibration_id: str) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from device.config import Config
-from device.errors import DeviceError, LightError, LightRestError, NoContrastError
+from device.errors import DeviceError, InterruptedPress, LightError, LightRestError, NoContrastError
 from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
@@ -32,12 +32,13 @@ from device.instrument.press.states import Guidance, PressState, before_contact
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
 from device.instrument.self_test.run import SelfTestRun
-from device.instrument.status import PressJob, StatusBoard
+from device.instrument.status import PressJob, StatusBoard, kept_job
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
+from device.instrument.watch.recordings_watch import RecordingsWatch
 from device.measurement.mode import FRAMES, Mode, ModeWorth
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
@@ -88,13 +89,14 @@ class Procedure:
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
+        self._show_what_was_kept()
         self._encoded = EncodedFrames()
         self._answers = PressAnswers(
             config, calibration, estimator, adviser, store, self.progress, simulated_truth, self._encoded.png_of
         )
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
-        self._computer = computer
+        self._computer, self._recordings = computer, RecordingsWatch(store)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
@@ -136,11 +138,20 @@ class Procedure:
         """Return which parts were seen working just now; waits for none of them."""
         return parts_health(self.board.now, self.progress, self.bench.force.fault)
 
+    def _show_what_was_kept(self) -> None:
+        """Show the press before the start and its result, and tell of one that was broken off by the end before."""
+        job, warnings = kept_job(self.store.last_press()), list[DeviceError](self.store.findings.warnings())
+        if self.store.interrupted:
+            cause = f"A press was broken off when the daemon ended, at {self.store.interrupted[-1].get('asked_at')}."
+            warnings.append(InterruptedPress(cause, "Press again; measurements that were shown are kept."))
+        self.board.update(press=job, measurement_id=job.measurement_id if job else None, warnings=tuple(warnings))
+
     def start(self) -> None:
         """Begin to wait for presses."""
         self._darkening.start()
         if self._computer:
             self._computer.start()
+        self._recordings.start()
         self._thread.start()
 
     def stop(self) -> None:
@@ -155,6 +166,7 @@ class Procedure:
         self._darkening.join(timeout=1.0)
         if self._computer:
             self._computer.close()
+        self._recordings.close()
         self._encoded.close()
         self._opened.close()
 
@@ -269,7 +281,7 @@ class Procedure:
         self._look_at_disk()
         self._book.save_light_hours(at_least_s=SAVE_LIGHT_EVERY_S)
         self._book.warn(self._clock.warning())
-        self._warn_of_computer()
+        self._warn_of_watches()
         self.calibration.require_valid(self._clock.now())
         self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
@@ -297,7 +309,7 @@ class Procedure:
             if job := self._requests.begin(is_touched=is_touched):
                 return job
             self.progress.beat()
-            self._warn_of_computer()
+            self._warn_of_watches()
             if time.monotonic() - self._used_s >= REST_AFTER_S:
                 self.bench.rest()
         return None
@@ -344,7 +356,7 @@ class Procedure:
         self._book.note(job, state="capturing", progress=0.1)
         self.board.update(step="reference", measurement_id=None)
         reference = self._capture.loaded("reference", job.mode)
-        self._warn_of_computer()
+        self._warn_of_watches()
         levels = self._capture.side_levels(reference)
         self._book.warn(self._dimming.warning(levels))
         self._book.warn(self._brightness.saw(levels))
@@ -368,7 +380,7 @@ class Procedure:
         self._darken()
         self.board.update(step="computing", guidance=Guidance.LIFT)
         self._book.warn(self._clock.warning())
-        self._warn_of_computer()
+        self._warn_of_watches()
         return frames, scan
 
     def _scan(self, job: PressJob, beside: list[Frame], started_at: str) -> Scan:
@@ -385,10 +397,10 @@ class Procedure:
             note=note,
         )
 
-    def _warn_of_computer(self) -> None:
-        """Show what the computer's watch has seen since the last time; what is shown already is not logged again."""
+    def _warn_of_watches(self) -> None:
+        """Show what the watches have seen since the last time; what is shown already is not logged again."""
         shown = [one.as_record() for one in self.board.now.warnings]
-        for warning in self._computer.taken() if self._computer else ():
+        for warning in (*(self._computer.taken() if self._computer else ()), *self._recordings.taken()):
             if warning.as_record() not in shown:
                 self._book.warn(warning)
 

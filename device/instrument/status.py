@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 from device.errors import DeviceError
@@ -52,6 +52,15 @@ class PressJob:
     def as_record(self) -> dict[str, Any]:
         """Return the job as JSON object."""
         return asdict(self)
+
+
+def kept_job(record: Mapping[str, Any] | None) -> PressJob | None:
+    """Return the job of a record that was kept, also by another release; None of one that says too little."""
+    names = {one.name for one in fields(PressJob)}
+    if record is None or not {"id", "mode"} <= record.keys():
+        return None
+    said = {name: value for name, value in record.items() if name in names}
+    return PressJob(**{**said, "warnings": tuple(said.get("warnings") or ())})
 
 
 @dataclass(frozen=True)

@@ -64,17 +64,14 @@ class AuditHead:
         return f"{self.seq}:{self.hash}"
 
 
-def prepare_audit(db: sqlite3.Connection) -> None:
-    """Make the audit's table, or chain that of an earlier release as it is found."""
-    db.executescript(AUDIT_TABLE)
-    if "hash" not in [column[1] for column in db.execute("PRAGMA table_info(audit)")]:
-        with db:
-            db.execute("BEGIN IMMEDIATE")
-            for trigger in ("audit_is_never_changed", "audit_is_never_deleted"):
-                db.execute(f"DROP TRIGGER IF EXISTS {trigger}")
-            db.execute("ALTER TABLE audit ADD COLUMN hash TEXT")
-            _chain_all(db)
-    db.executescript(AUDIT_GUARDS)
+def chain_older_audit(db: sqlite3.Connection) -> None:
+    """Chain the audit of a release that had no chain, as it is found, in a transaction that is under way."""
+    if "hash" in [column[1] for column in db.execute("PRAGMA table_info(audit)")]:
+        return
+    for trigger in ("audit_is_never_changed", "audit_is_never_deleted"):
+        db.execute(f"DROP TRIGGER IF EXISTS {trigger}")
+    db.execute("ALTER TABLE audit ADD COLUMN hash TEXT")
+    _chain_all(db)
 
 
 def _chain_all(db: sqlite3.Connection) -> None:

@@ -1,8 +1,7 @@
 """Measurements and press jobs in SQLite, recordings beside it: a .zip each, or a folder of an earlier release.
 
-A recording is on the disk before its row is, and the row before the press is called done. WAL with synchronous=FULL:
-with NORMAL the last acknowledged row may be gone after a power cut. A job that a restart interrupted says so. The
-database has the number of its form (device/records/schema.py): one of a newer release is left as it is.
+A recording is on the disk before its row is, and the row before the press is called done: `database` says how that
+lasts. A job that a restart interrupted says so. Of a damaged database what can be read is shown, and nothing written.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import json
+import logging
 import os
 import sqlite3
 import threading
@@ -18,77 +18,59 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from device.errors import DiskFullError, NewerDataError, StorageError, UnknownResource
+from device.errors import DamagedStoreError, DiskFullError, InterruptedPress, StorageError, UnknownResource
 from device.files.recording_file import FrameEncoder, png_of, remove_recording, write_recording
 from device.measurement.recording.recording import Recording
-from device.records.asked_once import ANSWERS_TABLE, AskedOnce, first_answer, keep_answer
-from device.records.audit import Audit, append, prepare_audit
+from device.records.asked_once import AskedOnce, first_answer, keep_answer
+from device.records.audit import Audit, append
+from device.records.database import open_database
 from device.records.disk import Disk, LocalDisk, read_uncached
-from device.records.exams import EXAM_TABLES, UNFILED, AskedExam, Exams, exam_of, filed
+from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.listing import Listing
-from device.records.outbox import OUTBOX_TABLES, Outbox
-from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
-from device.records.tokens import TOKENS_TABLE, Tokens
+from device.records.manifest import fingerprint_of, note_kept
+from device.records.outbox import Outbox
+from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
+from device.records.tokens import Tokens
 
+log = logging.getLogger(__name__)
 StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
-TABLES = """
-CREATE TABLE IF NOT EXISTS measurement
-  (seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE NOT NULL, record TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS press (id TEXT PRIMARY KEY, ended INTEGER NOT NULL, record TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS counter (name TEXT PRIMARY KEY, value REAL NOT NULL);
-"""
+BROKEN_OFF, PRESS_AGAIN = "The daemon was restarted during the press:", "press again."
 
 
 class Store:
     """The device's memory. All methods may be called from any thread."""
 
     def __init__(self, folder: Path, disk: Disk | None = None) -> None:
-        """Open or create; raise `StorageError` when the folder cannot be written or the database is damaged.
+        """Open or create; raise `StorageError` when the folder cannot be written or holds no database.
 
-        Raises `NewerDataError` when a newer release wrote it, before anything in it is changed.
+        Raises `NewerDataError` when a newer release wrote it, before anything in it is changed. Of a damaged database
+        what can be read is shown: see `require_whole`.
         """
         self.folder, self._disk, self._lock = folder, disk or LocalDisk(), threading.Lock()
+        self.findings, self._ended_late = StartFindings(), dict[str, StoredRecord]()
         with ExitStack() as opened:
-            self._db = self._open(opened)
-            self._end_interrupted()
-            self._remove_unfinished()
+            self._db, self._damage = self._open(opened)
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
             self.tokens = Tokens(self._transaction)
             self.listing = Listing(self._transaction)
             self.outbox = Outbox(self._transaction)
+            self.recordings = KeptRecordings(folder, self._transaction)
+            self.interrupted = tuple(map(_broken_off, self._records("SELECT record FROM press WHERE ended = 0")))
+            if not self._damage:
+                self._put_in_order()
             self._opened = opened.pop_all()
 
-    def _open(self, opened: ExitStack) -> sqlite3.Connection:
+    def _open(self, opened: ExitStack) -> tuple[sqlite3.Connection, DamagedStoreError | None]:
         try:
-            (self.folder / "recordings").mkdir(parents=True, exist_ok=True)
+            (self.folder / RECORDINGS).mkdir(parents=True, exist_ok=True)
             self._take(opened)
-            db = sqlite3.connect(self.folder / "tsis.sqlite", check_same_thread=False)
-            opened.enter_context(closing(db))
-            self._require_readable(db)
-            db.execute("PRAGMA journal_mode = WAL")
-            db.execute("PRAGMA synchronous = FULL")
-            db.executescript(TABLES + ANSWERS_TABLE + EXAM_TABLES + TOKENS_TABLE + OUTBOX_TABLES)
-            prepare_audit(db)
-            self._number(db)
+            database = open_database(self.folder)
+            opened.enter_context(closing(database.connection))
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
             raise StorageError(f"The store {self.folder} cannot be opened: {error}.", remedy) from error
-        return db
-
-    def _require_readable(self, db: sqlite3.Connection) -> None:
-        """Raise `NewerDataError` when this release does not know the database's form."""
-        form = _form(db) or UNNUMBERED
-        if form not in STORE_READS:
-            known = " and ".join(map(str, STORE_READS))
-            cause = f"The measurements in {self.folder} have schema {form}, and this release reads {known}."
-            raise NewerDataError(cause, "Install the newer release again.")
-
-    def _number(self, db: sqlite3.Connection) -> None:
-        """Write the number of the form into the file itself, where an update reads it, and not only into its log."""
-        if _form(db) != STORE_WRITES or store_schema(self.folder / "tsis.sqlite") != STORE_WRITES:
-            db.execute(f"PRAGMA user_version = {STORE_WRITES:d}")
-            db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        return database.connection, database.damage
 
     def _take(self, opened: ExitStack) -> None:
         """Hold the folder for this process: a second daemon on it would end the first one's presses."""
@@ -99,16 +81,30 @@ class Store:
             remedy = "Stop it, or give this one another folder with the setting `data`."
             raise StorageError(f"The store {self.folder} is in use by another daemon.", remedy) from None
 
-    def _remove_unfinished(self) -> None:
-        """Remove recordings that a power cut left half written; nobody was ever told of them."""
-        for unfinished in (self.folder / "recordings").glob("*.tmp"):
-            remove_recording(unfinished)
+    def _put_in_order(self) -> None:
+        """End what the daemon before has left; a disk that is full just now puts that off, and stops nothing."""
+        self._ended_late = {job["id"]: job for job in self.interrupted}
+        try:
+            self._end_interrupted()
+        except DiskFullError as error:
+            log.error("%s %s", error.code, error)
+        try:
+            self.findings = self.recordings.look_through()
+        except OSError as error:
+            raise StorageError(
+                f"The recordings of {self.folder} cannot be read: {error}.", "Check the disk."
+            ) from error
 
     def _end_interrupted(self) -> None:
-        for job in self._records("SELECT record FROM press WHERE ended = 0"):
-            self.save_press(
-                job | {"state": "failed", "reason": "The daemon was restarted during the press: press again."}
-            )
+        while self._ended_late:
+            press_id, job = next(iter(self._ended_late.items()))
+            self.save_press(job)
+            self._ended_late.pop(press_id, None)
+
+    def require_whole(self) -> None:
+        """Raise `DamagedStoreError` when only a part of the database can be read: then nothing is measured."""
+        if self._damage:
+            raise self._damage
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
@@ -116,6 +112,7 @@ class Store:
             with self._lock, self._db:
                 yield self._db
         except (OSError, sqlite3.Error) as error:
+            self.require_whole()
             kind = DiskFullError if _is_full(error) else StorageError
             remedy = "Free the disk, and let no other program hold the database."
             raise kind(f"The disk did not take the record: {error}.", remedy) from error
@@ -125,11 +122,16 @@ class Store:
             return [json.loads(row[-1]) for row in db.execute(query, values)]
 
     def require_space(self, free_mb: float) -> None:
-        """Raise `DiskFullError` when less than `free_mb` (1e6 bytes) is left, `StorageError` when nobody can say."""
+        """Raise `DiskFullError` when less than `free_mb` (1e6 bytes) is left, `StorageError` when nobody can say.
+
+        Raises as `require_whole` as well. What a full disk has put off at the start is done once there is space.
+        """
+        self.require_whole()
         left_mb = self.free_mb
         if left_mb < free_mb:
             cause = f"The disk of {self.folder} has {left_mb:.0f} MB left, below {free_mb:g} MB."
-            raise DiskFullError(cause, "Copy recordings away and delete them there.")
+            raise DiskFullError(cause, "Save them with `python -m device backup FOLDER`, then free space.")
+        self._end_interrupted()
 
     @property
     def free_mb(self) -> float:
@@ -192,7 +194,12 @@ class Store:
         found = self._records("SELECT record FROM press WHERE id = ?", press_id)
         if not found:
             raise _unknown("press", press_id)
-        return found[0]
+        return self._ended_late.get(press_id, found[0])
+
+    def last_press(self) -> StoredRecord | None:
+        """Return the press job that changed last, None when there was none."""
+        found = self._records("SELECT record FROM press ORDER BY rowid DESC LIMIT 1")
+        return self._ended_late.get(found[0]["id"], found[0]) if found else None
 
     def add_measurement(
         self,
@@ -207,13 +214,16 @@ class Store:
 
         `encode` may know PNGs of the frames that were made before.
         """
-        path = self._place_of(recording.id)
+        self.require_whole()
+        path = self.recordings.place_of(recording.id)
         self.write_out(recording, path, encode=encode, picture=picture)
         try:
+            written = fingerprint_of(path)
             with self._transaction() as db:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
                 whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
                 db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
+                note_kept(db, recording.id, written)
                 if exam_id:
                     db.execute("INSERT INTO filing VALUES (?, ?, NULL, 1)", (record["id"], exam_id))
         except StorageError:
@@ -264,17 +274,8 @@ class Store:
             return float(sum(row[0] for row in db.execute("SELECT value FROM counter WHERE name = 'light_on_s'")))
 
     def recording_path(self, recording_id: str) -> Path:
-        """Return where a recording lies, a .zip or a folder; raise `StorageError` when it is not there any more."""
-        path = self._place_of(recording_id)
-        folder = path.with_suffix("")
-        if path.is_file():
-            return path
-        if (folder / "recording.json").is_file():
-            return folder
-        raise StorageError(f"The recording {recording_id} is missing or damaged.", "Restore it from a backup.")
-
-    def _place_of(self, recording_id: str) -> Path:
-        return self.folder / "recordings" / f"{recording_id}.zip"
+        """Return where a recording lies, a .zip or a folder; raises as `KeptRecordings.path`."""
+        return self.recordings.path(recording_id)
 
     def close(self) -> None:
         """Close the database and let go of the folder."""
@@ -286,6 +287,11 @@ def _unknown(what: str, identifier: str) -> UnknownResource:
     return UnknownResource(f"There is no {what} {identifier}.", "Use the id that the API gave.")
 
 
+def _broken_off(job: StoredRecord) -> StoredRecord:
+    """Return a press as it has ended when the daemon did before it."""
+    return job | {"state": "failed", "code": InterruptedPress.code, "reason": f"{BROKEN_OFF} {PRESS_AGAIN}"}
+
+
 def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
     """Write into the audit that a press began, and how it ended."""
     kept = db.execute("SELECT ended FROM press WHERE id = ?", (job["id"],)).fetchone()
@@ -295,10 +301,6 @@ def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
         append(
             db, "press_ended", job["id"], after={name: job.get(name) for name in ("state", "code", "measurement_id")}
         )
-
-
-def _form(db: sqlite3.Connection) -> int:
-    return int(db.execute("PRAGMA user_version").fetchone()[0])
 
 
 def _is_full(error: Exception) -> bool:

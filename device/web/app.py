@@ -25,6 +25,7 @@ from device.web.contract import EVENTS, PROBLEM, TAGS, answers, install_contract
 from device.web.dicom import add_dicom
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import add_exams
+from device.web.exports import add_exports
 from device.web.guard import RequestGuard
 from device.web.measurements import add_measurements
 from device.web.presses import add_presses
@@ -86,6 +87,7 @@ def create_app(
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
+    add_exports(app, API, store)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
     add_updates(app, API, procedure, updates or Updates())
     app.mount("/static", StaticFiles(directory=STATIC), name="static")

@@ -16,6 +16,7 @@ from device.web.schema import Problem
 Responses = dict[int | str, dict[str, Any]]
 
 PNG, ZIP, EVENTS = "image/png", "application/zip", "text/event-stream"
+CSV, NPZ = "text/csv", "application/x-npz"
 BYTES = {"type": "string", "format": "binary"}
 """How the schema of a body says that it is no text: generated clients then hand out bytes."""
 TAGS = [
@@ -26,6 +27,7 @@ TAGS = [
     {"name": "exams", "description": "Whose measurement it is, and the audit of what was changed."},
     {"name": "measurements", "description": "What was measured, with picture and recording."},
     {"name": "hospital", "description": "Exams as DICOM, to download or to send to the hospital's archive."},
+    {"name": "exports", "description": "Take measurements away: tables, arrays, recordings."},
     {"name": "self-test", "description": "Test every part."},
     {"name": "updates", "description": "Releases, and what became of updates."},
 ]

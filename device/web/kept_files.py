@@ -17,6 +17,8 @@ from fastapi.responses import FileResponse, StreamingResponse
 
 from device.files.recording_file import read_picture, read_recording
 from device.instrument.press.picture import tactile_png
+from device.measurement.quantities import InvalidQuantity
+from device.records.recordings import damaged_recording
 from device.records.store import Store
 
 
@@ -29,10 +31,13 @@ class KeptFiles:
     async def picture(self, measurement_id: str) -> Response:
         """Return the tactile image of a measurement; who waits for one to be made occupies no thread."""
         path = await asyncio.to_thread(self._path, measurement_id)
-        png = await asyncio.to_thread(read_picture, path)
-        if png is None:
-            async with self._making:
-                png = await asyncio.to_thread(_made, path)
+        try:
+            png = await asyncio.to_thread(read_picture, path)
+            if png is None:
+                async with self._making:
+                    png = await asyncio.to_thread(_made, path)
+        except InvalidQuantity as error:  # of a recording of before there were hashes
+            raise damaged_recording(path.stem) from error
         return Response(png, media_type="image/png")
 
     def recording(self, measurement_id: str) -> Response:

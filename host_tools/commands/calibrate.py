@@ -10,7 +10,7 @@ import typer
 
 from device.files.durable import write_once
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.commands.output import note, problem_record
 from host_tools.commands.probe import ProbeOption, probe_with_tables
 
@@ -55,6 +55,7 @@ def calibrate(
     from host_tools.calibration.gates import CalibrationRejected
 
     _require_new(out)
+    require("force_n", force_n, Bound(0.0, 5.0, "N", low_included=False), "give the force of the recordings' presses")
     surface = load_surface_table(table)
     made, bench = _on_bench(recordings, probe, phantoms, table)
     try:

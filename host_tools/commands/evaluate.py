@@ -17,7 +17,7 @@ from rich.console import Console
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.mode import Mode, mode_named
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table
 from host_tools.commands.model import phantoms_of
 from host_tools.commands.output import Scheduler, note
@@ -70,6 +70,8 @@ def evaluate(
     Example: host_tools evaluate --mode precise --scenes 50
     """
     asked = mode_named(mode) if mode else None
+    if scenes is not None:
+        require("scenes", scenes, Bound(1, 1_000_000, "presses"), "score at least one")
     with workers(scheduler):
         if named := [
             name for name, is_asked in zip(REFERENCES, (noise_free, posterior, scan), strict=True) if is_asked

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from host_tools.calibration.phantom_sets import Phantom
 
 WIDE = Path("build/wide_table")
+FARTHEST_MM = 40.0
+"""Largest offset of a press from the lesion: farther, the face comes near the edge of a phantom's slab."""
 
 
 def table(
@@ -95,10 +97,15 @@ def phantom(
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 
+    require(
+        "offset_mm", offset_mm, Bound(-FARTHEST_MM, FARTHEST_MM, "mm"), "press on the lesion, or a little beside it"
+    )
     made_of = read_scenario(scenario) if scenario else Scenario()
     protocol = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
     tables, made_by = ProbeTables.load(table), probe_with_tables(probe, table)
-    for i, one in enumerate(_phantom_set(which, model, scenes, seed, phantoms)):
+    chosen = list(_phantom_set(which, model, scenes, seed, phantoms))
+    _require_room([out / one.name for one in chosen])
+    for i, one in enumerate(chosen):
         recording = phantom_recording(
             one.inclusion,
             tables,
@@ -111,6 +118,13 @@ def phantom(
         known = replace(recording, truth=one.truth, phantom_serial=one.set_serial)
         write_recording(known, out / one.name)
         note.print(f"{out / one.name}: {_told(one.truth)}")
+
+
+def _require_room(recordings: list[Path]) -> None:
+    """Refuse to record where a recording is, before any is made."""
+    for path in recordings:
+        if path.exists():
+            raise InvalidQuantity("recording", path, "a new folder", "name another one with --out, or delete it first")
 
 
 def _told(inclusion: Inclusion | None) -> str:

@@ -22,6 +22,7 @@ def sweep(
     ] = None,
     strain: Annotated[SweepStrain, typer.Option(help="small (linear) or finite.")] = "small",
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that holds something else.")] = False,
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -42,7 +43,7 @@ def sweep(
             bar.update(task, completed=done)
 
         try:
-            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, on_row=on_row)
+            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, on_row=on_row, replace=force)
         except KeyboardInterrupt:
             note.print(f"Interrupted. Solved scenes are kept in {out}.partial: run the same command to go on.")
             raise typer.Exit(1) from None

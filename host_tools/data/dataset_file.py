@@ -9,6 +9,7 @@ import json
 import os
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import h5netcdf  # type: ignore[import-untyped]
 import h5py  # type: ignore[import-untyped]
@@ -29,6 +30,15 @@ def write_dataset(journal: Journal, path: Path) -> None:
     """Write the journal's rows by their index to a netCDF file, whole or not at all."""
     solved = _first_solved(journal)
     temporary = path.with_suffix(path.suffix + ".tmp")
+    try:
+        _fill(temporary, journal, solved)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    sync_directory(path.parent)
+
+
+def _fill(temporary: Path, journal: Journal, solved: Row) -> None:
     with h5netcdf.File(temporary, "w") as file:
         empty_of = _lay_out(file, journal, solved)
         rows, start = journal.in_order(), 0
@@ -40,8 +50,15 @@ def write_dataset(journal: Journal, path: Path) -> None:
             start = stop
     with temporary.open("rb") as written:
         os.fsync(written.fileno())
-    temporary.replace(path)
-    sync_directory(path.parent)
+
+
+def origin_of(path: Path) -> Any:
+    """Return what a file says it is a sweep of, as `SweepPlan.as_record`; None for a file that is no sweep."""
+    try:
+        with h5netcdf.File(path, "r") as file:
+            return json.loads(file.attrs["origin"])
+    except (OSError, KeyError, ValueError):
+        return None
 
 
 def _first_solved(journal: Journal) -> Row:

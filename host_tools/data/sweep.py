@@ -6,6 +6,7 @@ all are there. Memory does not grow with the number of scenes, except for a trut
 
 from __future__ import annotations
 
+import json
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -14,7 +15,8 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from host_tools.data.dataset_file import write_dataset
+from device.measurement.quantities import InvalidQuantity
+from host_tools.data.dataset_file import origin_of, write_dataset
 from host_tools.data.executors import executor
 from host_tools.data.journal import Journal, Row
 from host_tools.data.plan import SweepPlan
@@ -28,12 +30,18 @@ def sweep(
     jobs: int = -1,
     scheduler: str | None = None,
     on_row: Callable[[Row, int], None] = lambda row, done: None,
+    replace: bool = False,
 ) -> Path:
     """Solve every scene that `out`'s journal does not hold yet, then write `out`; return it.
+
+    A file that holds this very sweep is left as it is. Raise `InvalidQuantity` for one that holds anything else, unless
+    `replace` says to give it up, and for a folder; both before anything is solved.
 
     `scheduler` is the address tcp://host:port of a Dask cluster; without it `jobs` processes of this machine solve.
     `on_row` hears each new row and how many there are. Interrupted, it leaves the journal and no `out`.
     """
+    if _is_done(plan, out, replace=replace):
+        return out
     with executor(jobs=jobs, scheduler=scheduler) as rows_of, _remembered_interrupt() as interrupted:
         out.parent.mkdir(parents=True, exist_ok=True)
         journal = Journal(out.with_suffix(out.suffix + ".partial"), plan.as_record())
@@ -50,6 +58,20 @@ def sweep(
     write_dataset(journal, out)
     journal.remove()
     return out
+
+
+def _is_done(plan: SweepPlan, out: Path, *, replace: bool) -> bool:
+    """Return whether a file holds this sweep already; refuse what may not be replaced."""
+    if out.is_dir():
+        raise InvalidQuantity("out", out, "a file, not a folder", "name the netCDF file in it")
+    if not out.exists():
+        return False
+    if origin_of(out) == json.loads(json.dumps(plan.as_record())):
+        return True
+    if not replace:
+        bound = "a new file, or one of the same scenes, seed, press and probe"
+        raise InvalidQuantity("out", f"{out}, which holds something else", bound, "name another file, or add --force")
+    return False
 
 
 @contextmanager

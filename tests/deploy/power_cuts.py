@@ -14,7 +14,6 @@ broken release: so this test can tell.
 from __future__ import annotations
 
 import argparse
-import fcntl
 import json
 import os
 import random
@@ -28,54 +27,16 @@ from threading import Thread
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS.parent)]
+from cut_disk import CutDisk, run  # noqa: E402
 from small_release import new_key, release_file  # noqa: E402
 from updated_probe import UpdatedProbe  # noqa: E402
 
 from device.files.durable import write_and_sync  # noqa: E402
 from device.update.contents import damage  # noqa: E402
 
-SHUTDOWN, WITHOUT_LOG = 0x8004587D, 2
-"""_IOR('X', 125, __u32) of linux/fs.h and ext4.h; flag EXT4_GOING_FLAGS_NOLOGFLUSH."""
-SIZE_MB, FILES = 96, 60
+FILES = 60
 UNSYNCHRONISED = "import os, runpy, sys; os.fsync = lambda handle: None; os.sync = lambda: None; "
 RUN = "runpy.run_module('device.update', run_name='__main__')"
-
-
-class Disk:
-    """An ext4 file system in a file, mounted on a folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self.image, self.mount = folder / "disk.img", folder / "mnt"
-        self.mount.mkdir()
-        with self.image.open("wb") as file:
-            file.truncate(SIZE_MB * 2**20)
-        run("mkfs.ext4", "-q", "-F", str(self.image))
-        self.up()
-
-    def up(self) -> None:
-        """Mount it, which replays its journal."""
-        run("mount", "-o", "loop", str(self.image), str(self.mount))
-
-    def cut(self) -> None:
-        """Cut the power: nothing that is not on the disk by now will be."""
-        handle = os.open(self.mount, os.O_RDONLY)
-        try:
-            fcntl.ioctl(handle, SHUTDOWN, WITHOUT_LOG.to_bytes(4, "little"))
-        finally:
-            os.close(handle)
-
-    def down(self) -> None:
-        """Let go of it, once nobody holds a file there any more."""
-        for _ in range(100):
-            if subprocess.run(["umount", str(self.mount)], capture_output=True).returncode == 0:
-                return
-            time.sleep(0.1)
-        run("umount", str(self.mount))
-
-
-def run(*command: str) -> None:
-    """Run a command that must succeed."""
-    subprocess.run(command, check=True)
 
 
 class Cuts:
@@ -83,7 +44,7 @@ class Cuts:
 
     def __init__(self, folder: Path, seed: int, *, synchronises: bool) -> None:
         self.folder, self.random, self.synchronises = folder, random.Random(seed), synchronises
-        self.disk = Disk(folder)
+        self.disk = CutDisk(folder)
         self.key = new_key(folder, "key")
         self.probe = UpdatedProbe(folder, self.key, self.disk.mount)
         self.counter, self.duration_s = 0, 0.0

@@ -1,12 +1,14 @@
 """The toolkit's commands as a researcher types them: output, exit codes, and one sentence for what cannot be done."""
 
 import json
+import signal
 import subprocess
 import sys
 
 import cv2
 import numpy as np
 import pytest
+from daemon_process import ROOT
 from toolkit_process import run_toolkit
 
 from device.files.certificate_file import read_calibration
@@ -62,6 +64,10 @@ def test_a_long_exposure_saturates_the_frame(tmp_path):
         (["evaluate", "--model", "missing"], "missing"),
         (["calibrate", "missing", "--out", "c.json"], "recording.json"),
         (["sweep", "--scenes", "0", "--out", "s.nc"], "scenes is 0"),
+        (["sweep", "--out", "."], "out is ., but must be a file"),
+        (["phantom", "--offset-mm", "500", "--out", "p"], "offset_mm is 500.0, but must be at least -40"),
+        (["calibrate", "missing", "--force-n", "nan", "--out", "c.json"], "force_n is nan, but must be above 0"),
+        (["evaluate", "--scenes", "0"], "scenes is 0, but must be at least 1"),
     ],
 )
 def test_what_cannot_be_done_is_one_sentence_and_exit_code_1(arguments, words, tmp_path):
@@ -149,3 +155,37 @@ def test_calibrate_names_a_certificate_by_its_id_or_prints_all_that_speaks_again
     ]
     assert record["problems"][-1]["action"] == "record more phantoms"
     assert not (tmp_path / "no").exists()
+
+
+def test_phantom_records_over_nothing(tmp_path):
+    (tmp_path / "phantom3").mkdir()
+    done = run_toolkit("phantom", "--out", tmp_path)
+    assert done.returncode == 1
+    assert "phantom3, but must be a new folder" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["phantom3"]
+
+
+def _interrupted(arguments, loaded):
+    """Start a verb and interrupt it as soon as it has loaded a module; return it ended, with what else it told."""
+    command = [sys.executable, "-X", "importtime", "-m", "host_tools", *arguments]
+    told = []
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts) as running:
+        for line in running.stderr:
+            told.append(line)
+            if line.rpartition("|")[2].strip() == loaded:
+                running.send_signal(signal.SIGINT)
+    return running.returncode, "".join(line for line in told if not line.startswith("import time:"))
+
+
+def hear_interrupts():
+    """A shell's background job ignores SIGINT, and so would all that it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.mark.parametrize("loaded", ["rich.console", "numpy.exceptions", "ngsolve.ngslib"])
+def test_an_interrupt_while_modules_are_loaded_leaves_no_traceback(loaded):
+    """The first second of a verb is imports; 130 is a shell's word for -2, the interrupt itself."""
+    code, told = _interrupted(["simulate", *map(str, SCENE)], loaded)
+    assert code in (-signal.SIGINT, 130, 1)
+    assert "Traceback" not in told
+    assert len(told.split()) < 5  # "Aborted." at most

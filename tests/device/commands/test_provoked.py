@@ -26,6 +26,12 @@ PROVOKED_BY = {
     "E020": "device/records/test_audit.py::test_what_was_changed_is_found_and_its_row_named",
     "E030": "device/dicom/test_sender.py::test_an_archive_that_is_down_is_told_of_and_gets_all_once_it_is_there",
     "E031": "device/dicom/test_sender.py::test_what_the_archive_refuses_is_told_of_until_it_is_sent_again",
+    "E603": "test_kept_over_restart.py::test_a_damaged_database_starts_at_fault_and_shows_what_can_be_read",
+    "E604": "device/records/test_recordings.py::"
+    "test_a_recording_that_was_changed_is_not_handed_out_while_its_numbers_are",
+    "E605": "device/records/test_recordings.py::"
+    "test_a_recording_that_a_kill_left_without_its_row_is_set_aside_and_told",
+    "E904": "test_kept_over_restart.py::test_a_press_that_a_kill_broke_off_and_the_last_result_are_told_after_it",
     "E801": "test_press_to_result.py::"
     "test_a_second_press_or_a_tare_is_refused_while_one_is_under_way_and_a_cancelled_one_says_so",
     "E802": "test_press_to_result.py::test_bad_requests_are_problem_documents_with_a_remedy",
@@ -42,6 +48,8 @@ PROVOKED_BY = {
     "E902": "test_watchdog_restart.py::test_a_frozen_loop_is_a_fault_on_the_screen_then_a_restart_that_says_why",
 }
 """What no scene provokes, but a request, a file or a restart: file below tests/ and test, which names the code."""
+FOUND_AT_START = {"E603", "E604", "E605"}
+"""What lies on the disk since an earlier run, before any scene begins."""
 NO_PARTS = {"0": "settings files and the daemon itself", "8": "requests", "9": "a restart"}
 
 
@@ -71,8 +79,8 @@ def test_a_test_that_is_named_for_a_code_exists_and_names_it(code):
 
 
 def test_every_fault_of_a_part_of_the_probe_has_a_scenario():
-    assert {code[1] for code in PROVOKED_BY} <= set(NO_PARTS)
-    assert {fault.code for fault in FAULTS if fault.code[1] not in NO_PARTS} <= codes_of_scenarios()
+    assert {code[1] for code in PROVOKED_BY.keys() - FOUND_AT_START} <= set(NO_PARTS)
+    assert {fault.code for fault in FAULTS if fault.code[1] not in NO_PARTS} <= (codes_of_scenarios() | FOUND_AT_START)
 
 
 def test_a_code_is_not_named_in_both_places_and_only_if_it_exists():

@@ -8,8 +8,10 @@ from contextlib import closing
 import pytest
 
 from device.errors import AuditChanged
+from device.records.asked_once import ANSWERS_TABLE
 from device.records.audit import FIRST, done_for, require_head, verify_chain
-from device.records.exams import ExamContent
+from device.records.exams import EXAM_TABLES, ExamContent
+from device.records.migrations import FIRST_TABLES
 from device.records.store import Store
 
 PAGE = {"before_seq": 2**62, "limit": 99}
@@ -157,7 +159,7 @@ PRAGMA user_version = 4;
 
 def test_the_audit_of_an_earlier_release_is_chained_as_it_is_found_and_goes_on(tmp_path):
     with closing(sqlite3.connect(tmp_path / "tsis.sqlite")) as db:
-        db.executescript(OF_FORM_4)
+        db.executescript(FIRST_TABLES + ANSWERS_TABLE + EXAM_TABLES + OF_FORM_4)
     store = Store(tmp_path)
     assert store.audit.verify().seq == 2
     exam(store)

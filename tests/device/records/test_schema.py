@@ -93,7 +93,8 @@ def test_what_a_newer_release_wrote_is_refused_and_left_as_it_is(tmp_path):
     (tmp_path / "recordings" / "half.tmp").mkdir()
     before = file.read_bytes()
     with pytest.raises(
-        NewerDataError, match=rf"have schema {max(STORE_READS) + 1}, and this release reads 1 and 2 and 3 and 4 and 5\."
+        NewerDataError,
+        match=rf"have schema {max(STORE_READS) + 1}, and this release reads 1 .* and {max(STORE_READS)}\.",
     ) as refusal:
         Store(tmp_path)
     assert (refusal.value.code, isinstance(refusal.value, StorageError)) == ("E014", True)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from device.errors import DiskFullError, ReusedKey, StorageError, UnknownResource
+from device.errors import DamagedRecordingError, DiskFullError, ReusedKey, StorageError, UnknownResource
 from device.files.recording_file import read_picture, read_recording, write_recording
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -61,7 +61,7 @@ def test_a_recording_that_an_earlier_release_kept_as_a_folder_is_found_and_read(
     assert found.is_dir()
     np.testing.assert_array_equal(read_recording(found).frames[1].counts, FRAME.counts)
     (found / "recording.json").unlink()
-    with pytest.raises(StorageError, match="r-1 is missing or damaged"):
+    with pytest.raises(DamagedRecordingError, match="r-1 is missing"):
         store.recording_path("r-1")
 
 
@@ -345,7 +345,7 @@ def test_what_a_power_cut_left_half_written_is_gone_at_the_next_opening(tmp_path
 def test_a_recording_that_has_gone_missing_is_a_storage_error_with_its_id(store):
     add(store, 1)
     store.recording_path("r-1").unlink()
-    with pytest.raises(StorageError, match="r-1 is missing or damaged"):
+    with pytest.raises(DamagedRecordingError, match="r-1 is missing"):
         store.recording_path("r-1")
 
 

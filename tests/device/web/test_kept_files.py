@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import os
 import threading
 import zipfile
 from dataclasses import replace
@@ -10,7 +11,6 @@ import httpx
 import numpy as np
 import pytest
 
-from device.errors import StorageError
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -38,6 +38,7 @@ def store(tmp_path):
     path = store.recording_path("r-2")
     write_recording(RECORDING, path.with_suffix(""))
     path.unlink()
+    store._db.execute("DELETE FROM kept_recording WHERE id = 'r-2'")  # the earlier release kept no hash either
     yield store
     store.close()
 
@@ -115,9 +116,22 @@ def test_a_zip_is_made_without_holding_more_than_one_file(tmp_path):
 def test_what_has_gone_missing_is_a_problem_with_its_id(app, store, path):
     store.recording_path("r-1").unlink()
     [answer] = ask(app, path)
-    assert answer.status_code == StorageError.status
-    assert answer.json()["code"] == "E601"
+    assert (answer.status_code, answer.json()["code"]) == (500, "E604")
     assert "r-1" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("path", ["m-1/image.png", "m-1/recording.zip"])
+@pytest.mark.parametrize("is_known", [True, False], ids=["with its hash", "of before there were hashes"])
+def test_what_was_cut_short_is_a_problem_of_the_probe_and_not_of_the_request(app, store, path, is_known):
+    zipped = store.recording_path("r-1")
+    if not is_known:
+        store._db.execute("DELETE FROM kept_recording")
+        if path.endswith(".zip"):
+            pytest.skip("without its hash nobody can tell")
+    os.truncate(zipped, zipped.stat().st_size // 2)
+    [answer] = ask(app, path)
+    assert (answer.status_code, answer.json()["code"]) == (500, "E604")
+    assert "r-1 is damaged" in answer.json()["detail"]
 
 
 def test_a_measurement_that_there_is_not_has_neither(app):

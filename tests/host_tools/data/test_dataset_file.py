@@ -57,9 +57,9 @@ def test_memory_does_not_grow_with_the_number_of_scenes(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep_module, "executor", lambda **_: nullcontext(synthetic_rows))
     monkeypatch.setattr(dataset_file, "BLOCK_SCENES", 16)
     peaks = []
-    for scenes in (32, 32, 128):  # the first one pays for imports
+    for turn, scenes in enumerate((32, 32, 128)):  # the first one pays for imports
         tracemalloc.start()
-        sweep(SweepPlan(scenes, 1), tmp_path / "s.nc")
+        sweep(SweepPlan(scenes, 1), tmp_path / f"{turn}.nc")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[2] < 1.1 * peaks[1]

@@ -1,5 +1,6 @@
 """A sweep can be stopped anywhere and goes on where it was; a scene that fails is a row with its reason."""
 
+import json
 import os
 import signal
 import subprocess
@@ -207,3 +208,55 @@ def test_a_file_that_is_no_sweep_is_refused(tmp_path, content):
     (tmp_path / "x.nc").write_bytes(content)
     with pytest.raises(InvalidQuantity, match="host_tools sweep"):
         read_dataset(tmp_path / "x.nc")
+
+
+@pytest.fixture
+def held(tmp_path, monkeypatch):
+    """A finished sweep of few scenes, and how often rows were asked for since."""
+    asked = []
+
+    def rows_of(solve, cases):
+        asked.append(1)
+        return synthetic_rows(solve, cases)
+
+    monkeypatch.setattr(sweep_module, "executor", lambda **where: nullcontext(rows_of))
+    out = sweep(SweepPlan(SCENES, 4), tmp_path / "s.nc")
+    asked.clear()
+    return out, asked
+
+
+def test_a_sweep_that_is_done_is_not_solved_again(held):
+    out, asked = held
+    before = out.read_bytes()
+    assert sweep(SweepPlan(SCENES, 4), out) == out
+    assert (asked, out.read_bytes()) == ([], before)
+
+
+def test_another_sweep_never_replaces_a_file_unless_told_to(held):
+    out, asked = held
+    before = out.read_bytes()
+    with pytest.raises(InvalidQuantity, match=r"which holds something else.*--force"):
+        sweep(SweepPlan(SCENES, 5), out)
+    assert (asked, out.read_bytes()) == ([], before)
+    sweep(SweepPlan(SCENES, 5), out, replace=True)
+    assert json.loads(read_dataset(out).attrs["origin"])["seed"] == 5
+
+
+def test_a_file_that_is_no_sweep_is_not_replaced(tmp_path):
+    out = tmp_path / "notes.txt"
+    out.write_text("mine")
+    with pytest.raises(InvalidQuantity, match="which holds something else"):
+        sweep(SweepPlan(SCENES, 4), out, jobs=1)
+    assert out.read_text() == "mine"
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing_behind_and_its_rows_are_kept(held, monkeypatch):
+    out, _ = held
+
+    def full(*layout):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr("host_tools.data.dataset_file._lay_out", full)
+    with pytest.raises(OSError, match="No space"):
+        sweep(SweepPlan(SCENES, 6), out.with_name("t.nc"))
+    assert sorted(path.name for path in out.parent.iterdir()) == ["s.nc", "t.nc.partial"]

@@ -1,0 +1,129 @@
+"""Measurements as CSV (RFC 4180, UTF-8): wide, a row a measurement, or long, a row a quantity; units in the names.
+
+A cell that people wrote and that a spreadsheet would take for a formula has an apostrophe before it. An empty cell is
+what is not known.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from device.exports.selection import Exported
+from device.measurement.quantities import UNKNOWNS
+
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+"""What a cell of a formula begins with (OWASP, CSV injection)."""
+OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
+PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open")
+UNIT_ENDINGS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa"}
+"""The unit of a feature, by how its name ends; of any other it is a ratio."""
+LONG_COLUMNS = (
+    "measurement_id", "taken_at_utc", "exam_id", "patient_ref", "mode", "status", "quantity", "unit",
+    "value", "low", "high", "std", "identifiable",
+)  # fmt: skip
+
+Cell = str | float | int | bool | None
+CellOf = Callable[[Exported], Cell]
+
+
+def _of_measurement(name: str) -> CellOf:
+    return lambda one: one.measurement.get(name)
+
+
+def _of_estimate(name: str) -> CellOf:
+    return lambda one: one.measurement["estimate"][name]
+
+
+def _of_exam(name: str) -> CellOf:
+    return lambda one: (one.exam or {}).get(name)
+
+
+def _of_unknown(name: str, part: str) -> CellOf:
+    return lambda one: one.measurement["estimate"][name].get(part)
+
+
+def _of_part(whole: str, name: str) -> CellOf:
+    return lambda one: (one.measurement[whole] or {}).get(name)
+
+
+def _column(name: str, part: str) -> str:
+    """Return `size_low_mm` of `size_mm` and `low`: the unit stays last."""
+    if part == "value":
+        return name
+    stem, unit = name.rsplit("_", 1)
+    return f"{stem}_{part}_{unit}" if part in ("low", "high", "std") else f"{stem}_{part}"
+
+
+WIDE_COLUMNS: Mapping[str, CellOf] = {
+    "measurement_id": _of_measurement("id"),
+    "seq": _of_measurement("seq"),
+    "taken_at_utc": lambda one: one.taken_at,
+    "taken_at_local": lambda one: one.taken_at_local,
+    "exam_id": _of_measurement("exam_id"),
+    **{name: _of_exam(name) for name in OF_EXAM},
+    "mode": _of_measurement("mode"),
+    **{name: _of_estimate(name) for name in ("status", "reason")},
+    **{_column(name, part): _of_unknown(name, part) for name in UNKNOWNS for part in PARTS_OF_UNKNOWN},
+    **{name: _of_measurement(name) for name in ("force_n", "frames", "ramps", "reached")},
+    "warnings": lambda one: " ".join(warning["code"] for warning in one.measurement["warnings"]),
+    **{f"voided_{name}": _of_part("voided", name) for name in ("at", "by", "reason")},
+    **{f"true_{name}": _of_part("truth", name) for name in UNKNOWNS},
+    **{name: _of_estimate(name) for name in ("model", "model_sha256", "calibration_id", "simulated")},
+    "recording_id": _of_measurement("recording_id"),
+}
+"""The wide table: what stands in each column of a measurement's row."""
+
+
+def wide_table(exported: Iterable[Exported]) -> Iterator[bytes]:
+    """Yield the table's bytes, the header and then row by row; the interval is that of 90 %."""
+    return _written(WIDE_COLUMNS, ([cell(one) for cell in WIDE_COLUMNS.values()] for one in exported))
+
+
+def long_table(exported: Iterable[Exported]) -> Iterator[bytes]:
+    """Yield the tidy table's bytes: of each measurement the unknowns, the force, and every feature."""
+    return _written(LONG_COLUMNS, (row for one in exported for row in _quantities(one)))
+
+
+def _quantities(one: Exported) -> Iterator[list[Cell]]:
+    measurement, estimate = one.measurement, one.measurement["estimate"]
+    patient_ref = (one.exam or {}).get("patient_ref")
+    of_all = [measurement["id"], one.taken_at, measurement["exam_id"], patient_ref, measurement["mode"]]
+    of_all.append(estimate["status"])
+    for name in UNKNOWNS:
+        told = [estimate[name].get(part) for part in ("value", "low", "high", "std", "identifiable")]
+        yield [*of_all, name, unit_of(name), *told]
+    for name, value in ({"force_n": None} | measurement["features"] | {"force_n": measurement["force_n"]}).items():
+        yield [*of_all, name, unit_of(name), value, None, None, None, None]
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that the name of a quantity ends with, "1" of a ratio."""
+    return next((unit for ending, unit in UNIT_ENDINGS.items() if name.endswith(ending)), "1")
+
+
+def _written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    for row in rows:
+        yield _taken(text)
+        writer.writerow([_cell(value) for value in row])
+    yield _taken(text)
+
+
+def _taken(text: io.StringIO) -> bytes:
+    content = text.getvalue().encode()
+    text.seek(0)
+    text.truncate()
+    return content
+
+
+def _cell(value: Cell) -> Any:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str) and value.lstrip(" ").startswith(FORMULA_STARTS):
+        return f"'{value}"
+    return value

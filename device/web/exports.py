@@ -1,0 +1,74 @@
+"""Exports over REST: the measurements of an exam, a time, a mode or an outcome as table, arrays or recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+from fastapi import FastAPI, Query, Response
+from fastapi.responses import StreamingResponse
+from pydantic import Field
+
+from device.exports.archive import archive_of
+from device.exports.arrays import npz_of
+from device.exports.selection import Selection
+from device.exports.table import long_table, wide_table
+from device.records.store import Store
+from device.web.contract import CSV, NPZ, ZIP, media
+from device.web.paging import MeasurementFilter
+
+
+class ExportQuery(MeasurementFilter):
+    """Which measurements are taken away."""
+
+    with_void: bool = Field(default=False, description="Whether also those that do not count.")
+
+    def selection(self, store: Store) -> Selection:
+        """Return them as they are now."""
+        return Selection.of_now(store, self.wanted, with_void=self.with_void)
+
+
+class TableQuery(ExportQuery):
+    """Which measurements are taken away, and whether as a row each, or as a row for each quantity of each."""
+
+    form: Literal["wide", "long"] = "wide"
+
+
+def add_exports(app: FastAPI, api: str, store: Store) -> None:
+    """Add the routes below `api` that hand out measurements as files; newest first, as in lists."""
+
+    @app.get(
+        f"{api}/exports/measurements.csv",
+        response_class=Response,
+        responses=media(CSV, "A header, and a row a measurement, or a row a quantity."),
+        tags=["exports"],
+    )
+    def export_table(asked: Annotated[TableQuery, Query()]) -> Response:
+        """Return measurements with their exams as a table."""
+        written = wide_table if asked.form == "wide" else long_table
+        return _file(written(asked.selection(store)), CSV, "measurements.csv")
+
+    @app.get(
+        f"{api}/exports/measurements.npz",
+        response_class=Response,
+        responses=media(NPZ, "Arrays of NumPy, none of them pickled."),
+        tags=["exports"],
+    )
+    def export_arrays(asked: Annotated[ExportQuery, Query()]) -> Response:
+        """Return measurements with their exams and features as arrays."""
+        return _file([npz_of(asked.selection(store))], NPZ, "measurements.npz")
+
+    @app.get(
+        f"{api}/exports/recordings.zip",
+        response_class=Response,
+        responses=media(ZIP, "`measurements.csv`, `recordings/` and `missing.csv`."),
+        tags=["exports"],
+    )
+    def export_recordings(asked: Annotated[ExportQuery, Query()]) -> Response:
+        """Return the recordings of measurements, and their table."""
+        return _file(archive_of(store, asked.selection(store)), ZIP, "recordings.zip")
+
+
+def _file(content: Iterable[bytes], media_type: str, name: str) -> Response:
+    shown = {"Content-Disposition": f'attachment; filename="tsis-{name}"'}
+    return StreamingResponse(content, media_type=media_type, headers=shown)

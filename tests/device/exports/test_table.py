@@ -1,0 +1,129 @@
+"""Tables: every column in its unit, nothing that a spreadsheet would run, and what pandas or a spreadsheet reads."""
+
+import csv
+import io
+import time
+
+import pytest
+from kept_measurements import keep, taken
+
+from device.exports.selection import Selection
+from device.exports.table import LONG_COLUMNS, WIDE_COLUMNS, long_table, unit_of, wide_table
+from device.records.exams import ExamContent
+from device.records.listing import Wanted
+from device.records.store import Store
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+def rows(parts):
+    """Return the table as a reader of RFC 4180 sees it."""
+    text = b"".join(parts).decode("utf-8")
+    assert text.endswith("\r\n")
+    return list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
+
+
+def exam(store, **fields):
+    return store.exams.make(ExamContent(**{"kind": "patient", "patient_ref": "A-17", "operator": "Ada", **fields}))
+
+
+def test_a_row_is_a_measurement_with_its_exam(store):
+    made = exam(store, side="left", clock_position=10, nipple_distance_mm=35.0, note='two\nlines, "quoted"')
+    kept = keep(store, 1, exam_id=made["id"], warnings=[{"code": "E206"}, {"code": "E407"}])
+    [row] = rows(wide_table(Selection(store)))
+    assert list(row) == list(WIDE_COLUMNS)
+    assert {name: row[name] for name in ("measurement_id", "seq", "taken_at_utc", "exam_id", "patient_ref")} == {
+        "measurement_id": "m-1", "seq": str(kept["seq"]), "taken_at_utc": taken(1), "exam_id": made["id"],
+        "patient_ref": "A-17",
+    }  # fmt: skip
+    assert (row["side"], row["clock_position"], row["nipple_distance_mm"]) == ("left", "10", "35.0")
+    assert row["note"] == 'two\nlines, "quoted"'
+    assert (float(row["size_mm"]), float(row["size_low_mm"]), float(row["size_high_mm"])) == (10.2, 10.2 - 0.3, 10.5)
+    assert (row["youngs_modulus_identifiable"], row["youngs_modulus_high_is_open"]) == ("false", "true")
+    assert (row["warnings"], row["true_size_mm"], row["voided_at"], row["reached"]) == ("E206 E407", "", "", "")
+
+
+def test_what_has_no_number_is_empty(store):
+    keep(store, 1, status="no_contact")
+    [row] = rows(wide_table(Selection(store)))
+    assert [row[name] for name in ("size_mm", "size_low_mm", "depth_std_mm", "patient_ref")] == [""] * 4
+    assert (row["status"], row["size_identifiable"]) == ("no_contact", "false")
+
+
+def test_a_quantity_is_a_row_with_its_unit(store):
+    keep(store, 1)
+    table = rows(long_table(Selection(store)))
+    assert list(table[0]) == list(LONG_COLUMNS)
+    assert [(row["quantity"], row["unit"], row["value"], row["low"]) for row in table] == [
+        ("size_mm", "mm", "10.2", str(10.2 - 0.3)), ("depth_mm", "mm", "6.4", str(6.4 - 0.5)),
+        ("youngs_modulus_kpa", "kPa", "81.0", "51.0"), ("force_n", "N", "0.5012", ""), ("contrast_0", "1", "0.26", ""),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["=1+1", "+1", "-1", "@SUM(A1)", "=HYPERLINK(\"http://evil.example\";\"x\")", "-2+3+cmd|' /C calc'!A0", "=",
+     "=1\n=2"],
+)  # fmt: skip
+def test_no_cell_is_a_formula(store, text):
+    """Not even one whose exam was kept with such a text."""
+    made = exam(store, operator=text.split("\n")[0], note=text)
+    keep(store, 1, exam_id=made["id"])
+    [row] = rows(wide_table(Selection(store)))
+    assert (row["operator"], row["note"]) == ("'" + text.split("\n")[0], f"'{text}")
+    assert not [cell for cell in row.values() if cell.startswith(("=", "+", "-", "@"))]
+
+
+def test_a_negative_number_stays_one(store):
+    keep(store, 1, force_n=-0.0012)
+    [row] = rows(wide_table(Selection(store)))
+    assert float(row["force_n"]) == -0.0012
+
+
+def test_any_script_comes_through(store):
+    made = exam(store, operator="Åse 王 \u05d0\u200d\u05d1")
+    keep(store, 1, exam_id=made["id"])
+    assert rows(wide_table(Selection(store)))[0]["operator"] == made["operator"]
+
+
+def test_the_local_time_is_the_same_moment(store, monkeypatch):
+    monkeypatch.setenv("TZ", "Asia/Kolkata")
+    time.tzset()
+    keep(store, 1)
+    try:
+        [row] = rows(wide_table(Selection(store)))
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert (row["taken_at_utc"], row["taken_at_local"]) == (taken(1), "2026-03-04T15:31:05.250+05:30")
+
+
+def test_a_selection_is_newest_first_over_pages_without_what_is_void_or_came_later(store):
+    for number in range(1, 60):
+        keep(store, number, mode="standard" if number % 2 else "quick")
+    store.exams.void("m-58", version=1, by="Ada", reason="=Slipped")
+    now = Selection.of_now(store, Wanted(mode="quick"))
+    keep(store, 0, mode="quick")
+    for _ in range(2):
+        assert [int(one.measurement["id"][2:]) for one in now] == list(range(56, 0, -2))
+    table = rows(wide_table(Selection(store, Wanted(mode="quick"), with_void=True)))
+    assert [(row["measurement_id"], row["voided_reason"]) for row in table[:2]] == [("m-0", ""), ("m-58", "'=Slipped")]
+
+
+def test_a_table_of_nothing_is_its_header(store):
+    assert b"".join(wide_table(Selection.of_now(store, Wanted()))).decode().split(",")[0] == "measurement_id"
+    assert rows(long_table(Selection(store))) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("force_n", "N"), ("size_mm", "mm"), ("central_deformation_mm3", "mm3"), ("deformation_area_mm2", "mm2"),
+     ("tissue_modulus_std_kpa", "kPa"), ("misfit_ratio", "1"), ("contrast_3", "1")],
+)  # fmt: skip
+def test_a_unit_is_that_of_the_name(name, unit):
+    assert unit_of(name) == unit

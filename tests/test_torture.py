@@ -1,0 +1,32 @@
+"""A short `make torture`: ten kills of the whole daemon, and some power cuts where this machine can cut it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from cut_disk import can_cut
+from daemon_process import ROOT
+
+sys.path.append(str(ROOT / "tests" / "torture"))
+from cuts import cut_often
+from kills import killed
+
+pytestmark = [pytest.mark.real_time, pytest.mark.long]
+KILLS, CUTS = 10, 5
+
+
+def test_no_kill_of_the_daemon_loses_doubles_or_alters_what_clients_were_told(tmp_path: Path) -> None:
+    told = killed(tmp_path, KILLS, seed=3).told
+    assert told.problems == []
+    assert len(told.accepted) >= KILLS
+    assert told.done
+
+
+@pytest.mark.skipif(not can_cut(), reason="root, loop devices and ext4 are needed to cut the power")
+def test_no_power_cut_loses_what_was_acknowledged_and_without_synchronising_one_does() -> None:
+    story = cut_often(CUTS, 3, synchronises=True)
+    assert story.problems == []
+    assert len(story.kept) >= CUTS
+    assert cut_often(4 * CUTS, 3, synchronises=False).problems
