@@ -43,7 +43,11 @@ ALTER TABLE audit ADD COLUMN hash TEXT;
 UPDATE audit SET hash = '{chained(FIRST, ENTRY)}';
 {AUDIT_GUARDS}
 """
-LEFT_BEHIND = dict.fromkeys((0, 1, 2, 3), TABLES_OF_1_TO_3) | {4: WHOLE_4, 5: WHOLE_4 + OF_5, 6: WHOLE_4 + OF_5 + MANIFEST_TABLE}
+LEFT_BEHIND = dict.fromkeys((0, 1, 2, 3), TABLES_OF_1_TO_3) | {
+    4: WHOLE_4,
+    5: WHOLE_4 + OF_5,
+    6: WHOLE_4 + OF_5 + MANIFEST_TABLE,
+}
 """What a release of each form has left; 0 is 1 without its number."""
 ASKED_BY_OLDER = {
     1: ("SELECT seq, record FROM measurement WHERE id = 'm-7'", "SELECT ended, record FROM press WHERE id = 'p-7'"),
