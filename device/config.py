@@ -396,6 +396,9 @@ class DicomSection(Section):
     ] = None
     worklist_port: Annotated[int, Bound(1, 65535, ""), Doc("Port of the worklist.")] = 104
     worklist_title: Annotated[AeTitle, Doc("Application entity title of the worklist.")] = "WORKLIST"
+    worklist_of_all: Annotated[
+        bool, Doc("Whether all steps of the worklist are asked for, and not those for this probe's own title alone.")
+    ] = False
     own_title: Annotated[AeTitle, Doc("Application entity title of this probe.")] = "TSIS"
     commitment_port: Annotated[
         int | None,

@@ -1,4 +1,4 @@
-"""`python -m device dicom`: whether the hospital's archive and worklist are there.
+"""`python -m device dicom`: whether the hospital's archive and worklist are there, and what is ordered.
 
 Exit codes: 0 ok, 1 one of them does not answer, 2 usage, 3 none is set.
 """
@@ -8,12 +8,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from datetime import date
 
 from device.config import Config
 
 EXAMPLES = """examples:
   python -m device dicom echo            does the archive answer, and the worklist
-  python -m device dicom echo --json
+  python -m device dicom worklist --day 2026-11-23
 What was sent, and what waits: GET /api/v1/dicom of the running daemon.
 """
 
@@ -23,11 +24,37 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLES
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     echo = actions.add_parser("echo", help="ask archive and worklist whether they are there (C-ECHO)")
-    echo.add_argument("--json", action="store_true", help="as one JSON object")
+    worklist = actions.add_parser("worklist", help="print what is ordered, patients' names included")
+    worklist.add_argument("--day", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of this day alone")
+    for action in (echo, worklist):
+        action.add_argument("--json", action="store_true", help="as JSON")
 
 
 def run_dicom_command(options: argparse.Namespace, config: Config) -> int:
-    """Ask every program that the settings name; return the exit code."""
+    """Ask what the settings name; return the exit code, or raise `ArchiveUnreachable` when the worklist is silent."""
+    return _worklist(options, config) if options.action == "worklist" else _echo(options, config)
+
+
+def _worklist(options: argparse.Namespace, config: Config) -> int:
+    from device.dicom.association import worklist_of
+    from device.dicom.worklist import WorklistQuery, scheduled_steps
+
+    remote = worklist_of(config.dicom)
+    if remote is None:
+        print("No worklist is set: set dicom.worklist_host.", file=sys.stderr)
+        return 3
+    steps = [one.as_record() for one in scheduled_steps(remote, config.dicom, WorklistQuery(options.day))]
+    if options.json:
+        print(json.dumps(steps))
+        return 0
+    for one in steps:
+        told = (one[name] for name in ("scheduled_at", "patient_ref", "patient_name", "order_number", "description"))
+        print("  ".join(told))
+    print(f"{len(steps)} steps")
+    return 0
+
+
+def _echo(options: argparse.Namespace, config: Config) -> int:
     from device.dicom.association import archive_of, echo, worklist_of
     from device.errors import ArchiveUnreachable
 

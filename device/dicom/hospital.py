@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
+from datetime import date
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from device.config import DicomSection
 from device.dicom.sender import Sender, SenderState
-from device.errors import DeviceError, InvalidRequest
+from device.dicom.subject import OrderedStudy, require_writable
+from device.errors import DeviceError, InvalidRequest, UnknownResource
+from device.records.asked_once import AskedOnce
+from device.records.exams import exam_content
 from device.records.store import Store, StoredRecord
 
 if TYPE_CHECKING:
     from device.dicom.delivery import Delivery
     from device.dicom.objects import DicomWriter
     from device.dicom.outgoing import Outgoing
+
+MOST_SHOWN = 1000
+"""Steps of the worklist that an exam can be made of: those that were shown last."""
 
 
 class Hospital:
@@ -34,6 +42,7 @@ class Hospital:
         """
         self._settings, self._store, self._picture_of = settings, store, picture_of
         self._sender: Sender | None = None
+        self._shown: dict[str, OrderedStudy] = {}
         if settings.archive_host is not None:
             days = settings.demographics_days
             self._sender = Sender(store.outbox, self._delivery, keep_patients_days=days, tell=tell)
@@ -69,6 +78,40 @@ class Hospital:
         """Return the objects of an exam that were ever to be at the archive, oldest first."""
         self._store.exams.exam(exam_id)
         return [_told(row) for row in self._store.outbox.of_exam(exam_id)]
+
+    def scheduled(self, day: date | None, patient_ref: str | None, order_number: str | None) -> list[dict[str, Any]]:
+        """Return what the worklist has, of a day, a patient or an order; raises as `scheduled_steps`.
+
+        Raises `InvalidRequest` when no worklist is set.
+        """
+        if self._settings.worklist_host is None:
+            raise InvalidRequest("No worklist is set.", "Set dicom.worklist_host, its port and its title.")
+        from device.dicom.association import worklist_of
+        from device.dicom.worklist import WorklistQuery, scheduled_steps
+
+        remote = worklist_of(self._settings)
+        assert remote is not None  # as its host is set
+        steps = scheduled_steps(remote, self._settings, WorklistQuery(day, patient_ref, order_number))
+        self._shown = {**self._shown, **{step.id: step.order for step in steps}}
+        self._shown = dict(list(self._shown.items())[-MOST_SHOWN:])
+        return [step.as_record() for step in steps]
+
+    def begin_exam(self, step_id: str, said: dict[str, Any], once: AskedOnce | None = None) -> StoredRecord:
+        """Make an exam of a step that was shown, and of what the operator says beside; return it.
+
+        Raises `UnknownResource` for a step that was not shown since the start, `InvalidRequest` when patient or order
+        are none that an exam can have, and `ReusedKey`.
+        """
+        order = self._shown.get(step_id)
+        if order is None:
+            raise UnknownResource(f"The worklist has shown no step {step_id}.", "Ask for the worklist again.")
+        whose = {"kind": "patient", "patient_ref": order.patient_ref, "order_number": order.order_number or None}
+        content = exam_content({**said, **whose})
+        require_writable(content.model_dump())
+        told = asdict(order)
+        patient = told.pop("patient")
+        outbox = self._store.outbox
+        return self._store.exams.make(content, once, lambda db, exam_id: outbox.order(db, exam_id, told, patient))
 
     def as_record(self) -> dict[str, Any]:
         """Return where archive and worklist are, how many objects are in which state, and what is wrong."""

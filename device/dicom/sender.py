@@ -23,6 +23,8 @@ log = logging.getLogger(__name__)
 LOOK_S = 30.0
 """So often it is looked whether a correction has made anything wrong that was sent."""
 FIRST_WAIT_S, LONGEST_WAIT_S = 2.0, 300.0
+NEVER_SENT = timedelta(days=60)
+"""Of an exam that nobody sends, too, who the patient is does not stay."""
 SEND_AGAIN = "See `GET dicom` for what it says; correct that, and send the exam again."
 
 
@@ -88,8 +90,7 @@ class Sender:
 
     def _delivered(self) -> bool:
         """Return whether anything is left to send or to ask for; only when there is are DICOM's libraries loaded."""
-        before = datetime.now(UTC) - self._keep_patients
-        self._outbox.erase_patients(before.isoformat(timespec="milliseconds").replace("+00:00", "Z"))
+        self._outbox.erase_patients(sent_before=_ago(self._keep_patients), made_before=_ago(NEVER_SENT))
         if self._outbox.is_idle():
             return False
         self._delivery = self._delivery or self._deliver()
@@ -119,3 +120,7 @@ class Sender:
         next_at = datetime.now(UTC) + timedelta(seconds=wait_s or 0.0)
         self.state = SenderState(fault, next_at.isoformat(timespec="seconds") if wait_s else None)
         self._tell(fault)
+
+
+def _ago(time: timedelta) -> str:
+    return (datetime.now(UTC) - time).isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -163,15 +163,24 @@ class Outbox:
             row = db.execute("SELECT record, patient FROM ordered_study WHERE exam_id = ?", (exam_id,)).fetchone()
         return (json.loads(row[0]), json.loads(row[1] or "{}")) if row else None
 
-    def erase_patients(self, before: str) -> int:
-        """Erase who patients are of exams that the archive has had since before a time (RFC 3339); return how many."""
+    def erase_patients(self, *, sent_before: str, made_before: str) -> int:
+        """Erase who patients are, from the file as well; return of how many exams. Times are RFC 3339 UTC.
+
+        Erased are those whose exam the archive has had since before the first time, or that was made before the other
+        one, unless any of it waits to be sent.
+        """
         query = """
             UPDATE ordered_study SET patient = NULL WHERE patient IS NOT NULL
-            AND exam_id IN (SELECT exam_id FROM outbox WHERE state = 'confirmed')
-            AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent', 'refused')
-              OR json_extract(record, '$.confirmed_at') >= ?)"""
+            AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent'))
+            AND (exam_id IN (SELECT id FROM exam WHERE json_extract(record, '$.made_at') < :made)
+              OR exam_id IN (SELECT exam_id FROM outbox WHERE state = 'confirmed')
+              AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE json_extract(record, '$.confirmed_at') >= :sent))"""
         with self._transaction() as db:
-            return db.execute(query, (before,)).rowcount
+            erased = db.execute(query, {"made": made_before, "sent": sent_before}).rowcount
+        if erased:
+            with self._transaction() as db:
+                db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        return erased
 
     def _select(self, where: str, *values: object) -> list[_Record]:
         with self._transaction() as db:

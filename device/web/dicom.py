@@ -1,4 +1,4 @@
-"""Exams in the hospital's format over REST: as files to download, and sent to the hospital's archive.
+"""Exams in the hospital's format over REST: made of its worklist, as files to download, and sent to its archive.
 
 What is sent is what the client has seen (If-Match), so that no exam goes out that was corrected to another patient
 meanwhile.
@@ -6,18 +6,19 @@ meanwhile.
 
 from __future__ import annotations
 
-from typing import Any
+from datetime import date
+from typing import Annotated, Any
 
 from fastapi import FastAPI, Response
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from device.dicom.hospital import Hospital
 from device.dicom.subject import ObjectKind
-from device.records.exams import Identifier
+from device.records.exams import Identifier, LesionFields
 from device.records.outbox import OutboxState
 from device.web.contract import ZIP, answers, media
-from device.web.exams import SeenVersion, version_of
-from device.web.schema import Fault
+from device.web.exams import OnceKey, SeenVersion, asked_once, tagged, version_of
+from device.web.schema import Exam, Fault
 
 
 class Sending(BaseModel):
@@ -77,6 +78,40 @@ class HospitalStatus(BaseModel):
     next_try_at: str | None
 
 
+class OrderedStep(BaseModel):
+    """An examination that the hospital's worklist has, with what tells the operator whose it is.
+
+    `scheduled_at` and `patient_birth_date` are as the hospital writes them, YYYYMMDD and the time behind.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    id: str
+    scheduled_at: str
+    patient_ref: str
+    patient_name: str
+    patient_birth_date: str
+    patient_sex: str
+    patient_issuer: str
+    order_number: str
+    study_uid: str
+    procedure_id: str
+    step_id: str
+    description: str
+
+
+class Worklist(BaseModel):
+    """Steps by their time."""
+
+    steps: list[OrderedStep]
+
+
+class ScheduledExam(LesionFields):
+    """A step that was shown, by its `id`, and what the worklist does not say of the exam."""
+
+    step: Annotated[str, Field(max_length=64)]
+    operator: Identifier
+
+
 def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
     """Add the routes below `api` of what the hospital's programs read."""
     of_exam = f"{api}/exams/{{exam_id}}/dicom"
@@ -106,3 +141,23 @@ def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
         """Send an exam to the archive: all of it that counts, and what was sent before not again."""
         objects = hospital.send(exam_id, version=version_of(if_match), by=sending.by)
         return {"exam_id": exam_id, "objects": objects}
+
+    @app.get(f"{api}/worklist", responses=answers(200, Worklist), tags=["hospital"])
+    def get_worklist(
+        day: date | None = None, patient_ref: str | None = None, order_number: str | None = None
+    ) -> dict[str, Any]:
+        """Ask the hospital's worklist what is ordered, of a day, a patient or an order."""
+        return {"steps": hospital.scheduled(day, patient_ref, order_number)}
+
+    @app.post(
+        f"{api}/worklist/exams", status_code=201, responses=answers(201, Exam, "Location", "ETag"), tags=["hospital"]
+    )
+    def make_scheduled_exam(
+        scheduled: ScheduledExam, response: Response, idempotency_key: OnceKey = None
+    ) -> dict[str, Any]:
+        """Begin an exam of a step of the worklist: patient, order and study are those that were shown."""
+        path = f"{api}/worklist/exams"
+        once = None if idempotency_key is None else asked_once(idempotency_key, f"POST {path}", scheduled)
+        exam = hospital.begin_exam(scheduled.step, scheduled.model_dump(exclude={"step"}), once)
+        response.headers["Location"] = f"{api}/exams/{exam['id']}"
+        return tagged(response, exam)

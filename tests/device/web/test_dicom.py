@@ -77,6 +77,19 @@ def test_without_an_archive_an_exam_can_be_fetched_but_not_sent(ask, exam):
     assert (files.headers["content-type"], files.content[:2]) == ("application/zip", b"PK")
 
 
+def test_an_exam_of_the_worklist_needs_a_step_that_was_shown_and_an_operator(ask, store):
+    assert ask("GET", "worklist").json()["detail"] == "No worklist is set."
+    assert ask("GET", "worklist?day=yesterday").status_code == 422
+    for body, status in (
+        ({"step": "2.25.1", "operator": "Ada"}, 404),
+        ({"step": "2.25.1"}, 422),
+        ({"step": "2.25.1", "operator": "Ada", "patient_ref": "B-18"}, 422),
+        ({"step": "2.25.1", "operator": "Ada", "side": "both"}, 422),
+    ):
+        assert ask("POST", "worklist/exams", body).status_code == status
+    assert store.exams.exams(before_seq=2**62, limit=9) == []
+
+
 def test_an_exam_that_is_not_there_is_told_as_such(ask):
     for path in ("exams/none/dicom", "exams/none/dicom.zip"):
         assert ask("GET", path).status_code == 404
