@@ -35,6 +35,8 @@ VERBS = {
     "config": "check or show the settings",
     "calibration": "list, show or activate certificates",
     "faults": "list the fault codes",
+    "pair": "make a code by which another machine gets a token",
+    "tokens": "list the tokens of other machines, or revoke one",
     "audit": "verify that no entry of the audit was changed",
     "openapi": "print the REST API as an OpenAPI document",
     "self-test": "test every part and name the one that fails",
@@ -129,6 +131,14 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.faults import run_faults_command
 
             return run_faults_command(options)
+        case "pair":
+            from device.commands.pair import run_pair_command
+
+            return run_pair_command(options, _start_settings(options, _scenario(options)).config)
+        case "tokens":
+            from device.commands.tokens import run_tokens_command
+
+            return run_tokens_command(options, _start_settings(options, _scenario(options)).config)
         case "audit":
             from device.commands.audit import run_audit_command
 

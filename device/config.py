@@ -370,13 +370,32 @@ class ServerSection(Section):
     host: Annotated[
         str,
         Field(min_length=1),
-        Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network."),
+        Doc("Address at which screen and REST API are served; 0.0.0.0 serves the network, by TLS and with tokens."),
     ] = "127.0.0.1"
-    port: Annotated[int, Bound(0, 65535, ""), Doc("Port of screen and REST API; 0 takes any free one.")] = 8000
+    port: Annotated[
+        int, Bound(0, 65535, ""), Doc("Port of screen and REST API at the probe itself; 0 takes any free one.")
+    ] = 8000
+    tls_port: Annotated[
+        int, Bound(0, 65535, ""), Doc("Port of both for other machines, by TLS; 0 takes any free one.")
+    ] = 8443
+    certificate: Annotated[
+        str, Doc("File of the certificate for other machines with those above it, PEM; unless given the probe's own.")
+    ] = ""
+    certificate_key: Annotated[str, Doc("File of that certificate's key, PEM.")] = ""
+    client_authority: Annotated[
+        str, Doc("File of certificates, PEM, of which one must vouch for a client's; unless given none is asked for.")
+    ] = ""
     hosts: Annotated[
         tuple[str, ...],
         Doc("More names by which the probe is asked, as a proxy's; its addresses and its host name are known."),
     ] = ()
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a certificate without its key, and a key without its certificate."""
+        given = {"server.certificate": self.certificate, "server.certificate_key": self.certificate_key}
+        for (name, path), other in zip(given.items(), reversed(given), strict=True):
+            if not path and given[other]:
+                yield Conflict(name, path, f"a file beside {other}", (other,), f"name it, or leave out {other}")
 
 
 @dataclass(frozen=True, config=STRICT)

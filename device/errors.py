@@ -156,6 +156,13 @@ class AuditChanged(DeviceError):  # noqa: N818 - the name is what the operator r
     is_lasting = True
 
 
+class CertificateRefused(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The server's certificate cannot be read, made or used, so the probe does not serve the network."""
+
+    code = "E021"
+    title = "Server certificate refused"
+
+
 class ArchiveUnreachable(DeviceError):  # noqa: N818 - the name is what the operator reads
     """The hospital's archive or worklist does not answer; results wait on the probe and are sent when it does."""
 
@@ -584,6 +591,46 @@ class StaleVersion(DeviceError):  # noqa: N818 - the name is what the caller rea
     code = "E811"
     title = "Changed meanwhile"
     status = 412
+
+
+class TokenNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """Whoever asks from another machine needs a token, and sent none that holds."""
+
+    code = "E820"
+    title = "No valid token"
+    status = 401
+
+
+class ScopeNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The token may not do this."""
+
+    code = "E821"
+    title = "Not allowed with this token"
+    status = 403
+
+
+class WrongCode(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The pairing code is not the one on the probe's screen, or it has ended."""
+
+    code = "E822"
+    title = "Wrong pairing code"
+    status = 403
+
+
+class TooManyTries(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A machine sent wrong codes or tokens too often, and has to wait; others need not."""
+
+    code = "E823"
+    title = "Too many wrong tries"
+    status = 429
+
+
+class UnencryptedRequest(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """A request from another machine came without TLS; a token that it sent may have been read on its way."""
+
+    code = "E824"
+    title = "Not encrypted"
+    status = 403
 
 
 class StalledError(DeviceError):

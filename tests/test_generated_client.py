@@ -104,3 +104,8 @@ def test_it_downloads_the_measurements_as_table_arrays_and_recordings(client, ex
     recordings = asked("exports.export_recordings", client, exam_id=exam.id).payload
     with zipfile.ZipFile(recordings) as archive:
         assert f"recordings/{measurement.recording_id}.zip" in archive.namelist()
+
+
+def test_it_downloads_the_exam_as_a_page_to_print(client, exam, measurement):
+    page = asked("exports.get_report", client, exam.id).payload.read()
+    assert (page[:5], page.rstrip()[-5:]) == (b"%PDF-", b"%%EOF")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from device.access.known_hosts import KnownHosts, is_loopback, split_authority
+from device.access.known_hosts import LOOPBACK, KnownHosts, is_loopback, split_authority
 from device.errors import BodyTooLarge, ForeignRequest, UnknownHost, WrongContentType
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -20,6 +20,8 @@ OWN_SITES = frozenset({"same-origin", "none"})
 """What `Sec-Fetch-Site` says of a request by this origin's own page, or by the user alone."""
 PORTS = {"http": 80, "https": 443}
 BUFFERED = "application/json"
+FORWARDED = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto", "x-real-ip")
+"""What a proxy says of a request that it passes on."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,9 @@ JSON_BODY = BodyRule()
 BODY_RULES: Mapping[str, BodyRule] = {
     "/api/v1/updates": BodyRule("application/octet-stream", 300_000_000, streamed=True, local_only=True),
     "/api/v1/updates/roll-back": BodyRule(local_only=True),
+    "/api/v1/pairing": BodyRule(local_only=True),
 }
-"""The paths with a rule of their own: a release file, or the wish for another release, comes from the local screen."""
+"""The paths with a rule of their own: release files, going back to one, and pairing are the own screen's."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,19 @@ class AskedRequest:
     headers: Mapping[str, str]
     served_at: str | None = None
     client: str | None = None
+    is_encrypted: bool = False
+    http_version: str = "1.1"
+
+    @property
+    def is_own_screen(self) -> bool:
+        """Whether it comes from this very machine, by its loopback name, and no proxy passed it on.
+
+        A proxy on the machine comes by loopback, too, for whoever asks it. One tells itself by its headers, by a Host
+        that it passes on as it came, or by HTTP/1.0, in which nginx forwards unless told otherwise.
+        """
+        name, _ = split_authority(self.headers.get("host", ""))
+        is_passed_on = any(header in self.headers for header in FORWARDED) or self.http_version == "1.0"
+        return is_loopback(self.client) and name in LOOPBACK and not is_passed_on
 
     @property
     def is_safe(self) -> bool:
@@ -94,11 +110,11 @@ def require_allowed(request: AskedRequest, hosts: KnownHosts) -> None:
 
 
 def require_local(request: AskedRequest) -> None:
-    """Raise `ForeignRequest` unless a request comes from this very machine, by loopback."""
-    if not is_loopback(request.client):
+    """Raise `ForeignRequest` unless a request comes from this very machine, by loopback and by no proxy."""
+    if not request.is_own_screen:
         raise ForeignRequest(
-            f"{request.method} {request.path} comes from {request.client}, another machine.",
-            "This is done at the probe's own screen.",
+            f"{request.method} {request.path} comes from {request.client}, which is not the probe's own screen.",
+            "This is done at the probe's own screen, http://127.0.0.1.",
         )
 
 

@@ -18,6 +18,8 @@ RELEASES = Path("/opt/tsis")
 MODEL_SETTINGS = ("paper_model", "quick_model", "standard_model")
 PASSING = {"lock", "restart.json", "answer_times.json"}
 """Files of the data folder that belong to the daemon that runs."""
+KEYS = "tls"
+"""The folder of the server's own certificate: a key is no part of a backup, and a new card gets a new one."""
 
 
 def below(root: Path, path: Path) -> Path:
@@ -67,7 +69,9 @@ def data_files(folder: Path) -> Iterator[tuple[str, Path]]:
     """Yield the files of a data folder by their names in it, but for the database and what is under way."""
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder)
-        is_passing = any(part.endswith(".tmp") for part in name.parts) or name.as_posix() in PASSING
+        is_passing = (
+            any(part.endswith(".tmp") for part in name.parts) or name.as_posix() in PASSING or name.parts[0] == KEYS
+        )
         is_database = len(name.parts) == 1 and name.name.startswith(DATABASE)
         if path.is_file() and not path.is_symlink() and not is_passing and not is_database:
             yield name.as_posix(), path

@@ -12,7 +12,7 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -32,9 +32,11 @@ from device.settings.last_good import StartSettings
 if TYPE_CHECKING:
     from device.dicom.hospital import Hospital
     from device.instrument.procedure import Procedure
+    from device.web.entrance.network import NetworkPort
 
 log = logging.getLogger(__name__)
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
+LOOPBACK_ADDRESS = "127.0.0.1"
 START_AGAIN = "Then start the daemon again."
 
 
@@ -45,7 +47,8 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     raises when a part does not open.
     """
     config = settings.config
-    with DaemonPort(config) as port:
+    with DaemonPort(config) as port, ExitStack() as listening:
+        sockets, network = _beside(config, listening)
         procedure = opened()
         from device.instrument.watch.watchdog import Watchdog
 
@@ -72,7 +75,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             ending.callback(hospital.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, hospital, port.listening())
+            _run_server(procedure, hospital, [port.listening(), *sockets], network)
     return 0
 
 
@@ -196,11 +199,28 @@ def _hospital(procedure: Procedure) -> Hospital:
     return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell)
 
 
-def _run_server(procedure: Procedure, hospital: Hospital, listening: socket.socket) -> None:
+def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:
+    """Open what else listens: by TLS for other machines, and by loopback where the daemon's port is not for that."""
+    from device.web.entrance.network import listen, open_network
+
+    network, local = open_network(config), list[socket.socket]()
+    if network:
+        opened.callback(network.listening.close)
+        if config.server.host not in ANYWHERE:
+            local.append(opened.enter_context(listen(LOOPBACK_ADDRESS, config.server.port, "server.port")))
+    return local, network
+
+
+def _run_server(
+    procedure: Procedure, hospital: Hospital, listening: Sequence[socket.socket], network: NetworkPort | None
+) -> None:
     from device.web.server import run_server
 
-    host, port = listening.getsockname()
+    port = listening[0].getsockname()[1]
     kind = "simulated probe" if procedure.is_simulated else "probe"
-    reached_at = socket.gethostname() if host in ANYWHERE else host
-    print(f"TSIS {kind} {procedure.config.serial}: screen and API at http://{reached_at}:{port}/", flush=True)
-    run_server(procedure, hospital, listening)
+    others = ""
+    if network:
+        others = f"{network.served.url} (certificate SHA-256 {network.served.certificate_sha256}), here "
+    local = LOOPBACK_ADDRESS if network else listening[0].getsockname()[0]
+    print(f"TSIS {kind} {procedure.config.serial}: screen and API at {others}http://{local}:{port}/", flush=True)
+    run_server(procedure, hospital, listening, network)

@@ -35,6 +35,12 @@ class Exported:
         return datetime.fromisoformat(self.taken_at).astimezone().isoformat(timespec="milliseconds")
 
 
+def local_time(moment: str) -> str:
+    """Return a time of a record for a reader: in the time zone of the probe, with its offset from UTC."""
+    told = datetime.fromisoformat(moment).astimezone().isoformat(" ", "seconds")
+    return f"{told[:19]} (UTC{told[19:]})"
+
+
 @dataclass(frozen=True)
 class Selection:
     """Measurements of a store below a sequence number, all or what is wanted of them."""

@@ -120,7 +120,8 @@ class FallbackRequest(BaseHTTPRequestHandler):
     def _asked(self) -> AskedRequest:
         path = self.path.partition("?")[0]
         served_at = str(self.connection.getsockname()[0])
-        return AskedRequest(self.command, path, joined(self.headers.items()), served_at, self.client_address[0])
+        headers, version = joined(self.headers.items()), self.request_version.removeprefix("HTTP/")
+        return AskedRequest(self.command, path, headers, served_at, self.client_address[0], False, version)
 
     def _get(self, asked: AskedRequest) -> None:
         if asked.path == LIVE:  # a daemon that starts waits for this one: systemd is not asked first
@@ -137,7 +138,7 @@ class FallbackRequest(BaseHTTPRequestHandler):
         elif asked.path == f"/static/{static.name}" and static.suffix in KINDS and static.is_file():
             self._send(static.read_bytes(), KINDS[static.suffix])
         elif asked.path == "/":
-            options = {"is_local": is_loopback(asked.client), "has_support": has_support()}
+            options = {"is_local": asked.is_own_screen, "has_support": has_support()}
             self._send(page(situation, self.server.address, **options).encode(), "text/html; charset=utf-8", STATUS)
         else:
             raise _unknown(asked)

@@ -33,6 +33,7 @@ from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
 from device.records.tokens import Tokens
 
 log = logging.getLogger(__name__)
+
 StoredRecord = dict[str, Any]
 ENDED = ("done", "rejected", "cancelled", "failed")
 BROKEN_OFF, PRESS_AGAIN = "The daemon was restarted during the press:", "press again."
@@ -296,8 +297,11 @@ def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
     """Write into the audit that a press began, and how it ended."""
     kept = db.execute("SELECT ended FROM press WHERE id = ?", (job["id"],)).fetchone()
     if kept is None:
+        log.info("press id=%s state=%s mode=%s", job["id"], job["state"], job.get("mode"))
         append(db, "press_begun", job["id"], after={name: job.get(name) for name in ("mode", "exam_id")})
     if job["state"] in ENDED and not (kept and kept[0]):
+        ended = (*(job.get(name) for name in ("id", "state", "mode", "code", "measurement_id")),)
+        log.info("press id=%s state=%s mode=%s code=%s measurement_id=%s", *ended)
         append(
             db, "press_ended", job["id"], after={name: job.get(name) for name in ("state", "code", "measurement_id")}
         )

@@ -17,15 +17,14 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime, timedelta
-from typing import Any, Literal
+from typing import Any
 
+from device.access.scopes import Scope
 from device.errors import UnknownResource
 from device.records.audit import append, utc_now
 
 log = logging.getLogger(__name__)
 
-Scope = Literal["read", "measure", "admin"]
-"""What a token may: ask, or also press and keep exams, or also look after the probe. Each may what those before may."""
 MARK = "tsis_"
 """What every token begins with, so that one is found where it should not be."""
 TOKENS_TABLE = """

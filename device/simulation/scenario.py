@@ -12,6 +12,7 @@ from typing import Any
 from device.files.toml_record import read_toml
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.simulation.faults import ScriptedFault
+from device.simulation.grid_target import GridTarget
 from device.simulation.hand import HandSettings
 from device.simulation.physics.image_formation import LinearOptics
 from device.simulation.physics.lens import Lens
@@ -49,6 +50,7 @@ class Scenario:
     An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 4-6.25 kPa, 27-36 mm.
     `expects` is the fault code it must raise, `self_test_fails` the check of its self-test that must fail.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
+    On a `grid`, a printed plate in a cap, there is nothing else to press on.
     `world` is what probe and presses are where that is not what skin, lens, cell and tables say.
     `settings` are those of the daemon, as in its file, that the scene needs otherwise than they are.
     """
@@ -66,6 +68,7 @@ class Scenario:
     seed: int = 1
     neighbour: Neighbour | None = None
     world: World = AS_BELIEVED
+    grid: GridTarget | None = None
     faults: tuple[ScriptedFault, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     expects: str = ""
@@ -76,6 +79,8 @@ class Scenario:
             raise InvalidQuantity("light", repr(self.light), "physical or linear", "choose one of them")
         if self.light == "linear" and self.world != AS_BELIEVED:
             raise InvalidQuantity("world", "given", "absent with linear light", "remove it, or take physical light")
+        if self.light == "linear" and self.grid:
+            raise InvalidQuantity("grid", "given", "absent with linear light", "remove it, or take physical light")
         _ = self.slab  # refuses tissue that the tables do not hold
         _ = self.world.lesion.skin(self.skin, 1.0)  # refuses an albedo above 1
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")

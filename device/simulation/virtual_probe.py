@@ -7,7 +7,7 @@ registers say.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.tactile_image import Counts
+from device.simulation.grid_target import CappedFace
 from device.simulation.hand import VirtualHand
 from device.simulation.physics.face_motion import FaceMotion, load_face_motion
 from device.simulation.physics.image_formation import ImageFormation, LinearImage, ScatteredImage
@@ -23,9 +24,10 @@ from device.simulation.physics.lookup_optics import LookupOptics
 from device.simulation.physics.neighbour import NeighbouredFace, NeighbourFace
 from device.simulation.physics.off_axis_table import OffAxisTable, load_off_axis_table
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
+from device.simulation.physics.skin import SkinTexture
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps, SurfaceTable, load_surface_table
-from device.simulation.physics.world import World
+from device.simulation.physics.world import OverLesion, World
 from device.simulation.physics.world_face import WorldFace
 from device.simulation.scenario import Scenario
 
@@ -122,7 +124,14 @@ class VirtualProbe:
         """
         self.scenario, self.hand = scenario, VirtualHand(scenario.hand)
         self._image = _image_formation(scenario, tables, shape, scale)
-        self._face = WorldFace(scenario.world, scenario.slab, lambda slab: self._faces(tables, slab, ramps))
+        self._face = self._capped(tables) if scenario.grid else self._on_tissue(tables, ramps)
+
+    def _capped(self, tables: ProbeTables) -> CappedFace:
+        return CappedFace(float(tables.centred.r_mm[-1]), self._image.x_mm, self._image.y_mm)
+
+    def _on_tissue(self, tables: ProbeTables, ramps: PressRamps | None) -> WorldFace:
+        world, slab = self.scenario.world, self.scenario.slab
+        return WorldFace(world, slab, lambda changed: self._faces(tables, changed, ramps))
 
     def _faces(self, tables: ProbeTables, slab: Slab, ramps: PressRamps | None) -> NeighbourFace:
         scenario, x_mm, y_mm = self.scenario, self._image.x_mm, self._image.y_mm
@@ -171,4 +180,8 @@ def _image_formation(
 ) -> ImageFormation:
     if scenario.light == "linear":
         return LinearImage(scenario.optics, shape, scale)
-    return ScatteredImage(tables.light, scenario.skin, scenario.lens, shape, scale, scenario.world)
+    skin, world, print_on = scenario.skin, scenario.world, None
+    if scenario.grid:
+        skin, print_on = scenario.grid.PLATE, scenario.grid.light_ratio
+        world = replace(world, lesion=OverLesion(), texture=SkinTexture())  # a plate has none of skin's differences
+    return ScatteredImage(tables.light, skin, scenario.lens, shape, scale, world, print_on)

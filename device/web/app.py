@@ -23,11 +23,15 @@ from device.records.updates import Updates
 from device.web.conditional import ConditionalRoute
 from device.web.contract import EVENTS, PROBLEM, TAGS, answers, install_contract, media
 from device.web.dicom import add_dicom
+from device.web.entrance.door import Door
+from device.web.entrance.network import ServedNetwork
+from device.web.entrance.open_answers import OpenAnswers
 from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import add_exams
 from device.web.exports import add_exports
 from device.web.guard import RequestGuard
 from device.web.measurements import add_measurements
+from device.web.pairing import add_pairing
 from device.web.presses import add_presses
 from device.web.problems import install_problems
 from device.web.schema import (
@@ -59,13 +63,18 @@ def create_app(
     *,
     hosts: KnownHosts | None = None,
     updates: Updates | None = None,
+    door: Door | None = None,
+    answers: OpenAnswers | None = None,
+    network: ServedNetwork | None = None,
     hospital: Hospital | None = None,
 ) -> FastAPI:
     """Return the web application of a running procedure, with what tells of its updates and of the hospital.
 
     It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
-    device/access/request_rules.py first.
+    device/access/request_rules.py first. Unless a `door` says otherwise, the own screen alone is let in; `answers` can
+    be ended, and `network` is how other machines reach the probe.
     """
+    door = door or Door()
     app = FastAPI(
         title="TSIS probe",
         version=__version__,
@@ -80,16 +89,18 @@ def create_app(
     app.router.route_class = ConditionalRoute
     install_contract(app)
     install_problems(app)
-    app.add_middleware(RequestGuard, hosts=hosts or KnownHosts.of_machine())
-    _add_state(app, procedure, store)
+    guarding = {"hosts": hosts or KnownHosts.of_machine(), "door": door, "answers": answers, "network": network}
+    app.add_middleware(RequestGuard, **guarding)  # type: ignore[arg-type]
+    _add_state(app, procedure, store, network)
     add_presses(app, API, procedure, store)
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
     add_exams(app, API, store)
-    add_exports(app, API, store)
+    add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
     add_updates(app, API, procedure, updates or Updates())
+    add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get("/", include_in_schema=False)
@@ -99,7 +110,7 @@ def create_app(
     return app
 
 
-def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
+def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: ServedNetwork | None) -> None:
     @app.get(f"{API}/device", responses=answers(200, Device), tags=["device"])
     def get_device() -> dict[str, Any]:
         """Say which probe this is, how long its LEDs have been on, and what each of its modes costs and is worth."""
@@ -111,6 +122,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store) -> None:
             "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
             "modes": [offer.as_record() for offer in procedure.offers()],
+            "network": network and network.as_record(),
         }
 
     @app.get(f"{API}/calibrations", responses=answers(200, CalibrationList), tags=["device"])

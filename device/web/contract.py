@@ -16,7 +16,7 @@ from device.web.schema import Problem
 Responses = dict[int | str, dict[str, Any]]
 
 PNG, ZIP, EVENTS = "image/png", "application/zip", "text/event-stream"
-CSV, NPZ = "text/csv", "application/x-npz"
+CSV, NPZ, PDF = "text/csv", "application/x-npz", "application/pdf"
 BYTES = {"type": "string", "format": "binary"}
 """How the schema of a body says that it is no text: generated clients then hand out bytes."""
 TAGS = [
@@ -29,6 +29,7 @@ TAGS = [
     {"name": "hospital", "description": "Exams as DICOM, to download or to send to the hospital's archive."},
     {"name": "exports", "description": "Take measurements away: tables, arrays, recordings."},
     {"name": "self-test", "description": "Test every part."},
+    {"name": "access", "description": "Pair other machines, and revoke their tokens."},
     {"name": "updates", "description": "Releases, and what became of updates."},
 ]
 PROBLEM: Responses = {"default": {"description": "Any error", "model": Problem}}
@@ -86,7 +87,7 @@ def _as_described(document: dict[str, Any]) -> dict[str, Any]:
     for path in document["paths"].values():
         for method, operation in path.items():
             for answer in operation["responses"].values():
-                for content in answer["content"].values():
+                for content in answer.get("content", {}).values():
                     content["schema"] = _named(content["schema"])
             operation["responses"]["default"] = {"$ref": "#/components/responses/Problem"}
             if method == "get" and "ETag" in operation["responses"].get("200", {}).get("headers", {}):

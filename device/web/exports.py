@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import FastAPI, Query, Response
@@ -14,7 +15,7 @@ from device.exports.arrays import npz_of
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.records.store import Store
-from device.web.contract import CSV, NPZ, ZIP, media
+from device.web.contract import CSV, NPZ, PDF, ZIP, media
 from device.web.paging import MeasurementFilter
 
 
@@ -34,8 +35,13 @@ class TableQuery(ExportQuery):
     form: Literal["wide", "long"] = "wide"
 
 
-def add_exports(app: FastAPI, api: str, store: Store) -> None:
-    """Add the routes below `api` that hand out measurements as files; newest first, as in lists."""
+def add_exports(
+    app: FastAPI, api: str, store: Store, serial: Callable[[], str], picture_of: Callable[[Path], bytes]
+) -> None:
+    """Add the routes below `api` that hand out measurements as files; newest first, as in lists.
+
+    `serial` says the probe's, `picture_of` the PNG of a kept recording.
+    """
 
     @app.get(
         f"{api}/exports/measurements.csv",
@@ -67,6 +73,18 @@ def add_exports(app: FastAPI, api: str, store: Store) -> None:
     def export_recordings(asked: Annotated[ExportQuery, Query()]) -> Response:
         """Return the recordings of measurements, and their table."""
         return _file(archive_of(store, asked.selection(store)), ZIP, "recordings.zip")
+
+    @app.get(
+        f"{api}/exams/{{exam_id}}/report.pdf",
+        response_class=Response,
+        responses=media(PDF, "Whose exam it is, and each measurement that counts with picture and intervals."),
+        tags=["exports"],
+    )
+    def get_report(exam_id: str) -> Response:
+        """Return an exam as a page to print; it is not a diagnosis."""
+        from device.exports.report import report_of  # its libraries take 15 MB, and most days nobody prints
+
+        return _file([report_of(store, exam_id, serial(), picture_of)], PDF, f"exam-{exam_id}.pdf")
 
 
 def _file(content: Iterable[bytes], media_type: str, name: str) -> Response:

@@ -1,7 +1,8 @@
-"""Stands before every route: refuses what no own page and no program sends, and bodies that are too large.
+"""Stands before every route: refuses what no own page and no program sends, who has no token, and too large bodies.
 
-What is refused, and why: device/access/request_rules.py. It is pure ASGI, so that a stream stays one and a body that
-is refused is never read.
+What is refused, and why: device/access/request_rules.py; who is asked for a token: device/web/entrance/door.py. Each
+request is a line of the log, without its query, which may say whom it is about. It is pure ASGI, so that a stream stays
+one and a body that is refused is never read.
 """
 
 from __future__ import annotations
@@ -12,40 +13,73 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from fastapi import Request, Response
+from fastapi.responses import RedirectResponse
 from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from device.access.known_hosts import KnownHosts
+from device.access.known_hosts import KnownHosts, split_authority
 from device.access.request_rules import AskedRequest, BodyRule, joined, require_allowed, too_large
 from device.access.safe_headers import SAFE_HEADERS
-from device.errors import DeviceError
+from device.access.scopes import OPEN_FOLDER
+from device.errors import DeviceError, TokenNeeded, UnencryptedRequest
+from device.records.audit import done_for
+from device.web.entrance.door import Door
+from device.web.entrance.network import ServedNetwork
+from device.web.entrance.open_answers import OpenAnswers
+from device.web.entrance.request_line import RequestLine
 from device.web.problems import problem
 
 log = logging.getLogger(__name__)
+NO_STORE = (b"cache-control", b"no-store")
+PAIRING_PAGE = f"{OPEN_FOLDER}pair.html"
 HEADERS = [(name.encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
 
 
 class RequestGuard:
     """The application behind its rules."""
 
-    def __init__(self, app: ASGIApp, hosts: KnownHosts) -> None:
-        """Take what answers when the rules hold, and under which names this machine may be asked."""
-        self._app, self._hosts = app, hosts
+    def __init__(
+        self,
+        app: ASGIApp,
+        hosts: KnownHosts,
+        door: Door | None = None,
+        answers: OpenAnswers | None = None,
+        network: ServedNetwork | None = None,
+    ) -> None:
+        """Take what answers when the rules hold, under which names this machine may be asked, and who is let in."""
+        self._app, self._hosts, self._door = app, hosts, door or Door()
+        self._answers, self._network = answers or OpenAnswers(), network
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with a problem document, or let the application answer; either way with the safe headers."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        request = asked(scope)
+        request, line = asked(scope), RequestLine()
+        noting = line.noting(_with_safe_headers(send, request.path, line.id))
         try:
             require_allowed(request, self._hosts)
+            client = self._door.require(request)
+            line.client = client.name
             bounded = await _bounded(request, receive)
         except DeviceError as error:
             log.warning("%s %s", error.code, error)
-            await problem(error)(scope, receive, _with_safe_headers(send))
+            await self._refusal(request, error)(scope, receive, noting)
         else:
-            await self._app(scope, bounded, _with_safe_headers(send))
+            with done_for(client.name):
+                await self._answers.answer(client.token_id, noting, lambda to: self._app(scope, bounded, to))
+        finally:
+            line.write(request.method, scope)
+
+    def _refusal(self, request: AskedRequest, error: DeviceError) -> Response:
+        """Return the problem, or for the screen the way to where it can be had."""
+        if request.path == "/" and request.is_safe:
+            if isinstance(error, UnencryptedRequest) and self._network:
+                name, _ = split_authority(request.headers.get("host", ""))
+                return RedirectResponse(self._network.url_for(name), 307)
+            if isinstance(error, TokenNeeded):
+                return RedirectResponse(PAIRING_PAGE, 303)
+        return problem(error)
 
 
 class StrictRoute(APIRoute):
@@ -82,8 +116,9 @@ def _each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def asked(scope: Scope) -> AskedRequest:
     """Return what an ASGI request says of itself."""
     headers = joined((name.decode("latin-1"), value.decode("latin-1")) for name, value in scope["headers"])
-    ends = ((scope.get(end) or (None,))[0] for end in ("server", "client"))
-    return AskedRequest(scope["method"], scope["path"], headers, *ends)
+    served_at, client = ((scope.get(end) or (None,))[0] for end in ("server", "client"))
+    is_encrypted, version = scope.get("scheme") == "https", scope.get("http_version", "1.1")
+    return AskedRequest(scope["method"], scope["path"], headers, served_at, client, is_encrypted, version)
 
 
 async def _bounded(request: AskedRequest, receive: Receive) -> Receive:
@@ -131,10 +166,17 @@ def _replayed(message: Message, receive: Receive) -> Receive:
     return replaying
 
 
-def _with_safe_headers(send: Send) -> Send:
+def _with_safe_headers(send: Send, path: str, request_id: str) -> Send:
+    """Return what sends an answer with the safe headers; whatever may be of a patient is kept by no browser."""
+    more = [*HEADERS, (b"x-request-id", request_id.encode())]
+    is_file = path.startswith(OPEN_FOLDER)
+
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
-            message = {**message, "headers": [*message.get("headers", []), *HEADERS]}
+            headers = list(message.get("headers", []))
+            if not is_file:
+                headers = [one for one in headers if one[0].lower() != b"cache-control"] + [NO_STORE]
+            message = {**message, "headers": [*headers, *more]}
         await send(message)
 
     return sending

@@ -34,7 +34,10 @@ def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
     }
     if isinstance(error, BusyError) and error.holder:
         body["holder"] = error.holder
-    return JSONResponse(body, status_code=status, media_type="application/problem+json")
+    answer = JSONResponse(body, status_code=status, media_type="application/problem+json")
+    if status == HTTPStatus.UNAUTHORIZED:
+        answer.headers["WWW-Authenticate"] = "Bearer"
+    return answer
 
 
 def _device_error(request: Request, error: DeviceError) -> JSONResponse:

@@ -293,8 +293,15 @@ class OfferedMode(_Body):
     reachable_half_width: dict[str, float] | None
 
 
+class NetworkResource(_Body):
+    """Where other machines ask, and the SHA-256 of the certificate that they see there: compare it before pairing."""
+
+    url: str
+    certificate_sha256: str
+
+
 class Device(_Body):
-    """Which probe it is, how long its LEDs have been on, and in which modes it measures."""
+    """Which probe it is, how long its LEDs have been on, in which modes it measures, and how it is reached."""
 
     serial: str
     software: str
@@ -302,6 +309,7 @@ class Device(_Body):
     light_on_s: float
     default_mode: Mode
     modes: list[OfferedMode]
+    network: NetworkResource | None
 
 
 class SelfTest(_Body):

@@ -7,7 +7,7 @@ holds for the frames that the daemon sees. Simulated: evidence of the method, ne
 from __future__ import annotations
 
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, req
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame, Role
+from device.simulation.grid_target import GridTarget
 from device.simulation.hand import BESIDE_MM
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.physics.surface_table import PressRamps
@@ -29,7 +30,7 @@ EXPOSURE_US, GAIN = 4000.0, 1.0
 
 
 def camera_settings(probe: Probe) -> CameraSettings:
-    """Return the settings under which a probe's camera is simulated: its frame and scale, 8 bits."""
+    """Return the settings under which a probe's camera is simulated: its frame and geometry, 8 bits."""
     scale = probe.scale
     return CameraSettings(
         width_px=probe.camera.width_px,
@@ -39,7 +40,7 @@ def camera_settings(probe: Probe) -> CameraSettings:
         mm_per_px_y=scale.mm_per_px_y,
         exposure_us=EXPOSURE_US,
         gain=GAIN,
-    )
+    ).seen_as(probe.geometry)
 
 
 CAMERA = camera_settings(simulated_probe())
@@ -47,6 +48,8 @@ LIT, DARK = (0.6, 0.6, 0.6, 0.6), (0.0, 0.0, 0.0, 0.0)
 UNLOADED_FRAMES, PRESS_FRAMES = 4, 10
 TARGET_N, HOLD_STD_N = 0.5, 0.006
 """Force the hand aims at, and how far it strays while it holds: standard deviations."""
+TURN_STD_DEG = 2.0
+"""How far from a quarter of a turn a cap is put on."""
 
 
 @dataclass(frozen=True)
@@ -124,14 +127,11 @@ def phantom_recording(
 
     `scenario` says what the probe is made of (its inclusion and seed are not used), `ramps` how the face deforms where
     the table does not say. A `probe`, of which the tables must be, brings its own camera, lens, load cell, serial
-    number and imbalance of the LEDs; axis and distortion of its camera are left out.
+    number and imbalance of the LEDs; the scenario's world is then what is true against its file.
     """
-    asked, stated = protocol or PhantomProtocol(), probe or simulated_probe()
-    made_of = replace(scenario or Scenario(), inclusion=inclusion, seed=seed)
-    made_of = _with_parts_of(probe, made_of) if probe else made_of
-    camera = replace(camera_settings(stated), bits=8 if made_of.sensor.bits == 8 else 16)
-    pressed = VirtualProbe(made_of, tables, (camera.height_px, camera.width_px), camera.scale, ramps=ramps)
-    recorder = _Recorder(pressed, camera, seed, stated.leds.imbalance_ratio)
+    asked = protocol or PhantomProtocol()
+    made_of = _made_of(replace(scenario or Scenario(), inclusion=inclusion, seed=seed), probe)
+    recorder = _recorder(made_of, tables, probe, ramps)
     frames = [
         *recorder.unloaded("dark"),
         *recorder.unloaded("reference"),
@@ -141,26 +141,80 @@ def phantom_recording(
     for ramp, place in enumerate(asked.further_places, start=1):
         frames += [replace(frame, ramp=ramp) for frame in recorder.pressed("press", asked, place)]
     places = f" {asked.further_places}" if asked.further_places else ""
+    described = f"phantom {made_of} {asked} {ramps is None}{places}{probe or ''}"
+    taken = _recording(recorder, frames, described, probe)
+    return replace(taken, position_mm=(asked.place.x_mm, asked.place.y_mm), truth=inclusion)
+
+
+def grid_recordings(
+    count: int,
+    target: GridTarget,
+    tables: ProbeTables,
+    *,
+    play_mm: float,
+    seed: int,
+    scenario: Scenario | None = None,
+    probe: Probe | None = None,
+) -> Iterator[Recording]:
+    """Yield recordings of a grid target in its cap, which is put on anew for each, a quarter of a turn farther.
+
+    Their reference frames show a blank plate.
+    `play_mm` is by how much its middle misses the face's along x and y, a standard deviation; it is turned by some
+    degrees more. Scenario and probe are as in `phantom_recording`.
+    """
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        x_mm, y_mm = target.x_mm + play_mm * rng.standard_normal(2)
+        turn_deg = target.turn_deg + 90.0 * number + float(rng.normal(0, TURN_STD_DEG))
+        put_on = replace(target, x_mm=float(x_mm), y_mm=float(y_mm), turn_deg=turn_deg)
+        made_of = _made_of(replace(scenario or Scenario(), grid=put_on, seed=seed + number), probe)
+        recorder = _recorder(made_of, tables, probe)
+        blank = _recorder(replace(made_of, grid=replace(put_on, ink_ratio=1.0)), tables, probe)
+        held = PhantomProtocol(forces_n=(TARGET_N,))
+        frames = [*blank.unloaded("dark"), *blank.pressed("reference", held, ProbePlacement())]
+        recorder.number = blank.number
+        frames += recorder.pressed("press", held, ProbePlacement())
+        yield _recording(recorder, frames, f"grid {made_of} {probe or ''}", probe)
+
+
+def _recorder(
+    made_of: Scenario, tables: ProbeTables, probe: Probe | None, ramps: PressRamps | None = None
+) -> _Recorder:
+    stated = probe or simulated_probe()
+    camera = replace(camera_settings(stated), bits=8 if made_of.sensor.bits == 8 else 16)
+    pressed = VirtualProbe(made_of, tables, (camera.height_px, camera.width_px), camera.scale, ramps=ramps)
+    return _Recorder(pressed, camera, made_of.seed, stated.leds.imbalance_ratio)
+
+
+def _recording(recorder: _Recorder, frames: Sequence[Frame], described: str, probe: Probe | None) -> Recording:
+    made_of = recorder.probe.scenario
     return Recording(
-        id=str(uuid.uuid5(uuid.NAMESPACE_OID, f"phantom {made_of} {asked} {ramps is None}{places}{probe or ''}")),
+        id=str(uuid.uuid5(uuid.NAMESPACE_OID, described)),
         serial=probe.serial if probe else made_of.serial,
         software=__version__,
         started_at="1970-01-01T00:00:00.000Z",
-        camera=camera,
+        camera=recorder.camera,
         frames=tuple(frames),
-        position_mm=(asked.place.x_mm, asked.place.y_mm),
-        truth=inclusion,
         simulated=True,
         cell=RecordedCell(made_of.cell.counts_per_n, made_of.cell.zero_counts),
     )
 
 
-def _with_parts_of(probe: Probe, scenario: Scenario) -> Scenario:
-    """Return a scenario with the lens, the sensor's bits and the load cell of a probe."""
-    camera = probe.camera
+def _made_of(scenario: Scenario, probe: Probe | None) -> Scenario:
+    """Return a scenario with the lens, axis and distortion, the sensor's bits and the load cell of a probe."""
+    if probe is None:
+        return scenario
+    camera, known, true = probe.camera, probe.geometry, scenario.world.camera
+    seen_by = replace(
+        true,
+        axis_x_mm=known.axis_x_mm + true.axis_x_mm,
+        axis_y_mm=known.axis_y_mm + true.axis_y_mm,
+        rim_distortion_percent=known.rim_distortion_percent + true.rim_distortion_percent,
+    )
     return replace(
         scenario,
         lens=replace(scenario.lens, blur_px=camera.blur_px, distance_mm=camera.lens_distance_mm),
         sensor=replace(scenario.sensor, bits=camera.bits),
         cell=replace(scenario.cell, counts_per_n=probe.cell.counts_per_n),
+        world=replace(scenario.world, camera=seen_by),
     )

@@ -17,7 +17,10 @@ from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from device.measurement.bundle import ModelBundle
+    from device.simulation.scenario import Scenario
+    from device.simulation.virtual_probe import ProbeTables
     from host_tools.calibration.phantom_sets import Phantom
+    from host_tools.scenes.probe import Probe
 
 WIDE = Path("build/wide_table")
 FARTHEST_MM = 40.0
@@ -84,8 +87,13 @@ def phantom(
     phantoms: Annotated[
         Path | None, typer.Option(help="File of the phantoms to record instead of a set, phantoms.toml.")
     ] = None,
+    grid: Annotated[int | None, typer.Option(help="Record a grid target instead, so many times.")] = None,
+    pitch_mm: Annotated[float, typer.Option(help="Distance of the grid's dots.")] = 2.0,
+    play_mm: Annotated[float, typer.Option(help="By how much the grid's cap misses the face's middle.")] = 0.02,
 ) -> None:
     """Record the simulated probe on phantoms: the model's nine, eight published ones, random ones or those of a file.
+
+    With --grid they are of a grid target, as `host_tools probe camera` takes them.
 
     Another probe's recordings come from its own tables: name their folder with --table.
 
@@ -103,6 +111,9 @@ def phantom(
     made_of = read_scenario(scenario) if scenario else Scenario()
     protocol = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
     tables, made_by = ProbeTables.load(table), probe_with_tables(probe, table)
+    if grid is not None:
+        _record_grid(out, grid, pitch_mm, play_mm, made_of, tables, seed, made_by)
+        return
     chosen = list(_phantom_set(which, model, scenes, seed, phantoms))
     _require_room([out / one.name for one in chosen])
     for i, one in enumerate(chosen):
@@ -118,6 +129,30 @@ def phantom(
         known = replace(recording, truth=one.truth, phantom_serial=one.set_serial)
         write_recording(known, out / one.name)
         note.print(f"{out / one.name}: {_told(one.truth)}")
+
+
+def _record_grid(
+    out: Path,
+    count: int,
+    pitch_mm: float,
+    play_mm: float,
+    scenario: Scenario,
+    tables: ProbeTables,
+    seed: int,
+    probe: Probe | None,
+) -> None:
+    from device.files.recording_file import write_recording
+    from device.simulation.grid_target import GridTarget
+    from host_tools.calibration.phantom import grid_recordings
+
+    require("grid", count, Bound(1, 1000, "recordings"), "record at least one")
+    require("play_mm", play_mm, Bound(0.0, 1.0, "mm"), "give the play of the cap")
+    target = GridTarget(pitch_mm, dot_mm=0.4 * pitch_mm, middle_dot_mm=0.6 * pitch_mm)
+    _require_room([out / f"grid{number}" for number in range(1, count + 1)])
+    made = grid_recordings(count, target, tables, play_mm=play_mm, seed=seed, scenario=scenario, probe=probe)
+    for number, recording in enumerate(made, start=1):
+        write_recording(recording, out / f"grid{number}")
+        note.print(f"{out / f'grid{number}'}: dots every {pitch_mm:g} mm")
 
 
 def _require_room(recordings: list[Path]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -57,3 +58,10 @@ def problem_record(problem: InvalidQuantity) -> dict[str, str]:
     """Return what is wrong as JSON object."""
     value = str(problem.value)
     return {"quantity": problem.quantity, "value": value, "bound": problem.bound, "action": problem.action}
+
+
+def print_rows(rows: Sequence[tuple[str, ...]]) -> None:
+    """Print a table of texts, each column as wide as its widest."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())

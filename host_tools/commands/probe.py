@@ -1,25 +1,28 @@
-"""`host_tools probe`: the file of what a builder knows of a probe, and that of the phantoms it is pressed on."""
+"""`host_tools probe`: the file of what a builder knows of a probe, that of the phantoms it is pressed on, its camera.
+
+`camera` makes recordings of a grid target the camera's geometry; `camera-trial` says how well that does.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.output import note, own_models, problem_record
+from host_tools.commands.output import note, own_models, print_rows, problem_record
 
 if TYPE_CHECKING:
     from device.files.toml_record import Record
+    from host_tools.calibration.camera_fit import FittedCamera, GridPrint
     from host_tools.scenes.phantom_set import StatedPhantom
     from host_tools.scenes.probe import Probe
     from host_tools.scenes.scene import Scene
-    from host_tools.scenes.stated import StatedRow
 
 ProbeFile = Annotated[Path, typer.Argument(metavar="FILE", help="The probe's file, probe.toml.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, also of what is wrong.")]
@@ -28,6 +31,8 @@ ProbeOption = Annotated[
     typer.Option("--probe", help="The probe's file, probe.toml; the simulated probe unless given."),
 ]
 """Of every verb whose defaults are the simulated probe's."""
+PitchMm = Annotated[float, typer.Option(help="Distance of the grid's dots.")]
+PlayMm = Annotated[float, typer.Option(help="By how much the cap misses the face's middle, one standard deviation.")]
 
 probe = typer.Typer(no_args_is_help=True, help="A probe as a file: what its builder knows of it, and of its phantoms.")
 
@@ -123,6 +128,96 @@ def _phantom_row(phantom: StatedPhantom) -> tuple[str, ...]:
     return phantom.name, *numbers, phantom.surface
 
 
+@probe.command(epilog="Example: host_tools probe camera build/grid/* --probe probe.toml --write")
+def camera(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings of the grid, the cap put on anew for each.")],
+    file: Annotated[Path | None, typer.Option("--probe", help="The probe's file, probe.toml, to compare with.")] = None,
+    pitch_mm: PitchMm = 2.0,
+    pitch_tolerance_mm: Annotated[float, typer.Option(help="How well that is known, one standard deviation.")] = 0.001,
+    play_mm: PlayMm = 0.02,
+    write: Annotated[bool, typer.Option("--write", help="Write what is found into the probe's file.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, also of what is wrong.")] = False,
+) -> None:
+    """Find pixel sizes, optical axis and distortion of a camera from a grid target in a cap round the face.
+
+    Reference frames show a blank plate, press frames the grid. What does not fit is named, all at once, and nothing is
+    written; exit code 1.
+    """
+    from host_tools.calibration.camera_fit import GridPrint
+    from host_tools.scenes.probe_file import read_probe
+
+    if write and file is None:
+        raise InvalidQuantity("probe", "not given", "given with --write", "name the probe's file with --probe")
+    printed = GridPrint(pitch_mm, pitch_tolerance_mm, play_mm)
+    try:
+        found = _found(recordings, printed, read_probe(file) if file else None, file if write else None)
+    except InvalidQuantity as refusal:
+        if not as_json:
+            raise
+        problems: Iterable[InvalidQuantity] = getattr(refusal, "problems", [refusal])
+        print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in problems]}))
+        raise typer.Exit(1) from refusal
+    if as_json:
+        print(json.dumps(_camera_record(found, len(recordings))))
+    else:
+        _show_camera(found, len(recordings), file if write else None)
+
+
+def _found(recordings: list[Path], printed: GridPrint, known: Probe | None, file: Path | None) -> FittedCamera:
+    """Return the fitted camera, once it is written into the file where there is one."""
+    from device.files.recording_file import read_recording
+    from host_tools.calibration.camera_fit import camera_of
+    from host_tools.scenes.probe_file import write_camera
+
+    found = camera_of({str(path): read_recording(path) for path in recordings}, printed, known)
+    if file:
+        write_camera(file, found.as_probe_camera())
+    return found
+
+
+def _camera_record(found: FittedCamera, recordings: int) -> dict[str, Any]:
+    numbers = {name: {"value": value, "deviation": deviation} for name, value, deviation, _ in found.rows()}
+    return {
+        "accepted": True,
+        "problems": [],
+        "camera": numbers,
+        "dots": found.dots,
+        "recordings": recordings,
+        "left_mm": found.left_mm,
+    }
+
+
+def _show_camera(found: FittedCamera, recordings: int, file: Path | None) -> None:
+    rows = [(name, f"{value:.6g}", f"{deviation:.2g}", unit) for name, value, deviation, unit in found.rows()]
+    print_rows([("quantity", "value", "1 sd", "unit"), *rows])
+    print(f"\n{found.dots} dots in {recordings} recordings, {1000 * found.left_mm:.2g} um from the grid (rms)")
+    print("\n# settings of the daemon")
+    print("[camera]", *(f"{name} = {value}" for name, value, _, _ in rows), sep="\n")
+    if file:
+        note.print(f"{file}: pixel sizes, axis and distortion written, with their tolerances.", soft_wrap=True)
+        return
+    print("\n# the same of probe.toml")
+    print("[camera]", *(f"{name} = {value!r}" for name, value in found.as_probe_camera().items()), sep="\n")
+
+
+@probe.command(epilog="Example: host_tools probe camera-trial scenarios/worlds/*.toml")
+def camera_trial(
+    worlds: Annotated[list[Path], typer.Argument(help="Scenario files of simulated probes.")],
+    grids: Annotated[int, typer.Option(help="Recordings of the grid on each.")] = 4,
+    play_mm: PlayMm = 0.02,
+    seed: Annotated[int, typer.Option(help="Seed of caps, camera and press.")] = 1,
+) -> None:
+    """Print how far a grid target's camera is from the true one of each world, and what that makes of a press.
+
+    The last columns are by how much a row of a press (standard mode, 0.001 of the light, rms over its columns) differs
+    from the row of an ideal camera, before and after that camera is undone.
+    """
+    from host_tools.scores.camera_trial import trial_table
+
+    for line in trial_table(worlds, grids=grids, play_mm=play_mm, seed=seed):
+        print(line, flush=True)
+
+
 def _read(read: Callable[[Path], Record], file: Path, as_json: bool) -> Record:
     """Return a file's record; what is wrong in it is raised, or printed as JSON with exit code 1."""
     try:
@@ -164,10 +259,3 @@ def own_folder(probe: Path | None, out: Path | None) -> Path:
         bound = "given with --probe"
         raise InvalidQuantity("out", "not given", bound, "name a folder: models/simulated_probe is another probe's")
     return out or own_models("simulated_probe")
-
-
-def print_rows(rows: Sequence[StatedRow | tuple[str, ...]]) -> None:
-    """Print a table of texts, each column as wide as its widest."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())

@@ -1,7 +1,7 @@
 """A probe as its builder knows it: what it is made of, its camera and its load cell, each number with its tolerance.
 
 Finite elements take its `waveguide`, light its `light_block`. Both leave out what no model of this project has:
-Poisson ratios that differ from layer to layer, LEDs of different brightness, a camera off the axis, its distortion.
+Poisson ratios that differ from layer to layer, LEDs of different brightness.
 These are stated all the same, since they decide what a press of this probe may look like.
 """
 
@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from device.measurement.quantities import Bound, InvalidQuantity
+from device.measurement.recording.camera_geometry import AXIS, CameraGeometry
 from device.measurement.recording.pixel_scale import PixelScale
 from host_tools.scenes.light_block import LightBlock
 from host_tools.scenes.scene import FaceShape, Waveguide
@@ -27,8 +28,11 @@ ABOVE_ZERO_MM = Bound(0.0, 100.0, "mm", low_included=False)
 NOT_NEGATIVE_MM = Bound(0.0, 100.0, "mm")
 INDEX = Bound(1.0, 3.0, "")
 PIXEL = Bound(1e-4, 1.0, "mm")
-SHORTER_SIDE_RATIO = 0.8
-"""Part of the face that the frame's shorter side must show; the paper's sensor shows 0.82 of 22 mm."""
+SHORTER_SIDE_RATIO = 0.73
+"""Part of the face that the frame's shorter side must show; the paper's sensor shows 0.82 of 22 mm.
+
+That leaves an axis 0.9 mm beside the middle: the ring of 8 mm is still seen whole.
+"""
 WALLS_APART = 1e-3
 """By so much the LEDs' imbalance may differ from 0 in the mean: it is the difference from their mean."""
 
@@ -111,12 +115,14 @@ class ProbeCamera:
     mm_per_px_x_tolerance: Tolerance
     mm_per_px_y: Annotated[float, PIXEL, "Height of a frame's pixel on the face."]
     mm_per_px_y_tolerance: Tolerance
-    axis_x_mm: Annotated[float, Bound(-10.0, 10.0, "mm"), "Where the face's middle is seen beside the frame's."]
+    axis_x_mm: Annotated[float, AXIS, "Where the optical axis, the frame's middle, meets the face: along a row."]
     axis_x_mm_tolerance: Tolerance
-    axis_y_mm: Annotated[float, Bound(-10.0, 10.0, "mm"), "The same along the rows' order."]
+    axis_y_mm: Annotated[float, AXIS, "The same down a column."]
     axis_y_mm_tolerance: Tolerance
     distortion_ratio: Annotated[
-        float, Bound(-0.3, 0.3, ""), "How much farther out the face's edge is seen; grows as the square of the radius."
+        float,
+        Bound(-0.1, 0.1, ""),
+        "How much farther out the face is seen where the pixel size says 11 mm; square law.",
     ]
     distortion_ratio_tolerance: Tolerance
     blur_px: Annotated[float, Bound(0.0, 20.0, "px"), "Blur, a standard deviation."]
@@ -189,6 +195,12 @@ class Probe:
     def scale(self) -> PixelScale:
         """Size of a pixel on the face."""
         return PixelScale(self.camera.mm_per_px_x, self.camera.mm_per_px_y)
+
+    @property
+    def geometry(self) -> CameraGeometry:
+        """Where on the face the camera's pixels look."""
+        camera = self.camera
+        return CameraGeometry(self.scale, camera.axis_x_mm, camera.axis_y_mm, 100 * camera.distortion_ratio)
 
     @property
     def frame_mm(self) -> tuple[float, float]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from device.files.durable import write_durably
 from device.files.shipped import SIMULATED_PROBE
-from device.files.toml_record import as_table
+from device.files.toml_record import as_table, from_table
 from device.measurement.quantities import InvalidQuantity
 from host_tools.scenes.probe import Probe, misfits
 from host_tools.scenes.stated import SUFFIX, as_commented, read_stated
@@ -54,6 +57,26 @@ def write_new_probe(path: Path, serial: str | None) -> None:
         raise InvalidQuantity("file", path, "a new file", "give another name: what is in this one would be lost")
     named = {"serial": serial, **table} if serial else table
     write_durably(path, f"{HEADER}{TO_FILL_IN}\n{as_commented(Probe, named)}".encode())
+
+
+def write_camera(path: Path, measured: Mapping[str, float]) -> Probe:
+    """Write measured keys of `[camera]` into a probe's file, whose other lines stay as they are; return the probe.
+
+    Raises `InvalidRecord` before anything is written when the file, or the probe with these, does not hold.
+    """
+    found, text = read_probe(path), path.read_text(encoding="utf-8")
+    table = as_table(found)
+    changed = from_table(Probe, table | {"camera": table["camera"] | measured})
+    before, section, rest = text.partition("\n[camera]\n")
+    for key, value in measured.items():
+        rest = re.sub(
+            rf"^{key}[ \t]*=[^#\n]*?(?=[ \t]*(#.*)?$)", f"{key} = {value!r}", rest, count=1, flags=re.MULTILINE
+        )
+    edited = before + section + rest
+    if from_table(Probe, tomllib.loads(edited)) != changed:  # written in a way of its own: all of it anew
+        edited = probe_text(changed)
+    write_durably(path, edited.encode())
+    return changed
 
 
 def _without_tolerances(table: Any) -> Any:

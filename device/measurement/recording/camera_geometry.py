@@ -23,7 +23,7 @@ from device.measurement.recording.reference_light import Image
 RIM_MM = 11.0
 """Radius at which a distortion is stated: the face's rim."""
 AXIS, RIM_DISTORTION = Bound(-2.0, 2.0, "mm"), Bound(-10.0, 10.0, "%")
-ACTION = "find it with `host_tools probe camera` from a grid target"
+ACTION = "centre the camera, or find it anew from a grid target with `host_tools probe camera`"
 STEPS = 8
 """Newton steps from the face to the image; five are enough for 10 % of distortion."""
 MISSED_MM = 1e-6

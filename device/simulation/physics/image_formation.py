@@ -11,6 +11,7 @@ Source: Lee & Won 2013, section III.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Protocol
@@ -122,13 +123,18 @@ class ScatteredImage:
         shape: tuple[int, int],
         scale: PixelScale,
         world: World = AS_BELIEVED,
+        print_on: Callable[[Image, Image], Image] | None = None,
     ) -> None:
-        """Skin, lens and scale are as believed; `world` says how far off that is."""
+        """Skin, lens and scale are as believed; `world` says how far off that is.
+
+        Of a printed plate in place of skin, `print_on` gives the light [ny, nx] over that of a blank one, at x, y.
+        """
         self.x_mm, self.y_mm = lookup.x_mm[None, :], lookup.y_mm[:, None]
         self._lookup, self._world = lookup, world
         self._projection = Projection(lens, lookup.x_mm, lookup.y_mm, shape, scale, world.camera)
         self._skin = lru_cache(maxsize=8)(lambda share: world.lesion.skin(skin, share))
         self._skin_light = lru_cache(maxsize=8)(self._skin_light_at)
+        self._print = print_on(self.x_mm, self.y_mm) if print_on else None
 
     def intensity(
         self,
@@ -146,6 +152,8 @@ class ScatteredImage:
             skin = replace(skin, wet_ratio=max(skin.wet_ratio, wet_ratio))
         lit = world.light.lit(led_ratio, share)
         radiance = self._lookup.radiance(w_mm, p_kpa, lit, skin, touching, world.contact)
+        if touching and self._print is not None:
+            radiance *= self._print
         if touching and world.texture.level_percent:
             radiance *= self._skin_light(place.x_mm, place.y_mm)
         return self._projection(radiance / np.float32(UNIT_RADIANCE))

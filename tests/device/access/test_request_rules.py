@@ -145,3 +145,35 @@ def test_a_header_that_is_there_twice_is_neither_of_the_two():
     assert both == {"host": "127.0.0.1, evil.example", "x": "1"}
     with pytest.raises(UnknownHost):
         require_allowed(AskedRequest("GET", "/", both, "127.0.0.1"), HOSTS)
+
+
+def own_screen(client="127.0.0.1", version="1.1", **headers):
+    return AskedRequest("GET", "/", {"host": "127.0.0.1:8000", **headers}, "127.0.0.1", client, False, version)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8000", "localhost:8000", "[::1]:8000", "LOCALHOST"])
+def test_the_own_screen_asks_by_loopback_and_its_name(host):
+    assert own_screen(host=host).is_own_screen
+
+
+@pytest.mark.parametrize(
+    "passed_on",
+    [
+        {"client": "192.0.2.7"},
+        {"client": None},
+        {"host": "probe.local"},
+        {"host": "127.0.0.1.evil.example"},
+        {"host": ""},
+        {"version": "1.0"},
+        {"x-forwarded-for": "127.0.0.1"},
+        {"x-forwarded-for": ""},
+        {"x-real-ip": "127.0.0.1"},
+        {"forwarded": "for=127.0.0.1"},
+        {"via": "1.1 proxy"},
+        {"x-forwarded-host": "localhost"},
+        {"x-forwarded-proto": "https"},
+    ],
+    ids=str,
+)
+def test_what_a_proxy_on_the_machine_passes_on_is_not_the_own_screens(passed_on):
+    assert not own_screen(**passed_on).is_own_screen

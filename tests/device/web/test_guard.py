@@ -88,7 +88,7 @@ def test_a_client_that_goes_in_the_middle_of_its_body_is_told_to_the_application
         return {"type": "http.disconnect"}
 
     headers = [(b"host", b"localhost"), (b"content-type", b"application/json"), (b"transfer-encoding", b"chunked")]
-    scope = {"type": "http", "method": "POST", "path": "/", "headers": headers}
+    scope = {"type": "http", "method": "POST", "path": "/", "headers": headers, "client": ("127.0.0.1", 9)}
     asyncio.run(RequestGuard(app, KnownHosts.of_machine())(scope, gone, None))
     assert told == [{"type": "http.disconnect"}]
 

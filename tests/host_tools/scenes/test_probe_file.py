@@ -19,7 +19,15 @@ from device.simulation.scenario import CellSettings, Scenario
 from device.simulation.virtual_probe import SIMULATED_PROBE_SHA256
 from host_tools.scenes.light_block import LightBlock
 from host_tools.scenes.probe import Probe, misfits
-from host_tools.scenes.probe_file import NAME, probe_of, probe_text, read_probe, simulated_probe, write_new_probe
+from host_tools.scenes.probe_file import (
+    NAME,
+    probe_of,
+    probe_text,
+    read_probe,
+    simulated_probe,
+    write_camera,
+    write_new_probe,
+)
 from host_tools.scenes.scene import Waveguide
 from host_tools.scenes.stated import stated_problems
 
@@ -50,6 +58,36 @@ def test_the_file_of_the_simulated_probe_is_written_as_it_reads(tmp_path):
     (tmp_path / "probe.toml").write_text(probe_text(other))
     assert read_probe(tmp_path / "probe.toml") == probe_of(tmp_path / "probe.toml") == other
     assert probe_of(None) == PROBE
+
+
+MEASURED = {"mm_per_px_x": 0.0316, "mm_per_px_x_tolerance": 1.6e-05, "axis_y_mm": -0.25, "distortion_ratio": -0.012}
+
+
+def test_a_measured_camera_is_written_between_what_the_builder_wrote(tmp_path):
+    """Comments stay, also those of other keys of the same names; a file that is laid out otherwise is written anew."""
+    own = TEXT.replace("mm_per_px_x = 0.03125\n", "mm_per_px_x = 0.03125   # by eye\n") + "# the builder's last word\n"
+    dotted = tomli_w.dumps(tomllib.loads(TEXT)).replace("[camera]\n", "[ camera ]\n")
+    for text in (own, dotted):
+        file = tmp_path / "probe.toml"
+        file.write_text(text)
+        written = write_camera(file, MEASURED)
+        assert read_probe(file) == written
+        assert {name: getattr(written.camera, name) for name in MEASURED} == MEASURED
+        assert replace(written, camera=PROBE.camera) == PROBE
+    file.write_text(own)
+    write_camera(file, MEASURED)
+    before, after = own.splitlines(), file.read_text().splitlines()
+    changed = [new for old, new in zip(before, after, strict=True) if old != new]
+    assert changed[:2] == ["mm_per_px_x = 0.0316   # by eye", "mm_per_px_x_tolerance = 1.6e-05"]
+    assert len(changed) == len(MEASURED)
+
+
+def test_a_camera_that_no_probe_can_have_is_not_written(tmp_path):
+    file = tmp_path / "probe.toml"
+    file.write_text(TEXT)
+    with pytest.raises(InvalidRecord, match="shorter side of the camera's window"):
+        write_camera(file, {"axis_y_mm": 1.9})
+    assert file.read_text() == TEXT
 
 
 WRONG = (
