@@ -50,9 +50,15 @@ class Orthanc:
             "Worklists": {"Enable": True, "Database": str(self.worklists), "FilterIssuerAet": False}, **more,
         }  # fmt: skip
         self._settings = folder / "orthanc.json"
-        self._settings.write_text(json.dumps(stated))
+        self._stated: dict[str, Any] = {}
+        self.state(**stated)
         self._log = (folder / "orthanc.log").open("w")
         self._process: subprocess.Popen[bytes] | None = None
+
+    def state(self, **settings: Any) -> None:
+        """Set more, before it is started."""
+        self._stated |= settings
+        self._settings.write_text(json.dumps(self._stated))
 
     def start(self) -> Orthanc:
         self._process = subprocess.Popen(

@@ -191,12 +191,17 @@ def _hospital(procedure: Procedure) -> Hospital:
     """Return what sends to the hospital's archive; the status tells when it does not get there."""
     from device.dicom.hospital import Hospital
     from device.instrument.press.picture import kept_or_drawn
+    from device.records.store import ENDED
 
     def tell(fault: DeviceError | None) -> None:
         if procedure.board.now.archive is not fault:
             procedure.board.update(archive=fault)
 
-    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell)
+    def is_busy() -> bool:
+        press = procedure.board.now.press
+        return press is not None and press.state not in ENDED
+
+    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell, is_busy)
 
 
 def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:

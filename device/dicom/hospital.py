@@ -35,17 +35,18 @@ class Hospital:
         store: Store,
         picture_of: Callable[[Path], bytes],
         tell: Callable[[DeviceError | None], None] = lambda fault: None,
+        is_busy: Callable[[], bool] = lambda: False,
     ) -> None:
         """Take the settings, the store, who returns the picture (a PNG) of a kept recording, and whom to tell faults.
 
-        Nothing is sent before `start`.
+        Nothing is sent before `start`, nor while the probe is busy with a press.
         """
         self._settings, self._store, self._picture_of = settings, store, picture_of
         self._sender: Sender | None = None
         self._shown: dict[str, OrderedStudy] = {}
         if settings.archive_host is not None:
             days = settings.demographics_days
-            self._sender = Sender(store.outbox, self._delivery, keep_patients_days=days, tell=tell)
+            self._sender = Sender(store.outbox, self._delivery, keep_patients_days=days, tell=tell, is_busy=is_busy)
 
     def start(self) -> None:
         """Begin to send what waits, if there is an archive."""

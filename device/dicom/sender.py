@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 
 LOOK_S = 30.0
 """So often it is looked whether a correction has made anything wrong that was sent."""
+BUSY_LOOK_S = 0.5
 FIRST_WAIT_S, LONGEST_WAIT_S = 2.0, 300.0
 NEVER_SENT = timedelta(days=60)
 """Of an exam that nobody sends, too, who the patient is does not stay."""
@@ -46,9 +47,13 @@ class Sender:
         *,
         keep_patients_days: int,
         tell: Callable[[DeviceError | None], None],
+        is_busy: Callable[[], bool],
     ) -> None:
-        """Take the outbox, what makes the delivery when it is first needed, and whom to tell of a fault."""
-        self._outbox, self._deliver, self._tell = outbox, deliver, tell
+        """Take the outbox, what makes the delivery when it is first needed, and whom to tell of a fault.
+
+        While the probe `is_busy` nothing is sent: a press has it to itself.
+        """
+        self._outbox, self._deliver, self._tell, self._is_busy = outbox, deliver, tell, is_busy
         self._keep_patients = timedelta(days=keep_patients_days)
         self._delivery: Delivery | None = None
         self._stopping, self._woken = threading.Event(), threading.Event()
@@ -77,6 +82,8 @@ class Sender:
 
     def _turn(self) -> float:
         """Send what there is; return how long to wait until the next time (s)."""
+        if self._is_busy():
+            return BUSY_LOOK_S
         try:
             is_left = self._delivered()
         except DeviceError as fault:
@@ -94,7 +101,7 @@ class Sender:
         if self._outbox.is_idle():
             return False
         self._delivery = self._delivery or self._deliver()
-        return self._delivery.turn(self._stopping.is_set)
+        return self._delivery.turn(lambda: self._stopping.is_set() or self._is_busy())
 
     def _failed(self, fault: DeviceError) -> float:
         self._failures += 1

@@ -85,13 +85,32 @@ def test_what_the_archive_refuses_is_told_of_until_it_is_sent_again(store, archi
 
 
 def test_waiting_grows_up_to_a_bound(store, archive):
-    waiting = sender.Sender(store.outbox, lambda: None, keep_patients_days=7, tell=lambda fault: None)
+    waiting = sender.Sender(store.outbox, lambda: None, keep_patients_days=7, tell=lambda fault: None, is_busy=bool)
     waits = []
     for _ in range(12):
         waiting._failures += 1
         waits.append(waiting._wait_s())
     assert waits[:4] == [2, 4, 8, 16]
     assert waits[-1] == sender.LONGEST_WAIT_S
+
+
+def test_nothing_is_sent_while_the_probe_is_busy_and_all_after_that(store, archive, monkeypatch):
+    monkeypatch.setattr(sender, "BUSY_LOOK_S", 0.02)
+    exam, looks, is_free = begin(store), [], []
+    measure(store, exam)
+    told = []
+    hospital = Hospital(
+        archive.start().settings(), store, read_picture, told.append, lambda: looks.append(1) or not is_free
+    )
+    hospital.send(exam["id"], version=1, by="Ada")
+    hospital.start()
+    try:
+        wait_for(lambda: len(looks), lambda number: number >= 3)
+        assert store.outbox.counts() == {"queued": 2}
+        is_free.append(1)
+        wait_for(store.outbox.counts, lambda counts: counts == {"confirmed": 2})
+    finally:
+        hospital.close()
 
 
 def test_what_an_archive_answers_can_not_end_the_thread(store, archive, monkeypatch):
