@@ -2,7 +2,7 @@
 
     import host_tools as tsis
 
-    scene = tsis.Scene(tsis.Inclusion(size_mm=10, depth_mm=6, youngs_modulus_kpa=80), tsis.Press(force_n=0.5))
+    scene = tsis.Scene(tsis.Inclusion(size_mm=10, depth_mm=6, youngs_modulus_kpa=80), tsis.Press(force_n=0.2))
     solution = tsis.solve(scene, tolerance=0.01)
     solution.plot()
 
@@ -13,7 +13,7 @@
 - what can be known: `limits`, `PressProtocol`, `read_protocol`
 - recordings and answers: `Recording`, `read_recording`, `write_recording`, `simulated_probe`, `phantom_recording`,
   `Estimate`, `ModeModels`, `installed_models`, `analyse`
-- refusals: `InvalidQuantity`, `PressFailed`, `BundleRefused`
+- refusals: `InvalidQuantity`, `PressFailed`, `ToleranceMissed`, `BundleRefused`
 
 Modules in reading order: `door`, `workers`, `interrupts`.
 
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from host_tools.door import solve_ramp as solve_ramp
     from host_tools.door import sweep as sweep
     from host_tools.door import train as train
+    from host_tools.forward.ladder import ToleranceMissed as ToleranceMissed
     from host_tools.forward.press_model import PressFailed as PressFailed
     from host_tools.forward.solution import Solution as Solution
     from host_tools.forward.solution_dataset import dataset_of as dataset_of
@@ -99,6 +100,7 @@ _HOME = {
     "analyse": "host_tools.door",
     "InvalidQuantity": "device.measurement.quantities",
     "PressFailed": "host_tools.forward.press_model",
+    "ToleranceMissed": "host_tools.forward.ladder",
     "BundleRefused": "device.measurement.bundle",
 }
 
@@ -117,6 +119,7 @@ __all__ = [
     "Solution",
     "Tissue",
     "TissueLayer",
+    "ToleranceMissed",
     "Waveguide",
     "analyse",
     "dataset_of",

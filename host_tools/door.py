@@ -32,34 +32,48 @@ if TYPE_CHECKING:
 
 STANDARD_PROTOCOL = PROTOCOLS / "standard.toml"
 TOLERANCE = 0.01
+WITHIN_S = 120.0
 StrainChoice = Literal["small", "finite", "auto"]
 
 
-def solve(scene: Scene, *, tolerance: float = TOLERANCE, strain: StrainChoice = "auto") -> Solution:
-    """Solve a scene by the cheapest model that is planned to hold a tolerance: the face, the force, O1-O3, and errors.
+def solve(
+    scene: Scene,
+    *,
+    tolerance: float = TOLERANCE,
+    strain: StrainChoice = "auto",
+    within_s: float = WITHIN_S,
+    best: bool = False,
+) -> Solution:
+    """Solve a scene by the cheapest model that holds a tolerance: the face, the force, O1-O3, and errors.
 
-    `tolerance` is the relative error allowed on O1-O3: 0.01 is 1 %. `strain` "auto" takes finite strain where small
-    strain departs by more than that; "small" is the paper's model. Raise `InvalidQuantity` for a scene that no model
-    serves, `PressFailed` for a press that cannot be reached.
+    `tolerance` is the relative error allowed on force and O1-O3: 0.01 is 1 %. What is stated is compared with it, and
+    higher levels are taken until it holds, for `within_s` seconds. `strain` "auto" takes finite strain where small
+    strain departs by more than that; "small" is the paper's model, whose departure is then not counted. Raise
+    `InvalidQuantity` for a scene that no model serves, `PressFailed` for a press that cannot be reached, and
+    `ToleranceMissed` where no level holds; `best` returns the best instead.
     """
-    return solve_ramp(scene, [scene.press], tolerance=tolerance, strain=strain)[0]
+    return solve_ramp(scene, [scene.press], tolerance=tolerance, strain=strain, within_s=within_s, best=best)[0]
 
 
 def solve_ramp(
-    scene: Scene, presses: Sequence[Press], *, tolerance: float = TOLERANCE, strain: StrainChoice = "auto"
+    scene: Scene,
+    presses: Sequence[Press],
+    *,
+    tolerance: float = TOLERANCE,
+    strain: StrainChoice = "auto",
+    within_s: float = WITHIN_S,
+    best: bool = False,
 ) -> tuple[Solution, ...]:
     """Solve a scene at several presses, all by indentation or all by force, ascending; one path serves all.
 
     As `solve`; `dataset_of` makes one data set of them.
     """
-    from host_tools.forward.plan import model_plan
-    from host_tools.forward.solve import solve_ramp as solve_presses
+    from host_tools.forward.ladder import climb, held
 
     if not presses:
         raise InvalidQuantity("presses", "none", "at least one", "give the loads")
     allowed = require("tolerance", tolerance, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
-    plan = model_plan(scene.with_press(presses[-1]), tolerance=allowed, strain=strain)
-    return solve_presses(scene, presses, plan, estimate_error=True)
+    return held(climb(scene, presses, tolerance=allowed, strain=strain, within_s=within_s), best=best).solutions
 
 
 def sweep(

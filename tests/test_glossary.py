@@ -146,7 +146,7 @@ def texts() -> tuple[Text, ...]:
     for page in pages:
         if page.name != "glossary.md":
             found.append(Text(str(page.relative_to(ROOT)), PROSE, plain(page.read_text(encoding="utf-8"))))
-    for page in (ROOT / "device" / "web" / "static").iterdir():
+    for page in filter(Path.is_file, (ROOT / "device" / "web" / "static").rglob("*")):
         found.append(Text(str(page.relative_to(ROOT)), SCREEN, plain(page.read_text(encoding="utf-8"))))
     return tuple(found)
 

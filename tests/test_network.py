@@ -15,6 +15,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
@@ -24,6 +25,8 @@ from networked_daemon import NetworkedDaemon
 from device.access.certificate import ServerCertificate, own_certificate
 
 pytestmark = pytest.mark.real_time
+LOOPBACK = "0100007F"
+"""127.0.0.1 in the kernel's tables."""
 SHELL = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
@@ -153,6 +156,29 @@ def test_pair_and_tokens_of_the_command_line_ask_the_daemon(probe):
     assert run("tokens", "--revoke", made["id"]).stdout == "The token of Shell PC holds no more.\n"
     assert "no token" in run("tokens", "--revoke", made["id"]).stderr
     assert str(ROOT) not in code.stdout
+
+
+def listening_to_others(process_id):
+    """The ports at which a process and its children listen beside loopback, as the kernel tells."""
+    own = {process_id, *map(int, Path(f"/proc/{process_id}/task/{process_id}/children").read_text().split())}
+    sockets = set()
+    for one in own:
+        for link in Path(f"/proc/{one}/fd").iterdir():
+            with contextlib.suppress(OSError):
+                sockets.add(os.readlink(link))
+    ports = set()
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for row in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            _, at, _, state, *_, inode = row.split()[:10]
+            address, _, port = at.partition(":")
+            if f"socket:[{inode}]" in sockets and (state == "0A" or table.startswith("udp")) and address != LOOPBACK:
+                ports.add((table, int(port, 16)))
+    return ports
+
+
+def test_it_listens_at_its_two_ports_and_at_no_other(probe):
+    found = listening_to_others(probe.daemon.process.pid)
+    assert found == {("tcp", probe.port), ("tcp", probe.tls_port)}
 
 
 def test_no_secret_is_in_the_log_the_data_folder_or_a_backup(probe):

@@ -1,6 +1,7 @@
 """Measurements, presses and exams as lists: newest first, page by page, of an exam, a time, a mode or an outcome.
 
-Their order is that in which they were kept, never that of a clock, which may have been set.
+And what of them was made or changed lately, oldest first. Their order is that in which they were kept, never that of a
+clock, which may have been set.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ import sqlite3
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
-from device.records.exams import filed
+from device.records.exams import exam_of, filed
 
 _Record = dict[str, Any]
+_MEASUREMENTS = "measurement LEFT JOIN filing ON measurement_id = id"
 NEWEST = 2**63 - 1
 """Above every number of a record: the largest integer SQLite holds."""
 
@@ -42,6 +44,15 @@ class Page:
     next_before: int | None
 
 
+@dataclass(frozen=True)
+class Change:
+    """A measurement or an exam as it is now, and the number of the audit's entry by which it came to be or changed."""
+
+    number: int
+    kind: Literal["measurement", "exam"]
+    record: _Record
+
+
 class Listing:
     """The lists of a store; all methods may be called from any thread."""
 
@@ -58,8 +69,7 @@ class Listing:
             "json_extract(record, '$.mode') = ?": wanted.mode,
             "json_extract(record, '$.estimate.status') = ?": wanted.outcome,
         }
-        table = "measurement LEFT JOIN filing ON measurement_id = id"
-        rows = self._rows("seq, record, exam_id, voided, version", table, "seq", where, before, limit)
+        rows = self._rows("seq, record, exam_id, voided, version", _MEASUREMENTS, "seq", where, before, limit)
         return _page([(seq, {**json.loads(record), **filed(*filing)}) for seq, record, *filing in rows], limit)
 
     def presses(self, wanted: Wanted, *, before: int = NEWEST, limit: int) -> Page:
@@ -95,6 +105,18 @@ class Listing:
         rows = self._rows("seq, record", "exam", "seq", where, before, limit)
         return _page([(seq, json.loads(record)) for seq, record in rows], limit)
 
+    def newest_change(self) -> int:
+        """Return the number of the audit's last entry, 0 when there is none."""
+        with self._transaction() as db:
+            return int(db.execute("SELECT coalesce(max(seq), 0) FROM audit").fetchone()[0])
+
+    def changes(self, *, after: int, limit: int) -> list[Change]:
+        """Return what was made or changed after an entry of the audit, oldest first."""
+        query = f"SELECT seq, subject, record FROM audit WHERE seq > ? AND {_TOLD} ORDER BY seq LIMIT ?"
+        with self._transaction() as db:
+            rows = db.execute(query, (after, limit)).fetchall()
+            return [_change(db, seq, subject, json.loads(record)) for seq, subject, record in rows]
+
     def _rows(
         self, columns: str, table: str, number: str, where: Mapping[str, str | None], before: int, limit: int
     ) -> list[Any]:
@@ -104,6 +126,22 @@ class Listing:
         query = f"SELECT {columns} FROM {table} WHERE {conditions} ORDER BY {number} DESC LIMIT ?"
         with self._transaction() as db:
             return db.execute(query, (before, *asked.values(), limit + 1)).fetchall()
+
+
+_TOLD = (
+    "(json_extract(record, '$.what') IN ('exam_made', 'exam_changed', 'measurement_moved', 'measurement_voided')"
+    " OR json_extract(record, '$.after.measurement_id') IS NOT NULL)"
+)
+"""The audit's entries of exams and measurements: the end of a press names the measurement that it made."""
+
+
+def _change(db: sqlite3.Connection, seq: int, subject: str, entry: _Record) -> Change:
+    if entry["what"].startswith("exam_"):
+        return Change(seq, "exam", exam_of(db, subject))
+    query = f"SELECT record, exam_id, voided, version FROM {_MEASUREMENTS} WHERE id = ?"
+    identifier = entry["after"].get("measurement_id") or subject
+    record, *filing = db.execute(query, (identifier,)).fetchone()
+    return Change(seq, "measurement", {**json.loads(record), **filed(*filing)})
 
 
 def _page(numbered: list[tuple[int, _Record]], limit: int) -> Page:

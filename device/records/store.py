@@ -50,6 +50,8 @@ class Store:
         """
         self.folder, self._disk, self._lock = folder, disk or LocalDisk(), threading.Lock()
         self.findings, self._ended_late = StartFindings(), dict[str, StoredRecord]()
+        self.revision = 0
+        """Is another one whenever something was kept since; to be looked at from any thread, for nothing."""
         with ExitStack() as opened:
             self._db, self._damage = self._open(opened)
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
@@ -112,6 +114,7 @@ class Store:
         try:
             with self._lock, self._db:
                 yield self._db
+            self.revision = self._db.total_changes
         except (OSError, sqlite3.Error) as error:
             self.require_whole()
             kind = DiskFullError if _is_full(error) else StorageError

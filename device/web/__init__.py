@@ -1,7 +1,8 @@
 """REST, events and the device's screen: what a hospital PC calls and what the operator sees.
 
 Modules in reading order: `server`, `app`, `guard`, `conditional`, `schema`, `contract`, `paging`, `exams`,
-`presses`, `measurements`, `events`, `kept_files`, `exports`, `dicom`, `updates`, `pairing`, `problems`.
+`presses`, `measurements`, `events`, `kept_files`, `exports`, `dicom`, `updates`, `pairing`, `problems`,
+`screen_words`.
 
 What stands before them is `entrance`.
 

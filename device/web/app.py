@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
-from fastapi.responses import FileResponse, JSONResponse, StreamingResponse
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
-from device.config import DicomSection
+from device.config import DicomSection, PressSection
 from device.dicom.hospital import Hospital
+from device.instrument.press.cost import ModeOffer
 from device.instrument.press.picture import kept_or_drawn
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import SelfTestJob
@@ -43,6 +46,8 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.streams.changes import ChangeFeed, LastEventId
+from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
 
 API = "/api/v1"
@@ -96,6 +101,7 @@ def create_app(
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_live_view(app, API, procedure)
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
@@ -121,7 +127,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
             "simulated": procedure.is_simulated,
             "light_on_s": round(store.light_on_s, 1),
             "default_mode": config.press.mode,
-            "modes": [offer.as_record() for offer in procedure.offers()],
+            "modes": [_offered(offer, config.press) for offer in procedure.offers()],
             "network": network and network.as_record(),
         }
 
@@ -152,13 +158,25 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
 
     @app.get(
         f"{API}/events",
-        response_class=StreamingResponse,
-        responses=media(EVENTS, "`status` events, each with a Status as its data."),
+        response_class=EventSourceResponse,
+        responses=media(EVENTS, "Events `status`, `measurement`, `exam`: a Status, Measurement or Exam each."),
         tags=["status"],
     )
-    async def stream_events() -> StreamingResponse:
-        """Stream the status as server-sent events, one when something has changed and at least two a second."""
-        return StreamingResponse(status_events(feed), media_type=EVENTS)
+    async def stream_events(last_event_id: LastEventId = None) -> AsyncIterator[ServerSentEvent]:
+        """Stream the status whenever it changes and twice a second, and each measurement and exam made or changed.
+
+        With Last-Event-ID those that were made or changed since are sent as well.
+        """
+        changes = ChangeFeed(store, None if last_event_id is None else int(last_event_id))
+        async for event in status_events(feed, changes):
+            yield event
+
+
+def _offered(offer: ModeOffer, press: PressSection) -> dict[str, Any]:
+    """Return a mode with the forces (N) between which its frames are wanted: of a hold a band around its force."""
+    record = offer.as_record()
+    band_n = (record["from_n"], record["to_n"]) if record["kind"] == "ramp" else press.band_n
+    return {**record, "band_n": band_n}
 
 
 def _add_self_test(app: FastAPI, procedure: Procedure) -> None:

@@ -16,6 +16,7 @@ from device.web.schema import Problem
 Responses = dict[int | str, dict[str, Any]]
 
 PNG, ZIP, EVENTS = "image/png", "application/zip", "text/event-stream"
+LIVE = "multipart/x-mixed-replace"
 CSV, NPZ, PDF = "text/csv", "application/x-npz", "application/pdf"
 BYTES = {"type": "string", "format": "binary"}
 """How the schema of a body says that it is no text: generated clients then hand out bytes."""

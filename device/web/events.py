@@ -1,4 +1,4 @@
-"""The status of the procedure as server-sent events, for the screen and for a PC.
+"""The status of the procedure and changes of what is kept as server-sent events, for the screen and for a PC.
 
 Sixteen times a second it is looked whether there is anything new, which costs next to nothing while nobody presses.
 """
@@ -10,11 +10,14 @@ import json
 import math
 import time
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+from fastapi.sse import ServerSentEvent
+
 from device import __version__
-from device.errors import DeviceError, LoadCellError
+from device.errors import DeviceError, LoadCellError, StorageError
 from device.instrument.press.frame_choice import ramp_targets_n
 from device.instrument.press.states import Guidance, PressState, before_contact, spoken
 from device.instrument.procedure import Procedure
@@ -22,8 +25,11 @@ from device.instrument.status import ProcedureStatus
 from device.measurement.mode import FRAMES, RAMP_TO_N, Mode
 from device.records.store import ENDED
 from device.records.updates import RUNNING
+from device.web.streams.changes import ChangeFeed
 
 EVENT_INTERVAL_S = 0.06
+RETRY_MS = 1000
+"""So long a browser that was cut off waits before it comes back."""
 ALIVE_S = 0.5
 """A status is never older: a client that hears none for 2 s takes the probe for gone (device/web/static/probe.js)."""
 STILL_N = 0.002
@@ -103,9 +109,9 @@ class StatusFeed:
         self._procedure, self._clock = procedure, clock
         self._status: ProcedureStatus | None = None
         self._silent: LoadCellError | None = None
-        self._force_n, self._until_s, self._event = math.inf, -math.inf, ""
+        self._force_n, self._until_s, self._event = math.inf, -math.inf, ServerSentEvent()
 
-    def event(self) -> str:
+    def event(self) -> ServerSentEvent:
         """Return the event; the same one as long as nothing has changed and it is not old."""
         status, (force_n, silent), now_s = self._procedure.board.now, _latest(self._procedure), self._clock()
         is_same = status is self._status and silent is self._silent
@@ -113,14 +119,23 @@ class StatusFeed:
         if not is_same or has_moved or now_s >= self._until_s:
             self._status, self._silent, self._until_s = status, silent, now_s + ALIVE_S
             self._force_n = math.inf if force_n is None else force_n
-            self._event = f"event: status\ndata: {json.dumps(snapshot(self._procedure))}\n\n"
+            self._event = ServerSentEvent(event="status", raw_data=json.dumps(snapshot(self._procedure)))
         return self._event
 
 
-async def status_events(feed: StatusFeed) -> AsyncIterator[str]:
-    """Yield each new `status` event until the client goes."""
-    sent = ""
+async def status_events(feed: StatusFeed, changes: ChangeFeed) -> AsyncIterator[ServerSentEvent]:
+    """Yield each new `status` event, and each `measurement` and `exam` that was made or changed, until the client goes.
+
+    The first event has the number that a client without any other is to come back with.
+    """
+    sent, begun = feed.event(), dict[str, Any](retry=RETRY_MS)
+    with suppress(StorageError):  # the status says what is wrong with the disk
+        begun["id"] = str(await changes.begin())
+    yield sent.model_copy(update=begun)
     while True:
+        with suppress(StorageError):
+            async for change in changes.new():
+                yield change
         event = feed.event()
         if event is not sent:
             sent = event

@@ -282,6 +282,7 @@ class OfferedMode(_Body):
     kind: Literal["hold", "ramp"]
     from_n: float
     to_n: float
+    band_n: tuple[float, float]
     seconds: float
     fewest_ramps: int
     most_ramps: int

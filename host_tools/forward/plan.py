@@ -25,6 +25,8 @@ Contact = Literal["closed_sliding", "unilateral", "true_sliding"]
 DEFAULT_TOLERANCE = 0.005
 STANDARD = Level("standard", 3)
 """The level of every data set: one level for all scenes, or features would jump where the plan changes its mind."""
+GRADED = "graded"
+"""The element sizes of one scene that climbs from order to order: layers around the rims, large elements elsewhere."""
 BLUNT = Level("blunt", 3)
 """The level of finite strain: elements at the sharp rims no smaller than the slip, or they fold."""
 

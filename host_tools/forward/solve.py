@@ -18,12 +18,14 @@ from dataclasses import replace
 from ngsolve import SetNumThreads, ngsglobals
 
 from device.measurement.quantities import InvalidQuantity
+from host_tools.forward.error_estimates.dual_error import dual_error
+from host_tools.forward.error_estimates.stated_error import stated_error
+from host_tools.forward.face_state import Rays
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.plan import ModelPlan, aligned, model_plan
 from host_tools.forward.press_model import Loaded, PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.soundness import require_sound
-from host_tools.forward.stated_error import stated_error
 from host_tools.forward.tiers import Meshed, build
 from host_tools.scenes.scene import Press, Scene
 
@@ -76,7 +78,7 @@ def solve_ramps(
                     without.state,
                     plan,
                     meshed.elements,
-                    stated_error(plan, meshed.rays, found, without),
+                    _stated(plan, meshed.rays, found, without, press),
                     one.with_press(press),
                 )
             )
@@ -96,6 +98,12 @@ def _without_inclusion(
         if scene.has_inclusion and plan.strain == "small":
             meshed.model.press(with_inclusion(scene), presses, estimate_error=False)
         raise
+
+
+def _stated(plan: ModelPlan, rays: Rays, found: Loaded, without: Loaded, press: Press) -> dict[str, float]:
+    if found.residual and without.residual:
+        return dual_error(rays, found, without, by_force=press.force_n is not None)
+    return stated_error(plan, rays, found, without)
 
 
 def _but_for_modulus(scene: Scene, other: Scene) -> Scene:

@@ -10,12 +10,12 @@ from host_tools.forward.face_state import Rays
 from host_tools.forward.finite_strain.load_path import FiniteStrainModel
 from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
 from host_tools.forward.meshes.morph import morphed_mesh
-from host_tools.forward.meshes.solid_mesh import COARSE, FINE, SolidResolution, solid_mesh
-from host_tools.forward.plan import ModelPlan
+from host_tools.forward.meshes.solid_mesh import COARSE, FINE, LAYERED, SolidResolution, solid_mesh
+from host_tools.forward.plan import GRADED, ModelPlan
 from host_tools.forward.press_model import PressFailed, PressModel
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.domed_press import DomedModel
-from host_tools.forward.small_strain.linear_press import LinearModel
+from host_tools.forward.small_strain.linear_model import LinearModel
 from host_tools.forward.symmetry import AXISYMMETRIC, SOLID, Symmetry
 from host_tools.scenes.scene import Scene
 
@@ -26,12 +26,13 @@ AXISYMMETRIC_SIZES = {
     "finest": Resolution(
         bulk_mm=1.5, face_mm=0.5, contact_rim_mm=0.005, back_rim_mm=0.005, per_inclusion=20.0, grading=0.3
     ),
+    GRADED: Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=8.0, grading=0.5, rim_layers=5),
     "blunt": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.5, per_inclusion=10.0, grading=0.5),
     "blunt_fine": Resolution(bulk_mm=2.0, face_mm=0.5, contact_rim_mm=0.3, back_rim_mm=0.3, grading=0.4),
 }
 """Element sizes by the name of the level; "blunt" keeps the rims coarser than the slip of finite strain."""
 
-SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE}
+SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE, GRADED: LAYERED}
 SOLID_ANGLES = 48
 """Rays over the face of a 3-D scene: 7.5 degrees apart, a multiple of eight to meet a square's corners."""
 
@@ -57,7 +58,8 @@ def build(scene: Scene, plan: ModelPlan) -> Meshed:
     symmetry, mesh = (AXISYMMETRIC if axisymmetric else SOLID), _mesh(scene, plan)
     rays = Rays.over(scene.waveguide, 1 if axisymmetric else SOLID_ANGLES)
     sampler = FaceSampler(mesh, rays, plan.symmetry)
-    probe, other_order = scene.waveguide, plan.order + 1 if axisymmetric else plan.order - 1
+    climbs = plan.grading == GRADED or not axisymmetric
+    probe, other_order = scene.waveguide, plan.order - 1 if climbs else plan.order + 1
     mixed = plan.formulation == "mixed"
     model: PressModel
     if plan.strain == "finite":
@@ -90,6 +92,6 @@ def _generate(scene: Scene, plan: ModelPlan) -> Any:
     if plan.symmetry != "axisymmetric":
         return solid_mesh(scene, symmetry=plan.symmetry, order=plan.order, resolution=SOLID_SIZES[plan.grading])
     sizes = AXISYMMETRIC_SIZES[plan.grading]
-    if plan.mesh == "morphed":
+    if plan.mesh == "morphed" and plan.grading != GRADED:
         return morphed_mesh(scene, order=plan.order, resolution=sizes)
     return axisymmetric_mesh(scene, order=plan.order, resolution=sizes)

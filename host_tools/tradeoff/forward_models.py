@@ -15,11 +15,11 @@ import numpy as np
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.accuracy import Level
+from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.plan import DEFAULT_TOLERANCE, ModelPlan, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
-from host_tools.forward.stated_error import numbers
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
 from host_tools.scenes.scene import Placement, Press, Scene
 from host_tools.tradeoff.fronts import Panel, front_figure, front_table

@@ -11,10 +11,10 @@ from joblib import Parallel, delayed
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.accuracy import prescribed
+from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.plan import ModelPlan, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
-from host_tools.forward.stated_error import numbers
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Placement, Press, Scene
 from host_tools.verification.level_tables import FEATURES, finest_plan
 

@@ -22,10 +22,10 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward import accuracy
 from host_tools.forward.accuracy import Level
+from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.plan import BLUNT, ModelPlan, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve, solve_ramp
-from host_tools.forward.stated_error import numbers
 from host_tools.scenes.scene import Placement, Press, Scene
 
 SCHEMA = "tsis.accuracy/1"

@@ -30,7 +30,7 @@ LOOK_AT_LIGHT_EVERY_S = 0.2
 class Bench:
     """The opened hardware. Owned by the procedure's thread alone, except `force`, which anyone may read.
 
-    Any thread may make it dark for good.
+    Any thread may make it dark for good, and look at `newest`: the frame that was taken last, None before the first.
     """
 
     lights: Lights
@@ -40,6 +40,7 @@ class Bench:
     budget: LightBudget = field(default_factory=LightBudget)
     progress: ProgressBoard = field(default_factory=ProgressBoard)
     levels: LevelWatch = field(default_factory=LevelWatch)
+    newest: CameraFrame | None = None
     _light: LedRatio = DARK
     _is_known: bool = False
     _not_before_s: float = 0.0
@@ -113,7 +114,7 @@ class Bench:
     def _capture(self) -> CameraFrame:
         with self.progress.inside("camera"):
             taken = self.camera.capture(begun_after_s=self._not_before_s, timeout_s=FRAME_TIMEOUT_S)
-        self._is_resting, self._frame_s = False, time.monotonic()
+        self._is_resting, self._frame_s, self.newest = False, time.monotonic(), taken
         self._not_before_s = taken.exposure_start_s + 1e-6
         self._go_on()
         return taken

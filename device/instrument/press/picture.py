@@ -6,6 +6,8 @@ bin them: light spreads further in the skin than a binned pixel is wide.
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import cv2
@@ -19,6 +21,10 @@ from device.measurement.recording.recording import REPAIR, Recording
 from device.measurement.recording.reference_light import Image, reference_light
 
 WIDTH_PX = 480
+FULL_CONTRAST = 0.4
+"""Contrast of the brightest colour, on every picture the same: a shallow hard inclusion of 12 mm reaches it."""
+PNG_HEADER = 33
+"""Bytes of a PNG's signature and IHDR."""
 SMOOTHED_PX = 1.0
 """Standard deviation, in binned pixels, that takes the camera's noise out of the picture."""
 
@@ -26,8 +32,9 @@ SMOOTHED_PX = 1.0
 def tactile_png(recording: Recording) -> bytes:
     """Return a PNG of the mean contrast of the press frames; black where a pixel is not valid.
 
-    The colours run from no contrast to the picture's own brightest spot; pixels are made square. Raises
-    `InvalidQuantity` without dark frames, touched reference frames or press frames.
+    The colours run from no contrast to `FULL_CONTRAST`, so that two pictures can be compared; pixels are made square.
+    The file says both: pixels per metre (pHYs) and `full_contrast` (tEXt). Raises `InvalidQuantity`
+    without dark frames, touched reference frames or press frames.
     """
     reference, press = lights_of(recording)
     for name, lights in (("touched reference", reference), ("press", press)):
@@ -44,13 +51,28 @@ def tactile_png(recording: Recording) -> bytes:
 
 def _png(contrast: Image, valid: np.ndarray, scale: PixelScale) -> bytes:
     smooth = cv2.GaussianBlur(contrast, (0, 0), SMOOTHED_PX)
-    peak = max(float(smooth[valid].max(initial=0.0)), 1e-6)
     height, width = valid.shape
     size = WIDTH_PX, round(WIDTH_PX * height * scale.mm_per_px_y / (width * scale.mm_per_px_x))
     large = cv2.resize(smooth, size, interpolation=cv2.INTER_LINEAR)
-    colour = cv2.applyColorMap(np.clip(large / peak * 255, 0, 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
+    colour = cv2.applyColorMap(np.clip(large / FULL_CONTRAST * 255, 0, 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     colour[cv2.resize(valid.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) == 0] = 0
-    return cv2.imencode(".png", colour)[1].tobytes()
+    mm_per_px = width * scale.mm_per_px_x / WIDTH_PX
+    return _with_scale(cv2.imencode(".png", colour)[1].tobytes(), mm_per_px)
+
+
+def _with_scale(png: bytes, mm_per_px: float) -> bytes:
+    """Return a PNG that says how large its pixels are (mm) and what its brightest colour means.
+
+    Source: PNG 1.2, 4.2.4.2 pHYs and 4.2.3.1 tEXt; both stand between the header and the first data.
+    """
+    per_metre = round(1000 / mm_per_px)
+    scale = _chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
+    text = _chunk(b"tEXt", b"full_contrast\0" + f"{FULL_CONTRAST:g}".encode())
+    return png[:PNG_HEADER] + scale + text + png[PNG_HEADER:]
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
 def kept_or_drawn(path: Path) -> bytes:

@@ -1,6 +1,6 @@
 // Pairing: at the probe's own screen it shows a code and who has a token; anywhere else it takes the code.
 
-import { byId, setText } from "./dom.js";
+import { byId, setText } from "./base/dom.js";
 
 const API = "/api/v1";
 const LOOK_MS = 1000;

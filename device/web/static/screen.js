@@ -1,78 +1,64 @@
 // The probe's own screen: each status of the event stream becomes one instruction, a gauge, and at the end a result.
 // The probe decides what happens next; this page keeps no procedure of its own and only shows what it is told.
 
-import { byId, element, setAttribute, setText } from "./dom.js";
-import { showGauge } from "./gauge.js";
-import { chosenMode, offerModes, showModes } from "./modes.js";
-import {
-  cancelPress, fetchDevice, fetchMeasurement, finishScan, followStatus, startPress, takeTare,
-} from "./probe.js";
-import { describeMeasurement, showMeasurement } from "./result.js";
-import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./scan.js";
-import { showSelfTest } from "./self_test.js";
-import { absenceWords, updateLine } from "./software.js";
+import { sound, stayAwake, useComfort } from "./base/comfort.js";
+import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./base/dom.js";
+import { showIdentity } from "./base/menu.js";
+import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, startPress, takeTare } from "./base/probe.js";
+import { figure, say, sayPage } from "./base/words.js";
+import { chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
+import { finish, isChosen, isFreeChosen, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
+import { openHistory } from "./exam/history.js";
+import { useKeyboard } from "./exam/keyboard.js";
+import { followScanner } from "./exam/scanner.js";
+import { askVoid } from "./exam/void.js";
+import { openService, showFaults } from "./press/faults.js";
+import { showGauge } from "./press/gauge.js";
+import { endWords, guidanceWords, showInstruction, stepHint } from "./press/instruction.js";
+import { asChosen, chosenMode, modeName, offerModes, onChoice, showModes } from "./press/modes.js";
+import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./press/scan.js";
+import { openDetails } from "./result/details.js";
+import { describeMeasurement } from "./result/result.js";
+import { dismiss, followAnswer, isMissing, isOlder, loadNewest, replace, showNow, showOlder, shownResult } from "./result/shown.js";
+import { showSelfTest } from "./service/self_test.js";
+import { absenceWords, updateLine } from "./service/software.js";
 
 const UNDER_WAY = new Set(["waiting", "capturing", "computing"]);
 const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
-const ICONS = {
-  press_beside: "press", press_lesion: "press", press_harder: "harder", press_lighter: "lighter",
-  touch_beside: "press", touch_lesion: "press", move_aside: "aside", press_slowly: "harder", slower: "wait",
-  keep_free: "lift", hold_block: "press", put_weight: "press", take_weight_off: "lift",
-  hold_still: "hold", lift: "lift", done: "done", rejected: "rejected", fault: "fault",
+const SOUNDS = {
+  touch_lesion: "step", press_lesion: "step", move_aside: "step", lift: "good", done: "good", rejected: "caution", fault: "bad",
 };
-const WAIT_ICONS = { ready: "press" };
-const TONES = { hold_still: "good", slower: "caution", done: "good", rejected: "caution", fault: "bad" };
-const STEP_HINTS = {
-  starting: "The probe starts and checks its parts.",
-  ready: "Two presses make a measurement: one beside the lesion, then one on it.",
-  reference: "Reference press: on plain tissue beside the lesion.",
-  lesion: "Lesion press: on the lesion, with the same force.",
-  computing: "Computing size, depth and Young's modulus.",
-  self_test: "The probe tests its parts.",
-};
-const RAMP_HINTS = {
-  reference: "Reference press: slowly harder, on plain tissue beside the lesion.",
-  lesion: "Lesion press: slowly harder, on the lesion.",
-};
-const PRESS_WORDS = { rejected: "Rejected.", cancelled: "Cancelled.", failed: "Failed." };
-const LONG_INSTRUCTION = 40; // characters; more would need a third line
 const RELOAD_MS = 1000;
-const TOLD_MS = 5000;
+const TOLD_MS = 6000;
 
 const panel = byId("panel");
-const button = byId("press-button");
+const pressButton = byId("press-button");
 const enoughButton = byId("enough-button");
-const tareButton = byId("tare");
-const LOST_WORDS = [byId("lost-title").textContent, byId("lost-words").textContent];
+const whyButton = byId("why-button");
 let status = null;
-let measurement = null;
-let answer = null; // what the press says while the probe keeps it; from then on the measurement takes its place
 let offersAreKnown = false;
 let loading = false;
 let sending = false;
-let problem = "";
-let tared = "";
-let faultsShown = "";
+let told = null; // {word, reason, tone, service}: what came of the last command
+let service = ""; // the daemon's own words behind what is said now
 
 const pressUnderWay = () => UNDER_WAY.has(status?.press?.state);
+const shown = () => shownResult(status);
+/** Whether nothing is under way and no result is shown: the next press may be chosen. */
+const isIdle = () => ["ready", "result"].includes(status.step) && !pressUnderWay() && shown() === null;
 
-/** The measurement that is shown, the answer that is still being kept, or null. */
-function shownResult() {
-  // A press that came to nothing must not stand above the figures of the one before it.
-  const wanted = status.step === "result" || (status.step === "ready" && !PRESS_WORDS[status.press?.state]);
-  if (wanted && measurement !== null && measurement.id === status.measurement_id) return measurement;
-  return answer;
-}
-
-function showIdentity() {
-  setText(byId("serial"), status.serial);
-  setText(byId("software"), `Software ${status.software}`);
-  byId("simulated-badge").hidden = !(status.simulated || shownResult()?.estimate.simulated);
+function showWho() {
+  const exam = openExam();
+  const free = isFreeChosen() ? say("exam.free") : say("exam.choose");
+  setText(byId("exam-who"), exam ? whoWords(exam) : free);
+  const isElsewhere = pressUnderWay() && (status.press.exam_id ?? null) !== (exam?.id ?? null);
+  setText(byId("exam-where"), isElsewhere ? say("hint.another_screen") : exam ? placeWords(exam) : "");
+  byId("exam-button").dataset.who = exam ? exam.kind : isFreeChosen() ? "free" : "none";
 }
 
 function showSteps() {
-  const isShown = shownResult() !== null;
-  const current = isShown ? 2 : STEP_INDEX[status.step] ?? -1;
+  const isShown = shown() !== null;
+  const current = isShown ? 2 : isIdle() ? -1 : STEP_INDEX[status.step] ?? -1;
   [...byId("steps").children].forEach((item, index) => {
     item.classList.toggle("step-done", index < current || (index === 2 && isShown));
     if (index === current) setAttribute(item, "aria-current", "step");
@@ -80,97 +66,117 @@ function showSteps() {
   });
 }
 
-function showInstruction() {
-  const { code, text } = status.guidance;
-  setText(byId("instruction"), text.replace(/(\d) (?=mm\b)/, "$1\u00a0"));
-  setAttribute(byId("instruction-icon"), "href", `#icon-${ICONS[code] ?? WAIT_ICONS[status.step] ?? "wait"}`);
-  byId("instruction").classList.toggle("long", text.length > LONG_INSTRUCTION);
-  panel.dataset.tone = TONES[code] ?? "calm";
+/** What to do between presses, by the mode that is chosen here; without an exam, to choose one. */
+function guidanceNow() {
+  const { code } = status.guidance;
+  if (!isIdle()) return { code, words: guidanceWords(status) };
+  if (!isChosen()) return { code: "choose", words: say("guidance.choose") };
+  const first = asChosen(status).kind === "ramp" ? "touch_beside" : "press_beside";
+  const wanted = ["touch_beside", "press_beside", "done"].includes(code) ? first : code;
+  return { code: wanted, words: say(`guidance.${wanted}`) };
 }
 
-/** The one sentence under the instruction: a refused command first, then what became of the press, then the result. */
-function describeStatus() {
-  const scan = scanHint(status, pressUnderWay() ? status.mode : chosenMode());
-  const hint = scan || (status.kind === "ramp" && RAMP_HINTS[status.step]) || (STEP_HINTS[status.step] ?? "");
-  const pressWord = PRESS_WORDS[status.press?.state];
-  if (problem) return { word: "Not done.", reason: problem, tone: "caution" };
+function hint() {
+  if (isIdle() && !isChosen()) return say("hint.choose");
+  const step = isIdle() ? "ready" : status.step;
+  return scanHint({ ...status, step }, pressUnderWay() ? status.mode : chosenMode()) || stepHint({ ...status, step });
+}
+
+/** The line under the instruction: what came of a command first, then an update, the end of a press, and what helps. */
+function lineNow() {
+  if (told) return told;
   if (updateLine()) return updateLine();
-  if (tared) return { word: "Tared.", reason: tared, tone: "good" };
-  if (pressWord) return { word: pressWord, reason: status.press.reason || hint, tone: "caution" };
+  const end = endWords(status);
+  if (end && status.step === "ready") return { ...end, word: `${end.word}.`, tone: "caution" };
   if (scanTrouble(status)) return scanTrouble(status);
-  if (shownResult()) return describeMeasurement(shownResult());
-  return { word: "", reason: hint, tone: "calm" };
+  return { word: "", reason: status.step === "fault" ? "" : hint(), tone: "calm" };
 }
 
-function showStatusLine() {
-  const { word, reason, tone } = describeStatus();
-  setText(byId("status-word"), word);
-  setText(byId("status-reason"), reason);
-  byId("status-line").dataset.tone = tone;
+/** Instruction and line of a measurement that is shown. */
+function sayResult(measurement) {
+  const { word, reason, tone } = describeMeasurement(measurement);
+  const lost = openExam() && measurement.exam_id === null && !isOlder() ? `${say("result.not_in_exam")}. ` : "";
+  const line = told ?? updateLine() ?? { word: isOlder() ? `${say("result.older")}.` : "", reason: lost + reason, tone };
+  showInstruction(tone === "good" ? "done" : "look", word, line);
+  service = told?.service ?? "";
 }
 
-function showProgress() {
-  const { frames_taken: taken, frames_needed: needed } = status;
+function sayState() {
+  const end = status.step === "rejected" ? endWords(status) : null;
+  const line = end && !told ? end : lineNow();
+  service = line.service ?? "";
+  if (!end) return showInstruction(guidanceNow().code, guidanceNow().words, line);
+  const code = status.press.state === "cancelled" ? "cancelled" : "rejected";
+  return showInstruction(code, end.word, { ...line, word: line === end ? "" : line.word, tone: "caution" });
+}
+
+function showProgress(seen) {
+  const { frames_taken: taken, frames_needed: needed } = seen;
   const cells = byId("frame-cells");
   panel.style.setProperty("--progress", pressUnderWay() ? status.press.progress : 0);
-  setText(byId("frames"), `${taken} of ${needed} frames`);
-  setText(byId("press-state"), pressUnderWay() ? status.press_state.replaceAll("_", " ") : "");
+  setText(byId("frames"), say("press.frames", { taken, needed }));
+  const isTold = pressUnderWay() && !["idle", "done", "rejected"].includes(status.press_state);
+  setText(byId("press-state"), isTold ? say(`state.${status.press_state}`) : "");
   if (cells.childElementCount !== needed) {
     cells.replaceChildren(...Array.from({ length: needed }, () => element("span", "")));
   }
   [...cells.children].forEach((cell, index) => cell.classList.toggle("taken", index < taken));
 }
 
-function faultItem({ code, title, severity, cause, remedy }) {
-  const item = element("div", "fault");
-  item.dataset.severity = severity;
-  const words = element("p", "fault-words");
-  words.append(element("strong", "fault-cause", cause), " ", element("span", "fault-remedy", remedy));
-  const name = element("p", "fault-name");
-  name.append(element("span", "fault-code", code), element("span", "fault-title", title));
-  item.append(name, words);
-  return item;
+function pressWords(measurement) {
+  if (pressUnderWay()) return say("press.cancel");
+  if (!isChosen()) return say("exam.choose");
+  if (status.simulated) return say("press.simulated");
+  return say(measurement ? "press.again" : "press.new");
 }
 
-function showFaults() {
-  const key = JSON.stringify(status.faults);
-  if (key === faultsShown) return;
-  faultsShown = key;
-  byId("faults").replaceChildren(...status.faults.map(faultItem));
-  byId("faults").hidden = status.faults.length === 0;
-  panel.classList.toggle("with-faults", status.faults.length > 0);
-}
-
-/** What is asked for: a mode, and of a scan how sure it is to be. */
-function wish() {
-  const mode = chosenMode();
-  return mode ? { mode, ...chosenAccuracy(mode) } : {};
-}
-
-function showButton() {
-  const start = status.simulated ? "Press the simulated probe" : "New measurement";
-  setText(button, pressUnderWay() ? "Cancel" : start);
-  button.classList.toggle("button-cancel", pressUnderWay());
+function showButtons(measurement) {
+  const isBusy = status.step === "starting" || status.step === "self_test";
+  setText(pressButton, pressWords(measurement));
+  pressButton.classList.toggle("button-quiet", pressUnderWay());
+  setEnabled(pressButton, !sending && !isBusy);
   enoughButton.hidden = !(status.scan && status.press?.state === "capturing");
-  enoughButton.disabled = sending;
-  button.disabled = sending || status.step === "starting" || status.step === "self_test";
-  tareButton.disabled = sending || pressUnderWay() || status.step === "self_test";
+  setEnabled(enoughButton, !sending);
+  setEnabled(byId("tare"), !sending && !pressUnderWay() && status.step !== "self_test");
+  whyButton.hidden = !service;
+  // A hand that holds the probe must not press what it does not mean: all but this one button is out of reach.
+  for (const id of ["header", "footer"]) byId(id).inert = pressUnderWay();
+}
+
+function showActs(measurement) {
+  const isKept = Boolean(measurement?.id);
+  byId("act-details").hidden = !isKept;
+  byId("act-void").hidden = !isKept || Boolean(measurement.voided);
+  byId("act-file").hidden = !(isKept && openExam() && measurement.exam_id === null);
+  byId("act-place").hidden = openExam()?.kind !== "patient" || isOlder();
+  byId("act-finish").hidden = !isChosen() || isOlder();
+  byId("act-mode").hidden = isOlder();
+  byId("act-now").hidden = !isOlder();
+  setText(byId("act-mode"), say("act.mode", { mode: chosenMode() ? modeName(chosenMode()) : "" }));
 }
 
 function show() {
+  if (!status) return;
+  const measurement = shown();
+  const seen = pressUnderWay() ? status : asChosen(status);
+  const isHere = status.step === "fault" && !isOlder();
   panel.dataset.step = status.step;
-  panel.dataset.view = shownResult() ? "result" : "measure";
-  showIdentity();
+  panel.dataset.idle = isIdle();
+  panel.dataset.view = measurement && !isHere ? "result" : "measure";
+  byId("simulated-badge").hidden = !(status.simulated || measurement?.estimate.simulated);
+  showIdentity(status);
+  showWho();
   showSteps();
-  showInstruction();
-  showStatusLine();
-  showProgress();
-  showFaults();
-  showButton();
+  if (panel.dataset.view === "result") sayResult(measurement);
+  else sayState();
+  showProgress(seen);
+  showFaults(status);
+  showButtons(measurement);
+  showActs(measurement);
   showModes(!pressUnderWay());
   showAccuracy(!pressUnderWay() && chosenMode());
   showScan(status);
-  showGauge(status);
+  showGauge(seen);
   showSelfTest(status);
 }
 
@@ -180,9 +186,8 @@ async function load(fetchAndShow) {
   loading = true;
   try {
     await fetchAndShow();
-    problem = "";
   } catch (error) {
-    problem = error.message;
+    tell({ word: say("not_done"), reason: error.message, tone: "caution", service: error.service });
     await new Promise((done) => { setTimeout(done, RELOAD_MS); });
   } finally {
     loading = false;
@@ -190,76 +195,151 @@ async function load(fetchAndShow) {
 }
 
 async function loadDevice() {
+  await refresh();
   offerModes(await fetchDevice());
   offersAreKnown = true;
 }
 
 async function loadMeasurement() {
-  measurement = await fetchMeasurement(status.measurement_id);
-  showMeasurement(measurement);
+  await loadNewest(status.measurement_id);
   offersAreKnown = false; // this press has shown how long an answer takes here
-  showAnswer();
+  followAnswer(status);
   show();
 }
 
 function loadWhatIsMissing() {
   if (!offersAreKnown) load(loadDevice);
-  else if (status.measurement_id !== null && status.measurement_id !== measurement?.id) load(loadMeasurement);
-}
-
-/** An answer stays in sight until its measurement is there; when it could not be kept, it is shown no more. */
-function showAnswer() {
-  if (status.answer && answer === null) showMeasurement(status.answer);
-  const isBeingLoaded = status.step === "result" && measurement?.id !== status.measurement_id;
-  answer = status.answer ?? (isBeingLoaded ? answer : null);
+  else if (isMissing(status)) load(loadMeasurement);
 }
 
 function showConnection(lost) {
-  const [title, words] = absenceWords() ?? LOST_WORDS;
+  const [title, words] = absenceWords() ?? [say("lost.title"), say("lost.words")];
   setText(byId("lost-title"), title);
   setText(byId("lost-words"), words);
   setAttribute(byId("lost-icon"), "href", absenceWords() ? "#icon-wait" : "#icon-fault");
   byId("connection-lost").dataset.tone = absenceWords() ? "caution" : "bad";
   byId("connection-lost").hidden = !lost;
-  byId("main").inert = lost;
-  if (lost) for (const id of ["self-test", "releases"]) byId(id).close(); // they lie above everything
+  for (const id of ["main", "header", "footer"]) byId(id).inert = lost || (id !== "main" && pressUnderWay());
+  if (lost) closeDialogs(); // they lie above everything
   if (lost) offersAreKnown = false; // whoever comes back may be another probe
+}
+
+function closeDialogs() {
+  for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();
+}
+
+function tell(next) {
+  told = next;
+  show();
+}
+
+/** What a new status changes beyond what it shows: sounds, the lock of the screen, dialogs out of the way. */
+function follow(before, next) {
+  const isNow = UNDER_WAY.has(next.press?.state);
+  const began = isNow && !UNDER_WAY.has(before?.press?.state);
+  if (began) closeDialogs();
+  if (began) dismiss(next);
+  if (before && before.guidance.code !== next.guidance.code && SOUNDS[next.guidance.code]) sound(SOUNDS[next.guidance.code]);
+  stayAwake(isNow);
 }
 
 function receive(next) {
   // After an update of the probe, the page that is already open must not stay the old one.
   if (status && status.release !== next.release) location.reload();
-  if (status && status.step !== next.step) problem = tared = "";
+  if (status && status.step !== next.step) told = null;
+  follow(status, next);
   status = next;
   showConnection(false);
   loadWhatIsMissing();
-  showAnswer();
+  followAnswer(status);
   show();
 }
 
 /** Send one command at a time; a refusal takes the place of what was said of the one before. */
 async function send(command) {
+  if (sending) return;
   sending = true;
-  problem = tared = "";
-  button.disabled = enoughButton.disabled = tareButton.disabled = true;
+  told = null;
+  show();
   try {
     await command();
   } catch (error) {
-    problem = error.message;
+    tell({ word: say("not_done"), reason: error.message, tone: "caution", service: error.service });
   } finally {
     sending = false;
+    show();
   }
 }
 
-button.addEventListener("click", () => {
-  send(() => (pressUnderWay() ? cancelPress(status.press.id) : startPress(wish())));
-});
-enoughButton.addEventListener("click", () => send(() => finishScan(status.press.id)));
-tareButton.addEventListener("click", () => {
-  send(async () => {
-    tared = `The zero has moved by ${(await takeTare()).moved_n.toFixed(3)} N.`;
-    setTimeout(() => { tared = ""; }, TOLD_MS);
-  });
-});
+/** Start a press of what is shown here; when the exam is not as it is shown, show it anew instead. */
+async function start() {
+  const mode = chosenMode();
+  const wish = mode ? { mode, ...chosenAccuracy(mode) } : {};
+  try {
+    await startPress(wish, openExam());
+  } catch (error) {
+    if (error.status !== 412) throw error;
+    await refresh();
+    tell({ word: say("not_done"), reason: say("exam.stale"), tone: "caution", service: error.service });
+  }
+}
 
+async function tare() {
+  const { moved_n: moved } = await takeTare();
+  tell({ word: say("tare.word"), reason: say("tare.moved", { n: figure(moved, 3) }), tone: "good" });
+  setTimeout(() => { told = null; }, TOLD_MS);
+}
+
+async function file() {
+  const exam = openExam();
+  await replace(await moveMeasurement(shown(), { by: exam.operator, reason: say("result.file"), exam_id: exam.id }));
+  tell({ word: "", reason: say("exam.filed", { patient: whoWords(exam) }), tone: "good" });
+}
+
+function finishExam() {
+  const exam = openExam();
+  dismiss(status);
+  finish();
+  if (exam) tell({ word: "", reason: say("exam.finished", { patient: whoWords(exam) }), tone: "good" });
+}
+
+/** A patient is scanned: into the field that waits for one, else the page opens that asks whose exam it is. */
+function scanned(code, field) {
+  if (field && field.id !== "patient-ref") return;
+  if (pressUnderWay()) tell({ word: "", reason: say("exam.scan_busy"), tone: "caution" });
+  else chooseExam(code);
+}
+
+pressButton.addEventListener("click", ({ detail }) => {
+  if (!isEnabled(pressButton) || detail > 1) return; // a finger that bounces does not cancel what it began
+  if (pressUnderWay()) send(() => cancelPress(status.press.id));
+  else if (!isChosen()) chooseExam();
+  else send(start);
+});
+pressButton.addEventListener("keydown", (event) => { if (event.repeat) event.preventDefault(); });
+enoughButton.addEventListener("click", () => { if (isEnabled(enoughButton)) send(() => finishScan(status.press.id)); });
+whyButton.addEventListener("click", () => openService(service));
+byId("tare").addEventListener("click", () => { if (isEnabled(byId("tare"))) send(tare); });
+byId("exam-button").addEventListener("click", () => chooseExam());
+byId("history-open").addEventListener("click", () => openHistory((id) => send(() => showOlder(id))));
+byId("act-details").addEventListener("click", () => openDetails(shown()));
+byId("act-void").addEventListener("click", () => askVoid(shown(), (after) => send(() => replace(after))));
+byId("act-file").addEventListener("click", () => send(file));
+byId("act-mode").addEventListener("click", () => { dismiss(status); show(); });
+byId("act-place").addEventListener("click", chooseAnotherPlace);
+byId("act-finish").addEventListener("click", finishExam);
+byId("act-now").addEventListener("click", () => send(showNow));
+onChoice(show);
+
+let examShown = null;
+onExam(() => {
+  const id = openExam()?.id ?? null;
+  if (id !== examShown && status) dismiss(examShown === null && !offersAreKnown ? null : status);
+  examShown = id;
+  show();
+});
+sayPage();
+useComfort();
+useKeyboard();
+followScanner(scanned);
 followStatus(receive, () => showConnection(true));

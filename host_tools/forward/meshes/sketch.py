@@ -41,9 +41,9 @@ class Sketch:
         self.bulk_mm, self.geometry = bulk_mm, SplineGeometry()
         self._domains: dict[str, int] = {OUTSIDE: 0}
 
-    def point(self, r_mm: float, z_mm: float, size_mm: float | None = None) -> int:
-        """Add a point, with the element size there."""
-        return int(self.geometry.AppendPoint(r_mm, z_mm, maxh=size_mm or self.bulk_mm))
+    def point(self, r_mm: float, z_mm: float, size_mm: float | None = None, *, layered: bool = False) -> int:
+        """Add a point, with the element size there; towards a layered one the mesh can be refined geometrically."""
+        return int(self.geometry.AppendPoint(r_mm, z_mm, maxh=size_mm or self.bulk_mm, hpref=float(layered)))
 
     def line(self, *points: int, left: str, right: str, boundary: str, size_mm: float | None = None) -> None:
         """Add a straight line of two points, or an arc of three whose middle one is the control point."""
@@ -76,14 +76,16 @@ class Sketch:
         return self.geometry.GenerateMesh(maxh=far_mm or self.bulk_mm, grading=grading)
 
 
-def draw_waveguide(sketch: Sketch, waveguide: Waveguide, centre: int, rim: int, back_rim_mm: float) -> None:
+def draw_waveguide(
+    sketch: Sketch, waveguide: Waveguide, centre: int, rim: int, back_rim_mm: float, *, layered: bool = False
+) -> None:
     """Draw the layers upwards from the face, whose end points are given; the face itself is the caller's."""
     inner, outer = centre, rim
     heights = list(accumulate(waveguide.layer_thicknesses_mm))
     for i, z_mm in enumerate(heights):
         material, last = f"layer{i}", i == len(heights) - 1
         up_inner = sketch.point(0, z_mm)
-        up_outer = sketch.point(waveguide.radius_mm, z_mm, back_rim_mm if last else None)
+        up_outer = sketch.point(waveguide.radius_mm, z_mm, back_rim_mm if last else None, layered=layered and last)
         above, name = (OUTSIDE, "back") if last else (f"layer{i + 1}", "bond")
         sketch.line(outer, up_outer, left=material, right=OUTSIDE, boundary="wall")
         sketch.line(up_outer, up_inner, left=material, right=above, boundary=name)

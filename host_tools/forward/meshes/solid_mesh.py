@@ -74,6 +74,17 @@ FINE = SolidResolution(
 )
 
 
+LAYERED = SolidResolution(
+    bulk_mm=20.0,
+    face_mm=4.0,
+    contact_rim_mm=4.0,
+    back_rim_mm=5.0,
+    per_inclusion=6.0,
+    grading=0.8,
+)
+"""Very large elements, for orders from 3: 700-1000 of a half body, whose errors fall from order to order."""
+
+
 def solid_symmetry(scene: Scene) -> SolidSymmetry:
     """Return the smallest part of the body that stands for all of it."""
     offset_x_mm, offset_y_mm = 0.0, 0.0

@@ -1,6 +1,7 @@
 """Small strain: linear elasticity, closed sliding contact under a flat face, unilateral contact under a dome.
 
-Modules in reading order: `elasticity`, `contact`, `folding`, `linear_press`, `domed_press`.
+Modules in reading order: `elasticity`, `contact`, `linear_press`, `folding`, `element_residual`,
+`linear_model`, `domed_press`.
 
 Nothing of finite strain.
 """

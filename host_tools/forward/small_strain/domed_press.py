@@ -23,7 +23,8 @@ from host_tools.forward.press_model import Loaded, PressFailed
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import integral_over_face, pressure_of_forces
 from host_tools.forward.small_strain.folding import Folding
-from host_tools.forward.small_strain.linear_press import LinearPress, out_of_reach
+from host_tools.forward.small_strain.linear_model import out_of_reach
+from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.symmetry import AXISYMMETRIC, Symmetry
 from host_tools.scenes.scene import Press
 

@@ -5,20 +5,16 @@ Everything is linear in the press, so this one solution scales to any indentatio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from ngsolve import BilinearForm, GridFunction, InnerProduct
 
 from host_tools.forward.face_state import MN_PER_N, FaceState
 from host_tools.forward.materials import Elasticity
-from host_tools.forward.press_model import Loaded, PressFailed
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import Body, ContactSpace, contact_pressure_kpa, integral_over_face
 from host_tools.forward.small_strain.elasticity import Stress, lame_modulus_kpa, shear_modulus_kpa, stress, work
-from host_tools.forward.small_strain.folding import Folding
 from host_tools.forward.symmetry import Expression, Symmetry
-from host_tools.scenes.scene import Press
 
 INDENTATION_MM = 1.0
 
@@ -33,23 +29,7 @@ class LinearPress:
 
     def displacement(self, elasticity: Elasticity, sinking_mm: Expression = INDENTATION_MM) -> Any:
         """Return the grid function that solves a(u, v) = 0 for every admissible v, the back sunk by a field (mm)."""
-        space = self.contact.space
-        trial, test = space.TnT()
-        a = BilinearForm(space, symmetric=True, condense=True)
-        for term in self.weak_form(elasticity, trial, test):
-            a += term
-        a.Assemble()
-        u = GridFunction(space)
-        back = self.mesh.Boundaries("back")
-        u.components[self.contact.normal_indices[0]].Set(-sinking_mm, definedon=back)
-        inverse = a.mat.Inverse(space.FreeDofs(True), "sparsecholesky")
-        rest = u.vec.CreateVector()
-        rest.data = -a.mat * u.vec
-        rest.data += a.harmonic_extension_trans * rest
-        u.vec.data += inverse * rest
-        u.vec.data += a.inner_solve * rest
-        u.vec.data += a.harmonic_extension * u.vec
-        return u
+        return SolvedPress(self, elasticity, sinking_mm).u
 
     def weak_form(self, elasticity: Elasticity, trial: Any, test: Any) -> list[Any]:
         """Return the integrals of sigma(u) : e(v); in a mixed space also those that tie the pressure to tr(e)."""
@@ -86,6 +66,10 @@ class LinearPress:
             contact_force_n=sampler.copies * integral_over_face(self.mesh, self.symmetry, pressure) / MN_PER_N,
         )
 
+    def stress_in(self, body: Body, elasticity: Elasticity) -> Stress:
+        """Return the stress (kPa) of one body's displacements, without a pressure of their own."""
+        return self._stress(elasticity, body, None)
+
     def stress_of_probe(self, u: Any, elasticity: Elasticity) -> Stress:
         """Return the probe's stress (kPa) under a solved displacement."""
         probe, _ = self.contact.bodies(u.components)
@@ -102,54 +86,36 @@ class LinearPress:
         return float(InnerProduct(work_of, push.vec))
 
 
-class LinearModel:
-    """Closed sliding in small strain as a `PressModel`: one solution, scaled to every press."""
+class SolvedPress:
+    """A press, its materials and the factor of their stiffness, which further loads can be solved with."""
 
-    def __init__(
-        self, mesh: Any, symmetry: Symmetry, sampler: FaceSampler, *, order: int, other_order: int, mixed: bool
-    ) -> None:
-        self.mesh, self.symmetry, self.sampler, self.mixed = mesh, symmetry, sampler, mixed
-        self.order, self.other_order = order, other_order
+    def __init__(self, press: LinearPress, elasticity: Elasticity, sinking_mm: Expression = INDENTATION_MM) -> None:
+        self.press, self.elasticity = press, elasticity
+        space = press.contact.space
+        trial, test = space.TnT()
+        self._form = BilinearForm(space, symmetric=True, condense=True)
+        for term in press.weak_form(elasticity, trial, test):
+            self._form += term
+        self._form.Assemble()
+        self._inverse = self._form.mat.Inverse(space.FreeDofs(True), "sparsecholesky")
+        self.u = GridFunction(space)
+        back = press.mesh.Boundaries("back")
+        self.u.components[press.contact.normal_indices[0]].Set(-sinking_mm, definedon=back)
+        rest = self.u.vec.CreateVector()
+        rest.data = -self._form.mat * self.u.vec
+        self._answer(rest, self.u.vec)
 
-    def press(self, elasticity: Elasticity, presses: Sequence[Press], *, estimate_error: bool) -> tuple[Loaded, ...]:
-        """Return the face at every press, at the model's order and at the other; raise `PressFailed` where it folds."""
-        linear = LinearPress(self.mesh, self.symmetry, self.order, mixed=self.mixed)
-        u = linear.displacement(elasticity)
-        unit = linear.face_state(u, elasticity, self.sampler)
-        require_reach(presses, unit, Folding(linear.contact, u))
-        other = self._unit(elasticity, self.other_order) if estimate_error else None
-        return tuple(Loaded(at_press(press, unit), at_press(press, other) if other else None) for press in presses)
+    def under(self, load: Any) -> Any:
+        """Return the grid function that answers a load (a vector, mN) while back and base stand still."""
+        z = GridFunction(self.press.contact.space)
+        rest = load.CreateVector()
+        rest.data = load
+        self._answer(rest, z.vec)
+        return z
 
-    def _unit(self, elasticity: Elasticity, order: int) -> FaceState:
-        linear = LinearPress(self.mesh, self.symmetry, order, mixed=self.mixed)
-        return linear.face_state(linear.displacement(elasticity), elasticity, self.sampler)
-
-
-def at_press(press: Press, unit: FaceState) -> FaceState:
-    """Return the unit press scaled to the indentation or force asked for."""
-    if press.indentation_mm is not None:
-        return unit.scaled(press.indentation_mm / unit.indentation_mm)
-    assert press.force_n is not None  # Press guarantees one of the two
-    return unit.scaled(press.force_n / unit.force_n)
-
-
-def require_reach(presses: Sequence[Press], unit: FaceState, folding: Folding) -> None:
-    """Refuse a press that would turn matter inside out, with the largest one that does not."""
-    deepest = max((at_press(press, unit) for press in presses), key=lambda state: state.indentation_mm)
-    scale = deepest.indentation_mm / unit.indentation_mm
-    if deepest.indentation_mm < folding.slab_mm and not folding.folds(scale):
-        return
-    largest = unit.scaled(folding.largest_scale(min(scale, folding.slab_mm / unit.indentation_mm)))
-    raise out_of_reach(presses, deepest, largest, folding.slab_mm)
-
-
-def out_of_reach(presses: Sequence[Press], asked: FaceState, largest: FaceState, slab_mm: float) -> PressFailed:
-    """Return the exception that says what was asked for, and the largest press that can be had."""
-    by_force = any(press.force_n is not None for press in presses)
-    quantity = f"force_n is {asked.force_n:g} N" if by_force else f"indentation_mm is {asked.indentation_mm:g} mm"
-    limit = f"{largest.force_n:.3g} N" if by_force else f"{largest.indentation_mm:.3g} mm"
-    return PressFailed(
-        f"{quantity}, but must be below {limit}: at {largest.indentation_mm:.3g} mm of indentation and "
-        f"{largest.force_n:.3g} N small strain begins to turn probe or tissue inside out in this slab "
-        f"of {slab_mm:g} mm. Press less."
-    )
+    def _answer(self, rest: Any, u: Any) -> None:
+        """Add to a vector what condensed unknowns and inner ones answer to a residual, which is used up."""
+        rest.data += self._form.harmonic_extension_trans * rest
+        u.data += self._inverse * rest
+        u.data += self._form.inner_solve * rest
+        u.data += self._form.harmonic_extension * u

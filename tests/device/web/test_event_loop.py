@@ -15,7 +15,7 @@ from device.instrument.status import StatusBoard
 from device.records.listing import Page
 from device.web import kept_files
 from device.web.app import create_app
-from device.web.events import StatusFeed, status_events
+from device.web.events import StatusFeed
 
 MEASUREMENT = {"id": "m-1", "recording_id": "r-1", "features": {"total": 1.0}, "version": 1}
 
@@ -90,17 +90,19 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
 def test_only_what_waits_runs_on_the_event_loop(witness):
     """The event stream, a picture that waits for its turn to be made, and the parts of an upload."""
     routes = [route for route in create_app(witness, witness).routes if isinstance(route, APIRoute)]
-    on_the_loop = [route.path for route in routes if inspect.iscoroutinefunction(route.endpoint)]
-    assert on_the_loop == ["/api/v1/events", "/api/v1/measurements/{measurement_id}/image.png", "/api/v1/updates"]
+    waits = (inspect.iscoroutinefunction, inspect.isasyncgenfunction)
+    on_the_loop = [route.path for route in routes if any(is_it(route.endpoint) for is_it in waits)]
+    assert sorted(on_the_loop) == [
+        "/api/v1/events",
+        "/api/v1/live.mjpeg",
+        "/api/v1/measurements/{measurement_id}/image.png",
+        "/api/v1/updates",
+    ]
 
 
 def test_an_event_is_small_and_touches_neither_disk_nor_store(witness):
     """It is what the board and the cell's newest sample say: some 1 kB, built once for all clients."""
-
-    async def first_event():
-        return await anext(status_events(StatusFeed(witness)))
-
-    event = asyncio.run(first_event())
-    assert len(event) < 2000
-    assert json.loads(event.partition("data: ")[2])["press_state"] == "idle"
+    told = StatusFeed(witness).event().raw_data
+    assert len(told) < 2000
+    assert json.loads(told)["press_state"] == "idle"
     assert witness.threads == {}

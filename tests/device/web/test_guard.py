@@ -117,3 +117,30 @@ def test_every_answer_tells_a_browser_what_it_may_not_do_with_it(headers):
 def test_a_refused_request_does_not_reach_the_application():
     asked = Conversation([b""], {"host": "evil.example"})
     assert (asked.status, asked.asked_for, asked.body) == (421, 0, None)
+
+
+@pytest.mark.parametrize("said", [[], [(b"cache-control", b"no-cache")], [(b"Cache-Control", b"max-age=9")]])
+@pytest.mark.parametrize(("path", "is_kept"), [("/api/v1/exams", False), ("/", False), ("/static/screen.js", True)])
+def test_no_browser_keeps_an_answer_but_the_screens_own_files(said, path, is_kept):
+    sent = []
+
+    async def app(scope, receive, send):
+        await send({"type": "http.response.start", "status": 200, "headers": said})
+        await send({"type": "http.response.body", "body": b"{}"})
+
+    async def told(message):
+        sent.append(message)
+
+    headers = [(b"host", b"localhost")]
+    scope = {"type": "http", "method": "GET", "path": path, "headers": headers, "client": ("127.0.0.1", 9)}
+    asyncio.run(RequestGuard(app, KnownHosts.of_machine())(scope, None, told))
+    found = [value for name, value in sent[0]["headers"] if name.lower() == b"cache-control"]
+    assert found == ([value for _, value in said] if is_kept else [b"no-store"])
+
+
+def test_a_request_is_a_line_of_the_log_without_its_query_and_the_answer_has_its_id(caplog):
+    with caplog.at_level("INFO", "device.web.entrance.request_line"):
+        asked = Conversation([b"{}"], {"content-length": "2"}, path="/api/v1/presses")
+    [line] = [one.getMessage() for one in caplog.records if one.name.endswith("request_line")]
+    assert line.startswith(f"request id={asked.headers['x-request-id']} method=POST route=none status=200 bytes=2 ms=")
+    assert line.endswith("client=screen")

@@ -19,8 +19,9 @@ def test_explain_prints_each_choice_with_its_reason_and_the_error_of_each_number
     for words in (
         "symmetry     axisymmetric",
         "contact      closed_sliding",
-        "the fastest level that holds 1 %",
-        "predicted",
+        "graded, order 4",
+        "the lowest that may state 1 %",
+        "small_strain_departure",
     ):
         assert words in done.stdout
     assert re.search(r"max_deformation_mm +0\.0216\d* +mm +\+- 0\.\d+ %", done.stdout)
@@ -65,6 +66,26 @@ def test_finite_strain_on_request_is_true_sliding_with_its_plan_in_the_json():
     assert (record["plan"]["strain"], record["plan"]["contact"]) == ("finite", "true_sliding")
     assert 0 < record["stated_error"]["max_deformation_mm"] < 0.01
     assert record["contact_force_n"] == pytest.approx(record["force_n"], rel=1e-6)
+
+
+def test_a_tolerance_that_no_level_holds_is_exit_code_1_with_what_was_reached():
+    """Numbers are printed only when the best is asked for, and then with the sentence."""
+    asked = (*INCLUSION, "--strain", "small", "--tolerance", "1e-9", "--within-s", "1")
+    refused, best = run_toolkit("simulate", *asked), run_toolkit("simulate", *asked, "--best", "--json")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert (best.returncode, json.loads(best.stdout)["tolerance"]["held"]) == (0, False)
+    for told in (refused.stderr, best.stderr):
+        assert "tolerance is 1e-07 %, but" in told
+        assert "only good to" in told
+
+
+def test_what_is_stated_is_within_the_tolerance_and_the_record_says_so():
+    record = json.loads(
+        run_toolkit("simulate", *INCLUSION, "--strain", "small", "--tolerance", "0.1%", "--json").stdout
+    )
+    assert record["tolerance"]["held"]
+    assert record["tolerance"]["asked"] == 0.001
+    assert max(record["stated_error"].values()) == record["tolerance"]["reached"] <= 0.001
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """The picture of a press shows what the corrected images of its frames show, in true proportions."""
 
+import struct
+import zlib
 from dataclasses import replace
 
 import cv2
@@ -7,7 +9,7 @@ import numpy as np
 import pytest
 
 from device.files.shipped import SIMULATED_PROBE
-from device.instrument.press.picture import WIDTH_PX, tactile_png
+from device.instrument.press.picture import FULL_CONTRAST, WIDTH_PX, tactile_png
 from device.measurement.parameters import HIGH, LOW
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
@@ -33,7 +35,7 @@ def test_it_shows_the_mean_contrast_of_the_full_frames(recording):
     images = list(recording.press_images())
     contrast = cv2.GaussianBlur(np.mean([image.contrast for image in images], axis=0), (0, 0), 4)
     valid = np.all([image.valid for image in images], axis=0)
-    shade = np.clip(contrast / contrast[valid].max() * 255, 0, 255).astype(np.float32)
+    shade = np.clip(contrast / FULL_CONTRAST * 255, 0, 255).astype(np.float32)
     expected = cv2.resize(shade, colour.shape[1::-1], interpolation=cv2.INTER_AREA)[::8, ::8]
     inside = cv2.erode(valid.astype(np.uint8), np.ones((31, 31)))
     inside = cv2.resize(inside, colour.shape[1::-1], interpolation=cv2.INTER_NEAREST)[::8, ::8] > 0
@@ -49,6 +51,26 @@ def test_its_pixels_are_square(recording):
     assert width == WIDTH_PX
     face = camera.width_px * camera.mm_per_px_x / (camera.height_px * camera.mm_per_px_y)
     assert width / height == pytest.approx(face, rel=0.01)
+
+
+def chunks(png: bytes) -> dict[bytes, bytes]:
+    """Return the chunks of a PNG, each with a right checksum, by kind."""
+    found, at = {}, 8
+    while at < len(png):
+        (length,), kind = struct.unpack(">I", png[at : at + 4]), png[at + 4 : at + 8]
+        content = png[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", png[at + 8 + length : at + 12 + length]) == (zlib.crc32(kind + content),)
+        found[kind], at = content, at + 12 + length
+    return found
+
+
+def test_it_says_its_scale_and_what_its_brightest_colour_means(recording):
+    said = chunks(tactile_png(recording))
+    across, down, unit = struct.unpack(">IIB", said[b"pHYs"])
+    camera = recording.camera
+    assert (across, unit) == (down, 1)
+    assert 1000 * WIDTH_PX / across == pytest.approx(camera.width_px * camera.mm_per_px_x, rel=0.01)
+    assert said[b"tEXt"] == f"full_contrast\0{FULL_CONTRAST:g}".encode()
 
 
 @pytest.mark.parametrize("role", ["dark", "reference", "press"])

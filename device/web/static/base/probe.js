@@ -1,0 +1,128 @@
+// The probe's REST interface: the stream of statuses, presses, measurements, exams. Paths and fields: docs of /api/v1.
+
+import { isSaid, say } from "./words.js";
+
+const API = "/api/v1";
+const SILENCE_MS = 2000; // a status arrives at least twice a second: after this long the figures are old
+const REOPEN_MS = 3000;
+const WATCH_MS = 250;
+const ANSWER_MS = 5000;
+const RELEASE_MS = 600000; // a slow stick
+
+/** Load the page anew when it is no longer the daemon that answers, but what stands in for it and says why. */
+async function loadFallback() {
+  const response = await fetch("/fallback/state", { signal: AbortSignal.timeout(ANSWER_MS) }).catch(() => null);
+  if (response?.ok) location.reload();
+}
+
+/** Call onStatus with each status, and onSilence again and again while none arrives. */
+export function followStatus(onStatus, onSilence) {
+  let source = null;
+  let openedAt = 0;
+  let heardAt = performance.now();
+
+  function open() {
+    source?.close();
+    openedAt = performance.now();
+    source = new EventSource(`${API}/events`);
+    source.addEventListener("status", (event) => {
+      const status = JSON.parse(event.data);
+      heardAt = performance.now();
+      onStatus(status);
+    });
+  }
+
+  // EventSource gives up for good after an HTTP error and never notices a pulled cable, so the page reopens it itself.
+  function watch() {
+    const now = performance.now();
+    if (now - heardAt <= SILENCE_MS) return;
+    onSilence();
+    if (now - openedAt <= REOPEN_MS) return;
+    loadFallback();
+    open();
+  }
+
+  open();
+  setInterval(watch, WATCH_MS);
+}
+
+/** An answer that was none: `message` is the operator's sentence, `service` what the daemon said, `status` HTTP's. */
+class Refused extends Error {
+  constructor({ code = "", detail = "", remedy = "", title = "" }, status) {
+    const known = isSaid(`fault.${code}.do`) ? `${say(`fault.${code}.is`)}. ${say(`fault.${code}.do`)}` : "";
+    super(known || say("problem.other", { code: code || status }));
+    this.code = code;
+    this.status = status;
+    this.service = [code, detail || title, remedy].filter(Boolean).join(" ");
+  }
+}
+
+async function ask(method, path, body, { headers = {}, type = "application/json", withinMs = ANSWER_MS } = {}) {
+  const signal = AbortSignal.timeout(withinMs);
+  const options = { method, body, headers: { "Content-Type": type, ...headers }, signal };
+  const response = await fetch(API + path, options).catch(() => {
+    throw new Error(say("no_answer"));
+  });
+  if (!response.ok) throw new Refused(await response.json().catch(() => ({})), response.status);
+  return response;
+}
+
+const asJson = async (asked) => (await asked).json();
+const post = (path, body, headers) => asJson(ask("POST", path, JSON.stringify(body), { headers }));
+const get = (path) => asJson(ask("GET", path));
+const of = encodeURIComponent;
+const seen = ({ version }) => ({ "If-Match": `"${version}"` });
+
+/** A name for one request, so that a page that sends it twice is obeyed once; no secure context is needed for it. */
+function onceKey() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return { "Idempotency-Key": [...bytes].map((one) => one.toString(16).padStart(2, "0")).join("") };
+}
+
+/** Start a press, of an exam as it is shown here or of none. */
+export function startPress(wish, exam) {
+  const body = exam ? { ...wish, exam_id: exam.id } : wish;
+  return post("/presses", body, { ...onceKey(), ...(exam ? seen(exam) : {}) });
+}
+
+export const finishScan = (id) => post(`/presses/${of(id)}/finish`, {});
+export const cancelPress = (id) => asJson(ask("DELETE", `/presses/${of(id)}`));
+export const takeTare = () => post("/tare", {});
+export const startSelfTest = (wanted) => post("/self-test", wanted);
+export const fetchSelfTest = () => get("/self-test");
+export const fetchDevice = () => get("/device");
+
+export const imageUrl = (id) => `${API}/measurements/${of(id)}/image.png`;
+export const recordingUrl = (id) => `${API}/measurements/${of(id)}/recording.zip`;
+export const reportUrl = (examId) => `${API}/exams/${of(examId)}/report.pdf`;
+export const tableUrl = (examId) => `${API}/exports/measurements.csv${examId ? `?exam_id=${of(examId)}` : ""}`;
+export const fetchMeasurement = (id) => get(`/measurements/${of(id)}`);
+
+/** Measurements, newest first, of an exam or of all, older than one of them. */
+export async function fetchMeasurements({ examId = null, beforeSeq = null, limit = 50 } = {}) {
+  const asked = new URLSearchParams({ limit });
+  if (examId) asked.set("exam_id", examId);
+  if (beforeSeq) asked.set("before_seq", beforeSeq);
+  return (await get(`/measurements?${asked}`)).measurements;
+}
+
+export const moveMeasurement = (one, act) => post(`/measurements/${of(one.id)}/move`, act, seen(one));
+export const voidMeasurement = (one, act) => post(`/measurements/${of(one.id)}/void`, act, seen(one));
+
+export const fetchExam = (id) => get(`/exams/${of(id)}`);
+export const makeExam = (content) => post("/exams", content, onceKey());
+
+/** Exams of one kind, newest first, of a patient or of all. */
+export async function fetchExams({ kind = "patient", patientRef = null, limit = 20 } = {}) {
+  const asked = new URLSearchParams({ kind, limit });
+  if (patientRef) asked.set("patient_ref", patientRef);
+  return (await get(`/exams?${asked}`)).exams;
+}
+
+export const fetchUpdates = () => get("/updates");
+export const goBack = () => post("/updates/roll-back", {});
+
+/** Send a release file; it goes from the stick to the probe part by part, never whole through the memory. */
+export async function sendRelease(file) {
+  return (await ask("POST", "/updates", file, { type: "application/octet-stream", withinMs: RELEASE_MS })).json();
+}

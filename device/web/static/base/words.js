@@ -1,0 +1,82 @@
+// The words of one language, from words/LANGUAGE.json, and numbers and times as that language writes them. What the
+// daemon says in English (words/sentences.json) is recognised by its form, and said in the operator's words.
+
+import { remembered, remember } from "./memory.js";
+
+export const LANGUAGES = { en: "English", de: "Deutsch" };
+
+const LOCALES = { en: "en-GB", de: "de-DE" };
+const wanted = [remembered("language"), ...navigator.languages.map((one) => one.slice(0, 2)), "en"];
+export const language = wanted.find((one) => one in LANGUAGES);
+const locale = LOCALES[language];
+
+const load = async (name) => (await fetch(`/static/words/${name}.json`)).json();
+const [words, sentences] = await Promise.all([load(language), load("sentences")]);
+
+export function chooseLanguage(chosen) {
+  remember("language", chosen);
+  location.reload();
+}
+
+const filled = (text, values) => text.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
+
+/** A figure and its unit stay on one line. */
+const together = (text) => text.replace(/([\d}]) (?=(?:%|mm|kPa|N|s)(?![\w]))/g, "$1\u00a0");
+
+/** The words of a key with its {values}; a key without words is shown itself, and a test finds it. */
+export const say = (key, values = {}) => together(filled(words[key] ?? key, values));
+export const isSaid = (key) => key in words;
+
+/** Fill the page's own texts: data-say, data-say-label and data-say-title hold keys. */
+export function sayPage(root = document) {
+  document.documentElement.lang = language;
+  for (const node of root.querySelectorAll("[data-say]")) node.textContent = say(node.dataset.say);
+  for (const node of root.querySelectorAll("[data-say-label]")) node.setAttribute("aria-label", say(node.dataset.sayLabel));
+  for (const node of root.querySelectorAll("[data-say-title]")) node.title = say(node.dataset.sayTitle);
+}
+
+/** A number with so many decimals, as the language writes it. */
+export function figure(number, decimals) {
+  const text = number.toLocaleString(locale, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false });
+  return /[1-9]/.test(text) ? text : text.replace(/^[-\u2212]/, "");
+}
+
+const DAY = { year: "numeric", month: "2-digit", day: "2-digit" };
+const MINUTE = { hour: "2-digit", minute: "2-digit" };
+
+/** A moment (RFC 3339) in local time with its zone. */
+export const moment = (at) => new Date(at).toLocaleString(locale, { ...DAY, ...MINUTE, timeZoneName: "short" });
+export const day = (at) => new Date(at).toLocaleDateString(locale, DAY);
+export const clock = (at) => new Date(at).toLocaleTimeString(locale, MINUTE);
+
+const asPattern = (text) => text.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+?)");
+const patterns = Object.entries(sentences).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
+
+function spokenValue(value) {
+  const number = /^(-?\d+(?:\.(\d+))?)( ?%?)$/.exec(value);
+  if (number) return figure(Number(number[1]), number[2]?.length ?? 0) + (number[3] ? "\u00a0%" : "");
+  return value.split(" and ").map((part) => words[`value.${part}`] ?? part).join(` ${words.and} `);
+}
+
+/** What the daemon's sentences say: {do, why}, each a sentence or "", or null when one of them is not known. */
+export function understand(text) {
+  const said = { do: "", why: [] };
+  let rest = text.trim();
+  while (rest) {
+    const [key, hit] = patterns.map(([one, pattern]) => [one, pattern.exec(rest)]).find(([, found]) => found) ?? [];
+    if (!hit) return null;
+    const values = Object.fromEntries(Object.entries(hit.groups ?? {}).map(([name, value]) => [name, spokenValue(value)]));
+    said.do = say(`reason.${key}.do`, values) || said.do;
+    said.why.push(say(`reason.${key}.why`, values));
+    rest = rest.slice(hit[0].length).trim();
+  }
+  return { do: said.do, why: said.why.join(" ") };
+}
+
+const REMEDIES = { E211: /^Wait (?<s>\d+) s:/ };
+
+/** What to do about a fault that ends by itself, with how long that takes; null where the daemon does not say it. */
+export function understandRest(code, remedy) {
+  const hit = REMEDIES[code]?.exec(remedy);
+  return hit ? say(`fault.${code}.do_s`, hit.groups) : null;
+}

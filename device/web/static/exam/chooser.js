@@ -1,0 +1,118 @@
+// Choose whose exam it is: scan or type a patient, go on with an exam, begin one at a place of the body, take a phantom,
+// or press freely, which is asked twice.
+
+import { button, byId, element, setText } from "../base/dom.js";
+import { remember, remembered } from "../base/memory.js";
+import { fetchExams, makeExam } from "../base/probe.js";
+import { moment, say } from "../base/words.js";
+import { beginMap, chosenPlace } from "./body_map.js";
+import { open, openExam, openFree, placeWords, whoWords } from "./current.js";
+
+const RECENT = 12;
+const dialog = byId("chooser");
+const fields = { patient_ref: byId("patient-ref"), order_number: byId("order-number"), operator: byId("operator") };
+let sending = false;
+
+function page(name) {
+  dialog.dataset.page = name;
+  setText(byId("chooser-problem"), "");
+}
+
+const typed = (name) => fields[name].value.trim();
+
+function problem(key) {
+  setText(byId("chooser-problem"), say(key));
+  return false;
+}
+
+function close() {
+  if (dialog.open) dialog.close();
+}
+
+function goOn(exam) {
+  open(exam);
+  close();
+}
+
+function row(exam) {
+  const node = button("recent", "", () => goOn(exam));
+  node.append(element("strong", "", whoWords(exam)), element("span", "", placeWords(exam)), element("small", "", moment(exam.made_at)));
+  return node;
+}
+
+/** Show the exams of before: of the patient that is typed, else the newest of all. */
+async function showRecent() {
+  const patientRef = typed("patient_ref") || null;
+  const found = await fetchExams({ patientRef, limit: RECENT }).catch(() => []);
+  if ((typed("patient_ref") || null) !== patientRef) return;
+  byId("recent").replaceChildren(...(found.length ? found.map(row) : [element("p", "", say("exam.recent_none"))]));
+}
+
+/** Open the page, with a patient who was scanned or without. */
+export function chooseExam(patient = "") {
+  page("who");
+  fields.patient_ref.value = patient;
+  fields.order_number.value = "";
+  fields.operator.value ||= remembered("operator") ?? "";
+  setText(byId("scanned"), patient ? say("exam.scanned", { patient }) : say("exam.patient_hint"));
+  if (!dialog.open) dialog.showModal();
+  showRecent();
+}
+
+/** Open the map for another place of the patient whose exam is open. */
+export function chooseAnotherPlace() {
+  const { patient_ref: patient, order_number: order, operator } = openExam();
+  Object.assign(fields.patient_ref, { value: patient });
+  Object.assign(fields.order_number, { value: order ?? "" });
+  Object.assign(fields.operator, { value: operator });
+  if (!dialog.open) dialog.showModal();
+  showMap();
+}
+
+function showMap() {
+  page("where");
+  setText(byId("where-of"), say("exam.where_of", { patient: typed("patient_ref") }));
+  beginMap();
+}
+
+function toMap() {
+  if (!typed("patient_ref")) return problem("exam.missing_patient");
+  if (!typed("operator")) return problem("exam.missing_operator");
+  remember("operator", typed("operator"));
+  return showMap();
+}
+
+async function begin(content) {
+  if (sending) return;
+  sending = true;
+  try {
+    goOn(await makeExam(content));
+  } catch (error) {
+    setText(byId("chooser-problem"), error.message);
+  } finally {
+    sending = false;
+  }
+}
+
+function beginPatient() {
+  const place = chosenPlace();
+  if (!place.side || !place.clock_position) return problem("exam.missing_place");
+  const who = { kind: "patient", patient_ref: typed("patient_ref"), operator: typed("operator") };
+  return begin({ ...who, order_number: typed("order_number") || null, ...place });
+}
+
+function beginPhantom() {
+  if (!typed("operator")) return problem("exam.missing_operator");
+  remember("operator", typed("operator"));
+  return begin({ kind: "phantom", operator: typed("operator") });
+}
+
+fields.patient_ref.addEventListener("input", showRecent);
+byId("to-place").addEventListener("click", toMap);
+byId("begin-exam").addEventListener("click", beginPatient);
+byId("begin-phantom").addEventListener("click", beginPhantom);
+byId("free-press").addEventListener("click", () => page("free"));
+byId("free-yes").addEventListener("click", () => { openFree(); close(); });
+for (const one of dialog.querySelectorAll(".to-who")) one.addEventListener("click", () => page("who"));
+byId("chooser-close").addEventListener("click", close);
+byId("who-form").addEventListener("submit", (event) => { event.preventDefault(); toMap(); });

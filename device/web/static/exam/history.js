@@ -1,0 +1,132 @@
+// What was measured: of this exam, of this patient or of all, each with its picture. Two that are marked stand side by
+// side; a patient's exams make a trend.
+
+import { button, byId, element } from "../base/dom.js";
+import { fetchExam, fetchExams, fetchMeasurements, imageUrl, reportUrl, tableUrl } from "../base/probe.js";
+import { moment, say } from "../base/words.js";
+import { modeName } from "../press/modes.js";
+import { UNKNOWNS, shortWords } from "../result/quantities.js";
+import { showComparison } from "./comparison.js";
+import { openExam, placeWords, whoWords } from "./current.js";
+import { showTrend } from "./trend.js";
+
+const PAGE = 30;
+const dialog = byId("history");
+const list = byId("history-list");
+let scope = "all";
+let onOpen = () => {};
+let marked = [];
+let exams = new Map();
+
+async function examOf({ exam_id: id }) {
+  if (!id) return null;
+  if (!exams.has(id)) exams.set(id, await fetchExam(id));
+  return exams.get(id);
+}
+
+const ownerWords = (exam) => (exam ? `${whoWords(exam)} ${placeWords(exam)}` : say("history.free"));
+
+function thumbnail({ id }) {
+  const image = element("img", "thumbnail");
+  Object.assign(image, { src: imageUrl(id), alt: "", loading: "lazy" });
+  return image;
+}
+
+/** Mark a measurement for the comparison; the third one takes the place of the first. */
+function mark(measurement, isMarked) {
+  marked = marked.filter(({ id }) => id !== measurement.id);
+  if (isMarked) marked = [...marked, measurement].slice(-2);
+  for (const box of list.querySelectorAll("input")) box.checked = marked.some(({ id }) => id === box.value);
+  showComparison(marked);
+}
+
+function marker(measurement) {
+  const label = element("label", "marker");
+  const box = element("input", "");
+  Object.assign(box, { type: "checkbox", value: measurement.id });
+  box.setAttribute("aria-label", `${say("history.compare")} ${measurement.seq}`);
+  box.addEventListener("change", () => mark(measurement, box.checked));
+  label.append(box);
+  return label;
+}
+
+function row(measurement, exam) {
+  const { seq, taken_at: at, mode, estimate, voided, truth } = measurement;
+  const item = element("li", "kept");
+  item.dataset.voided = Boolean(voided);
+  const show = button("kept-open", "", () => { dialog.close(); onOpen(measurement.id); });
+  const words = element("span", "kept-words");
+  const signs = [voided && say("history.void"), estimate.simulated && say("simulated"), truth && !estimate.simulated && say("phantom")];
+  words.append(
+    element("strong", "", `${seq} · ${ownerWords(exam)}`),
+    element("span", "", `${moment(at)}, ${modeName(mode)} ${signs.filter(Boolean).join(", ")}`),
+    element("span", "", UNKNOWNS.map((one) => `${say(one.name)} ${shortWords(estimate, one)}`).join(" · ")),
+  );
+  show.append(thumbnail(measurement), words);
+  item.append(show, marker(measurement));
+  return item;
+}
+
+function link(words, url) {
+  const node = element("a", "button button-quiet", words);
+  Object.assign(node, { href: url, download: "" });
+  return node;
+}
+
+/** What can be taken away: the report and the table of the exam that is open, or the table of all. */
+function showExports() {
+  const exam = scope === "all" ? null : openExam();
+  const report = exam ? [link(say("history.pdf"), reportUrl(exam.id))] : [];
+  byId("exports").replaceChildren(...report, link(say("history.csv"), tableUrl(exam?.id)));
+}
+
+/** The exams that a scope is of, or null for all measurements. */
+async function examsInScope() {
+  const exam = openExam();
+  if (!exam || scope === "all") return null;
+  if (scope === "exam" || exam.kind === "phantom") return [exam];
+  return fetchExams({ patientRef: exam.patient_ref, limit: 100 });
+}
+
+async function page(beforeSeq = null) {
+  const inScope = await examsInScope();
+  if (!inScope) return fetchMeasurements({ beforeSeq, limit: PAGE });
+  const found = await Promise.all(inScope.map((exam) => fetchMeasurements({ examId: exam.id, limit: 100 })));
+  exams = new Map([...exams, ...inScope.map((exam) => [exam.id, exam])]);
+  return found.flat().sort((a, b) => b.seq - a.seq);
+}
+
+async function show(beforeSeq = null) {
+  const measurements = await page(beforeSeq);
+  const rows = await Promise.all(measurements.map(async (one) => row(one, await examOf(one))));
+  if (beforeSeq) list.append(...rows);
+  else list.replaceChildren(...rows);
+  byId("history-none").hidden = list.childElementCount > 0;
+  const more = byId("history-more");
+  more.hidden = scope !== "all" || measurements.length < PAGE;
+  more.dataset.before = measurements.at(-1)?.seq ?? "";
+  showTrend(scope === "patient" ? measurements : []);
+}
+
+function choose(next) {
+  scope = next;
+  marked = [];
+  showComparison(marked);
+  showExports();
+  for (const one of ["exam", "patient", "all"]) byId(`history-${one}`).setAttribute("aria-pressed", one === next);
+  show().catch((error) => list.replaceChildren(element("li", "problem", error.message)));
+}
+
+for (const one of ["exam", "patient", "all"]) byId(`history-${one}`).addEventListener("click", () => choose(one));
+byId("history-more").addEventListener("click", ({ currentTarget }) => show(Number(currentTarget.dataset.before)));
+byId("history-close").addEventListener("click", () => dialog.close());
+
+/** Open the history of the exam that is open, else of all; what is chosen in it is handed to `act` by its id. */
+export function openHistory(act) {
+  onOpen = act;
+  const exam = openExam();
+  exams = new Map();
+  byId("history-exam").hidden = byId("history-patient").hidden = !exam;
+  choose(exam ? "exam" : "all");
+  dialog.showModal();
+}

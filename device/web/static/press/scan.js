@@ -1,0 +1,121 @@
+// A scan: how sure each unknown is after every press on the lesion, and, before it begins, how sure it is to be.
+
+import { byId, element, setAttribute, setText } from "../base/dom.js";
+import { figure, say, understand } from "../base/words.js";
+
+const STEPS_MM = [2, 1, 0.5];
+const ROWS = [
+  { key: "size_mm", name: "size", unit: "mm", full: 4 },
+  { key: "depth_mm", name: "depth", unit: "mm", full: 4 },
+  { key: "youngs_modulus_kpa", name: "modulus", unit: "kPa", full: 40 },
+];
+const box = byId("until");
+let offers = [];
+let shown = "";
+
+export const isScan = ({ most_ramps: most }) => most > 1;
+
+const offerOf = (mode) => offers.find((offer) => offer.mode === mode && isScan(offer));
+
+/** A half width with the digits that tell it from another: 0.45, 1.2, 14. */
+const width = (halfWidth) => figure(halfWidth, halfWidth < 0.995 ? 2 : halfWidth < 9.95 ? 1 : 0);
+
+/** Whether a scan can be as sure as that, as far as the probe knows; only the sizes in mm are asked for here. */
+function canReach(offer, step) {
+  const reachable = offer.reachable_half_width ?? {};
+  return ["size_mm", "depth_mm"].every((key) => !(step < reachable[key]));
+}
+
+function choice(step, isPossible) {
+  const label = element("label", "until-step");
+  const input = element("input", "");
+  const words = step === null ? say("until.any") : say("until.mm", { mm: figure(step, step < 1 ? 1 : 0) });
+  Object.assign(input, { type: "radio", name: "until", value: step ?? "", checked: step === null, disabled: !isPossible });
+  label.append(input, element("span", "", words));
+  if (!isPossible) setAttribute(label, "title", say("until.not"));
+  return label;
+}
+
+/** Offer how sure a scan is to be; what was chosen stays so while it can be had. */
+export function offerAccuracy(modes) {
+  const offer = modes.find(isScan);
+  const chosen = box.querySelector("input:checked")?.value;
+  offers = modes;
+  box.querySelectorAll("label, .until-words").forEach((one) => one.remove());
+  if (!offer) return;
+  box.append(element("span", "until-words", say("until.words")));
+  box.append(choice(null, true), ...STEPS_MM.map((step) => choice(step, canReach(offer, step))));
+  const again = [...box.querySelectorAll("input")].find(({ value, disabled }) => value === chosen && !disabled);
+  if (again) again.checked = true;
+}
+
+/** Show that choice where the mode that is chosen is a scan. */
+export function showAccuracy(mode) {
+  box.hidden = !offerOf(mode);
+}
+
+/** What a scan is asked for: nothing, or half of the 90 % interval of size and depth. */
+export function chosenAccuracy(mode) {
+  const step = Number(box.querySelector("input:checked")?.value);
+  return offerOf(mode) && step ? { until: { size_mm: step, depth_mm: step } } : {};
+}
+
+/** What a scan is doing, in words; "" when there is no scan, or nothing that differs from any other press. */
+export function scanHint({ step, scan, press_state: state }, mode) {
+  if (!offerOf(mode)) return "";
+  if (step === "ready") return say("hint.scan_ready");
+  if (step === "lesion" && state === "releasing") return say("hint.scan_answering");
+  if (step !== "lesion" || !scan) return "";
+  return say("hint.scan_next", { n: scan.ramps + 1, mm: figure(scan.next_offset_mm, 0) });
+}
+
+/** What the operator has to know before the next press: that the last one does not count, or that nothing is known. */
+export function scanTrouble({ step, scan, guidance }) {
+  if (step !== "lesion" || !scan || !["lift", "move_aside"].includes(guidance.code)) return null;
+  const why = (text) => understand(text)?.why ?? say("reason.other");
+  if (scan.failed) return { word: say("scan.not_counted"), reason: why(scan.failed), tone: "caution" };
+  const hasNumbers = Object.keys(scan.half_width).length > 0;
+  return hasNumbers ? null : { word: say("scan.no_numbers"), reason: why(scan.reason), tone: "caution" };
+}
+
+function bar(now, next, wanted, full) {
+  const track = element("div", "scan-bar");
+  const part = (className, value) => {
+    const node = element("span", className);
+    node.style.setProperty("--to", Math.min(value / full, 1));
+    track.append(node);
+  };
+  part("scan-now", now);
+  if (next !== undefined) part("scan-next", next);
+  if (wanted !== undefined) part("scan-wanted", wanted);
+  return track;
+}
+
+/** Value and half width of one unknown, what the next press is expected to make of it, and what is asked for. */
+function row({ key, name, unit, full }, scan, until) {
+  const item = element("li", "scan-row");
+  const now = scan.half_width[key];
+  const [next, wanted, value] = [scan.expected_half_width[key], until?.[key], scan.value[key]];
+  const isKnown = now !== undefined && scan.determined[key];
+  item.dataset.reached = wanted !== undefined && now <= wanted;
+  item.dataset.known = isKnown;
+  const words = isKnown ? `${figure(value, now >= 9.95 ? 0 : 1)} ± ${width(now)} ${unit}` : say("scan.unknown");
+  item.append(element("span", "scan-name", say(name)), element("strong", "scan-value", words));
+  if (now !== undefined) item.append(bar(now, next, wanted, full));
+  const told = element("span", "scan-told", next === undefined ? "" : say("scan.next", { width: width(next), unit }));
+  if (wanted !== undefined) told.append(" ", element("span", "scan-asked", say("scan.asked", { width: width(wanted), unit })));
+  item.append(told);
+  return item;
+}
+
+/** Show how sure each unknown is, once a press of a scan is complete. */
+export function showScan({ scan, press }) {
+  const key = JSON.stringify([scan, press?.until]);
+  if (key === shown) return;
+  shown = key;
+  byId("scan").hidden = !scan;
+  byId("panel").dataset.scan = Boolean(scan);
+  if (!scan) return;
+  byId("scan-rows").replaceChildren(...ROWS.map((one) => row(one, scan, press?.until)));
+  setText(byId("scan-count"), say("scan.count", { n: scan.ramps, most: scan.most_ramps }));
+}

@@ -1,0 +1,43 @@
+// Everything behind a measurement, in a researcher's words and the daemon's own: features, frames, force, model.
+
+import { byId, element } from "../base/dom.js";
+import { recordingUrl } from "../base/probe.js";
+import { figure, moment, say } from "../base/words.js";
+import { modeName } from "../press/modes.js";
+
+const dialog = byId("details");
+byId("details-close").addEventListener("click", () => dialog.close());
+
+const number = (value) => (Number.isInteger(value) ? String(value) : value.toPrecision(4));
+
+function warningWords({ code, title, cause, remedy }) {
+  return `${code} ${title}: ${cause} ${remedy}`;
+}
+
+function lines({ taken_at: at, mode, frames, force_n: force, estimate, features, warnings, exam_id: exam, recording_id: recording }) {
+  const of = { mode: modeName(mode), frames, force: figure(force, 3) };
+  return [
+    ["measured", `${moment(at)} (${at})`],
+    ["mode", say("details.mode_of", of)],
+    ["status", estimate.status],
+    ["reason", estimate.reason],
+    ["warnings", warnings.map(warningWords).join("\n")],
+    ["features", Object.entries(features).map(([name, value]) => `${name} ${number(value)}`).join("\n")],
+    ["model", `${estimate.model} ${estimate.model_sha256}`],
+    ["certificate", estimate.calibration_id],
+    ["exam", exam ?? ""],
+    ["recording", recording],
+  ];
+}
+
+/** Open the details of a measurement. */
+export function openDetails(measurement) {
+  byId("details-heading").textContent = say("details.title", { n: measurement.seq });
+  const told = lines(measurement).filter(([, words]) => words);
+  byId("details-list").replaceChildren(...told.flatMap(([name, words]) => [
+    element("dt", "", say(`details.${name}`)), element("dd", "", words),
+  ]));
+  const link = byId("details-recording");
+  Object.assign(link, { href: recordingUrl(measurement.id), download: `measurement-${measurement.seq}.zip` });
+  dialog.showModal();
+}

@@ -1,0 +1,77 @@
+// Which measurement the screen shows: the newest of the open exam, one from the history, or an answer that the probe is
+// still keeping. A result of somebody else is never shown under this exam's name.
+
+import { fetchMeasurement, fetchMeasurements } from "../base/probe.js";
+import { openExam } from "../exam/current.js";
+import { showRepeats } from "./repeats.js";
+import { showMeasurement } from "./result.js";
+
+const ENDED_WITHOUT = new Set(["rejected", "cancelled", "failed"]);
+let measurement = null;
+let answer = null; // what the press says while the probe keeps it; from then on the measurement takes its place
+let older = null;
+let dismissed = null;
+
+function isOfThisExam({ exam_id: id }) {
+  return id === null || id === openExam()?.id;
+}
+
+/** The measurement that is shown, the answer that is still being kept, or null. */
+export function shownResult(status) {
+  if (older) return older;
+  // A press that came to nothing must not stand above the figures of the one before it.
+  const wanted = status.step === "result" || (status.step === "ready" && !ENDED_WITHOUT.has(status.press?.state));
+  const isNewest = measurement !== null && measurement.id === status.measurement_id;
+  if (wanted && isNewest && measurement.id !== dismissed && isOfThisExam(measurement)) return measurement;
+  return answer;
+}
+
+export const isOlder = () => older !== null;
+export const isMissing = ({ measurement_id: id }) => id !== null && id !== measurement?.id;
+
+async function loadRepeats() {
+  const exam = openExam();
+  showRepeats(exam ? await fetchMeasurements({ examId: exam.id }) : []);
+}
+
+/** Load the newest measurement and show it. */
+export async function loadNewest(id) {
+  measurement = await fetchMeasurement(id);
+  showMeasurement(measurement);
+  await loadRepeats();
+}
+
+/** Show a measurement from the history. */
+export async function showOlder(id) {
+  older = await fetchMeasurement(id);
+  showMeasurement(older);
+  showRepeats([]);
+}
+
+/** Show the newest again, or nothing when it was put away. */
+export async function showNow() {
+  older = null;
+  if (measurement) showMeasurement(measurement);
+  await loadRepeats();
+}
+
+/** Put what is shown away: the next press comes. */
+export function dismiss(status) {
+  older = null;
+  dismissed = status?.measurement_id ?? null;
+}
+
+/** Take over a measurement that somebody has moved or voided. */
+export async function replace(after) {
+  if (older?.id === after.id) older = after;
+  if (measurement?.id === after.id) measurement = after;
+  showMeasurement(after);
+  await loadRepeats();
+}
+
+/** An answer stays in sight until its measurement is there; when it could not be kept, it is shown no more. */
+export function followAnswer(status) {
+  if (status.answer && answer === null) showMeasurement(status.answer);
+  const isBeingLoaded = status.step === "result" && measurement?.id !== status.measurement_id;
+  answer = status.answer ?? (isBeingLoaded ? answer : null);
+}

@@ -1,0 +1,172 @@
+"""A scene and a tolerance to a solution that states no more than it: plan, solve, compare, and climb.
+
+Each kind of model has its rungs. In small strain they are orders on one mesh, which beats refining it and keeps
+features smooth in the scene; in finite strain, whose rims must stay blunt, meshes and orders. The first rung is what
+usually holds; the climb ends where the stated error is within the tolerance, or the rungs or the time are used up, and
+then what is missing is said. Sweeps do not climb: all their scenes share one level.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, Literal
+
+from host_tools.forward.accuracy import Level, small_strain_departure
+from host_tools.forward.plan import GRADED, ModelPlan, model_plan
+from host_tools.forward.press_model import PressFailed
+from host_tools.forward.solution import Solution
+from host_tools.forward.solve import solve_ramp
+from host_tools.scenes.scene import Press, Scene
+
+AskedStrain = Literal["small", "finite", "auto"]
+WITHIN_S = 120.0
+"""Time for a scene unless told otherwise, wall clock."""
+NEXT_RUNG = 2.0
+"""A rung takes about so many times as long as the one below it."""
+FLAT_ORDERS, DOMED_ORDERS, SOLID_ORDERS = range(3, 10), range(3, 7), range(3, 7)
+FINITE_RUNGS = (Level("blunt", 2), Level("blunt", 3), Level("blunt_fine", 3), Level("blunt_fine", 4))
+FIRST_ORDERS = {0.05: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
+"""By the tolerance from which on it is worth beginning there."""
+FIRST_BLUNT_AT = 0.1
+"""A tolerance from which on finite strain begins with the lowest rung."""
+SMALL_IS_ENOUGH = "ask for small strain (--strain small), which then states its own errors alone"
+TAKE_THE_BEST = "take the best as it is (--best)"
+CANCELLING = "total_deformation_mm3"
+"""At a prescribed force what the centre gains the rim loses: its relative error says nothing."""
+
+
+@dataclass(frozen=True)
+class Climb:
+    """What was reached: solutions, one a press, and the error that they state, of which feature; relative."""
+
+    solutions: tuple[Solution, ...]
+    tolerance: float
+    reached: float
+    feature: str
+    departure: float = 0.0
+    """By how much small strain departs from finite strain in O1-O3, about; 0 in finite strain."""
+    was_chosen: bool = False
+    """Whether small strain was chosen here, and not asked for: its departure is then an error like any other."""
+    ended: str = ""
+    """Why the climb ended without the tolerance."""
+
+    def as_record(self) -> dict[str, Any]:
+        """Return what was asked and reached, as the JSON object in `host_tools simulate --json`."""
+        return {
+            "asked": self.tolerance,
+            "reached": self.reached,
+            "feature": self.feature,
+            "held": not self.missed,
+            "small_strain_departure": self.departure,
+        }
+
+    @property
+    def missed(self) -> str:
+        """One sentence on what was asked for and is not held; empty where it is."""
+        asked = f"{100 * self.tolerance:.3g} %"
+        if self.was_chosen and self.departure > self.tolerance:
+            return (
+                f"tolerance is {asked}, but small strain departs from finite strain by about "
+                f"{100 * self.departure:.2g} % here, and finite strain is axisymmetric and flat-faced only: press less "
+                f"deep, or {SMALL_IS_ENOUGH}."
+            )
+        if self.reached <= self.tolerance:
+            return ""
+        return (
+            f"tolerance is {asked}, but {self.feature} is only good to {100 * self.reached:.2g} % ({self.ended}): "
+            f"allow a larger tolerance or more time (--within-s), or {TAKE_THE_BEST}."
+        )
+
+
+class ToleranceMissed(PressFailed):
+    """A tolerance that no model held; `climb` has the best."""
+
+    def __init__(self, climb: Climb) -> None:
+        self.climb = climb
+        super().__init__(climb.missed)
+
+
+def climb(
+    scene: Scene,
+    presses: Sequence[Press],
+    *,
+    tolerance: float,
+    strain: AskedStrain = "auto",
+    within_s: float = WITHIN_S,
+) -> Climb:
+    """Solve a scene at presses, as `solve_ramp`, on higher rungs until what is stated is within a relative tolerance.
+
+    `within_s` is wall time; the first rung is solved in any case. Raise as `model_plan` and `solve_ramp` do.
+    """
+    began = time.perf_counter()
+    pressed = scene.with_press(presses[-1])
+    plan = model_plan(pressed, tolerance=tolerance, strain=strain)
+    best, told = None, ""
+    for level in _rungs(plan, tolerance):
+        took = time.perf_counter()
+        found = _rung(scene, presses, plan, level, tolerance, told)
+        best = min((one for one in (best, found) if one), key=lambda one: one.reached)
+        if found.reached <= tolerance:
+            break
+        told = f"{level.grading}, order {level.order} stated {100 * found.reached:.2g} %"
+        now = time.perf_counter()
+        if now + NEXT_RUNG * (now - took) > began + within_s:
+            best = replace(best, ended=f"the next level would take longer than the {within_s:g} s allowed")
+            break
+    else:
+        best = replace(best, ended="no level holds more") if best else None
+    assert best is not None  # every plan has rungs
+    departure = small_strain_departure(pressed) if plan.strain == "small" else 0.0
+    return replace(best, departure=departure, was_chosen=strain == "auto")
+
+
+def _rungs(plan: ModelPlan, tolerance: float) -> Sequence[Level]:
+    if plan.strain == "finite":
+        return FINITE_RUNGS if tolerance >= FIRST_BLUNT_AT else FINITE_RUNGS[1:]
+    first = next(order for at_least, order in FIRST_ORDERS.items() if tolerance >= at_least)
+    orders = SOLID_ORDERS if plan.symmetry != "axisymmetric" else FLAT_ORDERS
+    if plan.contact == "unilateral":
+        orders = DOMED_ORDERS
+    return [Level(GRADED, order) for order in orders if order >= min(first, orders[-1])]
+
+
+def _rung(scene: Scene, presses: Sequence[Press], plan: ModelPlan, level: Level, tolerance: float, told: str) -> Climb:
+    """Return what one level reaches; `told` is what the one below stated."""
+    why = f"the lowest that may state {100 * tolerance:g} %" + (f"; {told}" if told else "")
+    reasons = plan.reasons | {"level": why}
+    if level.grading == GRADED:
+        reasons["mesh"] = "meshed for this scene, its rims in layers"
+    mesh = "remeshed" if level.grading == GRADED else plan.mesh
+    on_level = replace(
+        plan,
+        grading=level.grading,
+        order=level.order,
+        mesh=mesh,
+        reasons=reasons,
+        predicted_error={},
+        predicted_seconds=None,
+    )
+    solutions = solve_ramp(scene, presses, on_level, estimate_error=True)
+    feature, reached = max((_worst(one) for one in solutions), key=lambda pair: pair[1])
+    return Climb(solutions, tolerance, reached, feature)
+
+
+def _worst(solution: Solution) -> tuple[str, float]:
+    """Return the feature with the largest stated error, and that error; a number that is none counts as infinite."""
+    by_force = solution.scene.press.force_n is not None
+    stated = {
+        name: error if error == error else inf
+        for name, error in solution.stated_error.items()
+        if not (by_force and name == CANCELLING)
+    }
+    return max(stated.items(), key=lambda pair: pair[1])
+
+
+def held(climbed: Climb, *, best: bool) -> Climb:
+    """Return a climb that holds its tolerance, or with `best` any; raise `ToleranceMissed` otherwise."""
+    if climbed.missed and not best:
+        raise ToleranceMissed(climbed)
+    return climbed

@@ -1,0 +1,133 @@
+"""Whose exam it is, in a real Chromium: never by accident, never somebody else's, and each act in the audit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from chromium import chromium_page
+from daemon_process import QUICK_HAND, Daemon
+from playwright.sync_api import Page, expect
+from screen_layout import wrong_in
+
+pytestmark = [pytest.mark.browser, pytest.mark.real_time]
+EXAM = {
+    "kind": "patient",
+    "patient_ref": "A-17",
+    "side": "left",
+    "clock_position": 10,
+    "nipple_distance_mm": 35.0,
+    "operator": "Ada",
+}
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    with chromium_page() as page:
+        yield page
+
+
+@pytest.fixture
+def daemon(page: Page, tmp_path: Path) -> Iterator[Daemon]:
+    running = Daemon(tmp_path, QUICK_HAND)
+    yield running
+    page.goto("about:blank")
+    page.context.clear_cookies()
+    running.stop()
+
+
+def make(daemon: Daemon, **changes: object) -> dict[str, object]:
+    answer = daemon.ask("/api/v1/exams", "POST", EXAM | changes)
+    assert answer.status == 201, answer.body
+    found: dict[str, object] = answer.json
+    return found
+
+
+def open_exam(page: Page, daemon: Daemon, patient: str) -> None:
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    page.locator(".recent").filter(has_text=patient).first.click()
+    expect(page.locator("#exam-who")).to_have_text(patient)
+
+
+def test_a_page_that_shows_an_old_exam_does_not_measure_but_shows_it_anew(page: Page, daemon: Daemon):
+    exam = make(daemon)
+    open_exam(page, daemon, "A-17")
+    expect(page.locator("#exam-where")).to_have_text("Left 10 o'clock, 35 mm")
+    change = {"by": "Bo", "reason": "Wrong side", "changes": {"side": "right"}}
+    headers = {"If-Match": f'"{exam["version"]}"'}
+    assert daemon.ask(f"/api/v1/exams/{exam['id']}", "PATCH", change, headers=headers).status == 200
+    page.locator("#press-button").click()
+    expect(page.locator("#status-line")).to_contain_text("Somebody changed this exam meanwhile.")
+    expect(page.locator("#exam-where")).to_have_text("Right 10 o'clock, 35 mm")
+    assert daemon.ask("/api/v1/status").json["press"] is None
+    assert wrong_in(page) == []
+    page.locator("#press-button").click()
+    expect(page.locator("#press-button")).to_have_text("Cancel")
+
+
+def test_a_scanner_fills_in_the_patient_and_its_enter_presses_nothing(page: Page, daemon: Daemon):
+    make(daemon)
+    make(daemon, patient_ref="B-22")
+    open_exam(page, daemon, "B-22")
+    page.locator("#press-button").focus()
+    page.keyboard.type("A-17", delay=4)
+    page.keyboard.press("Enter")
+    expect(page.locator("#scanned")).to_have_text("Scanned: A-17")
+    expect(page.locator(".recent")).to_have_count(1)
+    assert daemon.ask("/api/v1/status").json["press"] is None
+    page.locator(".recent").click()
+    expect(page.locator("#exam-who")).to_have_text("A-17")
+
+
+def test_a_press_without_a_patient_is_asked_for_on_purpose_after_every_load(page: Page, daemon: Daemon):
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#press-button").click()
+    expect(page.locator("#chooser")).to_be_visible()
+    assert daemon.ask("/api/v1/status").json["press"] is None
+    page.locator("#free-press").click()
+    expect(page.locator("#free-yes")).to_be_visible()
+    page.locator("#free-yes").click()
+    expect(page.locator("#exam-who")).to_have_text("Free press: no patient")
+    page.reload()
+    expect(page.locator("#exam-who")).to_have_text("Choose patient")
+
+
+@pytest.mark.long
+def test_a_press_begun_elsewhere_is_added_to_the_exam_and_no_result_is_anothers(page: Page, daemon: Daemon):
+    exam = make(daemon)
+    make(daemon, patient_ref="B-22")
+    open_exam(page, daemon, "A-17")
+    job = daemon.press("quick")
+    expect(page.locator("#status-line")).to_contain_text("Not in this exam.")
+    page.locator("#act-file").click()
+    expect(page.locator("#act-file")).to_be_hidden()
+    moved = daemon.ask(f"/api/v1/measurements/{job['measurement_id']}").json
+    assert moved["exam_id"] == exam["id"]
+    page.locator("#exam-button").click()
+    page.locator(".recent").filter(has_text="B-22").click()
+    expect(page.locator("#exam-who")).to_have_text("B-22")
+    expect(page.locator("#result")).to_be_hidden()
+    page.locator("#history-open").click()
+    expect(page.locator("#history-none")).to_be_visible()
+    page.locator("#history-all").click()
+    expect(page.locator(".kept")).to_have_count(1)
+    expect(page.locator(".kept")).to_contain_text("A-17 Left 10 o'clock, 35 mm")
+
+
+def test_enter_twice_starts_and_cancels_and_the_focus_stays(page: Page, daemon: Daemon):
+    make(daemon)
+    open_exam(page, daemon, "A-17")
+    button = page.locator("#press-button")
+    button.focus()
+    page.keyboard.press("Enter")
+    expect(button).to_have_text("Cancel")
+    expect(button).to_be_focused()
+    expect(page.locator("#header")).to_have_js_property("inert", value=True)
+    page.keyboard.press("Enter")
+    expect(page.locator("#instruction")).to_have_text("Cancelled")
+    expect(button).to_be_focused()
+    assert daemon.ask("/api/v1/status").json["press"]["state"] == "cancelled"

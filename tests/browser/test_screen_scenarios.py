@@ -1,0 +1,57 @@
+"""Every scenario of a fault at the real daemon, photographed: what the screen says of it is whole, and said once.
+
+A scenario with which the daemon does not start has another page (test_fallback.py).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from chromium import chromium_page
+from daemon_process import QUICK_HAND, ROOT, Daemon
+from playwright.sync_api import Page, expect
+from screen_layout import wrong_in
+
+pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long]
+SHOTS = ROOT / "build" / "screens" / "scenarios"
+SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
+NO_START = {"bundle_tampered", "calibration_foreign", "calibration_missing"}
+ENDED = "#panel:is([data-view='result'], [data-step='fault'], [data-step='rejected']), .fault, #status-word:not(:empty)"
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    with chromium_page() as page:
+        yield page
+
+
+def scene_of(path: Path) -> str:
+    """Return a scenario whose hand does not take its time, unless the hand is what it is about."""
+    text = path.read_text(encoding="utf-8")
+    return text if "[hand]" in text else text + "\n" + QUICK_HAND
+
+
+@pytest.mark.parametrize("path", [one for one in SCENARIOS if one.stem not in NO_START], ids=lambda path: path.stem)
+def test_the_screen_of_a_scenario_is_whole(page: Page, tmp_path: Path, path: Path) -> None:
+    tomllib.loads(scene_of(path))
+    daemon = Daemon(tmp_path, scene_of(path))
+    try:
+        page.goto(daemon.url)
+        expect(page.locator("#modes, .fault").first).to_be_attached()
+        page.locator("#exam-button").click()
+        page.locator("#free-press").click()
+        page.locator("#free-yes").click()
+        page.locator("#press-button").click()
+        expect(page.locator(ENDED).first).to_be_attached()
+        SHOTS.mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=str(SHOTS / f"{path.stem}.png"))
+        assert wrong_in(page) == []
+        words = page.locator("#panel").inner_text()
+        for remedy in page.locator(".fault-remedy").all_inner_texts():
+            assert words.count(remedy) == 1
+    finally:
+        page.goto("about:blank")
+        daemon.stop()

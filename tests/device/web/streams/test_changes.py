@@ -1,0 +1,122 @@
+"""Changes as events: each once, in order, by numbers with which a client comes back, also after a restart."""
+
+import asyncio
+import json
+
+import pytest
+from kept_measurements import keep
+
+from device.errors import StorageError
+from device.records.exams import ExamContent
+from device.records.store import Store
+from device.web.streams import changes
+from device.web.streams.changes import ChangeFeed
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "var"
+
+
+@pytest.fixture
+def store(folder):
+    opened = Store(folder)
+    yield opened
+    opened.close()
+
+
+def make_exam(store):
+    return store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
+
+
+def told(feed):
+    """Return what the feed tells now: kind and record, and the numbers."""
+
+    async def tell():
+        return [event async for event in feed.new()]
+
+    events = asyncio.run(tell())
+    return [(one.event, json.loads(one.raw_data)) for one in events], [int(one.id) for one in events]
+
+
+def begun(store, after=None):
+    feed = ChangeFeed(store, after)
+    return feed, asyncio.run(feed.begin())
+
+
+def test_what_is_made_and_changed_is_told_once_as_it_is_then(store):
+    keep(store, 1)
+    feed, _ = begun(store)
+    assert told(feed) == ([], [])
+    exam = make_exam(store)
+    kept = keep(store, 2, exam_id=exam["id"])
+    events, numbers = told(feed)
+    assert events == [("exam", exam), ("measurement", kept)]
+    store.exams.void("m-2", version=1, by="Ada", reason="Slipped")
+    changed = store.exams.change(exam["id"], {"note": "x"}, version=1, by="Ada", reason="y")
+    more, later = told(feed)
+    assert more == [("measurement", store.measurement("m-2")), ("exam", changed)]
+    assert numbers + later == sorted({*numbers, *later})
+    assert told(feed) == ([], [])
+
+
+def test_a_press_without_a_measurement_is_no_change(store):
+    feed, _ = begun(store)
+    store.save_press({"id": "p-9", "mode": "quick", "state": "cancelled", "measurement_id": None})
+    assert told(feed) == ([], [])
+
+
+def test_who_comes_back_gets_what_he_has_missed_also_after_a_restart(folder):
+    first = Store(folder)
+    keep(first, 1)
+    feed, number = begun(first)
+    keep(first, 2)
+    [(_, seen)], [number] = told(feed)
+    assert seen["id"] == "m-2"
+    keep(first, 3)
+    first.close()
+    again = Store(folder)
+    feed, begun_at = begun(again, number)
+    keep(again, 4)
+    assert begun_at == number
+    assert [record["id"] for _, record in told(feed)[0]] == ["m-3", "m-4"]
+    again.close()
+
+
+def test_who_was_away_for_long_gets_all_of_it_page_by_page(store, monkeypatch):
+    monkeypatch.setattr(changes, "PAGE", 2)
+    feed, _ = begun(store)
+    for number in range(1, 6):
+        keep(store, number)
+    assert [record["id"] for _, record in told(feed)[0]] == [f"m-{number}" for number in range(1, 6)]
+
+
+def test_a_number_from_another_store_is_taken_for_the_newest(store):
+    keep(store, 1)
+    feed, number = begun(store, 10**17)
+    assert number == begun(store)[1]
+    keep(store, 2)
+    assert [record["id"] for _, record in told(feed)[0]] == ["m-2"]
+
+
+def test_nothing_is_read_while_nothing_is_written(store, monkeypatch):
+    feed, _ = begun(store)
+    told(feed)
+    monkeypatch.setattr(store.listing, "changes", lambda **asked: pytest.fail("the store was read"))
+    assert told(feed) == ([], [])
+
+
+def test_a_store_that_cannot_be_read_is_asked_again_with_the_next_change(store, monkeypatch):
+    feed, _ = begun(store)
+    read = store.listing.changes
+
+    def gone(**asked):
+        raise StorageError("The disk is gone.", "Check it.")
+
+    monkeypatch.setattr(store.listing, "changes", gone)
+    keep(store, 1)
+    with pytest.raises(StorageError):
+        told(feed)
+    monkeypatch.setattr(store.listing, "changes", read)
+    keep(store, 2)
+    assert [record["id"] for _, record in told(feed)[0]] == ["m-1", "m-2"]

@@ -1,0 +1,139 @@
+"""The screen's words: whole in each language, for every fault and every sentence that the daemon can say."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from daemon_process import ROOT
+
+from device.config import PressSection
+from device.fault_table import FAULTS
+from device.instrument.press.capture import CANCELLED
+from device.instrument.press.machine import FrameSeen, PressRules, PressUnderWay
+from device.instrument.press.states import Guidance, PressState, off_centre, too_hard
+from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OUT, SHADE, UNKNOWN_IMAGE
+from device.measurement.mode import MODES
+from device.measurement.ramp_modes.estimate import REASONS
+from device.web.screen_words import LANGUAGES, page, words_of
+
+STATIC = ROOT / "device" / "web" / "static"
+ENGLISH = words_of("en")
+SENTENCES = words_of("sentences")
+ELSEWHERE = {
+    "daemon_stopped",
+    "daemon_restarted",
+    "force_below",
+    "force_other",
+    "not_round",
+    "unlike_image",
+    "no_numbers",
+}
+"""Said where a whole daemon or a recording is needed, or never alone."""
+SAID_BY_FAULTS = {"is", "do"}
+
+
+def placeholders(text: str) -> set[str]:
+    return set(re.findall(r"\{(\w+)\}", text))
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_language_says_everything_with_the_same_figures(language: str) -> None:
+    words = words_of(language)
+    assert list(words) == list(ENGLISH)
+    assert {key for key in words if placeholders(words[key]) != placeholders(ENGLISH[key])} == set()
+    silent = {key for key, text in words.items() if not text}
+    assert all(re.fullmatch(r"reason\.\w+\.do", key) for key in silent)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_fault_is_said_in_words_of_the_operator(language: str) -> None:
+    words = words_of(language)
+    wanted = {f"fault.{fault.code}.{part}" for fault in FAULTS for part in SAID_BY_FAULTS}
+    assert wanted <= words.keys()
+    for key in wanted:
+        assert not re.search(r"/dev|errno|register|I2C|daemon|0x", words[key], re.IGNORECASE), key
+
+
+def test_every_state_that_the_daemon_tells_has_words() -> None:
+    wanted = {f"guidance.{one.code}" for one in Guidance} | {f"mode.{mode}" for mode in MODES}
+    quiet = {PressState.IDLE, PressState.DONE, PressState.REJECTED}
+    wanted |= {f"state.{state.code}" for state in PressState if state not in quiet}
+    assert wanted <= ENGLISH.keys()
+
+
+def scripts() -> list[Path]:
+    return [path for path in STATIC.rglob("*") if path.suffix in (".js", ".html")]
+
+
+@pytest.mark.parametrize("path", scripts(), ids=lambda path: path.name)
+def test_what_the_page_asks_for_is_there(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    asked = set(re.findall(r'say\("([^"]+)"', text)) | set(re.findall(r'data-say(?:-label|-title)?="([^"]+)"', text))
+    assert asked <= ENGLISH.keys()
+
+
+def daemon_sentences() -> list[str]:
+    """Return every reason that a press or an estimate is answered with, made by the code that says it."""
+    press = PressSection()
+    spots = [(3.0, 0.1), (-3.0, 0.2), (2.5, 2.5), (0.1, -3.0)]
+    by_code = [too_hard(1.204, 1.0), CANCELLED, *(off_centre(spot, 2.5) for spot in spots)]
+    started = PressUnderWay().begin("press", 0.0)
+    rules = PressRules.of(press, press.band_n, is_ramp=False)
+    held = replace(started, state=PressState.HOLDING, saturated=99, replaced=99, touched_s=0.0, lifts=99, peak_n=0.4)
+    late_s = 2 * rules.timeout_s
+    for state, force_n, range_n in (
+        (PressState.TOO_LIGHT, 0.3, 0.0),
+        (PressState.TOO_HARD, 0.8, 0.0),
+        (PressState.HOLDING, 0.5, 1.0),
+        (PressState.HOLDING, 0.5, 0.0),
+    ):
+        seen = FrameSeen(late_s, force_n, force_n, range_n, 0.0)
+        by_code.append(replace(held, state=state).see(seen, rules).reason)
+    lifted = FrameSeen(1.0, 0.0, 0.0, 0.0, 0.0)
+    by_code.append(held.see(lifted, rules).reason)
+    by_code.append(started.see(replace(lifted, t_s=late_s), rules).reason)
+    by_code.append(held.check(lifted, press).reason)
+    by_code.append(replace(held, state=PressState.RELEASING).wait(late_s, 1.0, press).reason)
+    by_code.append(held.replace_frame(0.123).reason)
+    by_code.append(held.see(FrameSeen(1.0, 0.5, 0.5, 0.0, 0.0, 0.012), rules).reason)
+    estimates = [NOTHING_STANDS_OUT, *(f"{one} {NO_NUMBERS}" for one in (*REASONS.values(), NOT_ROUND, UNKNOWN_IMAGE))]
+    estimates.append(" ".join([*REASONS.values(), NO_NUMBERS]))
+    estimates.append(f"The image is too bright: 1.2% of its pixels are saturated, above 0.1%. {SHADE}")
+    estimates.append("This press does not determine size and depth and Young's modulus.")
+    return by_code + estimates
+
+
+def pattern_of(sentence: str) -> str:
+    return re.sub(r"\\\{\w+\\\}", ".+?", re.escape(sentence))
+
+
+def is_understood(text: str) -> bool:
+    """Whether sentences after each other make the text, as static/base/words.js reads it."""
+    patterns = [pattern_of(one) for one in SENTENCES.values()]
+    while text:
+        hit = next(filter(None, (re.match(f"{pattern}(?=\\s|$)", text) for pattern in patterns)), None)
+        if not hit:
+            return False
+        text = text[hit.end() :].strip()
+    return True
+
+
+@pytest.mark.parametrize("text", daemon_sentences())
+def test_a_reason_of_the_daemon_is_said_in_the_operators_words(text: str) -> None:
+    assert is_understood(text)
+
+
+def test_every_sentence_of_the_daemon_has_its_words_and_is_said() -> None:
+    wanted = {f"reason.{key}.{part}" for key in SENTENCES for part in ("do", "why")}
+    assert wanted <= ENGLISH.keys()
+    made = daemon_sentences()
+    unheard = {key for key, text in SENTENCES.items() if not any(re.match(pattern_of(text), one) for one in made)}
+    assert unheard <= ELSEWHERE
+
+
+def test_the_page_of_all_sentences_is_the_files() -> None:
+    shown = (ROOT / "docs" / "screen_words.md").read_text(encoding="utf-8")
+    assert shown == page(), "python -m device.web.screen_words > docs/screen_words.md"
