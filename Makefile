@@ -23,7 +23,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # The tests start hundreds of interpreters: without its cache each would compile the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts torture test-arm test-deploy bundle provision deploy check bench verify sweep train evaluate modes tradeoff pages measure lock clean
+.PHONY: help setup run test test-all loop test-camera-virtual test-systemd test-power-cuts torture test-arm test-deploy bundle provision deploy check fuzz bench verify sweep train evaluate modes tradeoff pages measure lock clean
 
 help: ## list the verbs
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -101,6 +101,9 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 	$(PY) tests/dead_links.py
 	$(HOST_TOOLS) pages --check
 	$(PY) -m device openapi --check docs/openapi.json
+
+fuzz: .venv/all.stamp ## send some three thousand requests that schemathesis makes of the API's document to a simulated probe (five minutes): make fuzz [EXAMPLES=40]
+	$(PY) tests/schema_fuzz.py $(or $(EXAMPLES),40)
 
 bench: .venv/all.stamp ## time everything that somebody waits for, in one table that fails where a bound is missed: make bench [ONLY="work darkness"] [JSON=FILE] [COMPARE=FILE]
 	$(PY) tests/bench.py $(ONLY) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE))

@@ -12,7 +12,7 @@ import faulthandler
 import logging
 import os
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -23,9 +23,8 @@ from device.measurement.quantities import InvalidQuantity
 
 if TYPE_CHECKING:
     from device.config import Config
-    from device.instrument.press.phantom_press import PhantomPress
+    from device.instrument.press.phantom_press import PhantomPress, PhantomTruth
     from device.instrument.procedure import Procedure
-    from device.measurement.quantities import Inclusion
     from device.settings.last_good import StartSettings
     from device.simulation.scenario import Scenario
 
@@ -43,10 +42,17 @@ VERBS = {
     "update": "install a signed release, go back",
     "backup": "save measurements, settings, certificates and own models to a file",
     "restore": "bring a backup to a card that holds no measurements yet",
+    "status": "say what the daemon does, and what the last press was",
+    "exams": "list the exams that are kept",
+    "export": "write measurements to a table, arrays or an archive of recordings",
+    "retention": "show which recordings the settings' rule deletes now",
     "support": "write a file for whoever helps, without patients' data",
     "dicom": "ask the hospital's archive and worklist whether they are there",
     "led-off": "darken the LED chip of the real probe",
 }
+OF_EVERY_VERB = {"--simulate": False, "--config": True, "--root": True, "--scene": True, "--port": True}
+"""Options that stand before the verb or behind it, and whether a value follows."""
+LOOKING = ("status", "exams", "export", "retention")
 ONE_THREAD = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS")
 """A frame is small work: more threads of a library would wait for each other. The camera's process inherits this."""
 
@@ -77,16 +83,35 @@ def _parser(named: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
     for verb, told in VERBS.items():
         its = commands.add_parser(verb, help=told, formatter_class=argparse.RawDescriptionHelpFormatter)
         if verb in named:
-            module = import_module(f"device.commands.{verb.replace('-', '_')}")
+            module = import_module(_module_of(verb))
             module.add_options(its)
     return parser
+
+
+def _module_of(verb: str) -> str:
+    return f"device.commands.{'look.' if verb in LOOKING else ''}{verb.replace('-', '_')}"
+
+
+def in_any_order(arguments: Sequence[str]) -> list[str]:
+    """Return a command line with the options of every verb before it, wherever they stood; what is after -- stays."""
+    ahead, rest, words = list[str](), list[str](), iter(arguments)
+    for word in words:
+        name, given, _ = word.partition("=")
+        if word == "--":
+            return [*ahead, *rest, word, *words]
+        takes_value = OF_EVERY_VERB.get(name)
+        where = rest if takes_value is None else ahead
+        where.append(word)
+        if takes_value and not given and (value := next(words, None)) is not None:
+            where.append(value)
+    return [*ahead, *rest]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; return its exit code."""
     for library in ONE_THREAD:
         os.environ.setdefault(library, "1")
-    arguments = sys.argv[1:] if arguments is None else arguments
+    arguments = in_any_order(sys.argv[1:] if arguments is None else arguments)
     parser = _parser([verb for verb in VERBS if verb in arguments])
     options = parser.parse_args(arguments)
     if options.scene and not options.simulate:
@@ -95,7 +120,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("led-off darkens the chip of a real probe: leave out --simulate")
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     try:
-        return _run(options)
+        code = _run(options)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # whoever read along, as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (DeviceError, InvalidQuantity) as error:
         print(error, file=sys.stderr)
     except _refusals() as error:
@@ -169,12 +198,21 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.dicom import run_dicom_command
 
             return run_dicom_command(options, _start_settings(options, _scenario(options)).config)
+        case verb if verb in LOOKING:
+            return _look(verb, options)
         case "led-off":
             from device.commands.led_off import led_off
 
             led_off(_start_settings(options, None).config.light)
             return 0
     return _serve(options)
+
+
+def _look(verb: str, options: argparse.Namespace) -> int:
+    """Run a verb that only reads what is kept, or asks the daemon."""
+    config = _start_settings(options, _scenario(options)).config
+    run: Callable[[argparse.Namespace, Config], int] = import_module(_module_of(verb)).run
+    return run(options, config)
 
 
 def _serve(options: argparse.Namespace) -> int:
@@ -250,7 +288,7 @@ def _self_test(options: argparse.Namespace) -> int:
 
 
 def _record(options: argparse.Namespace) -> int:
-    """Record one press on a phantom: it is what a virtual probe is pressed on, whatever its scene says."""
+    """Record one press on a phantom or a grid: it is what a virtual probe is pressed on, whatever its scene says."""
     from device.assembly.probe import open_phantom_press
     from device.commands.record import run_record_command
 
@@ -259,8 +297,9 @@ def _record(options: argparse.Namespace) -> int:
     if settings.warning:
         print(f"{settings.warning.code} {settings.warning}", file=sys.stderr)
 
-    def opened(inclusion: Inclusion) -> PhantomPress:
-        return open_phantom_press(settings.config, scenario and replace(scenario, inclusion=inclusion))
+    def opened(phantom: PhantomTruth) -> PhantomPress:
+        pressed = scenario and scenario.on(phantom.inclusion, is_grid=phantom.is_grid)
+        return open_phantom_press(settings.config, pressed)
 
     return run_record_command(options, opened)
 

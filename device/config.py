@@ -355,6 +355,21 @@ class StoreSection(Section):
 
 
 @dataclass(frozen=True, config=STRICT)
+class RetentionSection(Section):
+    """Which recordings are deleted by rule, none unless it says so; measurements and the audit stay for ever."""
+
+    keep_days: Annotated[
+        float | None, Bound(1.0, 36500.0, "days"), Doc("Recordings that are older are deleted; none unless given.")
+    ] = None
+    free_mb: Annotated[
+        float | None,
+        Bound(1.0, 1e6, "MB"),
+        Doc("While less is left the oldest recordings are deleted; none unless given."),
+    ] = None
+    saved_first: Annotated[bool, Doc("Only recordings that a backup holds are deleted.")] = True
+
+
+@dataclass(frozen=True, config=STRICT)
 class ClockSection(Section):
     """The wall clock: by how much it may be set before `taken_at` is doubted."""
 
@@ -484,6 +499,7 @@ class Config(Section):
     cell: CellSection = field(default_factory=CellSection)
     press: PressSection = field(default_factory=PressSection)
     store: StoreSection = field(default_factory=StoreSection)
+    retention: RetentionSection = field(default_factory=RetentionSection)
     clock: ClockSection = field(default_factory=ClockSection)
     server: ServerSection = field(default_factory=ServerSection)
     dicom: DicomSection = field(default_factory=DicomSection)
@@ -493,6 +509,9 @@ class Config(Section):
         if self.light.enable_line is not None:
             held = Bound(HELD_HZ, 240.0, "Hz, to hold the enable line from frame to frame")
             yield from conflict("camera.frame_rate_hz", self.camera.frame_rate_hz, held, "light.enable_line")
+        if self.retention.free_mb is not None:
+            above = Bound(self.store.min_free_mb, 1e6, "MB, what a press needs")
+            yield from conflict("retention.free_mb", self.retention.free_mb, above, "store.min_free_mb")
         yield from self.light.exposure_conflicts(self.camera.exposure_us, 1e6 / self.camera.frame_rate_hz)
         chips = {name: part for name, part in vars(self).items() if hasattr(part, "chip_address")}
         for (other, theirs), (name, ours) in combinations(chips.items(), 2):

@@ -31,12 +31,12 @@ def own_address() -> str:
 class NetworkedDaemon:
     """A simulated probe at `0.0.0.0`, and a client of it at this machine's own address, by TLS."""
 
-    def __init__(self, folder: Path, more: str = "") -> None:
+    def __init__(self, folder: Path, more: str = "", *, host: str = "0.0.0.0") -> None:
         self.address, self.folder = own_address(), folder
         (folder / "scene.toml").write_text(QUICK_HAND + PATIENT)
         certificate = ROOT / "models" / "simulated_probe" / "calibration.json"
         settings = f'serial = "SIM-0001"\ndata = "var"\ncalibration = "{certificate}"\n'
-        (folder / "probe.toml").write_text(f'{settings}[server]\nhost = "0.0.0.0"\nport = 0\ntls_port = 0\n{more}')
+        (folder / "probe.toml").write_text(f'{settings}[server]\nhost = "{host}"\nport = 0\ntls_port = 0\n{more}')
         arguments = ("--simulate", "--scene", "scene.toml", "--config", "probe.toml")
         self.daemon = Daemon(folder, arguments=arguments)
         words = self.daemon.greeting.split()

@@ -64,7 +64,7 @@ def add_measurement(store: Store, number: int) -> dict[str, Any]:
 
 def kept_files(root: Path) -> dict[str, bytes]:
     """Return every file that a restored card must have again, by its path below the root, but for the database."""
-    skipped = ("lock", "tsis.sqlite")
+    skipped = ("lock", "tsis.sqlite", "saved.json")
     return {
         path.relative_to(root).as_posix(): path.read_bytes()
         for path in sorted(root.rglob("*"))

@@ -20,9 +20,11 @@ from pathlib import Path
 import httpx
 import pytest
 from daemon_process import ROOT, WAIT_S, wait_for
-from networked_daemon import NetworkedDaemon
+from networked_daemon import NetworkedDaemon, own_address
 
 from device.access.certificate import ServerCertificate, own_certificate
+from device.files.plain_settings import DaemonAddress
+from device.update.gate import ask_parts
 
 pytestmark = pytest.mark.real_time
 LOOPBACK = "0100007F"
@@ -78,8 +80,8 @@ def test_a_browser_is_led_from_the_clear_address_to_pairing(probe):
     clear = httpx.get(f"http://{probe.address}:{probe.port}/")
     assert (clear.status_code, clear.headers["location"]) == (307, f"{probe.url}/")
     encrypted = probe.ask("GET", "/")
-    assert (encrypted.status_code, encrypted.headers["location"]) == (303, "/static/pair.html")
-    assert "Pair with the probe" in probe.ask("GET", "/static/pair.html").text
+    assert (encrypted.status_code, encrypted.headers["location"]) == (303, "/pair")
+    assert "Pair with the probe" in probe.ask("GET", "/pair").text
 
 
 @contextlib.contextmanager
@@ -219,5 +221,18 @@ def test_a_hospitals_certificate_is_shown_and_a_client_without_one_of_its_author
         with httpx.Client(verify=context, timeout=WAIT_S) as known:
             assert known.get(url).status_code == 200
             assert known.get(f"{probe.url}/api/v1/status").status_code == 401
+    finally:
+        probe.daemon.stop()
+
+
+@pytest.mark.long
+def test_a_probe_that_serves_one_address_has_its_own_screen_at_loopback_all_the_same(tmp_path):
+    probe = NetworkedDaemon(tmp_path, host=own_address())
+    try:
+        assert probe.daemon.url.startswith("http://127.0.0.1:")
+        assert probe.daemon.ask("/api/v1/status").status == 200
+        assert probe.ask("GET", "/api/v1/status").status_code == 401
+        health = ask_parts(DaemonAddress(probe.port, probe.address))  # as the updater asks
+        assert health.release
     finally:
         probe.daemon.stop()

@@ -15,8 +15,9 @@ SCOPES: tuple[Scope, ...] = ("read", "measure", "admin")
 
 API = "/api/v1"
 PAIRING, CLAIM, TOKENS = f"{API}/pairing", f"{API}/pairing/claim", f"{API}/tokens"
-OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM)})
-"""Whoever has no token yet may see that it runs, and bring the code from the probe's screen."""
+PAIRING_PAGE = "/pair"
+OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM), ("GET", PAIRING_PAGE)})
+"""Whoever has no token yet may see that it runs, and bring the code from the probe's screen by the page for that."""
 OPEN_FOLDER = "/static/"
 """The screen's own files: they are in every copy of the software."""
 WORKLIST = f"{API}/worklist"

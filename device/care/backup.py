@@ -6,8 +6,11 @@ that moment is in the next backup.
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,19 +18,25 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from device import __version__
-from device.care.archive import ArchiveWriter, written_whole
+from device.care.archive import ArchiveWriter, BackupEntry, written_whole
 from device.care.places import DATABASE, Places, below, data_files, links, settings_files
 from device.care.snapshot import StoreFacts, copy_database
 from device.config import Config
 from device.errors import DiskFullError, StorageError
+from device.files.durable import write_durably
 from device.measurement.quantities import InvalidQuantity
+from device.records.manifest import utc_now
+from device.records.saved import SAVED, SavedUntil
 
 SPARE_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
 class BackupReport:
-    """What a backup holds; `missing` are recordings that rows name and nobody has, `left_out` what was not followed."""
+    """What a backup holds; `missing` are recordings that rows name and nobody has, `left_out` what was not followed.
+
+    `damaged` are recordings that are in it, but are not as they were kept.
+    """
 
     path: str
     serial: str
@@ -35,17 +44,21 @@ class BackupReport:
     size_bytes: int
     measurements: int
     missing: tuple[str, ...]
+    damaged: tuple[str, ...]
     left_out: tuple[str, ...]
 
 
 def write_backup(config: Config, file: Path, root: Path = Path("/")) -> BackupReport:
     """Write a backup of these settings' probe to a new file, whole and verified, or not at all.
 
+    In a folder its name is the probe's with the time. Retention may delete then what it holds, if it has such a rule.
+
     Raises `InvalidQuantity` for a file that is there already or lies in what is saved, `StorageError` when something
     cannot be read or written.
     """
     places = Places.of(config)
     data = below(root, places.data)
+    file = _named(file, config.serial)
     _require_new(file, data)
     if not (data / DATABASE).is_file():
         remedy = "Correct the setting `data`, or state the card with --root."
@@ -70,9 +83,35 @@ def _written(config: Config, places: Places, root: Path, file: Path, copy: Path)
         for name, path in files.items():
             writer.add(name, path)
         writer.close(_described(config, places, facts, missing))
+    damaged = tuple(_damaged(writer.entries, facts))
+    _note_saved(data, facts, (*missing, *damaged))
+    left_out = tuple(links(data))
     return BackupReport(
-        str(file), config.serial, len(files), size_bytes, facts.measurements, missing, tuple(links(data))
+        str(file), config.serial, len(files), size_bytes, facts.measurements, missing, damaged, left_out
     )
+
+
+def _named(file: Path, serial: str) -> Path:
+    """Return the file itself, or a new one in a folder that is named."""
+    if not file.is_dir():
+        return file
+    return file / f"{serial}-{datetime.now(UTC).strftime('%Y%m%dT%H%M%SZ')}.backup"
+
+
+def _damaged(entries: list[BackupEntry], facts: StoreFacts) -> Iterator[str]:
+    """Yield the recordings that were written to the backup and are not as they were kept."""
+    for entry in entries:
+        name = entry.name.removeprefix("data/recordings/").removesuffix(".zip")
+        if entry.name.endswith(".zip") and name in facts.hashes and entry.sha256 != facts.hashes[name]:
+            yield name
+
+
+def _note_saved(data: Path, facts: StoreFacts, left_out: tuple[str, ...]) -> None:
+    """Note in the data folder what a backup holds; a card that can only be read needs no retention."""
+    if facts.newest and os.access(data, os.W_OK):
+        saved = SavedUntil(utc_now(), *facts.newest, left_out)
+        with suppress(OSError):
+            write_durably(data / SAVED, json.dumps(saved.as_record()).encode())
 
 
 def _is_in(files: Collection[str], recording: str) -> bool:

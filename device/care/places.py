@@ -12,11 +12,12 @@ from pathlib import Path
 from device.config import Config
 from device.files.plain_settings import DROP_INS, LOCAL
 from device.files.shipped import MODELS
+from device.records.saved import SAVED
 
 DATABASE = "tsis.sqlite"
 RELEASES = Path("/opt/tsis")
 MODEL_SETTINGS = ("paper_model", "quick_model", "standard_model")
-PASSING = {"lock", "restart.json", "answer_times.json"}
+PASSING = {"lock", "restart.json", "answer_times.json", SAVED}
 """Files of the data folder that belong to the daemon that runs."""
 KEYS = "tls"
 """The folder of the server's own certificate: a key is no part of a backup, and a new card gets a new one."""

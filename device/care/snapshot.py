@@ -9,14 +9,16 @@ import json
 import os
 import shutil
 import sqlite3
+from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from device.care.places import DATABASE
 from device.errors import StorageError
-from device.records.schema import UNNUMBERED
+from device.records.manifest import manifest_of
+from device.records.schema import MANIFEST_SINCE, UNNUMBERED
 
 BUSY_S = 10.0
 DAMAGED = "Copy the folder of recordings away by hand, and send the support file: python -m device support FILE."
@@ -24,12 +26,17 @@ DAMAGED = "Copy the folder of recordings away by hand, and send the support file
 
 @dataclass(frozen=True)
 class StoreFacts:
-    """What a database holds: schema, number of measurements and presses, and the recordings that it names."""
+    """What a database holds: schema, number of measurements and presses, and the recordings that it names and keeps.
+
+    `newest`: number and id of the last measurement; `hashes`: sha256 of each recording, where it was kept.
+    """
 
     schema: int
     measurements: int
     presses: int
     recordings: tuple[str, ...]
+    newest: tuple[int, str] | None = None
+    hashes: Mapping[str, str] = field(default_factory=dict)
 
 
 def copy_database(folder: Path, target: Path) -> StoreFacts:
@@ -61,11 +68,15 @@ def facts_of(database: Path) -> StoreFacts:
                 raise StorageError(f"The database {database} is damaged: {verdict}.", DAMAGED)
             [schema] = db.execute("PRAGMA user_version").fetchone()
             rows = [json.loads(row) for (row,) in db.execute("SELECT record FROM measurement")]
+            newest = db.execute("SELECT seq, id FROM measurement ORDER BY seq DESC LIMIT 1").fetchone()
+            manifest = manifest_of(db) if schema >= MANIFEST_SINCE else {}
             [presses] = db.execute("SELECT count(*) FROM press").fetchone()
     except (sqlite3.Error, ValueError) as error:
         raise StorageError(f"The database {database} cannot be read: {error}.", DAMAGED) from error
-    named = dict.fromkeys(str(row["recording_id"]) for row in rows if "recording_id" in row)
-    return StoreFacts(schema or UNNUMBERED, len(rows), presses, tuple(named))
+    deleted = {name for name, entry in manifest.items() if entry.removed}
+    named = dict.fromkeys(str(row["recording_id"]) for row in rows if row.get("recording_id", "") not in {"", *deleted})
+    hashes = {name: entry.fingerprint.sha256 for name, entry in manifest.items() if name not in deleted}
+    return StoreFacts(schema or UNNUMBERED, len(rows), presses, tuple(named), newest, hashes)
 
 
 def _copy(source: Path, target: Path) -> None:

@@ -3,5 +3,6 @@
 Modules in reading order: `serve`, `analyse`, `record`, `calibration`, `self_test`, `config`, `faults`, `audit`,
 `pair`, `tokens`, `openapi`, `update`, `backup`, `restore`, `support`, `dicom`, `led_off`.
 
-What a verb does stands in the room that does it; here are its options and what it prints. `led_off` imports no NumPy.
+Those that only look are in `look`. What a verb does stands in the room that does it; here are its options and what it
+prints. `led_off` imports no NumPy.
 """

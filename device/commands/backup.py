@@ -14,7 +14,8 @@ from device.care.backup import write_backup
 from device.config import Config
 
 EXAMPLES = """examples:
-  python -m device backup /media/stick/TSIS-0007.backup         while the daemon runs or not
+  python -m device backup /media/stick                          a new file there, while the daemon runs or not
+  python -m device backup /media/stick/TSIS-0007.backup         the same by a name of your own
   python -m device --root /mnt/card backup TSIS-0007.backup     of the card of a probe that is dead
 Patients' measurements are inside: keep it as you keep them. It is not encrypted.
 """
@@ -23,7 +24,7 @@ Patients' measurements are inside: keep it as you keep them. It is not encrypted
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what the verb takes to its own parser."""
     parser.epilog = EXAMPLES
-    parser.add_argument("file", type=Path, metavar="FILE", help="the backup, a new file")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the backup, a new file, or the folder of one")
     parser.add_argument("--json", action="store_true", help="as one JSON object")
 
 
@@ -39,6 +40,8 @@ def run_backup_command(options: argparse.Namespace, config: Config) -> int:
     )
     for one in report.missing:
         print(f"not in it: recording {one}, which is not on the disk any more")
+    for one in report.damaged:
+        print(f"damaged in it: recording {one}, which is not as it was kept")
     for one in report.left_out:
         print(f"not in it: {one}, a link")
     print("Every file was read back. Patients' measurements are inside: keep it as you keep them.")

@@ -1,5 +1,7 @@
 """`python -m device record`: lead the operator through one press on a phantom and write its recording, with truth.
 
+Or on a bare block of tissue, or on the two plates of a grid target: the blank one in place of the press beside.
+
 No certificate is needed: `host_tools calibrate` makes the first one of such recordings. Nothing is estimated.
 Exit codes: 0 ok, 1 the press failed or was cancelled.
 """
@@ -26,6 +28,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 EXAMPLES = """examples:
   python -m device record --size-mm 10 --depth-mm 6 --modulus-kpa 80 --out phantoms/1
   python -m device record --simulate --size-mm 8 --depth-mm 5 --modulus-kpa 60 --out phantoms/2
+  python -m device record --grid --out grid/1      the blank plate "beside the lesion", the printed one "on it"
 A daemon that runs holds the hardware: stop it first. Ctrl-C cancels the press.
 """
 
@@ -33,9 +36,15 @@ A daemon that runs holds the hardware: stop it first. Ctrl-C cancels the press.
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what the verb takes to its own parser."""
     parser.epilog = EXAMPLES
-    parser.add_argument("--size-mm", type=float, required=True, metavar="D", help="diameter of its inclusion")
-    parser.add_argument("--depth-mm", type=float, required=True, metavar="H", help="surface to the inclusion's top")
-    parser.add_argument("--modulus-kpa", type=float, required=True, metavar="E", help="the inclusion's Young's modulus")
+    parser.set_defaults(refuse=parser.error)
+    parser.add_argument("--size-mm", type=float, metavar="D", help="diameter of its inclusion")
+    parser.add_argument("--depth-mm", type=float, metavar="H", help="surface to the inclusion's top")
+    parser.add_argument("--modulus-kpa", type=float, metavar="E", help="the inclusion's Young's modulus")
+    without = parser.add_mutually_exclusive_group()
+    without.add_argument(
+        "--bare", dest="inclusion_free", action="store_true", help="a block of tissue without an inclusion"
+    )
+    without.add_argument("--grid", action="store_true", help="a grid target in oil, for `host_tools probe camera`")
     parser.add_argument("--mode", choices=MODES, default="paper", help="what is taken; paper, as calibrating needs")
     parser.add_argument("--phantom-serial", default="", metavar="S", help="serial number of the set of phantoms")
     parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="the recording, a new folder")
@@ -46,19 +55,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_record_command(options: argparse.Namespace, opener: Callable[[Inclusion], PhantomPress]) -> int:
-    """Record one press of the probe that `opener` opens, a virtual one on that inclusion; return the exit code.
+def run_record_command(options: argparse.Namespace, opener: Callable[[PhantomTruth], PhantomPress]) -> int:
+    """Record one press of the probe that `opener` opens, a virtual one on that phantom; return the exit code.
 
     Raises `InvalidQuantity` for an inclusion that cannot be, and for a folder that is there already.
     """
-    inclusion = Inclusion(options.size_mm, options.depth_mm, options.modulus_kpa)
+    phantom = _phantom(options)
     try:
         _require_new(options.out)
         with _ctrl_c() as cancelled:
             _tell(Guidance.KEEP_FREE)
-            with closing(opener(inclusion)) as press:
+            with closing(opener(phantom)) as press:
                 press.board.on_guidance(_tell)
-                press.record(PhantomTruth(inclusion, options.phantom_serial), options.mode, options.out, cancelled)
+                press.record(phantom, options.mode, options.out, cancelled)
     except DeviceError as error:
         print(f"{error.code} {error}", file=sys.stderr)
         return 1
@@ -67,6 +76,19 @@ def run_record_command(options: argparse.Namespace, opener: Callable[[Inclusion]
         return 1
     print(options.out)
     return 0
+
+
+def _phantom(options: argparse.Namespace) -> PhantomTruth:
+    """Return what is pressed: all three unknowns of an inclusion, or none of them; anything else is wrong usage."""
+    unknowns = options.size_mm, options.depth_mm, options.modulus_kpa
+    is_whole, is_without = None not in unknowns, set(unknowns) == {None}
+    if options.inclusion_free or options.grid:
+        if not is_without:
+            options.refuse("with --bare or --grid there is no --size-mm, --depth-mm or --modulus-kpa")
+        return PhantomTruth(None, options.phantom_serial, is_grid=options.grid)
+    if not is_whole:
+        options.refuse("give --size-mm, --depth-mm and --modulus-kpa, or --bare, or --grid")
+    return PhantomTruth(Inclusion(*unknowns), options.phantom_serial)
 
 
 def _require_new(folder: Path) -> None:

@@ -221,7 +221,7 @@ def _run_server(
 ) -> None:
     from device.web.server import run_server
 
-    port = listening[0].getsockname()[1]
+    port = listening[-1].getsockname()[1]  # of loopback, where there are two
     kind = "simulated probe" if procedure.is_simulated else "probe"
     others = ""
     if network:

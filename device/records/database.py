@@ -30,6 +30,7 @@ SALVAGED = (
     "measurement", "press", "counter", "exam", "filing", "audit", "asked_once", "token", "kept_recording", "outbox",
     "ordered_study",
 )  # fmt: skip
+BUSY_S = 10.0
 MOST_MISSED = 10_000
 """So many numbers of rows in a row may be unreadable before the rest of a table is given up."""
 MENDING = (
@@ -61,6 +62,24 @@ def open_database(folder: Path) -> OpenedDatabase:
         _make_durable(db, folder)
         bring_forward(db)
         _number_in_file(db, folder)
+        opened.pop_all()
+    return OpenedDatabase(db)
+
+
+def open_to_read(folder: Path) -> OpenedDatabase:
+    """Open the database of a data folder without changing anything, also beside a daemon.
+
+    Raises as `open_database`, and `StorageError` for one of an older form, which a start brings forward.
+    """
+    with ExitStack() as opened:
+        address = f"{(folder / DATABASE).resolve().as_uri()}?mode=ro"
+        db = sqlite3.connect(address, uri=True, timeout=BUSY_S, check_same_thread=False)
+        opened.enter_context(closing(db))
+        _require_readable(db, folder)
+        if damage := _damage(db, folder):
+            return OpenedDatabase(_salvaged(db), damage)
+        if form_of(db) != STORE_WRITES:
+            raise StorageError(f"The database in {folder} is of an older release.", "Start the daemon once.")
         opened.pop_all()
     return OpenedDatabase(db)
 

@@ -100,6 +100,12 @@ class KeptRecordings:
             note_kept(db, recording_id, found)
         return True
 
+    def remove(self, recording_id: str) -> None:
+        """Remove the file of a recording that the manifest says is deleted; a start does what a kill leaves of that."""
+        if path := self._found(recording_id):
+            remove_recording(path)
+            sync_directory(self.folder)
+
     def newest(self) -> list[str]:
         """Return the recordings that measurements name, newest first."""
         query = "SELECT json_extract(record, '$.recording_id') FROM measurement ORDER BY seq DESC"

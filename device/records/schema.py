@@ -19,6 +19,7 @@ STORE_WRITES = 7
 """The form that this code leaves behind. Whoever changes tables or recordings raises it, and adds to `migrations`."""
 STORE_READS = (1, 2, 3, 4, 5, 6, 7)
 """The forms that this code can open; one release long it reads and leaves the older one."""
+MANIFEST_SINCE = 6
 UNNUMBERED = 1
 """What a database without a number is: the form before it had one."""
 MAGIC, VERSION_AT = b"SQLite format 3\0", 60

@@ -23,13 +23,14 @@ from device.files.recording_file import FrameEncoder, png_of, remove_recording, 
 from device.measurement.recording.recording import Recording
 from device.records.asked_once import AskedOnce, first_answer, keep_answer
 from device.records.audit import Audit, append
-from device.records.database import open_database
+from device.records.database import open_database, open_to_read
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.listing import Listing
 from device.records.manifest import fingerprint_of, note_kept
 from device.records.outbox import Outbox
 from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
+from device.records.retention import Retention
 from device.records.tokens import Tokens
 
 log = logging.getLogger(__name__)
@@ -42,25 +43,28 @@ BROKEN_OFF, PRESS_AGAIN = "The daemon was restarted during the press:", "press a
 class Store:
     """The device's memory. All methods may be called from any thread."""
 
-    def __init__(self, folder: Path, disk: Disk | None = None) -> None:
-        """Open or create; raise `StorageError` when the folder cannot be written or holds no database.
+    def __init__(self, folder: Path, disk: Disk | None = None, *, to_read: bool = False) -> None:
+        """Open or create; with `to_read` only read what is there, also beside a daemon.
 
-        Raises `NewerDataError` when a newer release wrote it, before anything in it is changed. Of a damaged database
-        what can be read is shown: see `require_whole`.
+        Raises `StorageError` when the folder cannot be written or holds no database, and `NewerDataError` when a newer
+        release wrote it, before anything in it is changed. Of a damaged database what can be read is shown: see
+        `require_whole`.
         """
         self.folder, self._disk, self._lock = folder, disk or LocalDisk(), threading.Lock()
         self.findings, self._ended_late = StartFindings(), dict[str, StoredRecord]()
         self.revision = 0
         """Is another one whenever something was kept since; to be looked at from any thread, for nothing."""
         with ExitStack() as opened:
-            self._db, self._damage = self._open(opened)
+            self._db, self._damage = self._opened_to_read(opened) if to_read else self._open(opened)
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
             self.tokens = Tokens(self._transaction)
             self.listing = Listing(self._transaction)
             self.outbox = Outbox(self._transaction)
             self.recordings = KeptRecordings(folder, self._transaction)
-            self.interrupted = tuple(map(_broken_off, self._records("SELECT record FROM press WHERE ended = 0")))
-            if not self._damage:
+            self.retention = Retention(folder, self._transaction, self.recordings, lambda: self.free_mb)
+            broken_off = [] if to_read else self._records("SELECT record FROM press WHERE ended = 0")
+            self.interrupted = tuple(map(_broken_off, broken_off))
+            if not (self._damage or to_read):
                 self._put_in_order()
             self._opened = opened.pop_all()
 
@@ -73,6 +77,15 @@ class Store:
         except (OSError, sqlite3.Error) as error:
             remedy = "Free the disk or correct the setting `data`, then start the daemon again."
             raise StorageError(f"The store {self.folder} cannot be opened: {error}.", remedy) from error
+        return database.connection, database.damage
+
+    def _opened_to_read(self, opened: ExitStack) -> tuple[sqlite3.Connection, DamagedStoreError | None]:
+        try:
+            database = open_to_read(self.folder)
+        except sqlite3.Error as error:
+            cause = f"The store {self.folder} cannot be read: {error}."
+            raise StorageError(cause, "Correct the setting `data`, or run this as the daemon's user.") from error
+        opened.enter_context(closing(database.connection))
         return database.connection, database.damage
 
     def _take(self, opened: ExitStack) -> None:

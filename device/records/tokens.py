@@ -50,6 +50,11 @@ class TokenRecord:
         """Return whether it may still be used."""
         return self.revoked_at is None and now < self.expires_at
 
+    @property
+    def left_s(self) -> float:
+        """How long it still holds (s), unless it is revoked before; 0 when it holds no more."""
+        return max(0.0, (datetime.fromisoformat(self.expires_at) - datetime.now(UTC)).total_seconds())
+
     def as_record(self) -> dict[str, Any]:
         """Return it as JSON object, without its hash."""
         return {name: value for name, value in asdict(self).items() if name != "hash"}

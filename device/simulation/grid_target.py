@@ -1,7 +1,8 @@
 """A plate printed with a grid of dots, in a cap round the face: what a camera's pixels are measured by.
 
 It lies flat in a film of oil, so that light passes everywhere alike and the face is not deformed. The dots stand on a
-square grid about the cap's middle; the one in the middle is larger. Print and paper blur their edges.
+square grid about the cap's middle; the one in the middle is larger. Print and film blur their edges. Pressed beside the
+lesion's place the plate is blank: the flat field.
 """
 
 from __future__ import annotations

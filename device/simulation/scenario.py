@@ -5,7 +5,7 @@ Every number has its unit in its name; a key that is not known is refused, never
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,9 @@ from device.simulation.physics.world import AS_BELIEVED, World
 
 SERIALS = {"physical": "SIM-0001", "linear": "SIM-LINEAR"}
 DEFAULT_INCLUSION = Inclusion(size_mm=12.0, depth_mm=6.0, youngs_modulus_kpa=60.0)
+
+NO_INCLUSION = Inclusion(size_mm=0.0, depth_mm=5.0, youngs_modulus_kpa=80.0)
+"""What stands for the inclusion of a bare block, wherever one must be named."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,11 @@ class Scenario:
         _ = self.slab  # refuses tissue that the tables do not hold
         _ = self.world.lesion.skin(self.skin, 1.0)  # refuses an albedo above 1
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
+
+    def on(self, inclusion: Inclusion | None, *, is_grid: bool = False) -> Scenario:
+        """Return the scene pressed on an inclusion, on a block without one, or on its grid target."""
+        grid = (self.grid or GridTarget()) if is_grid else None
+        return replace(self, inclusion=inclusion or NO_INCLUSION, grid=grid)
 
     @property
     def slab(self) -> Slab:

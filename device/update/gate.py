@@ -6,10 +6,13 @@ cable, and have to be ready always.
 
 from __future__ import annotations
 
+import errno
 import http.client
 import json
+import os
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -23,6 +26,7 @@ UNDER_WAY = ("waiting", "capturing", "computing", "running")
 LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
 ALWAYS = ("answers", "store")
+LOOPBACK_ADDRESS = "127.0.0.1"
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
 """The parts that were not ready before the switch, each with its fault's code."""
@@ -79,9 +83,9 @@ def _is_pressed(address: DaemonAddress) -> bool:
 
 def _asked(address: DaemonAddress, path: str, read: Callable[[Any], Answer]) -> Answer:
     """Return what `read` makes of the daemon's answer; raise `NotHealthy` when there is none, or none of a daemon."""
-    port = address.port
-    line = http.client.HTTPConnection(asked_at(address.host), port, timeout=ANSWER_WITHIN_S)
+    port, line = address.port, None
     try:
+        line = _line(address)
         line.request("GET", path)
         answer = line.getresponse()
         record = json.loads(answer.read(MOST_BYTES))
@@ -94,7 +98,18 @@ def _asked(address: DaemonAddress, path: str, read: Callable[[Any], Answer]) -> 
     except (ValueError, KeyError, TypeError, AttributeError):
         raise DaemonGone(f"what answers on port {port} is no daemon of a probe") from None
     finally:
-        line.close()
+        if line:
+            line.close()
+
+
+def _line(address: DaemonAddress) -> http.client.HTTPConnection:
+    """Connect to the daemon: by loopback, or where one of an earlier release, or the fallback, has no other port."""
+    for place in (LOOPBACK_ADDRESS, asked_at(address.host)):
+        line = http.client.HTTPConnection(place, address.port, timeout=ANSWER_WITHIN_S)
+        with suppress(ConnectionRefusedError):
+            line.connect()
+            return line
+    raise ConnectionRefusedError(errno.ECONNREFUSED, os.strerror(errno.ECONNREFUSED))
 
 
 def take_baseline(address: DaemonAddress, patience: Patience) -> Baseline | None:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from device import __version__
 from device.access.known_hosts import KnownHosts
+from device.access.scopes import PAIRING_PAGE
 from device.config import DicomSection, PressSection
 from device.dicom.hospital import Hospital
 from device.instrument.press.cost import ModeOffer
@@ -33,6 +34,7 @@ from device.web.events import StatusFeed, snapshot, status_events
 from device.web.exams import add_exams
 from device.web.exports import add_exports
 from device.web.guard import RequestGuard
+from device.web.kept_files import add_retention
 from device.web.measurements import add_measurements
 from device.web.pairing import add_pairing
 from device.web.presses import add_presses
@@ -46,6 +48,8 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.service.manual import add_manual
+from device.web.service.metrics import add_metrics
 from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
@@ -101,13 +105,20 @@ def create_app(
     add_measurements(app, API, store)
     _add_self_test(app, procedure)
     _add_tare(app, procedure)
+    add_metrics(app, procedure, store)
+    add_manual(app)
     add_live_view(app, API, procedure)
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
+    add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
+
+    @app.get(PAIRING_PAGE, include_in_schema=False)
+    def pairing_page() -> FileResponse:
+        return FileResponse(STATIC / "pair.html")
 
     @app.get("/", include_in_schema=False)
     def screen() -> FileResponse:

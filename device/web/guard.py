@@ -20,7 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from device.access.known_hosts import KnownHosts, split_authority
 from device.access.request_rules import AskedRequest, BodyRule, joined, require_allowed, too_large
 from device.access.safe_headers import SAFE_HEADERS
-from device.access.scopes import OPEN_FOLDER
+from device.access.scopes import OPEN_FOLDER, PAIRING_PAGE
 from device.errors import DeviceError, TokenNeeded, UnencryptedRequest
 from device.records.audit import done_for
 from device.web.entrance.door import Door
@@ -31,7 +31,6 @@ from device.web.problems import problem
 
 log = logging.getLogger(__name__)
 NO_STORE = (b"cache-control", b"no-store")
-PAIRING_PAGE = f"{OPEN_FOLDER}pair.html"
 HEADERS = [(name.encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
 
 
@@ -67,7 +66,9 @@ class RequestGuard:
             await self._refusal(request, error)(scope, receive, noting)
         else:
             with done_for(client.name):
-                await self._answers.answer(client.token_id, noting, lambda to: self._app(scope, bounded, to))
+                await self._answers.answer(
+                    client.token_id, noting, lambda to: self._app(scope, bounded, to), valid_s=client.valid_s
+                )
         finally:
             line.write(request.method, scope)
 
@@ -100,7 +101,9 @@ class _StrictRequest(Request):
         body = await self.body()
         try:
             return json.loads(body, object_pairs_hook=_each_key_once)
-        except (UnicodeDecodeError, RecursionError) as error:
+        except json.JSONDecodeError:
+            raise
+        except (ValueError, RecursionError) as error:  # no text, a number of thousands of digits, or nested too deep
             raise json.JSONDecodeError(f"it is no JSON that can be read ({type(error).__name__})", "", 0) from None
 
 

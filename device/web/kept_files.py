@@ -1,4 +1,4 @@
-"""What was kept of a press as files for a client: its picture, and its recording as a .zip.
+"""What was kept of a press as files for a client: its picture, its recording as a .zip; and which a rule deletes now.
 
 Both are on the disk as they are sent, so that clients cost no memory. A recording of an earlier release is a folder
 without a picture: it is packed while it is sent, and one picture at a time is made of it, whoever else waits.
@@ -9,17 +9,22 @@ from __future__ import annotations
 import asyncio
 import io
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
-from fastapi import Response
+from fastapi import FastAPI, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
+from device.config import Config
 from device.files.recording_file import read_picture, read_recording
 from device.instrument.press.picture import tactile_png
+from device.instrument.watch.recordings_watch import retention_rule
 from device.measurement.quantities import InvalidQuantity
 from device.records.recordings import damaged_recording
 from device.records.store import Store
+from device.web.contract import answers
+from device.web.schema import DueRecordings
 
 
 class KeptFiles:
@@ -86,3 +91,12 @@ class _Window(io.BytesIO):
         super().seek(0)
         self.truncate(0)
         return content
+
+
+def add_retention(app: FastAPI, api: str, config: Callable[[], Config], store: Store) -> None:
+    """Add the route below `api` that shows what the rule of the settings deletes."""
+
+    @app.get(f"{api}/retention", responses=answers(200, DueRecordings), tags=["device"])
+    def get_retention() -> dict[str, Any]:
+        """Return which recordings the settings' rule deletes now; it changes nothing."""
+        return store.retention.plan(retention_rule(config())).as_record()

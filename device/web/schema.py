@@ -424,6 +424,34 @@ class ScanStatus(_Body):
     failed: str
 
 
+class RetentionSettings(_Body):
+    """The rule: None of both is never."""
+
+    keep_days: float | None
+    free_mb: float | None
+    saved_first: bool
+
+
+class DueRecording(_Body):
+    """A recording that the rule deletes, and why."""
+
+    recording_id: str
+    measurement_id: str
+    taken_at: str
+    size_bytes: int
+    why: str
+
+
+class DueRecordings(_Body):
+    """What the rule deletes now, oldest first; `held_back` recordings wait for a backup, the last is of `saved_at`."""
+
+    rule: RetentionSettings
+    saved_at: str | None
+    removals: list[DueRecording]
+    held_back: int
+    size_bytes: int
+
+
 class Status(_Body):
     """One moment of the probe. Forces in N, the band and what is still wanted included.
 

@@ -169,11 +169,12 @@ def grid_recordings(
         put_on = replace(target, x_mm=float(x_mm), y_mm=float(y_mm), turn_deg=turn_deg)
         made_of = _made_of(replace(scenario or Scenario(), grid=put_on, seed=seed + number), probe)
         recorder = _recorder(made_of, tables, probe)
-        blank = _recorder(replace(made_of, grid=replace(put_on, ink_ratio=1.0)), tables, probe)
         held = PhantomProtocol(forces_n=(TARGET_N,))
-        frames = [*blank.unloaded("dark"), *blank.pressed("reference", held, ProbePlacement())]
-        recorder.number = blank.number
-        frames += recorder.pressed("press", held, ProbePlacement())
+        frames = [
+            *recorder.unloaded("dark"),
+            *recorder.pressed("reference", held, ProbePlacement(*BESIDE_MM)),
+            *recorder.pressed("press", held, ProbePlacement()),
+        ]
         yield _recording(recorder, frames, f"grid {made_of} {probe or ''}", probe)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.surface_table import PressRamps
-from device.simulation.scenario import Scenario
+from device.simulation.scenario import NO_INCLUSION, Scenario
 from host_tools.probe_tables.surface_table import press_ramps
 from host_tools.scenes.phantom_set import PhantomSet
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Scene, Tissue
@@ -21,8 +21,6 @@ from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Scene, Tissue
 BREAST_IMAGER_SIZE_KPA = ((5, 20), (5, 80), (10, 10), (10, 40), (14, 40), (14, 156), (18, 20), (18, 80))
 BREAST_IMAGER_DEPTH_MM, BREAST_IMAGER_SLAB_MM = 10.0, 35.0
 SMALLEST_RANDOM_MM = 2.0
-NO_INCLUSION = Inclusion(0.0, 5.0, 80.0)
-"""What stands for the inclusion of a bare block, wherever one must be named."""
 
 
 @dataclass(frozen=True)

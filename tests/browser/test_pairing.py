@@ -30,7 +30,7 @@ def page() -> Iterator[Page]:
 
 
 def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_away_by_it(probe, page):
-    page.goto(f"{probe.daemon.url}/static/pair.html")
+    page.goto(f"{probe.daemon.url}/pair")
     page.get_by_label("Name of the other machine").fill("Ward PC")
     page.get_by_label("What it may").select_option("measure")
     page.get_by_role("button", name="Show a code").click()
@@ -41,7 +41,7 @@ def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_
 
     elsewhere = page.context.browser.new_context(ignore_https_errors=True).new_page()
     elsewhere.goto(f"http://{probe.address}:{probe.port}/")
-    assert elsewhere.url == f"{probe.url}/static/pair.html"
+    assert elsewhere.url == f"{probe.url}/pair"
     elsewhere.get_by_label("Code on the probe's screen").fill("AAAA-AAAA")
     elsewhere.get_by_role("button", name="Pair").click()
     expect(elsewhere.locator("#line")).to_contain_text("not the code")
@@ -57,4 +57,4 @@ def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_
     expect(page.locator("#line")).to_contain_text("Ward PC is not let in any more")
     assert elsewhere.evaluate("fetch('/api/v1/status').then((answer) => answer.status)") == 401
     elsewhere.goto(f"{probe.url}/")
-    assert elsewhere.url == f"{probe.url}/static/pair.html"
+    assert elsewhere.url == f"{probe.url}/pair"

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import threading
 import time
+from http.client import HTTPException
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from daemon_process import QUICK_HAND, Answer, Daemon  # noqa: E402
 
 API = "/api/v1"
 ENDED = ("done", "rejected", "cancelled", "failed")
-GONE = (ConnectionError, OSError, ValueError)
+GONE = (OSError, HTTPException, ValueError)
 """What a client meets whose daemon is killed while it answers; half an answer is none."""
 LATELY = 10
 """So many of the newest measurements are compared after each kill, and all of them at the end."""

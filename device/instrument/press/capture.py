@@ -91,6 +91,7 @@ class Capture:
         self.cancelled, self.stopping, self.called_away = threading.Event(), threading.Event(), threading.Event()
         self.finished = threading.Event()
         self.machine = PressUnderWay()
+        self.is_in_oil = False  # a plate in oil is pressed: all of its light is there at the first touch
         self._tears = TearWatch(config.camera.tear_counts)
         self._dark: list[Frame] = []
         self._untouched: list[Frame] = []
@@ -184,7 +185,7 @@ class Capture:
                 wanted.begin_again()
             self.board.update(guidance=guidance, frames_taken=len(wanted.frames), wanted_n=wanted.wanted_n)
         require_lit(wanted.frames, self._dark_counts)
-        if seen := wanted.light_and_hard():
+        if not self.is_in_oil and (seen := wanted.light_and_hard()):
             require_contrast(*seen, self._dark_counts, self.light.min_contrast_ratio)
         spot_mm = None if ramp else self._spot_mm(role, wanted.frames)
         self._become(self.machine.hold(spot_mm, rules))

@@ -33,10 +33,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PhantomTruth:
-    """What is pressed: its inclusion, and the serial number of the set that it is of, empty if it has none."""
+    """What is pressed: its inclusion, None in a bare block, and the serial number of its set, empty if it has none.
 
-    inclusion: Inclusion
+    A grid target has none either; `is_grid` says that its plates lie in oil.
+    """
+
+    inclusion: Inclusion | None
     serial: str = ""
+    is_grid: bool = False
 
 
 class PhantomPress:
@@ -94,6 +98,7 @@ class PhantomPress:
     def _recording(self, phantom: PhantomTruth, mode: Mode, cancelled: threading.Event) -> Recording:
         capture = Capture(self._bench, self._config, self.board, self._bench.progress)
         capture.cancelled = capture.called_away = cancelled
+        capture.is_in_oil = phantom.is_grid
         try:
             unloaded = self._unloaded(capture)
             started_at = self._clock.now()

@@ -127,7 +127,8 @@ class ScatteredImage:
     ) -> None:
         """Skin, lens and scale are as believed; `world` says how far off that is.
 
-        Of a printed plate in place of skin, `print_on` gives the light [ny, nx] over that of a blank one, at x, y.
+        Of a printed plate in place of skin, `print_on` gives the light [ny, nx] over that of a blank one, at x, y;
+        beside the lesion's place it is blank.
         """
         self.x_mm, self.y_mm = lookup.x_mm[None, :], lookup.y_mm[:, None]
         self._lookup, self._world = lookup, world
@@ -152,7 +153,7 @@ class ScatteredImage:
             skin = replace(skin, wet_ratio=max(skin.wet_ratio, wet_ratio))
         lit = world.light.lit(led_ratio, share)
         radiance = self._lookup.radiance(w_mm, p_kpa, lit, skin, touching, world.contact)
-        if touching and self._print is not None:
+        if touching and self._print is not None and share > 0.5:
             radiance *= self._print
         if touching and world.texture.level_percent:
             radiance *= self._skin_light(place.x_mm, place.y_mm)

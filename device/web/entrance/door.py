@@ -23,11 +23,12 @@ SCREEN, NOBODY = "screen", "nobody"
 
 @dataclass(frozen=True)
 class Client:
-    """Who asks, what he may, and by which token, None of the own screen or of nobody."""
+    """Who asks, what he may, and by which token, None of the own screen or of nobody; for how long (s) it holds."""
 
     name: str
     scope: Scope | None
     token_id: str | None = None
+    valid_s: float | None = None
 
 
 class Door:
@@ -59,7 +60,7 @@ class Door:
         if need == "nothing" and secret is None:
             return Client(NOBODY, None)
         token = self._known(secret, request, need)
-        return Client(token.name, token.scope, token.id) if token else Client(NOBODY, None)
+        return Client(token.name, token.scope, token.id, token.left_s) if token else Client(NOBODY, None)
 
     def _known(self, secret: str | None, request: AskedRequest, need: Need) -> TokenRecord | None:
         token = self._tokens.of(secret) if self._tokens and secret else None

@@ -23,8 +23,10 @@ class OpenAnswers:
         self._ended: set[asyncio.Task[object]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
 
-    async def answer(self, token_id: str | None, send: Send, run: Callable[[Send], Awaitable[None]]) -> None:
-        """Let `run` answer, until its last piece or until it is ended."""
+    async def answer(
+        self, token_id: str | None, send: Send, run: Callable[[Send], Awaitable[None]], *, valid_s: float | None = None
+    ) -> None:
+        """Let `run` answer, until its last piece or until it is ended, as by a token that is valid no longer."""
         task = asyncio.current_task()
         assert task is not None
         self._loop, is_complete = asyncio.get_running_loop(), False
@@ -37,6 +39,7 @@ class OpenAnswers:
                     self._under_way[task] = token_id
             await send(message)
 
+        expiry = None if valid_s is None else self._loop.call_later(valid_s, self._expire, task)
         try:
             await run(sending)
         except asyncio.CancelledError:
@@ -46,6 +49,8 @@ class OpenAnswers:
             if not is_complete:
                 await _end(send)
         finally:
+            if expiry:
+                expiry.cancel()
             self._under_way.pop(task, None)
             self._ended.discard(task)
 
@@ -60,6 +65,9 @@ class OpenAnswers:
 
     def _end_of(self, token_id: str) -> None:
         self._end([task for task, its in self._under_way.items() if its == token_id])
+
+    def _expire(self, task: asyncio.Task[object]) -> None:
+        self._end([task] if task in self._under_way else [])
 
     def _end(self, tasks: list[asyncio.Task[object]]) -> None:
         for task in tasks:

@@ -22,6 +22,8 @@ from device.care.restore import check_backup
 from device.errors import DiskFullError, StorageError
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.quantities import InvalidQuantity
+from device.records.retention import RetentionRule
+from device.records.saved import saved_until
 from device.records.schema import STORE_WRITES
 from device.records.store import Store
 from device.settings.layers import layer_files, read_layers
@@ -252,3 +254,37 @@ def test_the_copied_database_is_one_file_of_one_moment(root: Path, tmp_path: Pat
     assert db.execute("PRAGMA journal_mode").fetchone() == ("delete",)
     assert db.execute("SELECT count(*) FROM measurement").fetchone() == (3,)
     db.close()
+
+
+def test_a_folder_gets_a_file_by_the_probes_name_and_retention_knows_what_it_holds(root: Path, tmp_path: Path) -> None:
+    data = data_of(root)
+    report = saved(root, tmp_path)
+    assert Path(report.path).parent == tmp_path
+    assert Path(report.path).name.startswith(f"{SERIAL}-20")
+    store = Store(data)
+    add_measurement(store, 4)
+    plan = store.retention.plan(RetentionRule(free_mb=1e9))
+    store.close()
+    assert [one.recording_id for one in plan.removals] == ["r-1", "r-2", "r-3"]
+    assert plan.held_back == 1
+
+
+def test_a_recording_that_is_damaged_on_the_card_is_named_and_not_taken_for_saved(root: Path, tmp_path: Path) -> None:
+    data = data_of(root)
+    zipped = data / "recordings" / "r-2.zip"
+    zipped.write_bytes(zipped.read_bytes()[:-1] + b"x")
+    report = saved(root, tmp_path / "a.backup")
+    assert (report.damaged, report.missing) == (("r-2",), ())
+    found = saved_until(data)
+    assert found is not None
+    assert (found.newest_seq, found.newest_id, found.left_out) == (3, "m-3", ("r-2",))
+
+
+def test_a_recording_that_a_rule_has_deleted_is_not_missing_in_a_backup(root: Path, tmp_path: Path) -> None:
+    data = data_of(root)
+    saved(root, tmp_path / "a.backup")
+    store = Store(data)
+    assert len(store.retention.carry_out(RetentionRule(free_mb=1e9)).removals) == 3
+    store.close()
+    report = saved(root, tmp_path / "b.backup")
+    assert (report.measurements, report.missing, report.damaged) == (3, (), ())

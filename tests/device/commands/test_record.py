@@ -14,6 +14,7 @@ from device.__main__ import main
 from device.files.recording_file import read_recording
 from device.measurement.quantities import Inclusion
 from device.measurement.recording.recording import RecordedCell
+from host_tools.calibration.camera_fit import GridPrint, camera_of
 from host_tools.calibration.gates import unusable
 
 PHANTOM = ("--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80")
@@ -70,6 +71,42 @@ def test_a_probe_that_was_never_calibrated_records_a_phantom_once(run):
     assert (code, out) == (1, [])
     assert refusal == f"out is {OUT}, but must be a new folder: a recording is never replaced: give another name."
     assert (OUT / "recording.json").stat().st_mtime_ns == before
+
+
+def test_a_grid_target_is_recorded_in_oil_and_tells_the_camera(run):
+    """No light comes with the force there, which on skin is refused as gel."""
+    camera = "\n[world.camera]\nscale_x_ratio = 1.008\naxis_x_mm = 0.3\nrim_distortion_percent = -1.5\n"
+    code, out, told = run(command("--grid", "--out", str(OUT), scene=camera))
+    assert (code, out) == (0, [str(OUT)]), told
+    recording = read_recording(OUT)
+    assert (recording.truth, recording.simulated) == (None, True)
+    found = camera_of({"grid": recording}, GridPrint(play_mm=1e-4)).geometry
+    assert found.scale.mm_per_px_x == pytest.approx(1.008 * 0.03125, rel=1e-3)
+    assert (found.axis_x_mm, found.axis_y_mm) == pytest.approx((0.3, 0.0), abs=2e-3)
+    assert found.rim_distortion_percent == pytest.approx(-1.5, abs=0.05)
+
+
+def test_a_block_without_an_inclusion_is_recorded_without_truth(run):
+    code, _, told = run(command("--bare", "--phantom-serial", "PH-3", "--out", str(OUT)))
+    assert code == 0, told
+    recording = read_recording(OUT)
+    assert (recording.truth, recording.phantom_serial) == (None, "PH-3")
+    assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 4 + 10, 10]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "refusal"),
+    [
+        (PHANTOM[:4], "give --size-mm, --depth-mm and --modulus-kpa, or --bare, or --grid"),
+        ((*PHANTOM, "--bare"), "with --bare or --grid there is no --size-mm"),
+        (("--grid", "--size-mm", "10"), "with --bare or --grid there is no --size-mm"),
+        (("--grid", "--bare"), "not allowed with argument"),
+    ],
+)
+def test_what_is_pressed_is_told_whole_before_anything_is_opened(run, arguments, refusal):
+    code, out, told = run(command(*arguments, "--out", str(OUT)))
+    assert (code, out) == (2, [])
+    assert refusal in told[-1]
 
 
 def test_a_fault_ends_the_press_with_its_code_and_leaves_nothing(run):

@@ -78,6 +78,11 @@ def test_an_expired_token_is_none(store):
     again.close()
 
 
+def test_a_token_says_how_long_it_holds(store):
+    assert 86_000 < store.tokens.make("PC", "read", days=1)[0].left_s <= 86_400
+    assert store.tokens.make("PC", "read", days=0)[0].left_s == 0.0
+
+
 def test_a_record_has_no_hash(store):
     made, _ = store.tokens.make("PACS", "read", days=3)
     assert set(made.as_record()) == {"id", "name", "scope", "made_at", "expires_at", "revoked_at"}

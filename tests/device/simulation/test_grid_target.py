@@ -7,6 +7,7 @@ import pytest
 
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.grid_target import EDGE_MM, GridTarget
+from device.simulation.hand import BESIDE_MM
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario, read_scenario
 from device.simulation.virtual_probe import VirtualProbe
@@ -40,10 +41,13 @@ def test_the_middle_dot_is_larger_and_ink_takes_its_share_of_the_light():
     assert np.ptp(GridTarget(ink_ratio=1.0).light_ratio(X_MM, Y_MM)) == 0.0
 
 
-def counts(tables, target, force_n):
+ON_IT = ProbePlacement()
+
+
+def counts(tables, target, force_n, place=ON_IT):
     probe = VirtualProbe(Scenario(grid=target), tables, SHAPE, CAMERA.scale)
     return probe.frame_counts(
-        force_n=force_n, place=ProbePlacement(), led_ratio=(0.6,) * 4, exposure_us=4000, gain=1.0, frame_number=1
+        force_n=force_n, place=place, led_ratio=(0.6,) * 4, exposure_us=4000, gain=1.0, frame_number=1
     ).astype(float)
 
 
@@ -59,6 +63,13 @@ def test_a_printed_dot_is_dark_in_the_image_and_a_blank_plate_has_none(tables):
     between = np.s_[SHAPE[0] // 2 - 30 : SHAPE[0] // 2 - 24, SHAPE[1] // 2 + 29 : SHAPE[1] // 2 + 35]
     assert (printed[middle].mean() - 4) / (blank[middle].mean() - 4) == pytest.approx(0.3, abs=0.05)
     assert printed[between].mean() == pytest.approx(blank[between].mean(), rel=0.05)
+
+
+def test_beside_the_lesions_place_the_plate_is_blank(tables):
+    printed, blank = (
+        counts(tables, replace(GridTarget(), ink_ratio=ratio), 0.3, ProbePlacement(*BESIDE_MM)) for ratio in (0.3, 1.0)
+    )
+    np.testing.assert_array_equal(printed, blank)
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,16 @@ from dataclasses import replace
 import httpx
 import numpy as np
 import pytest
+from fastapi import FastAPI
 
+from device.config import Config, RetentionSection
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.recording.recording import CameraSettings, Recording
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
 from device.web import kept_files
 from device.web.app import create_app
-from device.web.kept_files import packed
+from device.web.kept_files import add_retention, packed
 
 CAMERA = CameraSettings(
     width_px=64, height_px=64, bits=8, mm_per_px_x=0.05, mm_per_px_y=0.05, exposure_us=4000.0, gain=1.0
@@ -136,3 +138,18 @@ def test_what_was_cut_short_is_a_problem_of_the_probe_and_not_of_the_request(app
 
 def test_a_measurement_that_there_is_not_has_neither(app):
     assert [answer.json()["code"] for answer in ask(app, "m-9/image.png", "m-9/recording.zip")] == ["E802"] * 2
+
+
+def test_what_the_rule_of_the_settings_deletes_is_shown_and_stays(store):
+    app, rule = FastAPI(), RetentionSection(free_mb=1e6, saved_first=False)
+    add_retention(app, "/api/v1", lambda: Config(retention=rule), store)
+
+    async def shown():
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+            return (await client.get("/api/v1/retention")).json()
+
+    plan = asyncio.run(shown())
+    assert plan["rule"] == {"keep_days": None, "free_mb": 1e6, "saved_first": False}
+    assert [one["measurement_id"] for one in plan["removals"]] == ["m-1"]  # that of an earlier release has no size yet
+    assert (plan["size_bytes"], plan["held_back"]) == (plan["removals"][0]["size_bytes"], 0)
+    assert store.recording_path("r-1").is_file()

@@ -153,5 +153,5 @@ def test_a_refusal_says_how_it_is_asked_for_and_the_screen_leads_to_pairing(stor
     assert (refused.status_code, refused.headers["www-authenticate"]) == (401, "Bearer")
     assert (refused.json()["code"], refused.headers["content-type"]) == ("E820", "application/problem+json")
     screen = asyncio.run(ask("/"))
-    assert (screen.status_code, screen.headers["location"]) == (303, "/static/pair.html")
-    assert asyncio.run(ask("/static/pair.html")).status_code == 200
+    assert (screen.status_code, screen.headers["location"]) == (303, "/pair")
+    assert asyncio.run(ask("/pair")).status_code == 200

@@ -55,6 +55,15 @@ def test_a_token_that_holds_no_more_ends_its_streams_alone():
     asyncio.run(story())
 
 
+def test_a_stream_ends_with_the_days_of_its_token():
+    async def story():
+        listener = Listener()
+        await OpenAnswers().answer("t-1", listener.send, endless, valid_s=0.05)
+        assert listener.sent[-1] == LAST
+
+    asyncio.run(story())
+
+
 def test_an_answer_that_has_not_begun_is_left_to_end_by_itself():
     """A press may have been started by it."""
 

@@ -1,0 +1,60 @@
+"""`python -m device exams`: the exams that are kept, newest first, also beside a daemon. It only reads.
+
+Exit code 0.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from contextlib import closing
+
+from device.config import Config
+from device.files.text_table import aligned
+from device.records.listing import NEWEST, Wanted
+from device.records.store import Store
+
+EXAMPLES = """examples:
+  python -m device exams                           the newest exams of patients
+  python -m device exams --patient A-17 --json     those of one reference, one JSON object a line
+  python -m device exams --kind phantom
+"""
+COLUMNS = ("made at", "exam", "patient", "order", "side", "operator", "measurements")
+PAGE = 100
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    parser.add_argument("--kind", choices=("patient", "phantom"), default="patient", help="of patients, or of phantoms")
+    parser.add_argument("--patient", metavar="REF", help="of one patient's reference")
+    parser.add_argument("--limit", type=int, default=PAGE, metavar="N", help=f"at most so many, {PAGE} unless given")
+    parser.add_argument("--json", action="store_true", help="as one JSON object a line")
+
+
+def run(options: argparse.Namespace, config: Config) -> int:
+    """Print the exams; return the exit code, or raise what keeps the store from being read."""
+    with closing(Store(config.data, to_read=True)) as store:
+        page = store.listing.exams(
+            Wanted(), kind=options.kind, patient_ref=options.patient, before=NEWEST, limit=options.limit
+        )
+        if options.json:
+            for exam in page.records:
+                print(json.dumps(exam))
+            return 0
+        rows = [
+            tuple(
+                str(value if value is not None else "")
+                for value in (
+                    exam["made_at"], exam["id"], exam["patient_ref"], exam["order_number"], exam["side"],
+                    exam["operator"], _measurements(store, exam["id"]),
+                )
+            )
+            for exam in page.records
+        ]  # fmt: skip
+    print("\n".join(aligned([COLUMNS, *rows])))
+    return 0
+
+
+def _measurements(store: Store, exam_id: str) -> int:
+    return len(store.measurements(before_seq=NEWEST, limit=1000, exam_id=exam_id))

@@ -1,0 +1,82 @@
+"""`python -m device export`: measurements to a file, as the exports over REST, also beside a daemon. It only reads.
+
+Exit codes: 0 ok, 1 nothing was written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable
+from contextlib import closing
+from pathlib import Path
+
+from device.config import Config
+from device.errors import StorageError
+from device.exports.archive import archive_of
+from device.exports.arrays import npz_of
+from device.exports.selection import Selection
+from device.exports.table import long_table, wide_table
+from device.files.durable import synced_file
+from device.measurement.quantities import InvalidQuantity
+from device.records.listing import Wanted
+from device.records.store import Store
+
+EXAMPLES = """examples:
+  python -m device export                          a row a measurement, to the screen
+  python -m device export --out all.csv --long     a row a quantity
+  python -m device export --out exam.zip --exam ID recordings with a table of them
+  python -m device export --out all.npz            arrays for NumPy
+"""
+SCREEN = Path("-")
+KINDS = (".csv", ".npz", ".zip")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the verb takes to its own parser."""
+    parser.epilog = EXAMPLES
+    kinds = ", ".join(KINDS)
+    parser.add_argument("--out", type=Path, default=SCREEN, metavar="FILE", help=f"a new file: {kinds}; else a table")
+    parser.add_argument("--exam", metavar="ID", help="measurements of one exam")
+    parser.add_argument("--mode", help="measurements of one mode")
+    parser.add_argument("--long", action="store_true", help="a table with a row for each quantity")
+    parser.add_argument("--with-void", action="store_true", help="also what does not count")
+
+
+def run(options: argparse.Namespace, config: Config) -> int:
+    """Write the measurements; return the exit code, or raise what keeps them from being read or written."""
+    out: Path = options.out
+    if out != SCREEN and (out.suffix not in KINDS or out.exists()):
+        raise InvalidQuantity("--out", out, f"a new file that ends with {' or '.join(KINDS)}", "choose another name")
+    with closing(Store(config.data, to_read=True)) as store:
+        wanted = Wanted(exam_id=options.exam, mode=options.mode)
+        pieces = _pieces(Selection.of_now(store, wanted, with_void=options.with_void), store, out, long=options.long)
+        if out == SCREEN:
+            for piece in pieces:
+                sys.stdout.buffer.write(piece)
+            return 0
+        _write(out, pieces)
+    print(f"{out}: {out.stat().st_size / 1e6:.1f} MB. Patients' measurements are inside: keep it as you keep them.")
+    return 0
+
+
+def _pieces(selection: Selection, store: Store, out: Path, *, long: bool) -> Iterable[bytes]:
+    match out.suffix:
+        case ".npz":
+            return [npz_of(selection)]
+        case ".zip":
+            return archive_of(store, selection)
+    return (long_table if long else wide_table)(selection)
+
+
+def _write(out: Path, pieces: Iterable[bytes]) -> None:
+    """Write a new file; nothing is left of one that could not be written whole."""
+    try:
+        with synced_file(out) as file:
+            for piece in pieces:
+                file.write(piece)
+    except BaseException as error:
+        out.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise StorageError(f"{out} could not be written: {error}.", "Choose another medium.") from error
+        raise

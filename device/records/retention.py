@@ -1,0 +1,145 @@
+"""Which recordings a rule deletes, and what it would delete now: by age, or for space, and only what a backup holds.
+
+A recording is most of what a press takes; its measurement, picture of numbers and audit stay for ever. First it is
+written down that a recording is deleted, and why, in one transaction with the audit; then its file goes. Without a
+rule nothing is ever deleted.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from device.records.audit import append
+from device.records.manifest import manifest_of, note_removed, utc_now
+from device.records.recordings import KeptRecordings
+from device.records.saved import SavedUntil, saved_until
+
+
+@dataclass(frozen=True)
+class RetentionRule:
+    """When a recording may go: older than some days, or while less than `free_mb` (1e6 bytes) is left; None is never.
+
+    `saved_first`: only what a backup holds.
+    """
+
+    keep_days: float | None = None
+    free_mb: float | None = None
+    saved_first: bool = True
+
+    @property
+    def is_any(self) -> bool:
+        """Whether anything is ever deleted."""
+        return self.keep_days is not None or self.free_mb is not None
+
+
+@dataclass(frozen=True)
+class Removal:
+    """One recording that is to go, of which measurement, its size (bytes), and why."""
+
+    recording_id: str
+    measurement_id: str
+    taken_at: str
+    size_bytes: int
+    why: str
+
+
+@dataclass(frozen=True)
+class RetentionPlan:
+    """What the rule deletes now, oldest first. `held_back`: recordings that it would, were they in a backup."""
+
+    rule: RetentionRule
+    saved_at: str | None
+    removals: tuple[Removal, ...]
+    held_back: int
+
+    def as_record(self) -> dict[str, Any]:
+        """Return it as JSON object."""
+        size_bytes = sum(one.size_bytes for one in self.removals)
+        return {**asdict(self), "size_bytes": size_bytes, "removals": [asdict(one) for one in self.removals]}
+
+
+class Retention:
+    """Plans and deletes on a store's recordings. All methods may be called from any thread."""
+
+    def __init__(
+        self,
+        folder: Path,
+        transaction: Callable[[], AbstractContextManager[sqlite3.Connection]],
+        recordings: KeptRecordings,
+        free_mb: Callable[[], float],
+    ) -> None:
+        self._folder, self._transaction, self._recordings, self._free_mb = folder, transaction, recordings, free_mb
+
+    def plan(self, rule: RetentionRule) -> RetentionPlan:
+        """Return what the rule deletes now; changes nothing. Raises `StorageError` when nobody can say."""
+        with self._transaction() as db:
+            kept, saved = _kept_recordings(db), self._saved(db)
+        due = _due(kept, rule, utc_now(), self._free_mb() if rule.free_mb is not None else 0.0)
+        may_go = [one for seq, one in due if not rule.saved_first or _is_saved(seq, one, saved)]
+        return RetentionPlan(rule, saved.made_at if saved else None, tuple(may_go), len(due) - len(may_go))
+
+    def carry_out(self, rule: RetentionRule) -> RetentionPlan:
+        """Delete what the rule deletes now, oldest first; return what that was."""
+        plan = self.plan(rule)
+        for one in plan.removals:
+            with self._transaction() as db:
+                note_removed(db, one.recording_id, one.why)
+                append(db, "recording_deleted", one.measurement_id, reason=one.why, after=asdict(one))
+            self._recordings.remove(one.recording_id)
+        return plan
+
+    def _saved(self, db: sqlite3.Connection) -> SavedUntil | None:
+        """Return what the last backup holds, if it was one of this very database."""
+        saved = saved_until(self._folder)
+        if saved is None:
+            return None
+        row = db.execute("SELECT id FROM measurement WHERE seq = ?", (saved.newest_seq,)).fetchone()
+        return saved if row and row[0] == saved.newest_id else None
+
+
+def _kept_recordings(db: sqlite3.Connection) -> list[tuple[int, Removal]]:
+    """Return every recording that is kept and not needed for the archive, by its measurement's number, oldest first."""
+    manifest = manifest_of(db)
+    query = (
+        "SELECT seq, id, json_extract(record, '$.recording_id'), json_extract(record, '$.taken_at') "
+        "FROM measurement WHERE id NOT IN "
+        "(SELECT measurement_id FROM outbox WHERE state IN ('queued', 'sent', 'refused')) ORDER BY seq"
+    )
+    return [
+        (seq, Removal(recording, name, taken_at or "", manifest[recording].fingerprint.size_bytes, ""))
+        for seq, name, recording, taken_at in db.execute(query)
+        if recording in manifest and not manifest[recording].removed
+    ]
+
+
+def _due(
+    kept: Sequence[tuple[int, Removal]], rule: RetentionRule, now: str, free_mb: float
+) -> list[tuple[int, Removal]]:
+    """Return what a rule deletes, with the reason: what is too old, and then the oldest until there is space."""
+    before = _days_before(now, rule.keep_days) if rule.keep_days is not None else ""
+    due, wanted_bytes = [], ((rule.free_mb or 0.0) - free_mb) * 1e6
+    for seq, one in kept:
+        if one.taken_at and one.taken_at < before:
+            why = f"older than {rule.keep_days:g} days"
+        elif wanted_bytes > 0.0:
+            why = f"less than {rule.free_mb:g} MB left"
+        else:
+            continue
+        wanted_bytes -= one.size_bytes
+        due.append((seq, Removal(one.recording_id, one.measurement_id, one.taken_at, one.size_bytes, why)))
+    return due
+
+
+def _days_before(now: str, days: float) -> str:
+    then = datetime.fromisoformat(now) - timedelta(days=days)
+    return then.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _is_saved(seq: int, one: Removal, saved: SavedUntil | None) -> bool:
+    return saved is not None and seq <= saved.newest_seq and one.recording_id not in saved.left_out

@@ -1,0 +1,33 @@
+"""What the last backup of a data folder holds, as `device.care.backup` notes it there once it is read back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+SAVED = "saved.json"
+
+
+@dataclass(frozen=True)
+class SavedUntil:
+    """What the last backup holds: all measurements up to a number, but for recordings that were damaged or missing."""
+
+    made_at: str
+    newest_seq: int
+    newest_id: str
+    left_out: tuple[str, ...] = ()
+
+    def as_record(self) -> dict[str, Any]:
+        """Return it as JSON object."""
+        return asdict(self)
+
+
+def saved_until(folder: Path) -> SavedUntil | None:
+    """Return what the last backup of a data folder holds, None when none is known."""
+    try:
+        said = json.loads((folder / SAVED).read_text(encoding="utf-8"))
+        return SavedUntil(said["made_at"], int(said["newest_seq"]), said["newest_id"], tuple(said["left_out"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

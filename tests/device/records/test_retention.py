@@ -1,0 +1,143 @@
+"""A rule deletes what it says and nothing else: shown before, written down with why, and only what a backup holds."""
+
+import json
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from probe_card import RECORDING
+
+from device.errors import DamagedRecordingError
+from device.instrument.watch.recordings_watch import RecordingsWatch
+from device.records.exams import ExamContent
+from device.records.outbox import OutboxItem
+from device.records.retention import RetentionRule
+from device.records.saved import SAVED
+from device.records.store import Store
+
+DAYS_OLD = {1: 400, 2: 100, 3: 20, 4: 1}
+
+
+def taken_at(days_old):
+    return (datetime.now(UTC) - timedelta(days=days_old)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path)
+    for number, days_old in DAYS_OLD.items():
+        record = {"id": f"m-{number}", "recording_id": f"r-{number}", "taken_at": taken_at(days_old)}
+        opened.add_measurement(record, replace(RECORDING, id=f"r-{number}"))
+    yield opened
+    opened.close()
+
+
+def save(store, until=4, left_out=()):
+    said = {"made_at": taken_at(0), "newest_seq": until, "newest_id": f"m-{until}", "left_out": list(left_out)}
+    (store.folder / SAVED).write_text(json.dumps(said))
+
+
+def names(plan):
+    return [one.recording_id for one in plan.removals]
+
+
+def files(store):
+    return sorted(path.stem for path in (store.folder / "recordings").iterdir())
+
+
+def test_without_a_rule_nothing_is_ever_deleted(store):
+    save(store)
+    assert names(store.retention.carry_out(RetentionRule())) == []
+    assert files(store) == ["r-1", "r-2", "r-3", "r-4"]
+
+
+def test_what_the_hospitals_archive_has_not_got_yet_stays(store):
+    save(store)
+    exam = store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
+    store.outbox.add([OutboxItem("2.25.1", exam["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    rule = RetentionRule(keep_days=90)
+    assert names(store.retention.plan(rule)) == ["r-2"]
+    store.outbox.settle("2.25.1", "confirmed")
+    assert names(store.retention.plan(rule)) == ["r-1", "r-2"]
+
+
+def test_what_is_older_is_shown_and_then_deleted_while_its_numbers_stay(store):
+    save(store)
+    rule = RetentionRule(keep_days=90)
+    shown = store.retention.plan(rule)
+    assert names(shown) == ["r-1", "r-2"]
+    assert {one.why for one in shown.removals} == {"older than 90 days"}
+    assert shown.as_record()["size_bytes"] == sum(
+        store.recordings.place_of(name).stat().st_size for name in ("r-1", "r-2")
+    )
+    assert files(store) == ["r-1", "r-2", "r-3", "r-4"]
+    assert store.retention.carry_out(rule) == shown
+    assert files(store) == ["r-3", "r-4"]
+    assert store.measurement("m-1")["seq"] == 1
+    assert names(store.retention.plan(rule)) == []
+
+
+def test_what_no_backup_holds_is_held_back_unless_the_rule_says_otherwise(store):
+    rule = RetentionRule(keep_days=10)
+    unsaved = store.retention.plan(rule)
+    assert (names(unsaved), unsaved.held_back, unsaved.saved_at) == ([], 3, None)
+    save(store, until=2, left_out=["r-1"])
+    partly = store.retention.plan(rule)
+    assert (names(partly), partly.held_back) == (["r-2"], 2)
+    assert names(store.retention.plan(replace(rule, saved_first=False))) == ["r-1", "r-2", "r-3"]
+
+
+@pytest.mark.parametrize("said", ["", "[]", '{"made_at": "x"}', '{"made_at": 1, "newest_seq": "x"}'])
+def test_a_note_of_a_backup_that_cannot_be_read_is_none(store, said):
+    (store.folder / SAVED).write_text(said)
+    assert names(store.retention.plan(RetentionRule(keep_days=10))) == []
+
+
+def test_a_backup_of_another_database_counts_for_nothing(store):
+    save(store)
+    (store.folder / SAVED).write_text((store.folder / SAVED).read_text().replace('"m-4"', '"m-9"'))
+    assert names(store.retention.plan(RetentionRule(keep_days=10))) == []
+
+
+def test_for_space_the_oldest_go_until_there_is_enough(store):
+    save(store)
+    size_mb = store.recordings.place_of("r-1").stat().st_size / 1e6
+    wanted = RetentionRule(free_mb=store.free_mb + 1.5 * size_mb)
+    left_bytes = store._disk.free_bytes(store.folder)
+    store._disk.free_bytes = lambda folder: left_bytes
+    plan = store.retention.plan(wanted)
+    assert names(plan) == ["r-1", "r-2"]
+    assert plan.removals[0].why.startswith("less than")
+    assert names(store.retention.plan(RetentionRule(free_mb=store.free_mb))) == []
+
+
+def test_what_was_deleted_says_when_and_why_and_is_in_the_audit(store):
+    save(store)
+    store.retention.carry_out(RetentionRule(keep_days=200))
+    with pytest.raises(DamagedRecordingError, match="r-1 was deleted at .*: older than 200 days"):
+        store.recording_path("r-1")
+    [entry] = store.audit.entries(subject="m-1", before_seq=99, limit=9)
+    assert (entry["what"], entry["reason"]) == ("recording_deleted", "older than 200 days")
+    assert store.audit.warning() is None
+
+
+def test_a_start_finishes_what_a_kill_left_of_it_and_misses_nothing(store, monkeypatch):
+    save(store)
+    monkeypatch.setattr(store.recordings, "remove", lambda name: None)
+    store.retention.carry_out(RetentionRule(keep_days=200))
+    assert files(store) == ["r-1", "r-2", "r-3", "r-4"]
+    store.close()
+    again = Store(store.folder)
+    again.close()
+    assert files(again) == ["r-2", "r-3", "r-4"]
+    assert again.findings.warnings() == ()
+
+
+def test_the_daemon_carries_the_rule_out_by_itself_once_an_hour(store):
+    save(store)
+    watch = RecordingsWatch(store, RetentionRule(keep_days=200))
+    watch.retain()
+    assert files(store) == ["r-2", "r-3", "r-4"]
+    store._db.execute("UPDATE measurement SET record = json_set(record, '$.taken_at', '2000-01-01T00:00:00.000Z')")
+    watch.retain()
+    assert files(store) == ["r-2", "r-3", "r-4"]
