@@ -12,10 +12,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import pynetdicom.association
 from pydicom.dataset import Dataset
 from pydicom.uid import UID
 from pynetdicom import AE, evt
 from pynetdicom.association import Association
+from pynetdicom.dul import DULServiceProvider
 
 from device.config import DicomSection
 from device.dicom.subject import IMPLEMENTATION_UID
@@ -30,6 +32,21 @@ COMMITMENT, COMMITMENT_INSTANCE = UID("1.2.840.10008.1.20.1"), UID("1.2.840.1000
 """
 CONNECT_S, ANSWER_S = 10.0, 30.0
 VERSION_NAME = "TSIS"
+
+
+class UnawaitedProvider(DULServiceProvider):
+    """pynetdicom's thread that has the connection, which would keep a stop of the daemon waiting for a silent archive.
+
+    It may be in a connect that takes ten seconds; a process ends without waiting for a daemonic thread.
+    """
+
+    def start(self) -> None:
+        """Begin."""
+        self.daemon = True
+        super().start()
+
+
+pynetdicom.association.DULServiceProvider = UnawaitedProvider  # type: ignore[attr-defined]
 
 
 @dataclass(frozen=True)

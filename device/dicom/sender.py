@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 LOOK_S = 30.0
 """So often it is looked whether a correction has made anything wrong that was sent."""
-BUSY_LOOK_S = 0.5
+BUSY_LOOK_S, STOP_S = 0.5, 0.3
 FIRST_WAIT_S, LONGEST_WAIT_S = 2.0, 300.0
 NEVER_SENT = timedelta(days=60)
 """Of an exam that nobody sends, too, who the patient is does not stay."""
@@ -73,7 +73,7 @@ class Sender:
         """End after the object that is being sent; an archive that hangs is not waited for."""
         self._stopping.set()
         self.wake()
-        self._thread.join(timeout=1.0)
+        self._thread.join(timeout=STOP_S)
 
     def _run(self) -> None:
         while not self._stopping.is_set():
@@ -86,13 +86,14 @@ class Sender:
             return BUSY_LOOK_S
         try:
             is_left = self._delivered()
+            refused = self._refused()
         except DeviceError as fault:
             return self._failed(fault)
         except Exception as error:  # noqa: BLE001 - whatever an archive answers must not end the thread
             log.error("sending to the archive failed: %s", type(error).__name__)
             return self._failed(DeviceError(f"Sending failed: {type(error).__name__}.", "Report the daemon's log."))
         self._failures = self._failures + 1 if is_left else 0
-        self._say(self._refused())
+        self._say(refused)
         return self._wait_s() if is_left else LOOK_S
 
     def _delivered(self) -> bool:

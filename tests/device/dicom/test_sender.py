@@ -1,9 +1,11 @@
 """The outbox gets to the archive whatever is killed on the way: nothing is lost, and nothing is there twice."""
 
 import random
+import socket
 import sqlite3
 import subprocess
 import sys
+import threading
 from contextlib import closing
 
 import pytest
@@ -111,6 +113,27 @@ def test_nothing_is_sent_while_the_probe_is_busy_and_all_after_that(store, archi
         wait_for(store.outbox.counts, lambda counts: counts == {"confirmed": 2})
     finally:
         hospital.close()
+
+
+def test_a_stop_waits_for_no_archive_that_is_silent(store, archive):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        exam = begin(store)
+        measure(store, exam)
+        settings = archive.settings(archive_port=silent.getsockname()[1])
+        hospital = Hospital(settings, store, read_picture)
+        hospital.send(exam["id"], version=1, by="Ada")
+        hospital.start()
+        accepted, _ = silent.accept()
+
+        def of_dicom():
+            return [thread for thread in threading.enumerate() if "UnawaitedProvider" in type(thread).__name__]
+
+        providers = wait_for(of_dicom, bool)
+        assert all(thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread())
+        accepted.close()
+        wait_for(lambda: [one for one in providers if one.is_alive()], lambda alive: not alive)
+        hospital.close()
+    assert store.outbox.counts() == {"queued": 2}
 
 
 def test_what_an_archive_answers_can_not_end_the_thread(store, archive, monkeypatch):
