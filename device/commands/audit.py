@@ -1,4 +1,4 @@
-"""`python -m device audit verify`: whether the audit is as it was written, also while a daemon writes it."""
+"""`python -m device audit`: whether the audit is as it was written, and what is in it, also beside a daemon."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ from pathlib import Path
 
 from device.config import Config
 from device.errors import AuditChanged, StorageError
+from device.files.text_table import aligned
 from device.records.audit import AuditHead, require_head, verify_chain
+from device.records.listing import NEWEST
+from device.records.store import Store
 
 BUSY_S = 10.0
+MOST_SHOWN = 100
+COLUMNS = ("row", "at", "by", "what", "subject", "reason")
 EXAMPLES = """examples:
   python -m device audit verify                         every entry; the first row that was changed is named
   python -m device audit verify --head 1204:9f2c...     also that the chain went through a hash kept elsewhere
+  python -m device audit list --subject ID --json       what was done to an exam or a measurement, newest first
 """
 
 
@@ -26,10 +32,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     verify = actions.add_parser("verify", help="go through the chain of hashes from its first entry")
     verify.add_argument("--head", metavar="SEQ:HASH", help="what this command, or the journal, said before")
     verify.add_argument("--json", action="store_true", help="print a JSON object")
+    listed = actions.add_parser("list", help="print what was done, newest first")
+    listed.add_argument("--subject", metavar="ID", help="to one exam, measurement, press or token")
+    listed.add_argument("--limit", type=int, default=MOST_SHOWN, metavar="N", help=f"{MOST_SHOWN} unless given")
+    listed.add_argument("--json", action="store_true", help="print a JSON object a line")
 
 
 def run_audit_command(options: argparse.Namespace, config: Config) -> int:
-    """Say how far the chain goes, or which row was changed; return 0, or 1 when one was."""
+    """Say how far the chain goes, or which row was changed; return 0, or 1 when one was. Or list what was done."""
+    if options.action == "list":
+        return _list(options, config)
     try:
         head = verified(config.data, options.head)
     except AuditChanged as change:
@@ -39,6 +51,17 @@ def run_audit_command(options: argparse.Namespace, config: Config) -> int:
         print(json.dumps({"whole": True, "entries": head.seq, "head": str(head)}))
     else:
         print(f"The audit is whole: {head.seq} entries.\nKeep its head elsewhere: {head}")
+    return 0
+
+
+def _list(options: argparse.Namespace, config: Config) -> int:
+    with closing(Store(config.data, to_read=True)) as store:
+        entries = store.audit.entries(subject=options.subject, before_seq=NEWEST, limit=options.limit)
+    if options.json:
+        print("\n".join(map(json.dumps, entries)))
+        return 0
+    names = ("seq", "at", "by", "what", "subject", "reason")
+    print("\n".join(aligned([COLUMNS, *(tuple(str(entry[name]) for name in names) for entry in entries)])))
     return 0
 
 

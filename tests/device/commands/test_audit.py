@@ -56,3 +56,15 @@ def test_a_folder_without_a_database_is_said(tmp_path, capsys):
     settings.write_text(f'data = "{tmp_path}/none"\n')
     assert main(["--simulate", "--config", str(settings), "audit", "verify"]) == 1
     assert "cannot be read" in capsys.readouterr().err
+
+
+def test_what_was_done_is_listed_newest_first_beside_a_daemon(kept, capsys):
+    _, command = kept
+    listing = [*command[:-1], "list"]
+    assert main([*listing, "--subject", "p-1", "--json"]) == 0
+    entries = list(map(json.loads, capsys.readouterr().out.splitlines()))
+    assert [entry["what"] for entry in entries] == ["press_ended", "press_begun"]
+    assert main([*listing, "--limit", "1"]) == 0
+    header, row = capsys.readouterr().out.splitlines()
+    assert header.split()[:2] == ["row", "at"]
+    assert row.split()[0] == "2"
