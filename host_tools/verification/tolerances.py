@@ -131,9 +131,9 @@ def as_chapter(found: Sequence[Sequence[ToleranceAnswer]]) -> Chapter:
     header = ("tolerance", "answered", "refused", "orders", "median seconds")
     return Chapter(
         "Tolerances",
-        f"{len(found)} random centred scenes far beyond the training box, in small strain: what is answered is within the "
-        "tolerance, all else is refused in words. Inclusions of 1-25 mm, 0.5-20 mm deep, of 1-1000 kPa, in tissue of 2-30 "
-        "kPa and slabs of 12-80 mm. Indentations of 0.1-4 mm, half of them by force.",
+        f"{len(found)} random centred scenes far beyond the training box, in small strain: what is answered is within "
+        "the tolerance, all else is refused in words. Inclusions of 1-25 mm, 0.5-20 mm deep, of 1-1000 kPa, in tissue "
+        "of 2-30 kPa and slabs of 12-80 mm. Indentations of 0.1-4 mm, half of them by force.",
         "No reference: the same model two orders higher.",
         tuple(judged),
         (
