@@ -14,7 +14,7 @@ from types import ModuleType
 from daemon_process import ROOT
 
 PACKAGE = "tsis_client"
-BINARY = ("image/png", "application/zip", "application/pdf", "application/x-npz")
+BINARY = ("image/png", "application/zip", "application/pdf", "application/x-npz", "multipart/x-mixed-replace")
 CONFIGURATION = {"post_hooks": [], "content_type_overrides": dict.fromkeys(BINARY, "application/octet-stream")}
 """What docs/contracts.md tells an integrator: bytes stay bytes."""
 

@@ -7,9 +7,19 @@ from dataclasses import dataclass
 from device.provisioning.item import told
 from device.provisioning.target import ProvisioningFailed, TargetMachine
 
-NEEDED = ("cage", "chromium", "fonts-dejavu-core", "i2c-tools", "libpam-systemd", "openssh-server", "xwayland")
+NEEDED = (
+    "cage",
+    "chromium",
+    "fonts-dejavu-core",
+    "i2c-tools",
+    "libpam-systemd",
+    "openssh-server",
+    "openssl",
+    "xwayland",
+)
 """The screen's compositor, browser, font, session and X server (without which Debian's cage does not start), the
-tools of the bring-up, and sshd with ssh-keygen. A release holds its Python packages, so pip and venv are not needed."""
+tools of the bring-up, sshd with ssh-keygen, and what makes the server's certificate. A release holds its Python
+packages, so pip and venv are not needed."""
 ONLY_RASPBERRY_PI_OS = ("python3-picamera2",)
 """libcamera fits the kernel and firmware of Raspberry Pi OS, so it comes from there."""
 WAIT_FOR_LOCK = "-oDPkg::Lock::Timeout=300"

@@ -54,7 +54,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Counts:
+class KeptCounts:
     """How many records there are; presses by their state."""
 
     presses: dict[str, int]
@@ -114,12 +114,12 @@ class Listing:
         rows = self._rows("seq, record", "exam", "seq", where, before, limit)
         return _page([(seq, json.loads(record)) for seq, record in rows], limit)
 
-    def counts(self) -> Counts:
+    def counts(self) -> KeptCounts:
         """Return how many records of each kind there are."""
         with self._transaction() as db:
             states = db.execute("SELECT json_extract(record, '$.state'), count(*) FROM press GROUP BY 1").fetchall()
             of_tables = (db.execute(f"SELECT count(*) FROM {name}").fetchone()[0] for name in ("measurement", "exam"))
-            return Counts(dict(states), *of_tables)
+            return KeptCounts(dict(states), *of_tables)
 
     def newest_change(self) -> int:
         """Return the number of the audit's last entry, 0 when there is none."""

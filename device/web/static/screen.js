@@ -187,7 +187,7 @@ async function load(fetchAndShow) {
   try {
     await fetchAndShow();
   } catch (error) {
-    tell({ word: say("not_done"), reason: error.message, tone: "caution", service: error.service });
+    tellRefusal(error);
     await new Promise((done) => { setTimeout(done, RELOAD_MS); });
   } finally {
     loading = false;
@@ -233,6 +233,12 @@ function tell(next) {
   show();
 }
 
+/** Say why a command was refused; what stands among the faults is not said again. */
+function tellRefusal({ message, code, service: words }) {
+  if (status.faults.some((fault) => fault.code === code)) tell(null);
+  else tell({ word: say("not_done"), reason: message, tone: "caution", service: words });
+}
+
 /** What a new status changes beyond what it shows: sounds, the lock of the screen, dialogs out of the way. */
 function follow(before, next) {
   const isNow = UNDER_WAY.has(next.press?.state);
@@ -264,7 +270,7 @@ async function send(command) {
   try {
     await command();
   } catch (error) {
-    tell({ word: say("not_done"), reason: error.message, tone: "caution", service: error.service });
+    tellRefusal(error);
   } finally {
     sending = false;
     show();
