@@ -47,6 +47,7 @@ VERBS = {
     "export": "write measurements to a table, arrays or an archive of recordings",
     "retention": "show which recordings the settings' rule deletes now",
     "support": "write a file for whoever helps, without patients' data",
+    "dicom": "ask the hospital's archive and worklist whether they are there",
     "led-off": "darken the LED chip of the real probe",
 }
 OF_EVERY_VERB = {"--simulate": False, "--config": True, "--root": True, "--scene": True, "--port": True}
@@ -193,6 +194,10 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.support import run_support_command
 
             return run_support_command(options)
+        case "dicom":
+            from device.commands.dicom import run_dicom_command
+
+            return run_dicom_command(options, _start_settings(options, _scenario(options)).config)
         case verb if verb in LOOKING:
             return _look(verb, options)
         case "led-off":

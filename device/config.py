@@ -430,6 +430,9 @@ class DicomSection(Section):
     ] = None
     worklist_port: Annotated[int, Bound(1, 65535, ""), Doc("Port of the worklist.")] = 104
     worklist_title: Annotated[AeTitle, Doc("Application entity title of the worklist.")] = "WORKLIST"
+    worklist_of_all: Annotated[
+        bool, Doc("Whether all steps of the worklist are asked for, and not those for this probe's own title alone.")
+    ] = False
     own_title: Annotated[AeTitle, Doc("Application entity title of this probe.")] = "TSIS"
     commitment_port: Annotated[
         int | None,
@@ -462,6 +465,8 @@ class DicomSection(Section):
             yield Conflict(f"dicom.{name}", "not set", "set", (f"dicom.{other}",))
         elif given["tls_certificate"] and not given["tls_authority"]:
             yield Conflict("dicom.tls_authority", "not set", "set", ("dicom.tls_certificate",))
+        elif given["tls_authority"] and self.commitment_port and not given["tls_certificate"]:
+            yield Conflict("dicom.tls_certificate", "not set", "set", ("dicom.commitment_port",))
 
     @property
     def is_configured(self) -> bool:

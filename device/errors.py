@@ -163,6 +163,24 @@ class CertificateRefused(DeviceError):  # noqa: N818 - the name is what the oper
     title = "Server certificate refused"
 
 
+class ArchiveUnreachable(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's archive or worklist does not answer; results wait on the probe and are sent when it does."""
+
+    code = "E030"
+    title = "Archive not reached"
+    status = 502
+    severity = "warning"
+
+
+class ArchiveRefuses(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's archive has refused results; they are kept on the probe until somebody sends them again."""
+
+    code = "E031"
+    title = "Archive refuses results"
+    status = 502
+    severity = "warning"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 

@@ -85,19 +85,20 @@ def sweep(
     strain: Literal["small", "finite"] = "small",
     jobs: int = -1,
     scheduler: str | None = None,
+    tolerance: float | None = None,
     replace: bool = False,
 ) -> xr.Dataset:
     """Solve random scenes of the paper's box under rising forces into a netCDF file; return it as a data set.
 
     On all cores, or on a Dask cluster (`scheduler` "tcp://host:port"). Interrupted, the same call goes on. All scenes
     are solved at one level, since features would jump where a plan changes its mind. A scene that fails is a row of
-    NaN with its `reason`. A file that holds this sweep is read as it is; raise `InvalidQuantity` for one that holds
-    anything else, unless `replace`.
+    NaN with its `reason`; with a `tolerance` (a ratio) so is one that states more. A file that holds this sweep is read
+    as it is; raise `InvalidQuantity` for one that holds anything else, unless `replace`.
     """
     from host_tools.data.plan import SweepPlan
     from host_tools.data.sweep import sweep as solve_scenes
 
-    plan = SweepPlan(scenes, seed, tuple(forces_n), strain)
+    plan = SweepPlan(scenes, seed, tuple(forces_n), strain, tolerance=tolerance)
     return read_sweep(solve_scenes(plan, Path(out), jobs=jobs, scheduler=scheduler, replace=replace))
 
 

@@ -20,7 +20,9 @@ OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM), ("GET", PAIRIN
 """Whoever has no token yet may see that it runs, and bring the code from the probe's screen by the page for that."""
 OPEN_FOLDER = "/static/"
 """The screen's own files: they are in every copy of the software."""
-MEASURING = ("presses", "exams", "measurements", "self-test", "tare")
+WORKLIST = f"{API}/worklist"
+"""Shows patients' names, which nothing else does: to whoever may begin exams."""
+MEASURING = ("presses", "exams", "measurements", "self-test", "tare", "worklist")
 """What a token that may measure may change, by the first part of its path."""
 
 
@@ -33,6 +35,8 @@ def need_of(method: str, path: str) -> Need:
         return "own screen"
     if path == TOKENS or path.startswith(f"{TOKENS}/"):
         return "admin"
+    if path == WORKLIST:
+        return "measure"
     if asked in ("GET", "OPTIONS"):
         return "read"
     first = path.removeprefix(f"{API}/").partition("/")[0] if path.startswith(f"{API}/") else ""

@@ -30,6 +30,7 @@ from device.records.updates import Updates
 from device.settings.last_good import StartSettings
 
 if TYPE_CHECKING:
+    from device.dicom.hospital import Hospital
     from device.instrument.procedure import Procedure
     from device.web.entrance.network import NetworkPort
 
@@ -69,9 +70,12 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             watchdog.start()
             ending.callback(watchdog.close)
             ready()
+            hospital = _hospital(procedure)
+            hospital.start()
+            ending.callback(hospital.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, [port.listening(), *sockets], network)
+            _run_server(procedure, hospital, [port.listening(), *sockets], network)
     return 0
 
 
@@ -183,6 +187,23 @@ def faults_of(error: Exception) -> list[DeviceError]:
     return [DeviceError(f"{type(error).__name__}: {error}.", "Report the daemon's log.")]
 
 
+def _hospital(procedure: Procedure) -> Hospital:
+    """Return what sends to the hospital's archive; the status tells when it does not get there."""
+    from device.dicom.hospital import Hospital
+    from device.instrument.press.picture import kept_or_drawn
+    from device.records.store import ENDED
+
+    def tell(fault: DeviceError | None) -> None:
+        if procedure.board.now.archive is not fault:
+            procedure.board.update(archive=fault)
+
+    def is_busy() -> bool:
+        press = procedure.board.now.press
+        return press is not None and press.state not in ENDED
+
+    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell, is_busy)
+
+
 def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:
     """Open what else listens: by TLS for other machines, and by loopback where the daemon's port is not for that."""
     from device.web.entrance.network import listen, open_network
@@ -195,7 +216,9 @@ def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], Net
     return local, network
 
 
-def _run_server(procedure: Procedure, listening: Sequence[socket.socket], network: NetworkPort | None) -> None:
+def _run_server(
+    procedure: Procedure, hospital: Hospital, listening: Sequence[socket.socket], network: NetworkPort | None
+) -> None:
     from device.web.server import run_server
 
     port = listening[-1].getsockname()[1]  # of loopback, where there are two
@@ -205,4 +228,4 @@ def _run_server(procedure: Procedure, listening: Sequence[socket.socket], networ
         others = f"{network.served.url} (certificate SHA-256 {network.served.certificate_sha256}), here "
     local = LOOPBACK_ADDRESS if network else listening[0].getsockname()[0]
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at {others}http://{local}:{port}/", flush=True)
-    run_server(procedure, listening, network)
+    run_server(procedure, hospital, listening, network)

@@ -50,10 +50,10 @@ def identifier(relation: str, concept: CodedTerm, value: str) -> Dataset:
     return item
 
 
-def image(sop_class: str, sop_uid: str) -> Dataset:
-    """Return an item that refers to an image."""
+def referring(kind: str, sop_class: str, sop_uid: str) -> Dataset:
+    """Return an item that refers to an object, of value type IMAGE or COMPOSITE."""
     item = Dataset()
-    item.RelationshipType, item.ValueType = CONTAINS, "IMAGE"
+    item.RelationshipType, item.ValueType = CONTAINS, kind
     item.ReferencedSOPSequence = Sequence([reference(sop_class, sop_uid)])
     return item
 

@@ -21,10 +21,10 @@ from device.dicom.content_items import (
     code,
     container,
     identifier,
-    image,
     name,
     no_number,
     number,
+    referring,
     text,
 )
 from device.dicom.shared_modules import MANUFACTURER, MODEL, begun, person_name, reference
@@ -74,7 +74,7 @@ def _request(subject: DicomSubject) -> Dataset:
 
 
 def _content(subject: DicomSubject) -> Dataset:
-    library = container(codes.IMAGE_GROUP, image(SecondaryCaptureImageStorage, subject.uid("image")))
+    library = container(codes.IMAGE_GROUP, referring("IMAGE", SecondaryCaptureImageStorage, subject.uid("image")))
     return container(
         codes.REPORT,
         code(MODIFIER, codes.LANGUAGE, codes.ENGLISH),

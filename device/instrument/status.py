@@ -99,6 +99,7 @@ class ProcedureStatus:
     `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
     frames. `scan`: how far a scan is, once its first press on the lesion is complete. `warnings`: those of the last
     press, or of the time since, and the lasting ones. `stall`: a part that makes no progress, by the watchdog's thread.
+    `archive`: why the hospital's archive has not got what it is to have, by the thread that sends.
     `answer`: what the press says while that is being kept, without an id; from then on `measurement_id`.
     """
 
@@ -115,6 +116,7 @@ class ProcedureStatus:
     fault: DeviceError | None = None
     warnings: tuple[DeviceError, ...] = ()
     stall: DeviceError | None = None
+    archive: DeviceError | None = None
 
     @property
     def hindrance(self) -> DeviceError | None:

@@ -22,10 +22,14 @@ from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_s
 
 log = logging.getLogger(__name__)
 DATABASE = "tsis.sqlite"
-DURABLE = {"journal_mode": "wal", "synchronous": 2, "cell_size_check": 1}
-"""What keeps acknowledged rows over a power cut, and finds a bad page when it is read; 2 is FULL."""
-SET = {"journal_mode": "WAL", "synchronous": "FULL", "cell_size_check": "ON"}
-SALVAGED = ("measurement", "press", "counter", "exam", "filing", "audit", "asked_once", "token", "kept_recording")
+DURABLE = {"journal_mode": "wal", "synchronous": 2, "cell_size_check": 1, "secure_delete": 1}
+"""What keeps acknowledged rows over a power cut, finds a bad page when it is read, and overwrites what is erased; 2 is
+FULL."""
+SET = {"journal_mode": "WAL", "synchronous": "FULL", "cell_size_check": "ON", "secure_delete": "ON"}
+SALVAGED = (
+    "measurement", "press", "counter", "exam", "filing", "audit", "asked_once", "token", "kept_recording", "outbox",
+    "ordered_study",
+)  # fmt: skip
 BUSY_S = 10.0
 MOST_MISSED = 10_000
 """So many numbers of rows in a row may be unreadable before the rest of a table is given up."""

@@ -66,22 +66,27 @@ class AskedExam:
     version: int | None = None
 
 
-class ExamFields(BaseModel):
-    """What may be said of an exam. The side, the clock position and the distance (mm) from the nipple are the lesion's.
-
-    `patient_ref` is opaque: what the hospital's PC knows the patient by. `order_number`: the order's or accession
-    number.
-    """
+class LesionFields(BaseModel):
+    """What the operator says of an exam: side, clock position and distance (mm) from the nipple are the lesion's."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
-    kind: ExamKind | None = None
-    patient_ref: Identifier | None = None
-    order_number: Identifier | None = None
     side: Literal["left", "right"] | None = None
     clock_position: Annotated[int, Field(ge=1, le=12)] | None = None
     nipple_distance_mm: Annotated[float, Field(ge=0.0, le=250.0, allow_inf_nan=False)] | None = None
     operator: Identifier | None = None
     note: Annotated[str, Field(max_length=2000), AfterValidator(_lines)] = ""
+
+
+class ExamFields(LesionFields):
+    """What may be said of an exam.
+
+    `patient_ref` is opaque: what the hospital's PC knows the patient by. `order_number`: the order's or accession
+    number.
+    """
+
+    kind: ExamKind | None = None
+    patient_ref: Identifier | None = None
+    order_number: Identifier | None = None
 
 
 class ExamContent(ExamFields):
@@ -107,8 +112,15 @@ class Exams:
         """Take how a transaction of the store is begun."""
         self._transaction = transaction
 
-    def make(self, content: ExamContent, once: AskedOnce | None = None) -> _Record:
+    def make(
+        self,
+        content: ExamContent,
+        once: AskedOnce | None = None,
+        also: Callable[[sqlite3.Connection, str], None] = lambda db, exam_id: None,
+    ) -> _Record:
         """Keep a new exam and return it; of a request that was obeyed before, what it was answered with then.
+
+        `also` keeps what belongs to the exam's id in the same transaction.
 
         Raises `ReusedKey` for another request's key.
         """
@@ -121,6 +133,7 @@ class Exams:
             exam = {"id": exam_id, "seq": cursor.lastrowid, "version": 1, "made_at": at, "changed_at": at, **said}
             db.execute("UPDATE exam SET record = ? WHERE id = ?", (json.dumps(exam), exam_id))
             append(db, "exam_made", exam_id, by=content.operator, after=said)
+            also(db, exam_id)
             if once:
                 keep_answer(db, once, exam)
         return exam
@@ -155,7 +168,7 @@ class Exams:
         with self._transaction() as db:
             exam = exam_of(db, exam_id, version)
             before = {name: exam[name] for name in ExamContent.model_fields}
-            after = _content({**before, **changes})
+            after = exam_content({**before, **changes}).model_dump()
             changed = [name for name in before if after[name] != before[name]]
             if not changed:
                 return exam
@@ -207,13 +220,14 @@ def filed(exam_id: str | None, voided: str | None, version: int | None) -> _Reco
     return {"exam_id": exam_id, "voided": voided and json.loads(voided), "version": version}
 
 
-def _content(said: _Record) -> _Record:
+def exam_content(said: _Record) -> ExamContent:
+    """Return an exam of its fields; raise `InvalidRequest` when they are none."""
     try:
-        return ExamContent.model_validate(said).model_dump()
+        return ExamContent.model_validate(said)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, ("exam", *first["loc"])))
-        raise InvalidRequest(f"{where}: {first['msg']}.", "Correct the field; the exam stays as it was.") from None
+        raise InvalidRequest(f"{where}: {first['msg']}.", "Correct the field; no exam was made or changed.") from None
 
 
 def exam_of(db: sqlite3.Connection, exam_id: str, version: int | None = None) -> _Record:

@@ -14,6 +14,7 @@ from device.records.asked_once import ANSWERS_TABLE
 from device.records.audit import AUDIT_GUARDS, AUDIT_TABLE, chain_older_audit
 from device.records.exams import EXAM_TABLES
 from device.records.manifest import MANIFEST_TABLE
+from device.records.outbox import OUTBOX_TABLES
 from device.records.schema import STORE_WRITES
 from device.records.tokens import TOKENS_TABLE
 
@@ -30,6 +31,7 @@ STEPS: MappingProxyType[int, tuple[_Step, ...]] = MappingProxyType(
         4: (ANSWERS_TABLE, EXAM_TABLES),
         5: (TOKENS_TABLE, AUDIT_TABLE, chain_older_audit, AUDIT_GUARDS),
         6: (MANIFEST_TABLE,),
+        7: (OUTBOX_TABLES,),
     }
 )
 """What is done to reach each form; to reach 2 and 3 nothing, for only recordings changed."""

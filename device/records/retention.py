@@ -104,11 +104,12 @@ class Retention:
 
 
 def _kept_recordings(db: sqlite3.Connection) -> list[tuple[int, Removal]]:
-    """Return every recording that is kept, with the number of its measurement, oldest first."""
+    """Return every recording that is kept and not needed for the archive, by its measurement's number, oldest first."""
     manifest = manifest_of(db)
     query = (
         "SELECT seq, id, json_extract(record, '$.recording_id'), json_extract(record, '$.taken_at') "
-        "FROM measurement ORDER BY seq"
+        "FROM measurement WHERE id NOT IN "
+        "(SELECT measurement_id FROM outbox WHERE state IN ('queued', 'sent', 'refused')) ORDER BY seq"
     )
     return [
         (seq, Removal(recording, name, taken_at or "", manifest[recording].fingerprint.size_bytes, ""))

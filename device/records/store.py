@@ -28,6 +28,7 @@ from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.listing import Listing
 from device.records.manifest import fingerprint_of, note_kept
+from device.records.outbox import Outbox
 from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
 from device.records.retention import Retention
 from device.records.tokens import Tokens
@@ -58,6 +59,7 @@ class Store:
             self.exams, self.audit = Exams(self._transaction), Audit(self._transaction)
             self.tokens = Tokens(self._transaction)
             self.listing = Listing(self._transaction)
+            self.outbox = Outbox(self._transaction)
             self.recordings = KeptRecordings(folder, self._transaction)
             self.retention = Retention(folder, self._transaction, self.recordings, lambda: self.free_mb)
             broken_off = [] if to_read else self._records("SELECT record FROM press WHERE ended = 0")

@@ -1,18 +1,128 @@
-"""Exams in the hospital's format over REST: as files to download."""
+"""Exams in the hospital's format over REST: made of its worklist, as files to download, and sent to its archive.
+
+What is sent is what the client has seen (If-Match), so that no exam goes out that was corrected to another patient
+meanwhile.
+"""
 
 from __future__ import annotations
 
+from datetime import date
+from typing import Annotated, Any
+
 from fastapi import FastAPI, Response
+from pydantic import BaseModel, ConfigDict, Field
 
 from device.dicom.hospital import Hospital
-from device.web.contract import ZIP, media
+from device.dicom.subject import ObjectKind
+from device.records.exams import Identifier, LesionFields
+from device.records.outbox import OutboxState
+from device.web.contract import ZIP, answers, media
+from device.web.exams import OnceKey, SeenVersion, asked_once, tagged, version_of
+from device.web.schema import Exam, Fault
+
+
+class Sending(BaseModel):
+    """Who sends an exam to the archive."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    by: Identifier
+
+
+class ExamObject(BaseModel):
+    """An object of an exam, and how far it is on its way to the archive; `problem` is what the archive said last.
+
+    A `rejection` tells the archive that another object is not to be used any more: a measurement that is void, was
+    moved, or whose exam was corrected after it was sent.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    uid: str
+    kind: ObjectKind
+    study_uid: str
+    measurement_id: str
+    state: OutboxState
+    problem: str
+    tries: int
+    queued_at: str
+    sent_at: str | None
+    confirmed_at: str | None
+
+
+class SentExam(BaseModel):
+    """The objects of an exam that were ever to be at the archive, oldest first."""
+
+    exam_id: str
+    objects: list[ExamObject]
+
+
+class RemotePlace(BaseModel):
+    """Where a program of the hospital is, and its application entity title."""
+
+    host: str
+    port: int
+    title: str
+
+
+class HospitalStatus(BaseModel):
+    """Where archive and worklist are, null for none, and how many objects are in which state.
+
+    `fault`: why the archive has not got what it is to have; `next_try_at`: when it is tried again.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    own_title: str
+    archive: RemotePlace | None
+    worklist: RemotePlace | None
+    objects: dict[OutboxState, int]
+    fault: Fault | None
+    next_try_at: str | None
+
+
+class OrderedStep(BaseModel):
+    """An examination that the hospital's worklist has, with what tells the operator whose it is.
+
+    `scheduled_at` and `patient_birth_date` are as the hospital writes them, YYYYMMDD and the time behind.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    id: str
+    scheduled_at: str
+    patient_ref: str
+    patient_name: str
+    patient_birth_date: str
+    patient_sex: str
+    patient_issuer: str
+    order_number: str
+    study_uid: str
+    procedure_id: str
+    step_id: str
+    description: str
+
+
+class Worklist(BaseModel):
+    """Steps by their time."""
+
+    steps: list[OrderedStep]
+
+
+class ScheduledExam(LesionFields):
+    """A step that was shown, by its `id`, and what the worklist does not say of the exam."""
+
+    step: Annotated[str, Field(max_length=64)]
+    operator: Identifier
 
 
 def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
     """Add the routes below `api` of what the hospital's programs read."""
+    of_exam = f"{api}/exams/{{exam_id}}/dicom"
+
+    @app.get(f"{api}/dicom", responses=answers(200, HospitalStatus), tags=["hospital"])
+    def get_hospital() -> dict[str, Any]:
+        """Say where archive and worklist are, and what the archive has not got yet."""
+        return hospital.as_record()
 
     @app.get(
-        f"{api}/exams/{{exam_id}}/dicom.zip",
+        f"{of_exam}.zip",
         response_class=Response,
         responses=media(ZIP, "An image and a report of each measurement that counts."),
         tags=["hospital"],
@@ -20,3 +130,34 @@ def add_dicom(app: FastAPI, api: str, hospital: Hospital) -> None:
     def get_dicom_files(exam_id: str) -> Response:
         """Return an exam as DICOM files, for a PC that fetches them itself."""
         return Response(hospital.files_of(exam_id), media_type=ZIP)
+
+    @app.get(of_exam, responses=answers(200, SentExam), tags=["hospital"])
+    def get_sent_exam(exam_id: str) -> dict[str, Any]:
+        """Return how far an exam is on its way to the archive."""
+        return {"exam_id": exam_id, "objects": hospital.objects_of(exam_id)}
+
+    @app.post(of_exam, status_code=202, responses=answers(202, SentExam), tags=["hospital"])
+    def send_exam(exam_id: str, sending: Sending, if_match: SeenVersion) -> dict[str, Any]:
+        """Send an exam to the archive: all of it that counts, and what was sent before not again."""
+        objects = hospital.send(exam_id, version=version_of(if_match), by=sending.by)
+        return {"exam_id": exam_id, "objects": objects}
+
+    @app.get(f"{api}/worklist", responses=answers(200, Worklist), tags=["hospital"])
+    def get_worklist(
+        day: date | None = None, patient_ref: str | None = None, order_number: str | None = None
+    ) -> dict[str, Any]:
+        """Ask the hospital's worklist what is ordered, of a day, a patient or an order."""
+        return {"steps": hospital.scheduled(day, patient_ref, order_number)}
+
+    @app.post(
+        f"{api}/worklist/exams", status_code=201, responses=answers(201, Exam, "Location", "ETag"), tags=["hospital"]
+    )
+    def make_scheduled_exam(
+        scheduled: ScheduledExam, response: Response, idempotency_key: OnceKey = None
+    ) -> dict[str, Any]:
+        """Begin an exam of a step of the worklist: patient, order and study are those that were shown."""
+        path = f"{api}/worklist/exams"
+        once = None if idempotency_key is None else asked_once(idempotency_key, f"POST {path}", scheduled)
+        exam = hospital.begin_exam(scheduled.step, scheduled.model_dump(exclude={"step"}), once)
+        response.headers["Location"] = f"{api}/exams/{exam['id']}"
+        return tagged(response, exam)

@@ -185,6 +185,9 @@ class AuditEntry(_Body):
         "token_made",
         "token_revoked",
         "settings_changed",
+        "exam_sent",
+        "object_withdrawn",
+        "object_recalled",
     ]
     subject: str
     reason: str

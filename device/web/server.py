@@ -19,6 +19,7 @@ from fastapi import FastAPI
 from device.access.certificate import CIPHERS
 from device.access.known_hosts import KnownHosts
 from device.config import ServerSection
+from device.dicom.hospital import Hospital
 from device.instrument.procedure import Procedure
 from device.records.updates import Updates
 from device.web.app import create_app
@@ -34,14 +35,25 @@ GRACE_S = 1
 MOST_HEAD_BYTES = 16 * 1024
 
 
-def run_server(procedure: Procedure, listening: Sequence[socket.socket], network: NetworkPort | None = None) -> None:
+def run_server(
+    procedure: Procedure, hospital: Hospital, listening: Sequence[socket.socket], network: NetworkPort | None = None
+) -> None:
     """Serve a running procedure on ports that listen, until SIGTERM or SIGINT."""
     stated, answers = procedure.config.server, OpenAnswers()
     hosts = KnownHosts.of_machine(stated.host, *stated.hosts)
     store, updates, door = procedure.store, Updates(procedure.config.updates), Door(procedure.store.tokens)
     door.tokens.on_revoked(answers.end_of)
     served = network.served if network else None
-    app = create_app(procedure, store, hosts=hosts, updates=updates, door=door, answers=answers, network=served)
+    app = create_app(
+        procedure,
+        store,
+        hosts=hosts,
+        updates=updates,
+        hospital=hospital,
+        door=door,
+        answers=answers,
+        network=served,
+    )
     servers = [DarkeningServer(_settings(app), procedure, answers, listening)]
     if network:
         servers.append(DarkeningServer(_encrypted(app, network, stated), procedure, answers, [network.listening]))

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from device.files.shipped import MODELS, SOURCE_TREE
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Bound, InvalidQuantity
 
 Scheduler = Annotated[
     str | None,
@@ -52,6 +52,18 @@ def require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:
         raise InvalidQuantity("file", path, f"of type {', '.join(suffixes)}", "give it another name")
     if path and not path.parent.is_dir():
         raise InvalidQuantity("folder", path.parent, "a folder that exists", "make it first")
+
+
+def ratio_of(text: str) -> float:
+    """Return 0.005 for "0.5%" or "0.005"."""
+    try:
+        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        value = -1.0
+    bound = Bound(0.0, 1.0, "", low_included=False)
+    if not bound.holds(value):
+        raise InvalidQuantity("tolerance", repr(text), f"a ratio {bound}, or per cent", "give for example 0.5%")
+    return value
 
 
 def problem_record(problem: InvalidQuantity) -> dict[str, str]:

@@ -11,7 +11,7 @@ import typer
 
 from device.files.shipped import SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.commands.output import note, require_writable
+from host_tools.commands.output import note, ratio_of, require_writable
 from host_tools.commands.probe import ProbeOption, with_probe
 from host_tools.scenes.scene import Press, Scene
 
@@ -60,7 +60,7 @@ def simulate(
     asked = _scene(base, inclusion, tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n))
     if save_scene:
         _save(asked, save_scene)
-    climbed = _climbed(asked, _ratio(tolerance), strain, within_s, best=best)
+    climbed = _climbed(asked, ratio_of(tolerance), strain, within_s, best=best)
     solution = climbed.solutions[0]
     if plot:
         _plot(solution, plot)
@@ -79,18 +79,6 @@ def _require_outputs(
         require_writable(path, endings)
     require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
     require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
-
-
-def _ratio(text: str) -> float:
-    """Return 0.005 for "0.5%" or "0.005"."""
-    try:
-        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        value = -1.0
-    bound = Bound(0.0, 1.0, "", low_included=False)
-    if not bound.holds(value):
-        raise InvalidQuantity("tolerance", repr(text), f"a ratio {bound}, or per cent", "give for example 0.5%")
-    return value
 
 
 def _read(path: Path | None) -> Scene:

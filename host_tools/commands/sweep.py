@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from host_tools.commands.output import Scheduler, note, progress
+from host_tools.commands.output import Scheduler, note, progress, ratio_of
 from host_tools.commands.probe import ProbeOption
 
 SweepStrain = Literal["small", "finite"]
@@ -23,6 +23,9 @@ def sweep(
     strain: Annotated[SweepStrain, typer.Option(help="small (linear) or finite.")] = "small",
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that holds something else.")] = False,
+    tolerance: Annotated[
+        str | None, typer.Option(help="A row that states more than this, such as 1%, has failed; any row counts else.")
+    ] = None,
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -32,7 +35,8 @@ def sweep(
     from host_tools.scenes.probe_file import probe_of
 
     forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N
-    plan = SweepPlan(scenes, seed, forces_n, strain, probe_of(probe).waveguide)
+    allowed = None if tolerance is None else ratio_of(tolerance)
+    plan = SweepPlan(scenes, seed, forces_n, strain, probe_of(probe).waveguide, allowed)
     failed = 0
     with progress("scenes") as bar:
         task = bar.add_task("", total=scenes)

@@ -24,12 +24,14 @@ def verify(
     short: Annotated[bool, typer.Option(help="Fewer cases, and nothing that takes minutes.")] = False,
     extremes: Annotated[bool, typer.Option(help="Add scenes at the ends of every range.")] = False,
     effectivity: Annotated[bool, typer.Option(help="Add how often stated errors hold the true ones.")] = False,
+    tolerances: Annotated[bool, typer.Option(help="Add whether tolerances that are asked for are held.")] = False,
     tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
     scheduler: Scheduler = None,
 ) -> None:
     """Check the forward model against answers known on paper; exit code 1 when one misses its bound."""
     require_writable(out, (".md",))
-    extra = [name for name, wanted in (("extremes", extremes), ("effectivity", effectivity)) if wanted]
+    longer = {"extremes": extremes, "effectivity": effectivity, "tolerances": tolerances}
+    extra = [name for name, wanted in longer.items() if wanted]
     chapters = _chapters(only or [], extra, short=short)
     with workers(scheduler):
         if tables:

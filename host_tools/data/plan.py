@@ -26,7 +26,8 @@ SCHEMA_OF_LOADS = "tsis.sweep/2"
 class SweepPlan:
     """What is swept: `scenes` draws from the box with a seed, each pressed with every one of `forces_n`, rising.
 
-    By one probe's `waveguide`, the simulated one's unless given.
+    By one probe's `waveguide`, the simulated one's unless given. With a `tolerance` (relative) a row that states more
+    of any feature has failed.
     """
 
     scenes: int
@@ -34,6 +35,7 @@ class SweepPlan:
     forces_n: tuple[float, ...] = DEFAULT_FORCES_N
     strain: StrainModel = "small"
     waveguide: Waveguide = field(default_factory=Waveguide)
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         require("scenes", self.scenes, Bound(1, 1_000_000, "scenes"), "ask for at least one scene")
@@ -42,6 +44,8 @@ class SweepPlan:
             raise InvalidQuantity("strain", repr(self.strain), "'small' or 'finite'", "choose one of them")
         if not self.forces_n or any(b <= a for a, b in zip(self.forces_n, self.forces_n[1:], strict=False)):
             raise InvalidQuantity("forces_n", self.forces_n, "at least one force, rising", "order the loads")
+        if self.tolerance is not None:
+            require("tolerance", self.tolerance, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
         for force_n in self.forces_n:
             Press(force_n=force_n)
 
@@ -72,4 +76,5 @@ class SweepPlan:
             **loads,
             "box": {"low": PAPER_BOX_LOW, "high": PAPER_BOX_HIGH},
             "scene_defaults": surroundings,
+            **({} if self.tolerance is None else {"tolerance": self.tolerance}),
         }

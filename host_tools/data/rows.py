@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from device.measurement.quantities import UNKNOWNS
 from host_tools.data.journal import Row
 from host_tools.data.plan import SweepPlan
+from host_tools.forward.ladder import worst_error
 from host_tools.forward.plan import StrainModel, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
@@ -28,11 +29,21 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
         solutions = _solve_loads(plan.scene(truth), plan.forces_n, plan.strain)
     except (NgException, ValueError, ArithmeticError, RuntimeError) as error:
         return empty_row(index, truth, reason=f"{type(error).__name__}: {error}")
+    if reason := _missed(solutions, plan.tolerance):
+        return empty_row(index, truth, reason=reason)
     columns = [_columns(solution) for solution in solutions]
     if plan.has_load_axis:
         of_loads = {name: [column[name] for column in columns] for name in columns[0]}
         return empty_row(index, truth) | of_loads | {"r_mm": columns[0]["r_mm"]}
     return empty_row(index, truth) | columns[0]
+
+
+def _missed(solutions: tuple[Solution, ...], tolerance: float | None) -> str:
+    """Return which feature of which load states more than the tolerance; nothing when none does, or none was asked."""
+    feature, error, force_n = max(((*worst_error(one), one.force_n) for one in solutions), key=lambda worst: worst[1])
+    if tolerance is None or error <= tolerance:
+        return ""
+    return f"{feature} under {force_n:g} N is only good to {100 * error:.2g} %, but {100 * tolerance:g} % was asked for"
 
 
 def empty_row(index: int, truth: Truth, *, reason: str = "") -> Row:

@@ -150,11 +150,11 @@ def _rung(scene: Scene, presses: Sequence[Press], plan: ModelPlan, level: Level,
         predicted_seconds=None,
     )
     solutions = solve_ramp(scene, presses, on_level, estimate_error=True)
-    feature, reached = max((_worst(one) for one in solutions), key=lambda pair: pair[1])
+    feature, reached = max((worst_error(one) for one in solutions), key=lambda pair: pair[1])
     return Climb(solutions, tolerance, reached, feature)
 
 
-def _worst(solution: Solution) -> tuple[str, float]:
+def worst_error(solution: Solution) -> tuple[str, float]:
     """Return the feature with the largest stated error, and that error; a number that is none counts as infinite."""
     by_force = solution.scene.press.force_n is not None
     stated = {

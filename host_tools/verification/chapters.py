@@ -82,4 +82,15 @@ def effectivity_chapter() -> Chapter:
     )
 
 
-EXTRA_CHAPTERS: dict[str, Callable[[], Chapter]] = {"extremes": extremes_chapter, "effectivity": effectivity_chapter}
+def tolerances_chapter() -> Chapter:
+    """Return the chapter on tolerances that are asked for; minutes."""
+    from host_tools.verification.tolerances import tolerances_chapter as measured_chapter
+
+    return measured_chapter()
+
+
+EXTRA_CHAPTERS: dict[str, Callable[[], Chapter]] = {
+    "extremes": extremes_chapter,
+    "effectivity": effectivity_chapter,
+    "tolerances": tolerances_chapter,
+}

@@ -49,9 +49,7 @@ def models(tmp_path):
 def started(monkeypatch):
     """Statuses of the daemons that have started; each ends where it would begin to serve."""
     statuses = []
-    monkeypatch.setattr(
-        serving, "_run_server", lambda procedure, listening, network: statuses.append(snapshot(procedure))
-    )
+    monkeypatch.setattr(serving, "_run_server", lambda procedure, *_: statuses.append(snapshot(procedure)))
     return statuses
 
 

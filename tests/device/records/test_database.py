@@ -109,7 +109,7 @@ def test_what_keeps_rows_over_a_power_cut_is_read_back(tmp_path, monkeypatch):
     store = Store(tmp_path)
     found = {name: store._db.execute(f"PRAGMA {name}").fetchone()[0] for name in database.DURABLE}
     store.close()
-    assert found == {"journal_mode": "wal", "synchronous": 2, "cell_size_check": 1}
+    assert found == {"journal_mode": "wal", "synchronous": 2, "cell_size_check": 1, "secure_delete": 1}
     monkeypatch.setattr(database, "SET", {**database.SET, "synchronous": "NORMAL"})
     with pytest.raises(StorageError, match="synchronous in .* is 1, but must be 2") as refusal:
         Store(tmp_path)

@@ -9,6 +9,8 @@ from probe_card import RECORDING
 
 from device.errors import DamagedRecordingError
 from device.instrument.watch.recordings_watch import RecordingsWatch
+from device.records.exams import ExamContent
+from device.records.outbox import OutboxItem
 from device.records.retention import RetentionRule
 from device.records.saved import SAVED
 from device.records.store import Store
@@ -47,6 +49,16 @@ def test_without_a_rule_nothing_is_ever_deleted(store):
     save(store)
     assert names(store.retention.carry_out(RetentionRule())) == []
     assert files(store) == ["r-1", "r-2", "r-3", "r-4"]
+
+
+def test_what_the_hospitals_archive_has_not_got_yet_stays(store):
+    save(store)
+    exam = store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
+    store.outbox.add([OutboxItem("2.25.1", exam["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    rule = RetentionRule(keep_days=90)
+    assert names(store.retention.plan(rule)) == ["r-2"]
+    store.outbox.settle("2.25.1", "confirmed")
+    assert names(store.retention.plan(rule)) == ["r-1", "r-2"]
 
 
 def test_what_is_older_is_shown_and_then_deleted_while_its_numbers_stay(store):

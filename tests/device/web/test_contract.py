@@ -66,7 +66,8 @@ def test_the_one_problem_is_a_problem_document():
 
 def test_who_starts_something_is_told_where_to_follow_it():
     asked = ("POST presses", "POST self-test", "POST updates", "POST updates/roll-back")
-    assert {name for name in OPERATIONS if "Location" in good(OPERATIONS[name])[2]} == {*asked, "POST exams"}
+    made = ("POST exams", "POST worklist/exams")
+    assert {name for name in OPERATIONS if "Location" in good(OPERATIONS[name])[2]} == {*asked, *made}
 
 
 def test_what_changes_something_wants_the_version_that_was_seen_and_what_starts_something_may_have_a_key():
@@ -82,7 +83,8 @@ def test_what_changes_something_wants_the_version_that_was_seen_and_what_starts_
     assert {name: wanted for name, wanted in headers.items() if wanted} == {
         "POST presses": {"Idempotency-Key": False, "If-Match": False},
         "POST exams": {"Idempotency-Key": False},
-        **{act: {"If-Match": True} for act in acts},
+        "POST worklist/exams": {"Idempotency-Key": False},
+        **{act: {"If-Match": True} for act in (*acts, "POST exams/{exam_id}/dicom")},
     }
     for name in (*acts, "GET exams/{exam_id}", "GET measurements/{measurement_id}", "POST exams"):
         assert "ETag" in good(OPERATIONS[name])[2]

@@ -260,3 +260,13 @@ def test_a_file_that_cannot_be_written_leaves_nothing_behind_and_its_rows_are_ke
     with pytest.raises(OSError, match="No space"):
         sweep(SweepPlan(SCENES, 6), out.with_name("t.nc"))
     assert sorted(path.name for path in out.parent.iterdir()) == ["s.nc", "t.nc.partial"]
+
+
+def test_a_row_that_states_more_than_the_tolerance_says_which_number_and_how_much():
+    plan = SweepPlan(1, 4, tolerance=1e-6)
+    row = solve_row(plan, 0, plan.truths()[0])
+    assert "under 0.5 N is only good to 0." in row["reason"]
+    assert "0.0001 % was asked for" in row["reason"]
+    held = SweepPlan(1, 4, tolerance=0.05)
+    assert solve_row(held, 0, held.truths()[0])["reason"] == ""
+    assert (held.as_record()["tolerance"], "tolerance" in SweepPlan(1, 4).as_record()) == (0.05, False)

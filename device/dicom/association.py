@@ -1,0 +1,146 @@
+"""An association with a program of the hospital, in the clear or by TLS, and what it means when there is none.
+
+Nothing of pynetdicom's own is logged: its log prints patients' data.
+"""
+
+from __future__ import annotations
+
+import logging
+import ssl
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import pynetdicom.association
+from pydicom.dataset import Dataset
+from pydicom.uid import UID
+from pynetdicom import AE, evt
+from pynetdicom.association import Association
+from pynetdicom.dul import DULServiceProvider
+
+from device.config import DicomSection
+from device.dicom.subject import IMPLEMENTATION_UID
+from device.errors import ArchiveUnreachable
+
+logging.getLogger("pynetdicom").setLevel(logging.CRITICAL)
+
+VERIFICATION, WORKLIST_FIND = UID("1.2.840.10008.1.1"), UID("1.2.840.10008.5.1.4.31")
+STUDY_FIND = UID("1.2.840.10008.5.1.4.1.2.2.1")
+COMMITMENT, COMMITMENT_INSTANCE = UID("1.2.840.10008.1.20.1"), UID("1.2.840.10008.1.20.1.1")
+"""SOP classes of services, PS3.4; pynetdicom makes its names of them while it runs, where no check of types sees them.
+"""
+CONNECT_S, ANSWER_S = 10.0, 30.0
+VERSION_NAME = "TSIS"
+
+
+class UnawaitedProvider(DULServiceProvider):
+    """pynetdicom's thread that has the connection, which would keep a stop of the daemon waiting for a silent archive.
+
+    It may be in a connect that takes ten seconds; a process ends without waiting for a daemonic thread.
+    """
+
+    def start(self) -> None:
+        """Begin."""
+        self.daemon = True
+        super().start()
+
+
+pynetdicom.association.DULServiceProvider = UnawaitedProvider  # type: ignore[attr-defined]
+
+
+@dataclass(frozen=True)
+class RemoteProgram:
+    """A program of the hospital in DICOM's network: `what` it is in words."""
+
+    what: str
+    host: str
+    port: int
+    title: str
+
+    def __str__(self) -> str:
+        return f"{self.what} {self.title} at {self.host}:{self.port}"
+
+
+def archive_of(settings: DicomSection) -> RemoteProgram | None:
+    """Return the archive, if there is one."""
+    if settings.archive_host is None:
+        return None
+    return RemoteProgram("archive", settings.archive_host, settings.archive_port, settings.archive_title)
+
+
+def worklist_of(settings: DicomSection) -> RemoteProgram | None:
+    """Return what keeps the worklist, if there is one."""
+    if settings.worklist_host is None:
+        return None
+    return RemoteProgram("worklist", settings.worklist_host, settings.worklist_port, settings.worklist_title)
+
+
+def application(settings: DicomSection) -> AE:
+    """Return this probe as a program in DICOM's network."""
+    own = AE(ae_title=settings.own_title)
+    own.implementation_class_uid, own.implementation_version_name = IMPLEMENTATION_UID, VERSION_NAME
+    own.connection_timeout = own.acse_timeout = CONNECT_S
+    own.dimse_timeout = own.network_timeout = ANSWER_S
+    return own
+
+
+@contextmanager
+def associated(remote: RemoteProgram, settings: DicomSection, sop_classes: Sequence[str]) -> Iterator[Association]:
+    """Associate for some SOP classes until the block ends; raise `ArchiveUnreachable` saying why that fails."""
+    own = application(settings)
+    for sop_class in sop_classes:
+        own.add_requested_context(sop_class)
+    connections: list[object] = []
+    association = own.associate(
+        remote.host,
+        remote.port,
+        ae_title=remote.title,
+        tls_args=_tls(settings, remote),
+        evt_handlers=[(evt.EVT_CONN_OPEN, connections.append)],
+    )
+    if not association.is_established:
+        raise unreachable(remote, _refusal(association, settings) if connections else "cannot be reached")
+    try:
+        yield association
+    finally:
+        association.release() if association.is_established else association.abort(block=False)
+
+
+def unreachable(remote: RemoteProgram, why: str) -> ArchiveUnreachable:
+    """Return the error of a program that does not answer."""
+    remedy = "Check network and settings with `python -m device dicom echo`; what waits is sent by itself."
+    return ArchiveUnreachable(f"The {remote} {why}.", remedy)
+
+
+def status_of(answer: Dataset) -> int | None:
+    """Return the status of an answer, None when the connection was lost before it came."""
+    status = answer.get("Status")
+    return None if status is None else int(status)
+
+
+def echo(remote: RemoteProgram, settings: DicomSection) -> None:
+    """Ask a program whether it is there (C-ECHO); raise `ArchiveUnreachable` when it does not say so."""
+    with associated(remote, settings, [VERIFICATION]) as association:
+        status = status_of(association.send_c_echo())
+    if status != 0:
+        raise unreachable(remote, "gives no answer" if status is None else f"answers with status {status:#06x}")
+
+
+def _refusal(association: Association, settings: DicomSection) -> str:
+    if association.is_rejected:
+        answer: Any = association.acceptor.primitive
+        return f"rejects {settings.own_title}: {answer.reason_str}"
+    return "takes none of what this probe offers, or broke the connection off"
+
+
+def _tls(settings: DicomSection, remote: RemoteProgram) -> tuple[ssl.SSLContext, str] | None:
+    if settings.tls_authority is None:
+        return None
+    try:
+        context = ssl.create_default_context(cafile=settings.tls_authority)
+        if settings.tls_certificate:
+            context.load_cert_chain(settings.tls_certificate, settings.tls_key)
+    except OSError as error:
+        raise unreachable(remote, f"is not asked, for a certificate of the settings cannot be read: {error}") from error
+    return context, remote.host

@@ -1,0 +1,138 @@
+"""An exam to rows of the outbox, a row to its object, and rows that are not right any more to what recalls them.
+
+A measurement that is void, or belongs to another exam, or whose exam says something else now, must not stay at the
+archive as if it were right: each of its objects there gets a note that it is rejected (IHE IOCM).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from typing import Any, get_args
+
+from pydicom.dataset import Dataset
+
+from device.dicom.objects import DicomWriter
+from device.dicom.rejection import rejection_of
+from device.dicom.subject import DicomSubject, ObjectKind, OrderedStudy, object_uid, require_writable, uid_of
+from device.errors import InvalidRequest
+from device.files.recording_file import RecordingHead
+from device.measurement.recording.recording import CameraSettings
+from device.records.outbox import OutboxItem
+from device.records.store import Store, StoredRecord
+
+WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
+"""What is written of each measurement, in the order in which it is sent: a report refers to its image."""
+MOST_MEASUREMENTS = 200
+
+
+class Outgoing:
+    """What a store's exams mean to the archive."""
+
+    def __init__(self, store: Store, writer: DicomWriter, *, with_phantoms: bool) -> None:
+        """Take the store, what writes objects, and whether exams of phantoms are sent."""
+        self._store, self._writer, self._with_phantoms = store, writer, with_phantoms
+
+    def queue(self, exam_id: str, *, version: int, by: str) -> None:
+        """Queue all of an exam that counts.
+
+        Raises as `Exams.exam`, and `InvalidRequest` when nothing of it counts, it is a phantom's, or an identifier of
+        it cannot be written.
+        """
+        exam = self._store.exams.exam(exam_id, version)
+        if exam["kind"] == "phantom" and not self._with_phantoms:
+            raise InvalidRequest("Exams of phantoms are not sent.", "Set dicom.send_phantoms if they are to be.")
+        require_writable(exam)
+        counting = counting_measurements(self._store, exam_id)
+        order = ordered_study(self._store, exam_id)
+        items = [self._item(kind, one, exam, order) for one in counting for kind in WRITTEN]
+        self._store.outbox.add(items, by=by, exam_version=version)
+
+    def _item(
+        self, kind: ObjectKind, measurement: StoredRecord, exam: StoredRecord, order: OrderedStudy | None
+    ) -> OutboxItem:
+        subject = self._writer.subject(measurement["id"], exam, order, now())
+        about = _about(kind, subject)
+        return OutboxItem(
+            subject.uid(kind), exam["id"], measurement["id"], exam["version"], measurement["version"], about
+        )
+
+    def written(self, row: StoredRecord) -> Dataset:
+        """Return the object of a row; raises as `DicomWriter.image`, and `UnknownResource`."""
+        subject, kind = self._subject(row), row["about"]["kind"]
+        if kind == "rejection":
+            return rejection_of(subject, row["uid"], row["about"]["rejects"], row["about"]["why"])
+        return self._writer.image(subject) if kind == "image" else self._writer.report(subject)
+
+    def _subject(self, row: StoredRecord) -> DicomSubject:
+        """Return what a row is written of, as it was when the row was queued."""
+        about = row["about"]
+        kept = ordered_study(self._store, row["exam_id"])
+        patient = kept.patient if kept else {}
+        order = OrderedStudy(**about["order"], patient=patient) if about["order"] else None
+        head = RecordingHead(**{**about["head"], "camera": CameraSettings(**about["head"]["camera"])})
+        measurement = self._store.measurement(row["measurement_id"])
+        return DicomSubject(measurement, about["exam"], head, about["written_at"], about["institution"], order)
+
+    def take_back_what_is_wrong(self) -> int:
+        """Withdraw or recall every object that is not right any more; return how many."""
+        taken = 0
+        for row, exam, filing in self._store.outbox.changed_since():
+            if row["about"]["kind"] == "rejection" or not (why := self._wrong(row, exam, filing)):
+                versions = {"exam_version": exam["version"], "filing_version": filing["version"]}
+                self._store.outbox.hold_on(row["uid"], **versions)
+                continue
+            about = _about("rejection", replace(self._subject(row), written_at=now()))
+            about |= {"rejects": {"uid": row["uid"], **row["about"]}, "why": why}
+            ids = uid_of("rejection", row["uid"]), row["exam_id"], row["measurement_id"]
+            recall = OutboxItem(*ids, exam["version"], filing["version"], about)
+            self._store.outbox.take_back(row["uid"], recall, why)
+            taken += 1
+        return taken
+
+    def _wrong(self, row: StoredRecord, exam: StoredRecord, filing: StoredRecord) -> str:
+        """Return why a row is not right any more, "" when it is."""
+        if filing["voided"]:
+            return f"The measurement does not count: {filing['voided']['reason']}"
+        if filing["exam_id"] != row["exam_id"]:
+            return "The measurement belongs to another exam."
+        order = ordered_study(self._store, row["exam_id"])
+        is_same = object_uid(row["about"]["kind"], row["measurement_id"], exam, order) == row["uid"]
+        return "" if is_same else "The exam was corrected."
+
+
+def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:
+    """Return what is needed to write an object again, beside its measurement, and where the archive has it."""
+    order = asdict(subject.order) if subject.order else None
+    if order:
+        del order["patient"]  # kept apart, to be erased
+    return {
+        "kind": kind,
+        "exam": subject.exam,
+        "order": order,
+        "head": asdict(subject.head),
+        "institution": subject.institution,
+        "written_at": subject.written_at,
+        "study_uid": subject.study_uid,
+        "series_uid": subject.series_uid(kind),
+    }
+
+
+def ordered_study(store: Store, exam_id: str) -> OrderedStudy | None:
+    """Return what the worklist has said of an exam, None when it was not made from it."""
+    kept = store.outbox.ordered(exam_id)
+    return OrderedStudy(**kept[0], patient=kept[1]) if kept else None
+
+
+def counting_measurements(store: Store, exam_id: str) -> list[dict[str, Any]]:
+    """Return the measurements of an exam that are not void; raise `InvalidRequest` when there is none."""
+    found = store.measurements(before_seq=2**63 - 1, limit=MOST_MEASUREMENTS, exam_id=exam_id)
+    counting = [one for one in found if not one["voided"]]
+    if not counting:
+        raise InvalidRequest(f"The exam {exam_id} has no measurement that counts.", "Measure first.")
+    return counting
+
+
+def now() -> str:
+    """Return the time, RFC 3339 UTC."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,234 @@
+"""What is queued gets to a real archive, once, is confirmed there, and is taken back when it is not right any more."""
+
+import io
+
+import pydicom
+import pytest
+from orthanc import Orthanc, free_port, needs_orthanc
+from written_exam import begin, measure, needs_dciodvfy, verdict
+
+from device.config import DicomSection
+from device.dicom import delivery
+from device.dicom.association import archive_of, echo
+from device.dicom.delivery import Delivery
+from device.dicom.objects import DicomWriter, as_file
+from device.dicom.outgoing import Outgoing
+from device.errors import ArchiveUnreachable, InvalidRequest, StaleVersion
+from device.files.recording_file import read_picture
+from device.records.store import Store
+
+# pynetdicom leaves the socket of a connection that failed to Python, which closes it at once.
+UNCLOSED = pytest.mark.filterwarnings("ignore:.*<socket.socket:pytest.PytestUnraisableExceptionWarning")
+pytestmark = [needs_orthanc, UNCLOSED]
+ACT = {"by": "Ada", "reason": "Mixed up"}
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    running = Orthanc(tmp_path_factory.mktemp("archive")).start()
+    yield running
+    running.close()
+
+
+@pytest.fixture(autouse=True)
+def _an_empty_archive(archive):
+    for one in archive.ask("instances"):
+        archive.remove(f"instances/{one}")
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def outgoing(store):
+    return Outgoing(store, DicomWriter(store, read_picture, "Klinik Süd"), with_phantoms=False)
+
+
+@pytest.fixture
+def deliver(archive, store, outgoing):
+    def delivering(**more):
+        settings = archive.settings(**more)
+        return Delivery(settings, archive_of(settings), store, outgoing).turn()
+
+    return delivering
+
+
+@pytest.fixture
+def exam(store):
+    made = begin(store)
+    for _ in range(2):
+        measure(store, made)
+    return made
+
+
+def states(store):
+    return [row[0] for row in store._db.execute("SELECT state FROM outbox ORDER BY seq")]
+
+
+def test_an_exam_arrives_bit_by_bit_as_it_was_written_and_is_confirmed(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    written = {row["uid"]: as_file(outgoing.written(row)) for row in store.outbox.of_exam(exam["id"])}
+    assert deliver() is False
+    assert states(store) == ["confirmed"] * 4
+    arrived = [pydicom.dcmread(io.BytesIO(one)) for one in archive.files()]
+    for data in arrived:
+        sent = pydicom.dcmread(io.BytesIO(written.pop(data.SOPInstanceUID)))
+        assert sent == data
+    assert written == {}
+    assert {data.PatientID for data in arrived} == {"Ä-17"}
+    assert store.outbox.counts() == {"confirmed": 4}
+
+
+def test_storage_commitment_is_asked_for_and_heard(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    assert deliver(commitment_port=archive.commitment_port) is False
+    assert states(store) == ["confirmed"] * 4
+
+
+def test_what_the_archive_has_lost_by_the_time_it_is_asked_is_sent_again(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    for row in store.outbox.of_exam(exam["id"]):
+        store.outbox.note_try(row["uid"])
+        store.outbox.settle(row["uid"], "sent")  # as if it had been there, and was lost
+    assert deliver(commitment_port=archive.commitment_port) is True
+    assert states(store) == ["queued"] * 4
+    assert deliver(commitment_port=archive.commitment_port) is False
+    assert len(archive.ask("instances")) == 4
+
+
+def test_nothing_is_doubled_by_asking_twice_or_by_an_answer_that_was_lost(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    outgoing.queue(exam["id"], version=1, by="Bob")
+    assert states(store) == ["confirmed"] * 4
+    for row in store.outbox.of_exam(exam["id"]):
+        store.outbox.settle(row["uid"], "queued")  # as if the answer had never come
+    deliver()
+    assert states(store) == ["confirmed"] * 4
+    assert len(archive.ask("instances")) == 4
+    sent = [entry for entry in store.audit.entries(subject=exam["id"], before_seq=2**62, limit=9)
+            if entry["what"] == "exam_sent"]  # fmt: skip
+    assert [(entry["by"], len(entry["after"]["objects"])) for entry in sent] == [("Bob", 0), ("Ada", 4)]
+
+
+def test_an_archive_that_is_not_there_costs_nothing_but_time(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    with pytest.raises(ArchiveUnreachable, match=r"archive HOSPACS at 127\.0\.0\.1:\d+ cannot be reached"):
+        deliver(archive_port=free_port())
+    with pytest.raises(ArchiveUnreachable, match="rejects STRANGER"):
+        deliver(own_title="STRANGER")
+    assert states(store) == ["queued"] * 4
+    deliver()
+    assert states(store) == ["confirmed"] * 4
+
+
+def test_a_void_measurement_is_recalled_by_a_note_that_names_it(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    void = store.measurements(before_seq=2**62, limit=9)[0]
+    store.exams.void(void["id"], version=1, by="Ada", reason="Slipped")
+    deliver()
+    assert sorted(states(store)) == ["confirmed"] * 4 + ["recalled"] * 2
+    notes = [one for one in archive.kept() if one["Modality"] == "KO"]
+    named = {note["CurrentRequestedProcedureEvidenceSequence"][0]["ReferencedSeriesSequence"][0][
+             "ReferencedSOPSequence"][0]["ReferencedSOPInstanceUID"] for note in notes}  # fmt: skip
+    recalled = {row["uid"] for row in store.outbox.in_state("recalled", limit=9)}
+    assert named == recalled
+    assert {note["ConceptNameCodeSequence"][0]["CodeValue"] for note in notes} == {"113037"}
+    assert deliver() is False
+    assert len(archive.ask("instances")) == 6
+
+
+def test_a_corrected_patient_takes_all_back_and_is_sent_anew(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    store.exams.change(exam["id"], {"patient_ref": "B-18"}, version=1, **ACT)
+    deliver()
+    assert sorted(states(store)) == ["confirmed"] * 4 + ["recalled"] * 4
+    outgoing.queue(exam["id"], version=2, by="Ada")
+    deliver()
+    of_studies = {}
+    for one in archive.kept():
+        of_studies.setdefault(one["StudyInstanceUID"], set()).add(one["PatientID"])
+    assert sorted(map(tuple, of_studies.values())) == [("B-18",), ("Ä-17",)]
+
+
+def test_what_was_never_sent_is_withdrawn_and_never_is(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    other = begin(store)
+    for one in store.measurements(before_seq=2**62, limit=9):
+        store.exams.move(one["id"], other["id"], version=1, **ACT)
+    deliver()
+    assert states(store) == ["withdrawn"] * 4
+    assert archive.ask("instances") == []
+
+
+def test_a_change_that_says_nothing_else_leaves_what_was_sent(store, outgoing, deliver, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    for version, note in ((1, "other"), (2, exam["note"])):
+        store.exams.change(exam["id"], {"note": note}, version=version, **ACT)
+    deliver()
+    assert states(store) == ["confirmed"] * 4
+    assert store.outbox.is_idle()
+
+
+def test_who_is_no_patient_or_has_seen_another_version_is_refused_and_nothing_queued(store, outgoing, exam):
+    phantom = begin(store, kind="phantom")
+    measure(store, phantom)
+    with pytest.raises(InvalidRequest, match="phantoms are not sent"):
+        outgoing.queue(phantom["id"], version=1, by="Ada")
+    with pytest.raises(StaleVersion):
+        outgoing.queue(exam["id"], version=2, by="Ada")
+    too_long = begin(store, order_number="1" * 17)
+    measure(store, too_long)
+    with pytest.raises(InvalidRequest, match="at most 16"):
+        outgoing.queue(too_long["id"], version=1, by="Ada")
+    assert states(store) == []
+
+
+def test_an_archive_that_does_not_take_a_kind_refuses_it_and_takes_the_others(
+    store, outgoing, deliver, monkeypatch, exam
+):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    only_images = {kind: uid for kind, uid in delivery.SOP_CLASSES.items() if kind == "image"}
+    monkeypatch.setattr(delivery, "SOP_CLASSES", only_images)  # what is proposed; the rest has no agreement
+    deliver()
+    assert sorted(states(store)) == ["confirmed", "confirmed", "refused", "refused"]
+    monkeypatch.undo()
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    assert states(store) == ["confirmed"] * 4
+
+
+def test_an_object_whose_recording_is_gone_stops_no_other(store, outgoing, deliver, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    store.recording_path("r-1").unlink()
+    deliver()
+    assert sorted(states(store)) == ["confirmed"] * 3 + ["refused"]
+
+
+@needs_dciodvfy
+def test_dciodvfy_finds_nothing_against_what_recalls(store, outgoing, deliver, exam, tmp_path):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    store.exams.change(exam["id"], {"patient_ref": "B-18"}, version=1, **ACT)
+    outgoing.take_back_what_is_wrong()
+    rows = store.outbox.in_state("queued", limit=9)
+    assert [row["about"]["kind"] for row in rows] == ["rejection"] * 4
+    for row in rows:
+        path = tmp_path / f"{row['uid']}.dcm"
+        path.write_bytes(as_file(outgoing.written(row)))
+        assert verdict(path) == []
+
+
+def test_an_archive_says_that_it_is_there(archive):
+    settings = archive.settings()
+    echo(archive_of(settings), settings)
+    nobody = DicomSection(archive_host="127.0.0.1", archive_port=free_port())
+    with pytest.raises(ArchiveUnreachable, match="cannot be reached"):
+        echo(archive_of(nobody), nobody)
