@@ -102,8 +102,8 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 	$(HOST_TOOLS) pages --check
 	$(PY) -m device openapi --check docs/openapi.json
 
-fuzz: .venv/all.stamp ## send some three thousand requests that schemathesis makes of the API's document to a simulated probe (five minutes): make fuzz [EXAMPLES=40]
-	$(PY) tests/schema_fuzz.py $(or $(EXAMPLES),40)
+fuzz: .venv/all.stamp ## send some three thousand requests that schemathesis makes of the API's document to a simulated probe (four minutes): make fuzz [EXAMPLES=55]
+	$(PY) tests/schema_fuzz.py $(or $(EXAMPLES),55)
 
 bench: .venv/all.stamp ## time everything that somebody waits for, in one table that fails where a bound is missed: make bench [ONLY="work darkness"] [JSON=FILE] [COMPARE=FILE]
 	$(PY) tests/bench.py $(ONLY) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE))

@@ -1,6 +1,6 @@
 """Requests that schemathesis makes of the API's document, good and bad, sent to a running simulated probe.
 
-`python tests/schema_fuzz.py 75` makes some three thousand; for `make fuzz`.
+`python tests/schema_fuzz.py 55` makes some three thousand; for `make fuzz`.
 """
 
 from __future__ import annotations
@@ -78,4 +78,4 @@ def main(examples: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 75))
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 55))

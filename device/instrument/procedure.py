@@ -142,7 +142,8 @@ class Procedure:
         """Show the press before the start and its result, and tell of one that was broken off by the end before."""
         job, warnings = kept_job(self.store.last_press()), list[DeviceError](self.store.findings.warnings())
         if self.store.interrupted:
-            cause = f"A press was broken off when the daemon ended, at {self.store.interrupted[-1].get('asked_at')}."
+            asked_at = self.store.interrupted[-1].get("asked_at") or "an unknown time"
+            cause = f"The press asked for at {asked_at} was broken off when the daemon ended."
             warnings.append(InterruptedPress(cause, "Press again; measurements that were shown are kept."))
         self.board.update(press=job, measurement_id=job.measurement_id if job else None, warnings=tuple(warnings))
 

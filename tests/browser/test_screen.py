@@ -279,7 +279,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#size-value")).to_be_visible()
     expect(page.locator("#image-title")).to_have_text("Measurement 1, Standard")
     expect(page.locator("#modes input:checked")).to_have_value("standard")
-    expect(modes.nth(1)).to_contain_text(re.compile(r"Standard[67] s"))
+    expect(modes.nth(1)).to_contain_text(re.compile(r"Standard[67]\ss"))
     expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
     expect(page.locator("#depth-interval")).to_have_text("7.2 mm or less")
     expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")
