@@ -46,6 +46,11 @@ FORBIDDEN = {
         "device.dicom.objects",
         "device.instrument.press.picture",
     ),
+    "Exports read records and files, and know nothing of the instrument or the web": (
+        "device.exports.archive",
+        "device.instrument.status",
+    ),
+    "Only the exports print pages": ("device.web.app", "reportlab"),
     "Care saves and restores what lies on the disk, whether a daemon runs or not": (
         "device.care.support",
         "device.instrument.status",
