@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from host_tools.scenes.probe import Probe
 
 WIDE = Path("build/wide_table")
+PARTS = ("centred", "off-axis", "layers", "motion", "all", "wide", "derivatives")
 FARTHEST_MM = 40.0
 """Largest offset of a press from the lesion: farther, the face comes near the edge of a phantom's slab."""
 
@@ -32,7 +33,9 @@ def table(
         Path | None,
         typer.Option(help="Folder of the tables: models/simulated_probe, or build/wide_table of part wide."),
     ] = None,
-    part: Annotated[str, typer.Option(help="centred, off-axis, layers, motion, or all of these; or wide.")] = "all",
+    part: Annotated[
+        str, typer.Option(help="centred, off-axis, layers, motion, or all of these; wide; or derivatives.")
+    ] = "all",
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -40,8 +43,11 @@ def table(
     axis, what other layers of waveguide and tissue change, and how far the face moves outwards.
 
     The first hold tissue of 4-6.25 kPa and 27-36 mm, the others are carried over to it. Half an hour on two cores.
-    Part wide, some ten minutes, is of inclusions around the trained ranges: `train --mode standard` needs it.
+    Part wide, some ten minutes, is of inclusions around the trained ranges: `train --mode standard` needs it. Part
+    derivatives, as long, says how presses change with what a commissioning finds out; it needs the others.
     """
+    from device.simulation.virtual_probe import ProbeTables
+    from host_tools.press_models.press_derivatives import sampled_derivatives, write_derivatives
     from host_tools.probe_tables.face_motion import build_face_motion, write_face_motion
     from host_tools.probe_tables.layer_table import build_layer_table, write_layer_table
     from host_tools.probe_tables.off_axis_table import build_off_axis_table, write_off_axis_table
@@ -49,8 +55,8 @@ def table(
     from host_tools.probe_tables.surface_table import build_surface_table, write_surface_table
     from host_tools.scenes.probe_file import probe_of
 
-    if part not in ("centred", "off-axis", "layers", "motion", "all", "wide"):
-        raise InvalidQuantity("part", part, "centred, off-axis, layers, motion, all or wide", "name one of them")
+    if part not in PARTS:
+        raise InvalidQuantity("part", part, " or ".join(PARTS), "name one of them")
     if probe and part == "wide":
         raise InvalidQuantity("part", part, "of the simulated probe", "leave --probe out: train reads no other yet")
     made_of = probe_of(probe)
@@ -61,6 +67,8 @@ def table(
         def on_point(done: int, n: int) -> None:
             bar.update(task, completed=done, total=n)
 
+        if part == "derivatives":
+            write_derivatives(*sampled_derivatives(ProbeTables.load(out)), out, made_of)
         if part == "wide":
             build_wide_table(on_point=on_point).save(out)
         if part in ("centred", "all"):

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.estimate import stands_out
-from device.measurement.ramp_modes.model import CriticalValues, RampAnswer, RampAnswers, found_values
+from device.measurement.ramp_modes.model import CriticalValues, found_values
 from host_tools.press_models.recorded_presses import RecordedPresses, in_parallel
 
 CRITICAL_RATIO = 0.9875

@@ -142,6 +142,11 @@ def random_scan(
     direction_rad = rng.uniform(0, 2 * np.pi, len(offsets_mm))
     rows = surrogate.rows(each, direction_rad)
     rows[1:, RESPONSE] = rows[0, RESPONSE]
+    return noisy_scan(rows, noise, rng), direction_rad
+
+
+def noisy_scan(rows: Array, noise: PressNoise, rng: np.random.Generator) -> Array:
+    """Return the rows [N, P] of presses with one reference, whose response is the same, with noise."""
     covariance = noise.scan_covariance(rows)
     error = np.linalg.cholesky(covariance) @ rng.standard_normal(len(covariance))
     first, further = error[: rows.shape[1]], error[rows.shape[1] :]
@@ -149,4 +154,4 @@ def random_scan(
     noisy[0] += first
     noisy[1:, FURTHER] += further.reshape(len(rows) - 1, len(FURTHER))
     noisy[1:, RESPONSE] = noisy[0, RESPONSE]
-    return noisy, direction_rad
+    return noisy

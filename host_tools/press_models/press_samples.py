@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -29,6 +29,8 @@ from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.skin import Skin
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps
+from device.simulation.physics.world import AS_BELIEVED, World
+from device.simulation.physics.world_face import WorldFace
 from device.simulation.virtual_probe import ProbeTables
 
 SHAPE, SCALE = (164, 192), PixelScale(0.125, 0.10938)
@@ -122,40 +124,82 @@ def profile_rows(
     ramps: PressRamps | None = None,
     span_ratio: float = 1.0,
     reference_span_ratio: float | None = None,
+    world: World = AS_BELIEVED,
 ) -> Array:
     """Return the profile rows [n, P] of presses without noise, for parameters [n, 9].
 
     The inclusion lies in directions [n] of the image, along its rows unless they are told. `ramps` are those of an
     inclusion that the tables do not hold, on the axis. `span_ratio`: true force over what the cell says;
-    `reference_span_ratio`: the same of the reference press, where it is another.
+    `reference_span_ratio`: the same of the reference press, where it is another. `world` is what probe and presses
+    truly are.
     """
-    scene = _Scene(tables, ramps, span_ratio, span_ratio if reference_span_ratio is None else reference_span_ratio)
+    scene = PressedScene(tables, ramps, span_ratio, reference_span_ratio, world)
     directions = np.zeros(len(parameters)) if direction_rad is None else direction_rad
     return np.array([
-        scene.press(dict(zip(PARAMETERS, map(float, values), strict=True)), float(direction))
+        scene.press(values, float(direction)).as_row()
         for values, direction in zip(parameters, directions, strict=True)
     ])  # fmt: skip
 
 
-class _Scene:
+class PressedRings(NamedTuple):
+    """Ring means of the contrast [K, J], with harmonics, at the profile's forces, and the reference response."""
+
+    rings: RingMeans
+    reference_response: Array
+
+    def as_row(self, direction_rad: float | None = None) -> Array:
+        """Return them as a profile row [P], harmonics along the bright side unless a direction is told."""
+        first, second = (
+            (first_harmonic(self.rings), second_harmonic(self.rings)[0])
+            if direction_rad is None
+            else harmonics_along(self.rings, direction_rad)
+        )
+        parts = self.rings.mean, self.reference_response, first, second
+        return np.concatenate([part.ravel() for part in parts])
+
+
+def harmonics_along(rings: RingMeans, direction_rad: float, *, across: bool = False) -> tuple[Array, Array]:
+    """Return first [K, J - 1] and second harmonic [K, J - 2] of ring means along a direction, or across it.
+
+    As a row has them.
+    """
+    quarter = np.pi / 2 if across else 0.0
+    first, second = (
+        rings.cosine[:, order - 1] * np.cos(order * direction_rad + quarter)
+        + rings.sine[:, order - 1] * np.sin(order * direction_rad + quarter)
+        for order in (1, 2)
+    )
+    return first[:, 1:], second[:, 1:-1]
+
+
+class PressedScene:
     """Presses inclusions on one tissue and skin after the other; remembers the inclusion-free press of the last."""
 
     def __init__(
-        self, tables: ProbeTables, ramps: PressRamps | None, span_ratio: float, reference_span_ratio: float
+        self,
+        tables: ProbeTables,
+        ramps: PressRamps | None = None,
+        span_ratio: float = 1.0,
+        reference_span_ratio: float | None = None,
+        world: World = AS_BELIEVED,
     ) -> None:
         self._tables, self._ramps, self._weights = tables, ramps, ring_weights(SHAPE, SCALE)
-        self._forces_n, self._reference_n = span_ratio * PROFILE_FORCES_N, reference_span_ratio * PROFILE_FORCES_N
+        of_reference = span_ratio if reference_span_ratio is None else reference_span_ratio
+        said_n = PROFILE_FORCES_N / world.cell_span_ratio
+        self._forces_n, self._reference_n, self._world = span_ratio * said_n, of_reference * said_n, world
         self._valid = np.ones(SHAPE, dtype=bool)
         self._skin: Skin | None = None
         self._slab: Slab | None = None
 
-    def press(self, at: dict[str, float], direction_rad: float) -> Array:
+    def press(self, parameters: Array, direction_rad: float) -> PressedRings:
+        """Return what the camera sees of a press with parameters [9], the inclusion in a direction of the image."""
+        at = dict(zip(PARAMETERS, map(float, parameters), strict=True))
         skin = Skin(albedo=at["albedo"], spread_mm=at["spread_mm"], contact_pressure_kpa=at["contact_pressure_kpa"])
         slab = Slab(at["tissue_modulus_kpa"], at["slab_thickness_mm"])
         inclusion = Inclusion(at["size_mm"], at["depth_mm"], at["youngs_modulus_kpa"])
         if (skin, slab) != (self._skin, self._slab):
             self._skin, self._slab = skin, slab
-            self._image = ScatteredImage(self._tables.light, skin, LENS, SHAPE, SCALE)
+            self._image = ScatteredImage(self._tables.light, skin, LENS, SHAPE, SCALE, self._world)
             self._baseline = self._lights(inclusion, ProbePlacement(*BESIDE_MM), self._reference_n)
             baseline = np.array([self._means(light).mean for light in self._baseline])
             self._reference_response = np.log(baseline[:-1] / baseline[-1])
@@ -166,18 +210,16 @@ class _Scene:
             for light, baseline in zip(lights, self._baseline, strict=True)
         ]
         stacked = RingMeans(*(np.array(part) for part in zip(*rings, strict=True)))
-        return np.concatenate([
-            stacked.mean.ravel(),
-            self._reference_response.ravel(),
-            first_harmonic(stacked).ravel(),
-            second_harmonic(stacked)[0].ravel(),
-        ])  # fmt: skip
+        return PressedRings(stacked, self._reference_response)
 
     def _lights(self, inclusion: Inclusion, place: ProbePlacement, forces_n: Array) -> list[Image]:
         assert self._slab is not None  # press has set it
-        ramps = self._ramps or self._tables.centred.ramps(inclusion, self._slab)
-        face = PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, self._slab)
-        return [self._image.intensity(*face.at(float(force), place), LIT) for force in forces_n]
+        face = WorldFace(self._world, self._slab, lambda slab: self._face(inclusion, slab))
+        return [self._image.intensity(*face.at(float(force), place), LIT, place=place) for force in forces_n]
+
+    def _face(self, inclusion: Inclusion, slab: Slab) -> PressedFace:
+        ramps = self._tables.ramps(inclusion, slab, self._world, solved=self._ramps)
+        return PressedFace(ramps, self._tables.off_axis, inclusion, self._image.x_mm, self._image.y_mm, slab)
 
     def _means(self, image: Image) -> RingMeans:
         return self._weights.means(image, self._valid)

@@ -17,7 +17,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
 from device.measurement.parameters import normalise
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.radial_profile import network_rows
 from device.measurement.ramp_modes.surrogate import OFFSET

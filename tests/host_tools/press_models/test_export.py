@@ -17,8 +17,9 @@ from device.files.bundle_file import read_ramp_model
 from device.measurement.bundle import BundleRefused
 from device.measurement.parameters import HIGH, NUISANCES, PARAMETERS, RANGES, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
-from device.measurement.ramp_modes.model import RAMP_MODES, SURROGATE_FILE, CriticalValues, RampAnswers, RampModel
+from device.measurement.ramp_modes.model import RAMP_MODES, SURROGATE_FILE, CriticalValues, RampModel
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES, PROFILE_FORCES_N, network_rows
 from device.measurement.ramp_modes.range_classifier import OUTPUT, RANGE_FILE

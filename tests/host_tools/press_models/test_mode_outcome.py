@@ -11,8 +11,9 @@ from small_surrogate import COLUMNS, LinearRows, linear_surrogate, white_noise
 
 from device.measurement.parameters import COUNT, EVEN_STD, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
-from device.measurement.ramp_modes.model import CriticalValues, RampAnswer, RampAnswers
+from device.measurement.ramp_modes.model import CriticalValues
 from device.measurement.ramp_modes.posterior import CELLS, ModulusCells, PressFit
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, PROFILE_FORCES_N, RESPONSE, SeenPresses
 from device.measurement.ramp_modes.surrogate import MODULUS, OFFSET

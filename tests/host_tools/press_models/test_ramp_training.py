@@ -5,7 +5,7 @@ import pytest
 from small_surrogate import COLUMNS, LinearRows, white_noise
 
 from device.measurement.parameters import HIGH, PARAMETERS, normalise
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.radial_profile import FIRST, NETWORK_NAMES, SECOND, SeenPresses, network_rows
 from device.measurement.ramp_modes.surrogate import OFFSET, WAVES
 from host_tools.press_models import ramp_training, train_range

@@ -1,0 +1,72 @@
+"""Derivatives of profile rows: by differences of the virtual probe, and polynomials that give them back."""
+
+import numpy as np
+import pytest
+
+from device.files.shipped import SIMULATED_PROBE
+from device.measurement.parameters import HIGH, LOW, normalise
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.noise import light_ratio
+from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE
+from device.measurement.ramp_modes.row_derivatives import COUNT, DIRECTIONS, NAMES, RowDerivatives
+from device.measurement.ramp_modes.surrogate import OFFSET
+from device.simulation.physics.world import AS_BELIEVED
+from host_tools.press_models.press_derivatives import (
+    changes_of_presses,
+    fit_region,
+    load_derivatives,
+    world_changed,
+    write_derivatives,
+)
+from host_tools.press_models.press_samples import draw_parameters
+from host_tools.scenes.probe_file import simulated_probe
+
+ENDS_MM = float(LOW[OFFSET]), float(HIGH[OFFSET])
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "face_motion_ratio"])
+def test_no_step_along_a_direction_is_no_change_of_the_world(name):
+    assert world_changed(name, 0.0, 0.3) == AS_BELIEVED
+    assert world_changed(name, DIRECTIONS[name].step, 0.3) != AS_BELIEVED
+
+
+def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
+    """On presses that they were not learnt from: of the sizes that count, within a fifth of themselves."""
+    rng = np.random.default_rng(77)
+    parameters, direction_rad = draw_parameters(3, rng, inclusions_a_skin=3), rng.uniform(0, 2 * np.pi, 3)
+    rows, changes = changes_of_presses(tables, parameters, direction_rad)
+    kept = load_derivatives(SIMULATED_PROBE).changes(normalise(parameters), rows)
+    for name, columns in (("contact_exponent", RESPONSE), ("tilt_lesion_deg", FIRST), ("face_motion_ratio", RESPONSE)):
+        one, found = changes[:, NAMES.index(name), columns], kept[:, NAMES.index(name), columns]
+        assert np.sqrt(np.mean((found - one) ** 2)) < 0.2 * np.sqrt(np.mean(one**2)), name
+
+
+def test_changes_that_are_polynomials_are_given_back():
+    rng = np.random.default_rng(1)
+    parameters = draw_parameters(150, rng)
+    at = normalise(parameters)
+    rows = 0.1 * rng.standard_normal((150, COLUMNS))
+    slope = rng.standard_normal((COUNT, COLUMNS))
+    changes = light_ratio(rows)[:, None] * (1 + 0.3 * at[:, 3])[:, None, None] * slope
+    region = fit_region(parameters, rows, changes, ENDS_MM)
+    found = region.changes(at, rows)
+    assert np.sqrt(np.mean((found - changes) ** 2)) < 0.01 * np.sqrt(np.mean(changes**2))
+
+
+def test_too_few_presses_are_refused():
+    parameters = draw_parameters(10, np.random.default_rng(1))
+    with pytest.raises(InvalidQuantity, match="presses"):
+        fit_region(parameters, np.zeros((10, COLUMNS)), np.zeros((10, COUNT, COLUMNS)), ENDS_MM)
+
+
+def test_a_file_gives_derivatives_back_and_a_damaged_one_is_refused(tmp_path):
+    kept = load_derivatives(SIMULATED_PROBE)
+    assert isinstance(kept, RowDerivatives)
+    write_derivatives(kept, np.zeros(COUNT), tmp_path, simulated_probe())
+    again = load_derivatives(tmp_path)
+    at, rows = np.zeros((1, len(LOW))), np.zeros((1, COLUMNS))
+    assert np.array_equal(again.changes(at, rows), kept.changes(at, rows))
+    file = tmp_path / "press_derivatives.npz"
+    file.write_bytes(file.read_bytes()[:-1] + b"x")
+    with pytest.raises(InvalidQuantity, match="hash"):
+        load_derivatives(tmp_path)
