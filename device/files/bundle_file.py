@@ -20,14 +20,9 @@ from device.measurement.mode_models import ModeModels
 from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QUICK_UNITS, QuickModel
-from device.measurement.ramp_modes.model import (
-    RAMP_UNITS,
-    SURROGATE_ARRAYS,
-    SURROGATE_FILE,
-    RampAnswers,
-    RampModel,
-    ramp_answers_of,
-)
+from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.model import RAMP_UNITS, SURROGATE_ARRAYS, SURROGATE_FILE, RampModel, ramp_answers_of
+from device.measurement.ramp_modes.own_probe import OWN_ARRAYS
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE, RangeClassifier
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -51,7 +46,7 @@ def read_ramp_model(folder: Path) -> RampModel:
     files = _files(folder, SURROGATE_FILE, RANGE_FILE)
     bundle = ModelBundle(files, RAMP_UNITS)
     content = files.verified(SURROGATE_FILE, bundle.card.get("surrogate_sha256"))
-    answers = ramp_answers_of(_arrays("surrogate", folder / SURROGATE_FILE, content, SURROGATE_ARRAYS))
+    answers = ramp_answers_of(_arrays("surrogate", folder / SURROGATE_FILE, content, SURROGATE_ARRAYS, OWN_ARRAYS))
     return RampModel(bundle, answers, RangeClassifier(files, bundle.fields, len(RAMP_UNITS)))
 
 
@@ -65,7 +60,8 @@ def read_models(paper: ModelBundle, quick: Path, standard: Path) -> ModeModels:
 
 def read_ramp_answers(path: Path) -> RampAnswers:
     """Read forward model and noise alone; raise `InvalidQuantity` when a part is missing or of another shape."""
-    return ramp_answers_of(_arrays("surrogate", path, _content("surrogate", path, SURROGATE_ARRAYS), SURROGATE_ARRAYS))
+    content = _content("surrogate", path, SURROGATE_ARRAYS)
+    return ramp_answers_of(_arrays("surrogate", path, content, SURROGATE_ARRAYS, OWN_ARRAYS))
 
 
 def _files(folder: Path, *more: str) -> BundleFiles:
@@ -91,10 +87,11 @@ def _content(what: str, path: Path, names: tuple[str, ...]) -> bytes:
         raise _not_an_archive(what, path, names) from error
 
 
-def _arrays(what: str, path: Path, content: bytes, names: tuple[str, ...]) -> Arrays:
+def _arrays(what: str, path: Path, content: bytes, names: tuple[str, ...], more: tuple[str, ...] = ()) -> Arrays:
+    """Return the arrays of these names, and `more` where they are there."""
     try:
         with np.load(io.BytesIO(content)) as file:
-            return {name: np.asarray(file[name]) for name in names}
+            return {name: np.asarray(file[name]) for name in (*names, *(one for one in more if one in file))}
     except DAMAGED as error:
         raise _not_an_archive(what, path, names) from error
 

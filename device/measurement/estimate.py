@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.bundle import ModelBundle
-from device.measurement.calibration import Calibration
+from device.measurement.calibration import Calibration, moment
 from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, HIGH, LOW, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
@@ -105,15 +105,22 @@ def origin_of(recording: Recording, mode: Mode, bundle: ModelBundle, calibration
 
 
 def require_trained_for(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> None:
-    """Raise `InvalidQuantity` for a probe that the certificate, or the model itself, is not for.
+    """Raise `InvalidQuantity` for a probe that the certificate, or the model itself, is not for, or not any more.
 
-    The card's `serials` are the probes whose light and tables the model was trained with.
+    The card's `serials` are the probes whose light and tables the model was trained with; that of a commissioned
+    probe's has `expires_at`, too.
     """
     serials = bundle.card.get("serials", [])
     if recording.serial not in serials:
         expected = f"one of {', '.join(serials)}, which {bundle.name} is trained for"
         raise InvalidQuantity(
             "serial", recording.serial, expected, "press in mode paper, or train a model for this one"
+        )
+    expires_at = bundle.card.get("expires_at")
+    if expires_at is not None and moment(recording.started_at, "started_at") > moment(expires_at, "expires_at"):
+        action = "commission the probe again"
+        raise InvalidQuantity(
+            "time of the press", recording.started_at, f"before {expires_at} of {bundle.name}", action
         )
     if calibration.serial != recording.serial:
         found, expected = f"for probe {calibration.serial}", f"for probe {recording.serial}"

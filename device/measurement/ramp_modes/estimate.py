@@ -29,7 +29,8 @@ from device.measurement.estimate import (
 )
 from device.measurement.mode import Mode
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampAnswer, RampModel
+from device.measurement.ramp_modes.answers import RampAnswer
+from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import (
     CONTRAST,
@@ -39,8 +40,6 @@ from device.measurement.ramp_modes.radial_profile import (
     press_profiles,
     seen_presses,
 )
-from device.measurement.ramp_modes.scan import worth_of_places
-from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.ring_means import MIDDLE, MIDDLE_LESS_RIM
 from device.measurement.scan_advice import ScanAdvice, half_widths
@@ -72,19 +71,12 @@ def advise_scan(recording: Recording, model: RampModel, calibration: Calibration
     if answered is None or not now:
         return ScanAdvice(estimate, now, None, now)
     seen, answer = answered
-    surrogate, noise = model.answers.surrogate, model.answers.noise
-    at = _with_reach(answer, model.answers.reach_mm(len(seen.rows)) / surrogate.to_mm)
-    parts = worth_of_places(seen.rows, at, surrogate, noise, surrogate.to_mm, PLACES_MM, seen.direction_rad)
+    parts = model.answers.worth(seen, answer, PLACES_MM)
     best = int(np.argmin(np.log(parts).sum(axis=1)))
     if parts[best].min() > 1 - WORTH_A_RAMP:
         return ScanAdvice(estimate, now, None, now)
     part_of = dict(zip(UNKNOWNS, map(float, parts[best]), strict=True))
     return ScanAdvice(estimate, now, PLACES_MM[best], {name: part_of[name] * half for name, half in now.items()})
-
-
-def _with_reach(answer: RampAnswer, ratio: float) -> Array:
-    """Return the best fit with offsets over a longer reach: `ratio` is the old one over it."""
-    return np.concatenate([answer.fit.best[:OFFSET], ratio * (answer.fit.best[OFFSET:] + 1) - 1])
 
 
 def _answered(
@@ -104,7 +96,7 @@ def _answered(
     if not contrast > VISIBLE_DEVIATIONS:
         features = with_critical({"contrast_deviations": contrast}, {"contrast_deviations": VISIBLE_DEVIATIONS})
         return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features), None
-    answer = model.answer(seen.rows, seen.direction_rad)
+    answer = model.answer_to(seen)
     found = model.found(answer, seen)
     residual = max(profile.residual for profile in profiles)
     return _judged(answer, found, model.critical[mode], residual, origin), (seen, answer)

@@ -8,6 +8,7 @@ Source: the iterated loop asked for by Lee & Won 2013, section V.
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,22 @@ from device.measurement.ramp_modes.noise import FURTHER, PressNoise, as_one_row
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
 TOLERANCE, STEPS = 1e-10, 100
+
+
+class Explained(Protocol):
+    """How well coordinates explain what was seen."""
+
+    def residuals(self, at: Array) -> Array:
+        """Return whitened residuals [..., S] at coordinates [..., k]."""
+        ...
+
+    def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
+        """Return the same [n, S] at coordinates [n, k], and their derivatives [n, S, k]."""
+        ...
+
+    def log_density(self, at: Array) -> Array:
+        """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, k]."""
+        ...
 
 
 class PressPosterior:
@@ -109,13 +126,13 @@ class PressPosterior:
         return [slice(0, first), *(slice(*pair) for pair in pairwise(ends))]
 
 
-def best_fit(posterior: PressPosterior, start: Array) -> Array:
+def best_fit(posterior: Explained, start: Array) -> Array:
     """Return the coordinates [8 + N] that explain a row best, each held weakly to the middle of its range."""
     (best,) = best_fits(posterior, start[None], np.ones(len(start), dtype=bool), tolerance=TOLERANCE)
     return np.asarray(best)
 
 
-def best_fits(posterior: PressPosterior, start: Array, free: NDArray[np.bool_], *, tolerance: float) -> Array:
+def best_fits(posterior: Explained, start: Array, free: NDArray[np.bool_], *, tolerance: float) -> Array:
     """Return the best fits [n, 8 + N] begun at n points, in those of the coordinates that are `free`; others stay."""
     held = np.broadcast_to(np.eye(free.sum()) / EVEN_STD, (len(start), free.sum(), free.sum()))
 

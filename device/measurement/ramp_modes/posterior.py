@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD
-from device.measurement.ramp_modes.fit import PressPosterior, best_fit, best_fits
+from device.measurement.ramp_modes.fit import Explained, best_fit, best_fits
 from device.measurement.ramp_modes.surrogate import MODULUS
 
 CELLS, SAMPLES = 11, 6000
@@ -143,7 +143,7 @@ def _log_students(standard: Array) -> Array:
     return np.asarray(constant - (freedom + k) / 2 * np.log1p(np.sum(standard**2, axis=1) / freedom))
 
 
-def sample_press(posterior: PressPosterior, start: Array) -> PressFit:
+def sample_press(posterior: Explained, start: Array) -> PressFit:
     """Return best fit, mean and spread of the posterior of a press or a scan, begun at coordinates [8 + N]."""
     best = best_fit(posterior, start)
     samples, weight, effective = weighted_samples(posterior, best)
@@ -153,7 +153,7 @@ def sample_press(posterior: PressPosterior, start: Array) -> PressFit:
     return PressFit(best, mean, spread, effective, _by_modulus(samples, weight))
 
 
-def weighted_samples(posterior: PressPosterior, best: Array) -> WeightedSamples:
+def weighted_samples(posterior: Explained, best: Array) -> WeightedSamples:
     """Return samples of the posterior about its best fit [8 + N].
 
     Where Gaussians miss a bent posterior, the sample of the largest weight says where: there another one is put, and
@@ -182,7 +182,7 @@ def _log_mixture(parts: Sequence[tuple[_Cells | _Spot, int]], samples: Array) ->
     return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(sum(count for _, count in parts)))
 
 
-def _spot_at(posterior: PressPosterior, at: Array) -> _Spot:
+def _spot_at(posterior: Explained, at: Array) -> _Spot:
     """Return the Gaussian of the posterior about coordinates [k], a little wider."""
     _, jacobian = posterior.residuals_and_jacobian(at[None])
     return _Spot(at, WIDER * np.linalg.cholesky(np.linalg.inv(_precision(jacobian)[0])))
@@ -211,7 +211,7 @@ def _moments(samples: Array, weight: Array) -> tuple[Array, Array]:
     return mean, np.sqrt(weight @ (samples - mean) ** 2)
 
 
-def _cells(posterior: PressPosterior, best: Array) -> _Cells:
+def _cells(posterior: Explained, best: Array) -> _Cells:
     centres = _best_in_cells(posterior, best)
     residuals, jacobian = posterior.residuals_and_jacobian(centres)
     precision, rest = _precision(jacobian), _rest(len(best))
@@ -223,7 +223,7 @@ def _cells(posterior: PressPosterior, best: Array) -> _Cells:
     return _Cells(centres, -np.einsum("nij,nj->ni", covariance, precision[:, rest, MODULUS]), factor, share)
 
 
-def _best_in_cells(posterior: PressPosterior, best: Array) -> Array:
+def _best_in_cells(posterior: Explained, best: Array) -> Array:
     """Return the best fits [C, k] with the modulus held in the middle of each cell, begun where `best` slides to."""
     _, jacobian = posterior.residuals_and_jacobian(best[None])
     precision, rest = _precision(jacobian)[0], _rest(len(best))

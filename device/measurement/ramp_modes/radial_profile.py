@@ -52,15 +52,16 @@ class RadialProfile:
 
     contrast [K, J]: ring means of the tactile image. reference_response [K - 1, J]: ln of the inclusion-free light at
     each force over that at the largest. first_harmonic [K, J - 1]: of the contrast towards its bright side, without the
-    ring in the middle. second_harmonic [2, K, J - 2]: along and across that direction, also without the outermost ring.
-    direction_rad: of the bright side in the image, 0 along its rows. residual: root mean square, over rings and frames,
-    of what the polynomial in the force leaves.
+    ring in the middle; first_across [K, J - 1]: across it. second_harmonic [2, K, J - 2]: along and across that
+    direction, also without the outermost ring. direction_rad: of the bright side in the image, 0 along its rows.
+    residual: root mean square, over rings and frames, of what the polynomial in the force leaves.
     """
 
     force_n: Array
     contrast: Array
     reference_response: Array
     first_harmonic: Array
+    first_across: Array
     second_harmonic: Array
     direction_rad: float
     residual: float
@@ -78,11 +79,23 @@ class RadialProfile:
 
 
 class SeenPresses(NamedTuple):
-    """What is read of presses with one reference: rows [N, P], second harmonics [N, 2, K, J - 2], directions [N]."""
+    """What is read of presses with one reference: rows [N, P], second harmonics [N, 2, K, J - 2], directions [N].
+
+    first_across [N, K, J - 1]: what a probe of one's own is told by, beside these.
+    """
 
     rows: Array
     second_harmonics: Array
     direction_rad: Array
+    first_across: Array | None = None
+
+    @property
+    def across(self) -> Array | None:
+        """First and second harmonics across the bright side as one row [A] of each press, where they were read."""
+        if self.first_across is None:
+            return None
+        count = len(self.first_across)
+        return np.hstack([self.first_across.reshape(count, -1), self.second_harmonics[:, 1].reshape(count, -1)])
 
 
 def seen_presses(profiles: Sequence[RadialProfile]) -> SeenPresses:
@@ -91,6 +104,7 @@ def seen_presses(profiles: Sequence[RadialProfile]) -> SeenPresses:
         np.array([profile.as_row() for profile in profiles]),
         np.array([profile.second_harmonic for profile in profiles]),
         np.array([profile.direction_rad for profile in profiles]),
+        np.array([profile.first_across for profile in profiles]),
     )
 
 
@@ -196,6 +210,7 @@ def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile
         contrast=rings.mean,
         reference_response=np.log(baseline[:-1] / baseline[-1]),
         first_harmonic=first_harmonic(rings),
+        first_across=first_across(rings),
         second_harmonic=second_harmonic(rings),
         direction_rad=bright_side_rad(rings),
         residual=residual,
@@ -233,6 +248,12 @@ def first_harmonic(rings: RingMeans) -> Array:
     """
     cosine, sine = _waves(rings, 1)
     return _along(cosine, sine, bright_side_rad(rings))
+
+
+def first_across(rings: RingMeans) -> Array:
+    """Return the first harmonic [K, J - 1] at each force, across the direction of `first_harmonic`."""
+    cosine, sine = _waves(rings, 1)
+    return _along(cosine, sine, bright_side_rad(rings) + np.pi / 2)
 
 
 def second_harmonic(rings: RingMeans) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, EVEN_STD, HIGH
-from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.fit import Explained, PressPosterior
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
@@ -63,18 +63,18 @@ def worth_of_places(
     `rows` [N, P] and directions [N] are those of the presses so far, `best` [8 + N] their best fit. The direction of
     the further one is the hand's choice.
     """
-    before = _bound(PressPosterior(rows, surrogate, noise, reach_mm, direction_rad), best)
+    before = bound_of(PressPosterior(rows, surrogate, noise, reach_mm, direction_rad), best)
     directions = None if direction_rad is None else np.append(direction_rad, np.nan)
     parts = []
     for place_mm in places_mm:
         further = np.append(best[:OFFSET], 2 * place_mm / float(HIGH[OFFSET]) - 1)
         expected = np.concatenate([rows, surrogate.rows(further[None])])
         after = PressPosterior(expected, surrogate, noise, reach_mm, directions)
-        parts.append(_bound(after, np.append(best, 2 * place_mm / reach_mm - 1)) / before)
+        parts.append(bound_of(after, np.append(best, 2 * place_mm / reach_mm - 1)) / before)
     return np.array(parts)
 
 
-def _bound(posterior: PressPosterior, at: Array) -> Array:
+def bound_of(posterior: Explained, at: Array) -> Array:
     """Return the unknowns' spreads [3] of the Gaussian posterior at coordinates [8 + N]."""
     _, (jacobian,) = posterior.residuals_and_jacobian(at[None])
     precision = jacobian.T @ jacobian + np.eye(len(at)) / EVEN_STD**2

@@ -6,8 +6,9 @@ from small_surrogate import COLUMNS, REACH_MM, LinearRows, random_scan_surrogate
 
 from device.measurement.parameters import COUNT, HIGH, PARAMETERS
 from device.measurement.ramp_modes import model as module
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
-from device.measurement.ramp_modes.model import NOT_TOLD_LOG_ODDS, RampAnswer, RampAnswers, found_values
+from device.measurement.ramp_modes.model import NOT_TOLD_LOG_ODDS, found_values
 from device.measurement.ramp_modes.noise import light_ratio
 from device.measurement.ramp_modes.radial_profile import FIRST, PROFILE_FORCES_N, RESPONSE, SECOND, SeenPresses
 from device.measurement.ramp_modes.surrogate import MODULUS, OFFSET, TISSUE

@@ -9,7 +9,8 @@ from small_surrogate import COLUMNS, REACH_MM, random_scan_surrogate, random_sur
 from device.files.bundle_file import read_ramp_answers
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise, normalise
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import SURROGATE_ARRAYS, RampAnswers, surrogate_arrays
+from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.model import SURROGATE_ARRAYS, surrogate_arrays
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, RESPONSE, SECOND
 from device.measurement.ramp_modes.surrogate import (
     CONTRAST_COLUMNS,

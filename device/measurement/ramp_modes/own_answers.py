@@ -1,0 +1,114 @@
+"""One ramp or several of a commissioned probe to an answer: the design's forward model, and what is unlike it.
+
+What the probe and its presses change is linear about a point near the truth: so it is taken anew where the fit comes
+to. Source: docs/own_probe.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.parameters import COUNT, LOW
+from device.measurement.ramp_modes.answers import (
+    NEAR,
+    WELL_INSIDE,
+    RampAnswer,
+    RampAnswers,
+    answer_of,
+)
+from device.measurement.ramp_modes.fit import best_fit, best_fits
+from device.measurement.ramp_modes.noise import PressNoise
+from device.measurement.ramp_modes.own_posterior import AXES, OwnPosterior
+from device.measurement.ramp_modes.own_probe import OwnProbe, Place
+from device.measurement.ramp_modes.posterior import sample_press
+from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE, SeenPresses
+from device.measurement.ramp_modes.scan import bound_of, scan_starts
+from device.measurement.ramp_modes.surrogate import OFFSET, ScanSurrogate
+
+LOOKED_AGAIN = 2
+"""How often what the probe changes is taken anew, where the fit has come to."""
+BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
+"""Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
+
+
+class OwnAnswers(RampAnswers):
+    """Forward model, noise, and what is believed of a commissioned probe."""
+
+    def __init__(self, surrogate: ScanSurrogate, noise: PressNoise, own: OwnProbe) -> None:
+        super().__init__(surrogate, noise)
+        self.own = own
+
+    def answer_to(self, seen: SeenPresses, estimates: Array) -> RampAnswer:
+        """Return the answer to what was read of presses with one reference; `estimates` [n, 3] are first guesses."""
+        reach_mm = self.reach_mm(len(seen.rows))
+        at = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
+        for _ in range(LOOKED_AGAIN):
+            posterior = self._posterior(seen, at, reach_mm)
+            at = best_fit(posterior, at)
+        posterior = self._posterior(seen, at, reach_mm)
+        fit = sample_press(posterior, at)
+        misfit = float(np.mean(posterior.residuals(fit.best) ** 2))
+        offset_mm = reach_mm * np.linalg.norm(fit.best[OFFSET:].reshape(-1, AXES), axis=1)
+        unlike = posterior.unlike(fit.best, int(np.argmin(offset_mm)))
+        return answer_of(fit, misfit, offset_mm, unlike)
+
+    def ordinary_shift(self, rows: Array) -> Array:
+        """Return what is believed to move rows [n, P] of presses on an inclusion in the middle of all ranges [n, P]."""
+        count = len(rows)
+        middle = Place(np.zeros((count, len(LOW))), np.zeros(count), np.zeros(count))
+        return self.own.shift(middle, rows)[:, :COLUMNS]
+
+    def worth(self, seen: SeenPresses, answer: RampAnswer, places_mm: Sequence[float]) -> Array:
+        """Return to which part [n, 3] a further press at each place narrows the unknowns' spreads."""
+        to_mm = self.surrogate.to_mm
+        ratio = self.reach_mm(len(seen.rows)) / to_mm
+        at = np.concatenate([answer.fit.best[:OFFSET], ratio * answer.fit.best[OFFSET:]])
+        before = bound_of(self._posterior(seen, at, to_mm), at)
+        parts = []
+        for place_mm in places_mm:
+            further = np.append(at[:OFFSET], place_mm - 1.0)
+            (row,) = self.surrogate.rows(further[None])
+            row[RESPONSE] = seen.rows[0, RESPONSE]
+            after = np.append(at, [place_mm / to_mm, 0.0])
+            parts.append(bound_of(self._posterior(_with_further(seen, row), after, to_mm), after) / before)
+        return np.array(parts)
+
+    def _posterior(self, seen: SeenPresses, at: Array, reach_mm: float) -> OwnPosterior:
+        return OwnPosterior(seen, self.surrogate, self.noise, self.own, reach_mm, at)
+
+    def _begun(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:
+        """Return coordinates [8 + 2 N] to begin at: of several the one that explains the presses best."""
+        starts = self._scan_starts(seen, inside, reach_mm) if len(seen.rows) > 1 else _single_starts(inside)
+        posterior = self._posterior(seen, starts[0], reach_mm)
+        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=NEAR)
+        return np.asarray(found[np.argmin(np.sum(posterior.residuals(found) ** 2, axis=1))])
+
+    def _scan_starts(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:
+        """Return starts [n, 8 + 2 N] of a scan, each inclusion on its bright side."""
+        rows = seen.rows - self.ordinary_shift(seen.rows)
+        alike = scan_starts(rows, inside, self.surrogate, self.noise, reach_mm, seen.direction_rad)
+        starts = np.zeros((len(alike), OFFSET + AXES * len(rows)))
+        starts[:, :OFFSET] = alike[:, :OFFSET]
+        starts[:, OFFSET::AXES] = (alike[:, OFFSET:] + 1) / 2
+        return starts
+
+
+def _single_starts(inside: Array) -> Array:
+    starts = np.zeros((len(BEGUN_AT), OFFSET + AXES))
+    starts[:, :COUNT], starts[:, OFFSET:] = inside[0], BEGUN_AT
+    return starts
+
+
+def _with_further(seen: SeenPresses, row: Array) -> SeenPresses:
+    """Return presses with a further one, whose row [P] is in its inclusion's direction, wherever that is."""
+    assert seen.first_across is not None  # of a commissioned probe
+    nothing = np.zeros((1, *seen.second_harmonics.shape[1:]))
+    return SeenPresses(
+        np.vstack([seen.rows, row]),
+        np.concatenate([seen.second_harmonics, nothing]),
+        np.append(seen.direction_rad, np.nan),
+        np.concatenate([seen.first_across, np.zeros((1, *seen.first_across.shape[1:]))]),
+    )

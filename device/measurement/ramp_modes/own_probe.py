@@ -1,0 +1,210 @@
+"""What is believed of a probe of one's own and of its presses, and how far that moves what they show.
+
+Commissioning on phantoms tells of the probe; of a press nobody knows more than a hand's habits. Both are Gaussian, and
+rows follow them by derivatives: so they shift what the forward model says, and widen its covariance. The directions of
+a scan's presses are shared as they are: the probe by all, the lesion's skin and the reference press by those of one
+scan, tilt and light by none. A tilt of a third of a degree outshines the side on which most inclusions lie. So the
+harmonics across the bright side are read, too, and the inclusion lies anywhere beside it.
+Source: docs/own_probe.md; second order of a ratio of tilted lights: its mean over the angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.noise import LOADS, ErrorLevels
+from device.measurement.ramp_modes.radial_profile import (
+    COLUMN_COUNTS,
+    COLUMNS,
+    CONTRAST,
+    FIRST,
+    FIRST_RINGS,
+    SECOND,
+)
+from device.measurement.ramp_modes.row_derivatives import (
+    COUNT,
+    DERIVATIVE_ARRAYS,
+    NAMES,
+    PAIR,
+    RowDerivatives,
+    owned_by,
+    row_derivatives_of,
+)
+from device.measurement.recording.ring_means import RING_RADII_MM
+
+OWN_ARRAYS = (*(f"derivatives_{name}" for name in DERIVATIVE_ARRAYS), "own_mean", "own_covariance", "own_levels")
+"""Arrays that the file of a commissioned probe's surrogate has beside the others."""
+ACTION = "commission the probe again"
+FIRST_ACROSS = slice(COLUMNS, COLUMNS + COLUMN_COUNTS[2])
+SECOND_ACROSS = slice(FIRST_ACROSS.stop, FIRST_ACROSS.stop + COLUMN_COUNTS[3])
+SEEN_COLUMNS = SECOND_ACROSS.stop
+"""Columns of what is seen of a press: its profile row, then first and second harmonics across the bright side."""
+LESION_TILT, BESIDE_TILT, ALONG = (
+    NAMES.index(name) for name in ("tilt_lesion_deg", "tilt_beside_deg", "light_along_ratio")
+)
+NOT_LINEAR_RATIO, NOT_LINEAR_MM = 0.2, 1.35
+"""Where the face's edge lifts a tilt is not linear: its harmonic is believed to this part, over so many millimetres."""
+
+
+class Place(NamedTuple):
+    """Where inclusions of N presses lie: coordinates [N, 9], and angles [N] from the bright side, itself at [N]."""
+
+    normalised: Array
+    angle_rad: Array
+    bright_side_rad: Array
+
+
+class RowChanges(NamedTuple):
+    """By how much what is seen of N presses is shifted [N, S], and a factor [N, S, K] of the covariance it shares."""
+
+    shift: Array
+    factor: Array
+
+
+@dataclass(frozen=True, eq=False)
+class OwnProbe:
+    """`mean` [COUNT] and `covariance` [COUNT, COUNT] of the directions of `DIRECTIONS`, and `levels` of smooth errors.
+
+    Raises `InvalidQuantity` for arrays of another shape, and for a covariance that is none.
+    """
+
+    derivatives: RowDerivatives
+    mean: Array
+    covariance: Array
+    levels: ErrorLevels
+
+    def __post_init__(self) -> None:
+        for name, found, expected in (("mean", self.mean, (COUNT,)), ("covariance", self.covariance, (COUNT, COUNT))):
+            if found.shape != expected:
+                raise InvalidQuantity(f"shape of the probe's {name}", found.shape, str(expected), ACTION)
+        try:
+            np.linalg.cholesky(self.covariance)
+        except np.linalg.LinAlgError:
+            raise InvalidQuantity("probe's covariance", "indefinite", "positive", ACTION) from None
+
+    def changes(self, place: Place, rows: Array) -> RowChanges:
+        """Return how what is seen of presses with one reference moves; rows [N, P] are in the inclusion's direction."""
+        presses = len(rows)
+        changes = self.derivatives.changes(place.normalised, rows)
+        seen = turned_columns(changes, place.angle_rad[:, None, None])
+        shared = np.concatenate([owned_by("probe"), owned_by("lesion")])
+        parts = [np.einsum("nds,dk->nsk", seen[:, shared], self._factor(shared))]
+        parts.append(self._std(BESIDE_TILT) * self._beside(changes, place))
+        for number in range(presses):
+            own = self._of_press(changes[number], place.angle_rad[number], place.bright_side_rad[number])
+            columns = np.zeros((presses, *own.shape))
+            columns[number] = own
+            parts.append(columns)
+        return RowChanges(self._shift(seen, changes), np.concatenate(parts, axis=2))
+
+    def shift(self, place: Place, rows: Array) -> Array:
+        """Return what is believed to shift what is seen of presses [N, S], as of `changes`."""
+        changes = self.derivatives.changes(place.normalised, rows)
+        return self._shift(turned_columns(changes, place.angle_rad[:, None, None]), changes)
+
+    def _shift(self, seen: Array, changes: Array) -> Array:
+        scalar = np.array([number not in (LESION_TILT, BESIDE_TILT, ALONG, PAIR) for number in range(COUNT)])
+        shift: Array = np.einsum("nds,d->ns", seen[:, scalar], self.mean[scalar])
+        shift[:, CONTRAST] += self._squared_tilt(changes)
+        return shift
+
+    def _beside(self, changes: Array, place: Place) -> Array:
+        """Return what a unit of the reference's tilt along the image's rows and columns does [N, S, 2]."""
+        each = np.stack([
+            vector_columns(one[BESIDE_TILT], angle) for one, angle in zip(changes, place.angle_rad, strict=True)
+        ])  # fmt: skip
+        along, across = each[..., 0], each[..., 1]
+        angle = np.nan_to_num(place.bright_side_rad)[:, None]
+        return np.stack(
+            [along * np.cos(angle) - across * np.sin(angle), along * np.sin(angle) + across * np.cos(angle)], axis=2
+        )
+
+    def _of_press(self, changes: Array, angle_rad: float, bright_side_rad: float) -> Array:
+        """Return what is one press' own, in standard deviations [S, K]."""
+        vectors = [self._std(number) * vector_columns(changes[number], angle_rad) for number in (LESION_TILT, ALONG)]
+        pair = self._std(PAIR) * pair_columns(changes[PAIR], bright_side_rad)[:, None]
+        tilt = self._std(LESION_TILT) * changes[LESION_TILT, FIRST].reshape(LOADS, FIRST_RINGS)
+        bent = NOT_LINEAR_RATIO * (tilt[:, :, None] * _SMOOTH_FACTOR).reshape(LOADS * FIRST_RINGS, -1)
+        not_linear = np.zeros((SEEN_COLUMNS, 2 * FIRST_RINGS))
+        not_linear[FIRST, :FIRST_RINGS], not_linear[FIRST_ACROSS, FIRST_RINGS:] = bent, bent
+        squared = np.zeros((SEEN_COLUMNS, 1))
+        squared[CONTRAST, 0] = self._squared_tilt(changes[None])[0]
+        return np.hstack([*vectors, pair, not_linear, squared])
+
+    def _squared_tilt(self, changes: Array) -> Array:
+        """Return by how much tilts move ring means of a ratio of lights [n, contrast], in the mean and about it.
+
+        Of light 1 + b cos on the reference and 1 + p cos on the lesion it is (b - p) b / 2, of which p's part is as
+        often above as below.
+        """
+        tilt = self._std(BESIDE_TILT) * changes[:, BESIDE_TILT, FIRST].reshape(-1, LOADS, FIRST_RINGS)
+        whole = np.concatenate([np.zeros((len(tilt), LOADS, 1)), tilt], axis=2)
+        return np.asarray((whole**2).reshape(len(tilt), -1))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return what a file holds, by the names in `OWN_ARRAYS`."""
+        derivatives = {f"derivatives_{name}": part for name, part in self.derivatives.arrays().items()}
+        levels = np.array([getattr(self.levels, name) for name in ErrorLevels.__dataclass_fields__])
+        return derivatives | {"own_mean": self.mean, "own_covariance": self.covariance, "own_levels": levels}
+
+    def _factor(self, chosen: NDArray[np.intp]) -> Array:
+        return np.asarray(np.linalg.cholesky(self.covariance[np.ix_(chosen, chosen)]), np.float64)
+
+    def _std(self, number: int) -> float:
+        return float(np.sqrt(self.covariance[number, number]))
+
+
+def turned_columns(rows: Array, angle_rad: float | Array) -> Array:
+    """Return rows [..., P] in the inclusion's direction as seen [..., S], at an angle [..., 1] from the bright side."""
+    seen = np.concatenate([rows, np.zeros((*rows.shape[:-1], SEEN_COLUMNS - COLUMNS))], axis=-1)
+    for order, along, across in ((1, FIRST, FIRST_ACROSS), (2, SECOND, SECOND_ACROSS)):
+        seen[..., along] = rows[..., along] * np.cos(order * angle_rad)
+        seen[..., across] = rows[..., along] * np.sin(order * angle_rad)
+    return seen
+
+
+def vector_columns(change: Array, angle_rad: float) -> Array:
+    """Return what a vector's parts along and across the bright side do [S, 2], of one along the inclusion [P].
+
+    Ring means follow the part along the inclusion, whose angle from the bright side is told; the first harmonic does
+    not ask where the inclusion lies.
+    """
+    means = np.zeros(SEEN_COLUMNS)
+    means[CONTRAST] = change[CONTRAST]
+    seen = np.column_stack([means * np.cos(angle_rad), means * np.sin(angle_rad)])
+    seen[FIRST, 0] = seen[FIRST_ACROSS, 1] = change[FIRST]
+    return seen
+
+
+def pair_columns(change: Array, bright_side_rad: float) -> Array:
+    """Return what light of one pair of sides against the other does [S], of it along the rows of the image [P]."""
+    seen, angle = np.zeros(SEEN_COLUMNS), 2 * np.nan_to_num(bright_side_rad)
+    seen[SECOND], seen[SECOND_ACROSS] = np.cos(angle) * change[SECOND], -np.sin(angle) * change[SECOND]
+    return seen
+
+
+def _smooth_factor() -> Array:
+    """Return a factor [J - 1, J - 1] of the correlation of rings."""
+    r_mm = RING_RADII_MM[1:]
+    apart = (r_mm[:, None] - r_mm) / NOT_LINEAR_MM
+    return np.asarray(np.linalg.cholesky(np.exp(-(apart**2) / 2) + 1e-9 * np.eye(len(r_mm))))
+
+
+_SMOOTH_FACTOR = _smooth_factor()
+
+
+def own_probe_of(arrays: Mapping[str, NDArray[Any]]) -> OwnProbe:
+    """Return what the arrays in `OWN_ARRAYS` say; raise `InvalidQuantity` when one is of another shape."""
+    derivatives = row_derivatives_of({name: arrays[f"derivatives_{name}"] for name in DERIVATIVE_ARRAYS})
+    levels, expected = arrays["own_levels"], (len(ErrorLevels.__dataclass_fields__),)
+    if levels.shape != expected:
+        raise InvalidQuantity("shape of the probe's error levels", levels.shape, str(expected), ACTION)
+    mean, covariance = (np.asarray(arrays[name], np.float64) for name in ("own_mean", "own_covariance"))
+    return OwnProbe(derivatives, mean, covariance, ErrorLevels(*map(float, levels)))

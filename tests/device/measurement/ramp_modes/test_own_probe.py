@@ -1,0 +1,221 @@
+"""A commissioned probe: what it changes of a press, and that presses of it are answered where the design's are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.files.shipped import SIMULATED_PROBE
+from device.measurement.parameters import HIGH, PARAMETERS, normalise
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
+from device.measurement.ramp_modes.noise import ErrorLevels
+from device.measurement.ramp_modes.own_answers import OwnAnswers
+from device.measurement.ramp_modes.own_posterior import AXES, OwnPosterior, seen_of, seen_with_noise, to_bright_side
+from device.measurement.ramp_modes.own_probe import (
+    FIRST_ACROSS,
+    OwnProbe,
+    Place,
+    turned_columns,
+)
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
+from device.measurement.ramp_modes.row_derivatives import (
+    COUNT,
+    DERIVATIVE_ARRAYS,
+    MEAN,
+    NAMES,
+    STD,
+    owned_by,
+    row_derivatives_of,
+)
+from device.measurement.ramp_modes.surrogate import OFFSET
+from device.simulation.physics.table_file import load_table
+
+TRUTH = np.array([10.0, 6.0, 80.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
+PROBE = owned_by("probe")
+
+
+@pytest.fixture(scope="module")
+def derivatives():
+    arrays, _ = load_table(
+        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/1", DERIVATIVE_ARRAYS, "make them again"
+    )
+    return row_derivatives_of(arrays)
+
+
+def believed(derivatives, mean=MEAN, std=STD):
+    return OwnProbe(derivatives, np.array(mean), np.diag(np.array(std) ** 2), ErrorLevels(flat_field_ratio=0.0047))
+
+
+def own_posterior(seen, ramp_model, own, at):
+    answers = ramp_model.answers
+    return OwnPosterior(seen, answers.surrogate, answers.noise, own, answers.reach_mm(len(seen.rows)), at)
+
+
+def rows_at(ramp_model, parameters=TRUTH):
+    at = normalise(np.atleast_2d(parameters))
+    return at, ramp_model.answers.surrogate.rows(at, np.zeros(len(at)))
+
+
+def test_derivatives_survive_their_arrays(derivatives, ramp_model):
+    again = row_derivatives_of(derivatives.arrays())
+    at, rows = rows_at(ramp_model)
+    assert np.array_equal(again.changes(at, rows), derivatives.changes(at, rows))
+
+
+@pytest.mark.parametrize("part", ["near_baseline_coefficients", "beside_inclusion_degrees"])
+def test_derivatives_of_another_shape_are_refused(derivatives, part):
+    arrays = derivatives.arrays()
+    with pytest.raises(InvalidQuantity, match="derivatives"):
+        row_derivatives_of(arrays | {part: arrays[part][:, 1:]})
+
+
+def test_a_tilt_moves_the_first_harmonic_and_the_contact_law_the_reference(derivatives, ramp_model):
+    at, rows = rows_at(ramp_model)
+    changes = dict(zip(NAMES, derivatives.changes(at, rows)[0] * STD[:, None], strict=True))
+    rms = {
+        name: [float(np.sqrt(np.mean(one[part] ** 2))) for part in (CONTRAST, RESPONSE, FIRST)]
+        for name, one in changes.items()
+    }
+    assert np.argmax(rms["tilt_lesion_deg"]) == np.argmax(rms["tilt_beside_deg"]) == 2
+    assert np.argmax(rms["contact_exponent"]) == 1
+    assert np.argmax(rms["albedo_log_ratio"]) == 0
+    assert rms["tilt_lesion_deg"][1] == 0.0  # the reference press does not lean with it
+
+
+def test_a_covariance_that_is_none_is_refused(derivatives):
+    with pytest.raises(InvalidQuantity, match="covariance"):
+        OwnProbe(derivatives, MEAN, -np.eye(COUNT), ErrorLevels())
+    with pytest.raises(InvalidQuantity, match="mean"):
+        OwnProbe(derivatives, MEAN[1:], np.eye(COUNT), ErrorLevels())
+
+
+def test_what_presses_share_is_the_probe_the_lesion_and_the_reference_press(derivatives, ramp_model):
+    """Two presses at one place: their tilts are their own, all else is alike, so contrasts go together."""
+    at, rows = rows_at(ramp_model, np.tile(TRUTH, (2, 1)))
+    factor = believed(derivatives).changes(Place(at, np.zeros(2), np.zeros(2)), rows).factor
+    first, second = factor
+
+    def shared_ratio(columns):
+        own = [np.sum(part[columns] ** 2, axis=1) for part in factor]
+        return np.sum(first[columns] * second[columns], axis=1) / np.sqrt(own[0] * own[1])
+
+    assert shared_ratio(RESPONSE).min() > 0.999
+    assert shared_ratio(CONTRAST).min() > 0.9
+    assert 0.4 < np.median(shared_ratio(FIRST)) < 0.7  # half of a harmonic is the reference's tilt
+
+
+def test_a_tilt_of_the_reference_is_one_vector_in_the_image_whichever_side_is_bright(derivatives, ramp_model):
+    """A quarter of a turn apart, what is along for the one press is across for the other."""
+    at, rows = rows_at(ramp_model, np.tile(TRUTH, (2, 1)))
+    own = believed(derivatives, std=np.where(np.arange(COUNT) == NAMES.index("tilt_beside_deg"), 1.0, 1e-9))
+    factor = own.changes(Place(at, np.zeros(2), np.array([0.0, np.pi / 2])), rows).factor
+    first, second = factor
+    together = first @ second.T
+    assert np.abs(np.diag(together[FIRST, FIRST])).max() < 1e-9
+    apart = np.diag(together[FIRST, FIRST_ACROSS])
+    alone = np.diag((first @ first.T)[FIRST, FIRST])
+    assert apart == pytest.approx(-alone, rel=1e-3) or apart == pytest.approx(alone, rel=1e-3)
+
+
+def test_turning_to_the_bright_side_keeps_what_is_seen(ramp_model):
+    """Wherever the harmonics were taken along, they are the same waves in the image."""
+    _, rows = rows_at(ramp_model)
+    once = to_bright_side(turned_columns(rows, 0.4), np.array([1.0]))
+    again = to_bright_side(turned_columns(rows, -1.1), np.array([2.5]))
+    assert again.rows == pytest.approx(once.rows, abs=1e-12)
+    assert again.across == pytest.approx(once.across, abs=1e-12)
+    assert again.direction_rad == pytest.approx(once.direction_rad)
+    assert once.direction_rad[0] == pytest.approx(1.4)
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_derivatives_of_the_posterior_are_its_differences(derivatives, ramp_model, presses):
+    """But for what the direction itself changes of the light, which is left out of them."""
+    rng = np.random.default_rng(3)
+    parameters = np.tile(TRUTH, (presses, 1))
+    _, rows = rows_at(ramp_model, parameters)
+    seen = seen_of(turned_columns(rows, 0.3), np.full(presses, np.nan))
+    at = rng.uniform(-0.3, 0.3, OFFSET + AXES * presses)
+    posterior = own_posterior(seen, ramp_model, believed(derivatives), at)
+    residuals, (jacobian,) = posterior.residuals_and_jacobian(at[None])
+    assert residuals[0] == pytest.approx(posterior.residuals(at), abs=1e-9)
+    for k in range(posterior.dimensions):
+        step = 1e-5 * (np.arange(posterior.dimensions) == k)
+        difference = (posterior.residuals(at + step) - posterior.residuals(at - step)) / 2e-5
+        assert np.abs(difference - jacobian[:, k]).max() < 1e-4 * np.abs(difference).max()
+
+
+def test_a_press_of_the_design_is_explained_as_well_as_by_the_designs_own_posterior(derivatives, ramp_model):
+    """With no directions and the inclusion on the bright side both are the same, but for harmonics across."""
+    at, rows = rows_at(ramp_model)
+    answers = ramp_model.answers
+    own = replace(believed(derivatives, np.zeros(COUNT), np.full(COUNT, 1e-9)), levels=answers.noise.levels)
+    place = np.append(at[0, :OFFSET], [TRUTH[-1] / HIGH[OFFSET], 0.0])
+    seen = seen_of(turned_columns(rows, 0.0), np.zeros(1))
+    posterior = own_posterior(seen, ramp_model, own, place)
+    usual = PressPosterior(rows, answers.surrogate, answers.noise, direction_rad=np.zeros(1))
+    elsewhere = place + 0.05 * (np.arange(len(place)) < OFFSET)
+    moved = at[0] + 0.05 * (np.arange(len(PARAMETERS)) < OFFSET)
+    found = np.sum(posterior.residuals(elsewhere) ** 2) - np.sum(posterior.residuals(place) ** 2)
+    assert found == pytest.approx(np.sum(usual.residuals(moved) ** 2), rel=1e-3)
+
+
+def test_harmonics_across_are_needed(derivatives, ramp_model):
+    _, rows = rows_at(ramp_model)
+    seen = seen_of(turned_columns(rows, 0.0), np.zeros(1))._replace(first_across=None)
+    with pytest.raises(ValueError, match="across"):
+        OwnPosterior(
+            seen, ramp_model.answers.surrogate, ramp_model.answers.noise, believed(derivatives), 2.0, np.zeros(10)
+        )
+
+
+@pytest.fixture(scope="module")
+def foreign(derivatives, ramp_model):
+    """A press of a probe whose contact law and face differ by two tolerances, and that leans."""
+    at, rows = rows_at(ramp_model)
+    mean = MEAN + 2 * STD * np.isin(NAMES, ["contact_exponent", "face_modulus_log_ratio"])
+    changes = derivatives.changes(at, rows)[0]
+    seen = turned_columns(rows + np.einsum("dp,d->p", changes[PROBE], mean[PROBE]), 0.0)
+    seen[:, FIRST_ACROSS] += 0.3 * changes[NAMES.index("tilt_lesion_deg"), FIRST]
+    noisy = seen_with_noise(seen, ramp_model.answers.noise, np.random.default_rng(8))
+    return to_bright_side(noisy, np.array([0.7]))
+
+
+def test_a_foreign_probes_press_is_answered_by_its_own_bundle_and_refused_by_the_designs(
+    foreign, derivatives, ramp_model
+):
+    own = OwnAnswers(ramp_model.answers.surrogate, ramp_model.answers.noise, believed(derivatives))
+    guess = ramp_model.first_guesses(foreign.rows - own.ordinary_shift(foreign.rows))
+    answer, design = own.answer_to(foreign, guess), ramp_model.answers.answer_to(foreign, guess)
+    assert design.misfit_ratio > 3 * ramp_model.critical["standard"].misfit_ratio
+    assert answer.misfit_ratio < 1.4
+    truth = normalise(TRUTH[None])[0]
+    for unknown in (0, 1):
+        assert answer.intervals.low[unknown] <= truth[unknown] <= answer.intervals.high[unknown]
+    assert answer.unlike is not None
+    assert answer.unlike.shift.shape == (COLUMNS,)
+
+
+def test_where_to_press_next_is_told_of_a_commissioned_probe_too(foreign, derivatives, ramp_model):
+    own = OwnAnswers(ramp_model.answers.surrogate, ramp_model.answers.noise, believed(derivatives))
+    answer = own.answer_to(foreign, ramp_model.first_guesses(foreign.rows))
+    parts = own.worth(foreign, answer, (2.0, 4.0))
+    assert parts.shape == (2, 3)
+    assert np.all((parts > 0) & (parts <= 1 + 1e-9))
+
+
+def test_a_bundle_keeps_what_is_the_probes_own(derivatives, ramp_model):
+    own = OwnAnswers(ramp_model.answers.surrogate, ramp_model.answers.noise, believed(derivatives, MEAN + STD))
+    arrays = surrogate_arrays(own)
+    again = ramp_answers_of(arrays)
+    assert isinstance(again, OwnAnswers)
+    assert again.own.mean == pytest.approx(MEAN + STD)
+    assert again.noise.levels == own.own.levels
+    with pytest.raises(InvalidQuantity, match="error levels"):
+        ramp_answers_of(arrays | {"own_levels": np.zeros(3)})
+
+
+def test_the_file_of_a_design_has_nothing_of_its_own(ramp_model):
+    assert not isinstance(ramp_answers_of(surrogate_arrays(ramp_model.answers)), OwnAnswers)
