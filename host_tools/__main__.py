@@ -10,7 +10,7 @@ import sys
 import typer
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.commands.calibrate import calibrate
+from host_tools.commands.calibrate import calibrate, commission
 from host_tools.commands.evaluate import evaluate
 from host_tools.commands.limits import limits
 from host_tools.commands.model import phantom, table
@@ -26,7 +26,7 @@ from host_tools.commands.sweep import sweep
 from host_tools.commands.tradeoff import tradeoff
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
-from host_tools.commands.worlds import worlds
+from host_tools.commands.worlds import robustness, worlds
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -41,6 +41,10 @@ app.command(epilog="Example: host_tools train --mode standard --out models/stand
 app.command(epilog="Example: host_tools table --out models/simulated_probe")(table)
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
 app.command(epilog="Example: host_tools worlds --count 20 --seed 1 --out scenarios/worlds")(worlds)
+app.command(epilog="Example: host_tools robustness --probes 3 --presses 20")(robustness)
+app.command(
+    epilog="Example: host_tools commission ramps/* --probe probe.toml --phantoms phantoms.toml --out models/TSIS-0007"
+)(commission)
 app.command(epilog="Example: host_tools calibrate build/phantoms/* --out build/calibration.json")(calibrate)
 app.command(epilog="Example: host_tools evaluate --scenes 40")(evaluate)
 app.command(epilog="Example: host_tools modes --out docs/modes.md")(modes)

@@ -1,4 +1,7 @@
-"""`host_tools calibrate`: phantom recordings to a certificate, written once, or to all that speaks against it."""
+"""`host_tools calibrate` and `commission`: phantom recordings to a certificate, or to modes of one's own probe.
+
+Either is written once, or all that speaks against it is told.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,9 @@ if TYPE_CHECKING:
     from host_tools.calibration.calibrate import Calibrated
     from host_tools.calibration.gates import Gate
     from host_tools.calibration.known_bench import OnBench
+    from host_tools.commissioning.commission import CommissionedProbe
 
-MODEL = MODELS / "paper"
+MODEL, STANDARD = MODELS / "paper", MODELS / "standard"
 
 
 def calibrate(
@@ -135,3 +139,73 @@ def _show(done: Calibrated, path: Path) -> None:
 
 def _gate_line(gate: Gate) -> str:
     return f"{gate.quantity:48} {gate.value:<10.4g} {gate.bound}"
+
+
+def commission(
+    recordings: Annotated[list[Path], typer.Argument(help="Ramps on phantoms, each file named as its phantom is.")],
+    probe: Annotated[Path, typer.Option(help="File of the probe, probe.toml.")],
+    phantoms: Annotated[Path, typer.Option(help="File of the phantoms, phantoms.toml, with bare blocks.")],
+    out: Annotated[Path, typer.Option(help="New folder of the bundle, models/NAME.")],
+    design: Annotated[Path, typer.Option(help="Bundle of modes standard and precise of the design.")] = STANDARD,
+    table: Annotated[Path, typer.Option(help="Folder of the design's tables and derivatives.")] = SIMULATED_PROBE,
+    valid_days: Annotated[float, typer.Option(help="Days until the probe is to be commissioned again.")] = 365.0,
+    seed: Annotated[int, typer.Option(help="Seed of the presses that limits and the card are made of.")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
+) -> None:
+    """Find out what a probe is from its ramps on phantoms, and make its modes standard and precise of the design's.
+
+    Each phantom is also answered as unknown, by a probe commissioned without it. Gates of misfit and coverage of these,
+    and of how far the probe lies from its design, must be passed; otherwise nothing is written and the exit code is 1.
+    Some two minutes on two cores.
+    """
+    from datetime import UTC, datetime
+
+    from device.files.bundle_file import read_ramp_model
+    from device.files.recording_file import read_recording
+    from host_tools.calibration.gates import CalibrationRejected
+    from host_tools.commissioning.commission import commission as run_commission
+    from host_tools.commissioning.own_bundle import write_own_bundle
+    from host_tools.commissioning.phantom_ramps import phantom_ramps
+    from host_tools.press_models.press_derivatives import load_derivatives
+    from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+    from host_tools.scenes.probe_file import probe_of
+
+    if out.exists():
+        raise InvalidQuantity("bundle", out, "a new folder", "a bundle is written once: give another name")
+    require("valid_days", valid_days, Bound(1.0, 730.0, "days"), "commission again before that")
+    made_by, stated = probe_of(probe), read_phantoms(phantoms, blocks_needed=BLOCKS_NEEDED)
+    model, derivatives = read_ramp_model(design), load_derivatives(table)
+    names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
+    try:
+        ramps = phantom_ramps([read_recording(path) for path in recordings], names, stated, made_by)
+        done = run_commission(ramps, model, derivatives, seed=seed, say=note.print)
+    except CalibrationRejected as rejection:
+        if not as_json:
+            raise
+        print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in rejection.problems]}))
+        raise typer.Exit(1) from rejection
+    write_own_bundle(
+        done,
+        design,
+        out,
+        serial=made_by.serial,
+        made_at=datetime.now(UTC),
+        valid_days=valid_days,
+        command=f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}",
+        origin={"phantoms": stated.serial, "design": model.bundle.name},
+    )
+    if as_json:
+        print(json.dumps({"accepted": True, "path": str(out), "gates": [gate.as_record() for gate in done.gates]}))
+    else:
+        _show_commissioned(done, out)
+
+
+def _show_commissioned(done: CommissionedProbe, out: Path) -> None:
+    from host_tools.commissioning.joint_fit import PROBE
+    from host_tools.commissioning.report import phantom_lines, probe_lines
+
+    for line in (*probe_lines(done.fit, PROBE), *phantom_lines(done.phantoms)):
+        print(line)
+    for gate in done.gates:
+        print(_gate_line(gate))
+    print(f"bundle in {out}: set standard_model to it, and serial to the probe's own")

@@ -22,8 +22,8 @@ from device.measurement.arrays import Array
 from device.measurement.mode import Mode
 from device.measurement.parameters import HIGH, normalise
 from device.measurement.quantities import Inclusion
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
-from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.virtual_probe import ProbeTables

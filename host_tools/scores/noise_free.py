@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from device.measurement.arrays import Array
 from device.measurement.parameters import denormalise, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, PressRows
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Chapter, Table, at_most

@@ -18,8 +18,9 @@ from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import COUNT, EVEN_STD, HIGH, denormalise_unknowns, normalise
 from device.measurement.quantities import Bound, require
+from device.measurement.ramp_modes.answers import RampAnswer
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import RampAnswer, RampModel
+from device.measurement.ramp_modes.model import RampModel
 from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, OFFSET, SIZE
 from host_tools.cramer_rao.information import cramer_rao
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most

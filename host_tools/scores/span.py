@@ -18,8 +18,9 @@ from device.measurement.estimate import SPOKEN
 from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, EVEN_STD, normalise
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import RAMP_MODES, RampAnswers, RampModel
+from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
 from device.measurement.ramp_modes.noise import as_one_row
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.virtual_probe import ProbeTables

@@ -1,0 +1,80 @@
+"""Phantoms as if they were patients: each is answered by a probe that was commissioned without it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.arrays import Array
+from device.measurement.parameters import COUNT, denormalise_unknowns
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
+from device.measurement.ramp_modes.own_answers import OwnAnswers
+from device.measurement.ramp_modes.radial_profile import SeenPresses
+from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe
+from host_tools.commissioning.phantom_ramps import PhantomRamp
+from host_tools.press_models.mode_outcome import Guess
+from host_tools.press_models.recorded_presses import in_parallel
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A phantom answered as unknown: truth, estimate and interval [3] in the unknowns' own units, and its misfit."""
+
+    name: str
+    truth: Array
+    value: Array
+    low: Array
+    high: Array
+    is_determined: NDArray[np.bool_]
+    misfit_ratio: float
+
+    @property
+    def is_covered(self) -> NDArray[np.bool_]:
+        """Whether each interval [3] holds the truth."""
+        return np.asarray((self.low <= self.truth) & (self.truth <= self.high))
+
+
+def answers_of(design: Design, fit: ProbeFit) -> OwnAnswers:
+    """Return what answers presses of a probe of which commissioning has found this."""
+    noise = replace(design.answers.noise, levels=fit.levels)
+    return OwnAnswers(design.answers.surrogate, noise, fit.own_probe(design.derivatives))
+
+
+def left_out(
+    ramps: Sequence[PhantomRamp], design: Design, guess: Guess, fit: ProbeFit, jobs: int = -1
+) -> list[LeftOut]:
+    """Return how each phantom with an inclusion is answered by a probe commissioned on the others.
+
+    `guess` says of rows where a fit may begin. The level of the model's error stays that of all phantoms.
+    """
+    chosen = [number for number, ramp in enumerate(ramps) if ramp.has_inclusion]
+
+    def answered(place: int) -> LeftOut:
+        ramp = ramps[chosen[place]]
+        others = [one for one in ramps if one is not ramp]
+        alone = fit_probe(others, design, model_ratios=(fit.levels.model_ratio,))
+        return _answered(ramp, answers_of(design, alone), guess)
+
+    return in_parallel(answered, len(chosen), jobs)
+
+
+def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
+    answer = answers.answer_to(ramp.seen, guess(ramp.seen.rows - answers.ordinary_shift(ramp.seen.rows)))
+    low, high = (denormalise_unknowns(ends) for ends in answer.intervals[:2])
+    truth, value = denormalise_unknowns(ramp.stated[:COUNT]), denormalise_unknowns(answer.mean)
+    return LeftOut(ramp.name, truth, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
+
+
+def answers_to_seen(
+    answers: RampAnswers, guess: Guess, seen: Sequence[SeenPresses], jobs: int = -1
+) -> list[RampAnswer]:
+    """Return the answers to what was read of presses or scans."""
+
+    def answer(number: int) -> RampAnswer:
+        one = seen[number]
+        return answers.answer_to(one, guess(one.rows - answers.ordinary_shift(one.rows)))
+
+    return in_parallel(answer, len(seen), jobs)

@@ -1,0 +1,99 @@
+"""A commissioned probe to the bundle of its modes standard and precise: the design's, with what is its own.
+
+Networks, polynomials and the camera's noise are the design's, to the byte. Serial, what is believed of the probe,
+limits, and what the answers are worth are its own. Source of the format: the model bundle of docs/contracts.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from dataclasses import asdict
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from device.measurement.bundle import CARD_FILE
+from device.measurement.quantities import Bound, require
+from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
+from device.measurement.ramp_modes.range_classifier import RANGE_FILE
+from device.measurement.ramp_modes.row_derivatives import NAMES, STD
+from host_tools.commissioning.commission import CommissionedProbe
+from host_tools.commissioning.joint_fit import PROBE
+from host_tools.paper_network.export import write_folder
+from host_tools.press_models.mode_statistics import reachable_half_width, statistics
+
+VALID_DAYS = Bound(1.0, 730.0, "days")
+"""How long a commissioning may hold: silicone stiffens, LEDs fade."""
+OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width"
+"""What a card says of the design's own probe, and of no other."""
+
+
+def write_own_bundle(
+    done: CommissionedProbe,
+    design: Path,
+    folder: Path,
+    *,
+    serial: str,
+    made_at: datetime,
+    valid_days: float,
+    command: str,
+    origin: dict[str, str],
+) -> None:
+    """Write the bundle of a probe to a new folder, from the design's in `design`; whole or not at all.
+
+    Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
+    """
+    require("valid_days", valid_days, VALID_DAYS, "commission again before that")
+    files = {path.name: path.read_bytes() for path in design.iterdir()}
+    card = json.loads(files[CARD_FILE])
+    surrogate = _archive(surrogate_arrays(done.answers))
+    card |= {
+        "name": folder.resolve().name,
+        "serials": [serial],
+        "training_command": command,
+        "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
+        "expires_at": (made_at + timedelta(days=valid_days)).isoformat(timespec="seconds").replace("+00:00", "Z"),
+        "commissioned": _record(done, made_at, origin),
+    }
+    for mode, presses in (("standard", done.presses), ("precise", done.scans)):
+        kept = {name: value for name, value in card["modes"][mode].items() if name not in OF_DESIGN}
+        card["modes"][mode] = kept | asdict(done.critical) | {"simulated": statistics(presses)}
+    card["modes"]["precise"]["reachable_half_width"] = reachable_half_width(done.scans)
+    text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
+    names = (*(name for name in files if name.endswith(".onnx")),)
+    assert RANGE_FILE in names
+    write_folder(folder, {name: files[name] for name in names} | {SURROGATE_FILE: surrogate, CARD_FILE: text})
+
+
+def _record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:
+    """Return what the card says of the commissioning: the probe, its model error, phantoms left out, gates."""
+    std = np.sqrt(np.diag(done.fit.covariance))
+    return {
+        "made_at": made_at.isoformat(timespec="seconds").replace("+00:00", "Z"),
+        **origin,
+        "model_ratio": done.fit.levels.model_ratio,
+        "probe": {
+            NAMES[number]: {"mean": round(float(mean), 5), "std": round(float(own), 5), "tolerance": float(STD[number])}
+            for number, mean, own in zip(PROBE, done.fit.mean, std, strict=True)
+        },
+        "phantoms_left_out": [
+            {
+                "name": one.name,
+                **{part: np.round(getattr(one, part), 3).tolist() for part in ("truth", "value", "low", "high")},
+                "is_determined": one.is_determined.tolist(),
+                "misfit_ratio": round(one.misfit_ratio, 3),
+            }
+            for one in done.phantoms
+        ],
+        "gates": [gate.as_record() for gate in done.gates],
+    }
+
+
+def _archive(arrays: dict[str, Any]) -> bytes:
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    return content.getvalue()

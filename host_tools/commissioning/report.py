@@ -1,0 +1,40 @@
+"""What commissioning found, in lines: the probe beside its tolerances, and phantoms that were answered as unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.row_derivatives import NAMES, STD
+from host_tools.commissioning.joint_fit import ProbeFit
+from host_tools.commissioning.left_out import LeftOut
+
+
+def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
+    """Yield what is known of the probe; layers carry what the model lacks, and are no measurement of the silicone."""
+    yield f"{'of the probe':28} {'found':>8} {'1 sd':>8} {'tolerance':>10}"
+    std = np.sqrt(np.diag(fit.covariance))
+    for number, mean, own in zip(directions, fit.mean, std, strict=True):
+        yield f"{NAMES[number]:28} {mean:8.4f} {own:8.4f} {STD[number]:10.3g}"
+    yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
+
+
+def phantom_lines(phantoms: Sequence[LeftOut]) -> Iterator[str]:
+    """Yield how each phantom left out was answered."""
+    yield f"{'phantom left out':18} {'misfit':>6}  " + "  ".join(f"{name:>28}" for name in UNKNOWNS)
+    for one in phantoms:
+        yield f"{one.name:18} {one.misfit_ratio:6.2f}  " + "  ".join(
+            f"{_told(one, place):>28}" for place in range(len(UNKNOWNS))
+        )
+
+
+def _told(one: LeftOut, place: int) -> str:
+    """Return truth and interval of an unknown, and whether the interval holds it."""
+    low, high, truth = one.low[place], one.high[place], one.truth[place]
+    if not one.is_determined[place]:
+        return f"{truth:.3g}: not determined"
+    held = "in" if one.is_covered[place] else "NOT in"
+    return f"{truth:.3g} {held} {low:.3g}-{high:.3g}"

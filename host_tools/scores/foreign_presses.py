@@ -1,0 +1,124 @@
+"""Presses and phantoms of probes that differ from the design in all that a builder's tolerances and a hand leave open.
+
+A world of `foreign_probes` is split: what is the probe's stays, what is a press' own - tilts, skin and tissue over the
+lesion, relaxation, light between the presses, the patch of skin - is drawn anew for each. Its camera is left out: a
+grid target tells it, and it is undone in the image. Rows are exact, of the virtual probe's own light and faces, with
+noise and drift as they are believed of the design's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.parameters import PARAMETERS, denormalise
+from device.measurement.ramp_modes.noise import PressNoise
+from device.measurement.ramp_modes.own_posterior import seen_with_noise, to_bright_side
+from device.measurement.ramp_modes.radial_profile import SeenPresses
+from device.measurement.recording.led_sides import LedRatio
+from device.simulation.physics.lens import AS_CERTIFIED
+from device.simulation.physics.world import OverLesion, PressTilts, Relaxation, TrueLight, World
+from device.simulation.scenario import NO_INCLUSION
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.commissioning.phantom_ramps import PhantomRamp, stated_coordinates
+from host_tools.press_models.press_samples import PressedScene, draw_parameters, harmonics_along
+from host_tools.press_models.recorded_presses import in_parallel
+from host_tools.scenes.phantom_set import PhantomSet
+
+TRIMMED = 0.1
+"""What is left of the LEDs' imbalance: `light.target_counts` has the sides made alike."""
+PHANTOM_OFFSET_MM = 0.5
+"""How far off the middle of a phantom's inclusion the probe is set down, standard deviation in x and y."""
+SURFACES = {"contact_pressure_kpa": (1.6, 2.4), "albedo": (0.42, 0.58), "spread_mm": (0.85, 1.2)}
+"""Skins of two surfaces, the ends of their ranges: phantoms have one or the other."""
+
+
+class ForeignPresses(NamedTuple):
+    """Parameters [n, 9] of presses, and what is `seen` of each, with noise."""
+
+    parameters: Array
+    seen: list[SeenPresses]
+
+    def first(self, count: int) -> ForeignPresses:
+        """Return the first of the presses."""
+        return ForeignPresses(self.parameters[:count], self.seen[:count])
+
+
+def probe_part(world: World) -> World:
+    """Return what a world says of the probe alone, its camera undone and its sides made alike."""
+    x, y, minus_x, minus_y = (1 + TRIMMED * (side - 1) for side in world.light.side_ratio)
+    light = TrueLight(side_ratio=(x, y, minus_x, minus_y))
+    return replace(
+        world, camera=AS_CERTIFIED, lesion=OverLesion(), tilt=PressTilts(), relaxation=Relaxation(), light=light
+    )
+
+
+def press_part(probe: World, rng: np.random.Generator, *, on_phantom: bool = False) -> World:
+    """Return the world of one press of a probe, as hand and skin would have it; a phantom is one casting."""
+    about = 0.0 if on_phantom else 1.0
+    tilts = 0.3 * rng.standard_normal(4)
+    lesion = 1 + about * np.array([0.03, 0.02, 0.05]) * np.clip(rng.standard_normal(3), -2, 2)
+    sides = tuple(map(float, 1 + 0.005 * rng.standard_normal(4)))
+    lit: LedRatio = (sides[0], sides[1], sides[2], sides[3])
+    lost, constant_s, beside, lesion_rate = rng.uniform((0.02, 2.0, 0.1, 0.1), (0.05, 10.0, 0.2, 0.2))
+    return replace(
+        probe,
+        tilt=PressTilts(*map(float, tilts)),
+        lesion=OverLesion(*map(float, lesion)),
+        relaxation=Relaxation(float(lost), float(constant_s), float(beside), float(lesion_rate)),
+        light=replace(probe.light, lesion_side_ratio=lit),
+        texture=replace(probe.texture, seed=int(rng.integers(2**31))),
+    )
+
+
+def foreign_presses(
+    tables: ProbeTables, probe: World, noise: PressNoise, count: int, *, seed: int, jobs: int = -1
+) -> ForeignPresses:
+    """Return random presses of a probe on patients."""
+    parameters = draw_parameters(count, np.random.default_rng([seed, 0]))
+
+    def pressed(number: int) -> SeenPresses:
+        rng = np.random.default_rng([seed, 1, number])
+        return _seen(tables, parameters[number], press_part(probe, rng), noise, rng)
+
+    return ForeignPresses(parameters, in_parallel(pressed, count, jobs))
+
+
+def foreign_phantoms(
+    tables: ProbeTables, probe: World, noise: PressNoise, phantoms: PhantomSet, *, seed: int, jobs: int = -1
+) -> list[PhantomRamp]:
+    """Return the ramps of a probe on phantoms, whose true numbers lie about those stated by their tolerances."""
+
+    def pressed(number: int) -> PhantomRamp:
+        phantom, rng = phantoms.phantoms[number], np.random.default_rng([seed, 2, number])
+        stated, std, has_inclusion = stated_coordinates(phantom)
+        values = _true_values(stated, std, number, rng)
+        if not has_inclusion:
+            values[: len(NO_INCLUSION.as_tuple())] = NO_INCLUSION.as_tuple()
+        seen = _seen(tables, values, press_part(probe, rng, on_phantom=True), noise, rng)
+        return PhantomRamp(phantom.name, seen, stated, std, has_inclusion)
+
+    return in_parallel(pressed, len(phantoms.phantoms), jobs)
+
+
+def _true_values(stated: Array, std: Array, number: int, rng: np.random.Generator) -> Array:
+    """Return the parameters [9] of a phantom: as stated but for tolerances, of one of two surfaces, off its middle."""
+    values = denormalise(np.clip(stated + std * np.clip(rng.standard_normal(len(stated)), -2, 2), -1, 1))
+    for name, ends in SURFACES.items():
+        values[PARAMETERS.index(name)] = ends[number % 2] * (1 + 0.03 * rng.standard_normal())
+    values[PARAMETERS.index("offset_mm")] = min(float(np.hypot(*(PHANTOM_OFFSET_MM * rng.standard_normal(2)))), 2.0)
+    return values
+
+
+def _seen(
+    tables: ProbeTables, parameters: Array, world: World, noise: PressNoise, rng: np.random.Generator
+) -> SeenPresses:
+    """Return what is read of one press in a world, with noise."""
+    direction_rad = np.array([rng.uniform(0, 2 * np.pi)])
+    pressed = PressedScene(tables, world=world).press(parameters, float(direction_rad[0]))
+    along = pressed.as_row(float(direction_rad[0]))
+    across = [part.ravel() for part in harmonics_along(pressed.rings, float(direction_rad[0]), across=True)]
+    return to_bright_side(seen_with_noise(np.concatenate([along, *across])[None], noise, rng), direction_rad)

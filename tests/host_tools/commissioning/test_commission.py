@@ -1,0 +1,183 @@
+"""Commissioning: phantoms of a probe to what it is, what it refuses, and a bundle that answers for it."""
+
+import json
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from device.files.bundle_file import read_ramp_model
+from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.bundle import BundleRefused
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.own_answers import OwnAnswers
+from device.measurement.ramp_modes.row_derivatives import NAMES, STD
+from device.simulation.physics.layer_table import LayerRatios
+from device.simulation.physics.skin import ContactLaw
+from device.simulation.physics.world import World
+from device.simulation.scenario import Scenario
+from host_tools.calibration.gates import CalibrationRejected
+from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
+from host_tools.calibration.phantom_sets import of_file
+from host_tools.commissioning import commission as commission_module
+from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, commission, gates_of
+from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design, fit_probe
+from host_tools.commissioning.left_out import left_out
+from host_tools.commissioning.own_bundle import write_own_bundle
+from host_tools.commissioning.phantom_ramps import phantom_ramps
+from host_tools.commissioning.report import phantom_lines, probe_lines
+from host_tools.press_models.press_derivatives import load_derivatives
+from host_tools.scenes.phantom_set import read_phantoms
+from host_tools.scenes.probe_file import simulated_probe
+from host_tools.scores.foreign_presses import foreign_phantoms
+
+EXPONENT = NAMES[PROBE[0]], 0
+RAMP_N = tuple(np.linspace(0.1, 0.64, 8))
+FOREIGN = World(contact=ContactLaw(exponent=0.9), layers=LayerRatios(face_modulus_ratio=1.1))
+
+
+@pytest.fixture(scope="module")
+def model():
+    return read_ramp_model(MODELS / "standard")
+
+
+@pytest.fixture(scope="module")
+def derivatives():
+    return load_derivatives(SIMULATED_PROBE)
+
+
+@pytest.fixture(scope="module")
+def phantoms():
+    return read_phantoms(SIMULATED_PROBE / "phantoms.toml", blocks_needed=3)
+
+
+@pytest.fixture(scope="module")
+def ramps(tables, model, phantoms):
+    return foreign_phantoms(tables, FOREIGN, model.answers.noise, phantoms, seed=3, jobs=1)
+
+
+@pytest.fixture(scope="module")
+def fit(ramps, model, derivatives):
+    return fit_probe(ramps, Design(model.answers, derivatives), model_ratios=(0.002, 0.006))
+
+
+def test_phantoms_tell_the_contact_law_of_a_probe(fit):
+    """An exponent of 0.9 where the design has 1, ten times as exactly as its tolerance says."""
+    name, place = EXPONENT
+    assert name == "contact_exponent"
+    assert fit.mean[place] == pytest.approx(-0.1, abs=0.015)
+    assert np.sqrt(fit.covariance[place, place]) < STD[PROBE[place]] / 10
+    assert fit.misfit_ratio.max() < 2
+
+
+def test_the_level_of_the_models_error_is_the_likeliest(fit, ramps, model, derivatives):
+    """Those are presses of the design's own physics: a small error explains them better than a large one."""
+    large = fit_probe(ramps, Design(model.answers, derivatives), model_ratios=(0.013,))
+    assert fit.log_evidence > large.log_evidence
+    assert fit.levels.model_ratio == 0.002
+
+
+def test_what_is_believed_is_no_narrower_than_part_of_the_tolerance(fit, derivatives):
+    own = fit.own_probe(derivatives)
+    std = np.sqrt(np.diag(own.covariance))[PROBE]
+    assert np.all(std >= FLOOR * STD[PROBE])
+    assert own.mean[PROBE] == pytest.approx(fit.mean)
+
+
+def test_probe_and_phantoms_are_reported_in_words(fit):
+    lines = list(probe_lines(fit, PROBE))
+    assert len(lines) == len(PROBE) + 2
+    assert lines[1].startswith("contact_exponent")
+
+
+@pytest.mark.long
+def test_a_phantom_left_out_is_answered_as_unknown_and_wrong_truths_are_told(fit, ramps, model, derivatives):
+    """Two phantoms whose truths are exchanged are not covered: the gate names what to measure again."""
+    design = Design(model.answers, derivatives)
+    honest = left_out(ramps, design, model.first_guesses, fit, jobs=1)
+    assert [gate.problem for gate in gates_of(fit, honest)] == [None, None, None]
+    assert len(list(phantom_lines(honest))) == len(honest) + 1
+    exchanged = [replace(one, truth=honest[-1 - place].truth) for place, one in enumerate(honest)]
+    problems = [gate.problem for gate in gates_of(fit, exchanged) if gate.problem]
+    assert "measure the phantoms again" in str(problems[0])
+
+
+@pytest.mark.long
+def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives, tmp_path, monkeypatch):
+    monkeypatch.setattr(commission_module, "PRESSES", 12)
+    monkeypatch.setattr(commission_module, "SCANS", 4)
+    said = []
+    done = commission(ramps, model, derivatives, jobs=1, say=said.append)
+    assert len(said) == 3
+    assert 1 < done.critical.misfit_ratio <= LARGEST_MISFIT_RATIO
+    out = tmp_path / "TSIS-0007"
+    made_at = datetime(2026, 1, 2, tzinfo=UTC)
+    write_own_bundle(
+        done,
+        MODELS / "standard",
+        out,
+        serial="TSIS-0007",
+        made_at=made_at,
+        valid_days=365,
+        command="host_tools commission",
+        origin={"phantoms": "PH-7"},
+    )
+    own = read_ramp_model(out)
+    own.prove()
+    assert isinstance(own.answers, OwnAnswers)
+    assert own.bundle.card["serials"] == ["TSIS-0007"]
+    assert own.bundle.card["expires_at"] == "2027-01-02T00:00:00Z"
+    assert asdict(own.critical["standard"]) == asdict(done.critical)
+    answer, before = (
+        own.answer_to(ramps[0].seen),
+        done.answers.answer_to(ramps[0].seen, own.first_guesses(ramps[0].seen.rows)),
+    )
+    assert answer.mean == pytest.approx(before.mean, abs=1e-3)
+    card = json.loads((out / "model.json").read_text())
+    assert "dial" not in card["modes"]["standard"]
+    (out / "model.json").write_text(json.dumps(card | {"serials": ["TSIS-0008"]}))
+    with pytest.raises(BundleRefused):
+        read_ramp_model(out)
+
+
+def recorded(tables, one, world=FOREIGN, forces_n=RAMP_N):
+    scenario = one.in_its_tissue(Scenario(world=world))
+    protocol = PhantomProtocol(forces_n, frames=1)
+    return phantom_recording(one.inclusion, tables, seed=4, protocol=protocol, scenario=scenario)
+
+
+def test_a_recording_is_of_the_phantom_whose_name_its_file_has(tables, phantoms):
+    known = list(of_file(phantoms))
+    recordings = [recorded(tables, one) for one in known]
+    ramps = phantom_ramps(recordings, [one.name for one in known], phantoms, simulated_probe())
+    assert [ramp.name for ramp in ramps] == [one.name for one in known]
+    assert [ramp.has_inclusion for ramp in ramps] == [one.truth is not None for one in known]
+    assert ramps[0].seen.across is not None
+
+
+def test_all_that_contradicts_the_recordings_is_told_at_once(tables, phantoms):
+    """Too few, an unknown name, another probe, and a press that is no ramp."""
+    first, second, third = list(of_file(phantoms))[:3]
+    recordings = [
+        recorded(tables, first),
+        replace(recorded(tables, second), serial="TSIS-0009"),
+        recorded(tables, third, forces_n=(0.3, 0.5)),
+    ]
+    with pytest.raises(CalibrationRejected) as rejected:
+        phantom_ramps(recordings, [first.name, "nobody", third.name], phantoms, simulated_probe())
+    told = [problem.quantity for problem in rejected.value.problems]
+    assert "serial of nobody" in told
+    assert "phantom of nobody" in told
+    assert any(one.startswith(f"{third.name}: ") for one in told)
+    assert "recorded bare blocks" in told
+    assert "recorded phantoms with an inclusion" in told
+
+
+def test_a_phantom_that_the_designs_model_does_not_hold_is_refused(tables, phantoms):
+    deep = replace(phantoms.phantoms[0], depth_mm=14.0)
+    others = replace(phantoms, phantoms=(deep, *phantoms.phantoms[1:]))
+    known = list(of_file(others))
+    recording = recorded(tables, next(of_file(phantoms)))
+    with pytest.raises(InvalidQuantity, match="depth_mm of"):
+        phantom_ramps([recording], [known[0].name], others, simulated_probe())
