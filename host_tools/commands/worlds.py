@@ -1,4 +1,4 @@
-"""`host_tools worlds`: scenes of probes that differ from what the models believe."""
+"""`host_tools worlds` and `robustness`: probes that differ from what the models believe, and how they are answered."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from typing import Annotated
 
 import typer
 
+from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, require
-from host_tools.commands.output import note
+from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table, shown
+from host_tools.commands.output import Scheduler, note, require_writable
+from host_tools.workers import workers
 
 
 def worlds(
@@ -28,3 +31,52 @@ def worlds(
     out.mkdir(parents=True, exist_ok=True)
     written = write_worlds(count, seed, out)
     note.print(f"{written[0]} to {written[-1].name}", soft_wrap=True)
+
+
+def robustness(
+    out: Annotated[
+        Path | None, typer.Option(help="Markdown file to write, results beside it; printed only when not given.")
+    ] = None,
+    probes: Annotated[int, typer.Option(help="How many foreign probes, up to 99.")] = 20,
+    presses: Annotated[int, typer.Option(help="Random presses of each.")] = 60,
+    model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise of the design.")] = MODELS
+    / "standard",
+    phantoms: Annotated[Path, typer.Option(help="File of the phantoms of every probe.")] = SIMULATED_PROBE
+    / "phantoms.toml",
+    table: Annotated[Path, typer.Option(help="Folder of the design's tables.")] = SIMULATED_PROBE,
+    seed: Annotated[int, typer.Option(help="Seed of probes, presses and phantoms.")] = 1,
+    scheduler: Scheduler = None,
+) -> None:
+    """Measure how presses of probes of random tolerances are answered, before and after commissioning.
+
+    A quarter of an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
+    """
+    from device.files.bundle_file import read_ramp_model
+    from device.simulation.virtual_probe import ProbeTables
+    from host_tools.pages.page import Results, write_page
+    from host_tools.press_models.press_derivatives import load_derivatives
+    from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+    from host_tools.scores.robustness import robustness_chapter
+
+    require("probes", probes, Bound(1, 99, "probes"), "ask for at least one")
+    require("presses", presses, Bound(4, 10_000, "presses"), "ask for at least four of each probe")
+    if out:
+        require_writable(out, (".md",))
+    trained, derivatives = read_ramp_model(model), load_derivatives(table)
+    stated, tables = read_phantoms(phantoms, blocks_needed=BLOCKS_NEEDED), ProbeTables.load(table)
+    with workers(scheduler):
+        measured = measure_chapters({
+            "tolerances": lambda: robustness_chapter(
+                trained, derivatives, tables, stated, probes=probes, presses=presses, seed=seed
+            )
+        })  # fmt: skip
+    missed = sum(print_chapter(timed) for timed in measured.values())
+    for timed in measured.values():
+        for one in timed.chapter.tables:
+            print_table(one)
+    if out:
+        command = f"host_tools robustness --probes {probes} --presses {presses} --out {shown(out)}"
+        write_page(out, Results("robustness", command, measured))
+        note.print(f"{out} written.")
+    if missed:
+        raise typer.Exit(1)

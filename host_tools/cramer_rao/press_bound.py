@@ -21,7 +21,7 @@ from device.measurement.arrays import Array
 from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, PARAMETERS, normalise
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
 from host_tools.cramer_rao.accuracy_map import MODULI_KPA, Triple, inclusions
 from host_tools.cramer_rao.information import cramer_rao

@@ -22,7 +22,8 @@ from device.measurement.parameters import denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.quick_mode.model import QuickModel
 from device.measurement.quick_mode.profile import quick_press
-from device.measurement.ramp_modes.model import RampAnswers, RampModel
+from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.model import RampModel
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, light_ratio
 from device.measurement.ramp_modes.radial_profile import TOUCHED_N, press_profile
 from device.measurement.recording.recording import Recording

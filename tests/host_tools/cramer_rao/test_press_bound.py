@@ -9,7 +9,7 @@ from small_surrogate import linear_surrogate, random_surrogate, white_noise
 
 from device.measurement.parameters import EVEN_STD, HIGH, LOW, PARAMETERS
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
 from host_tools.cramer_rao.press_bound import least_errors
 

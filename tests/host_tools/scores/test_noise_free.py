@@ -8,7 +8,7 @@ from small_surrogate import COLUMNS, linear_surrogate, random_surrogate, white_n
 
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, RESPONSE_COLUMNS
 from host_tools.scores import noise_free
 from host_tools.scores.noise_free import known_nuisances_fit, noise_free_chapter

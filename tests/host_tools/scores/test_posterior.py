@@ -11,8 +11,8 @@ from small_surrogate import COLUMNS, LinearRows, linear_surrogate, white_noise
 
 from device.measurement.parameters import EVEN_STD, PARAMETERS
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import RampAnswers
 from device.measurement.ramp_modes.radial_profile import FIRST
 from device.measurement.ramp_modes.surrogate import MODULUS
 from host_tools.scores import posterior as mode_posterior

@@ -11,7 +11,7 @@ from small_surrogate import LinearRows, white_noise
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, PARAMETERS, normalise_unknowns
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE
 from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.press_models.mode_outcome import EvaluatedPresses

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 from small_surrogate import random_scan_surrogate, white_noise
 
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from host_tools.scores import span
 from host_tools.scores.span import LARGER_RATIOS, SCAN_MM, SPAN_ERROR_RATIO, Moved, moved_by, power, span_chapter
 

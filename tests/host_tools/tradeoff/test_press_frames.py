@@ -10,7 +10,7 @@ from small_surrogate import LinearRows, white_noise
 
 from device.measurement.parameters import COUNT, NOMINAL, PARAMETERS, denormalise
 from device.measurement.quantities import Inclusion
-from device.measurement.ramp_modes.model import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.radial_profile import COLUMNS, press_profile
 from device.measurement.recording.recording import Recording
 from device.simulation.virtual_probe import ProbeTables
