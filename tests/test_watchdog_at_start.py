@@ -28,7 +28,7 @@ def test_a_daemon_whose_probe_is_held_is_fed_says_so_and_is_ready_once_it_is_lif
         for path, method in (("/api/v1/health/ready", "GET"), ("/api/v1/presses", "POST")):
             refusal = daemon.ask(path, method, {} if method == "POST" else None)
             assert (refusal.status, refusal.json["code"]) == (503, "E306")
-        assert daemon.ask("/api/v1/measurements").json == {"measurements": []}
+        assert daemon.ask("/api/v1/measurements").json["measurements"] == []
         assert daemon.ask("/api/v1/device").json["light_on_s"] == 0.0
         assert supervisor.chip.led_ratio() == DARK
         assert supervisor.is_fed_until(lambda daemon: daemon.ask("/api/v1/health/ready").status == 200)

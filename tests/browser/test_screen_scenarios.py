@@ -18,7 +18,7 @@ from screen_layout import wrong_in
 pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long]
 SHOTS = ROOT / "build" / "screens" / "scenarios"
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
-NO_START = {"bundle_tampered", "calibration_foreign", "calibration_missing"}
+NO_START = {"bundle_tampered", "calibration_foreign", "calibration_missing", "enable_busy"}
 ENDED = "#panel:is([data-view='result'], [data-step='fault'], [data-step='rejected']), .fault, #status-word:not(:empty)"
 
 

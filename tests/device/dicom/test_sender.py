@@ -116,6 +116,7 @@ def test_nothing_is_sent_while_the_probe_is_busy_and_all_after_that(store, archi
 
 
 def test_a_stop_waits_for_no_archive_that_is_silent(store, archive):
+    others = threading.enumerate()
     with socket.create_server(("127.0.0.1", 0)) as silent:
         exam = begin(store)
         measure(store, exam)
@@ -129,7 +130,7 @@ def test_a_stop_waits_for_no_archive_that_is_silent(store, archive):
             return [thread for thread in threading.enumerate() if "UnawaitedProvider" in type(thread).__name__]
 
         providers = wait_for(of_dicom, bool)
-        assert all(thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread())
+        assert all(thread.daemon for thread in threading.enumerate() if thread not in others)
         accepted.close()
         wait_for(lambda: [one for one in providers if one.is_alive()], lambda alive: not alive)
         hospital.close()
