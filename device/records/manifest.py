@@ -19,7 +19,7 @@ MANIFEST_TABLE = """
 CREATE TABLE IF NOT EXISTS kept_recording
   (id TEXT PRIMARY KEY, size_bytes INTEGER NOT NULL, sha256 TEXT NOT NULL, noted_at TEXT NOT NULL, removed TEXT);
 """
-CHUNK = 1 << 20
+CHUNK = 1 << 16
 
 
 @dataclass(frozen=True)
