@@ -15,20 +15,22 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.ramp_modes.noise import LOADS, PressNoise, light_ratio, smooth_errors
-from device.measurement.ramp_modes.radial_profile import COLUMN_COUNTS, COLUMNS, CONTRAST, SECOND
+from device.measurement.ramp_modes.radial_profile import COLUMN_COUNTS, CONTRAST, SECOND
 from device.measurement.recording.ring_means import RING_RADII_MM, RINGS
 
 SECOND_COLUMNS = COLUMN_COUNTS[-1]
-ROUND_ONLY: Array = np.zeros((COLUMNS, 0))
 
 
-def elongation_deviations(second_harmonic: Array, row: Array, noise: PressNoise, factor: Array = ROUND_ONLY) -> float:
+def elongation_deviations(second_harmonic: Array, row: Array, noise: PressNoise, factor: Array | None = None) -> float:
     """Return how far a press' `second_harmonic` [2, K, J - 2] is from round, in standard deviations.
 
     `row` [P] is that of its best fit, which is round; `factor` [P, K] one of a covariance beside that of the noise.
     """
     pattern = stretched(row[CONTRAST].reshape(LOADS, RINGS))
-    weights = np.linalg.solve(second_covariance(row, noise) + factor[SECOND] @ factor[SECOND].T, pattern)
+    covariance = second_covariance(row, noise)
+    if factor is not None:
+        covariance = covariance + factor[SECOND] @ factor[SECOND].T
+    weights = np.linalg.solve(covariance, pattern)
     left = second_harmonic.reshape(2, SECOND_COLUMNS) - np.stack([row[SECOND], np.zeros(SECOND_COLUMNS)])
     return float(np.linalg.norm(left @ weights) / np.sqrt(weights @ pattern))
 

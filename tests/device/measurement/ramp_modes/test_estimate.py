@@ -8,7 +8,7 @@ import pytest
 
 from device.measurement.estimate import NO_NUMBERS, NOTHING_STANDS_OUT
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.ramp_modes import estimate as estimate_module
+from device.measurement.ramp_modes import answers as answers_module
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.estimate import (
     PLACES_MM,
@@ -231,17 +231,17 @@ def test_an_inclusion_beside_the_axis_is_not_called_oblong(pressed, ramp_model):
 @pytest.mark.parametrize("mode", RAMP_MODES)
 def test_ramps_are_answered_in_the_directions_that_their_frames_show(scan, ramp_model, calibration, mode, monkeypatch):
     """And whether they are round is looked for in the same ones."""
-    asked, answer, found = [], ramp_model.answer, ramp_model.found
+    asked, answer, found = [], ramp_model.answer_to, ramp_model.found
 
-    def answered(rows, direction_rad):
-        asked.append(direction_rad)
-        return answer(rows, direction_rad)
+    def answered(seen):
+        asked.append(seen.direction_rad)
+        return answer(seen)
 
     def judged(answer, seen):
         asked.append(seen.direction_rad)
         return found(answer, seen)
 
-    monkeypatch.setattr(ramp_model, "answer", answered)
+    monkeypatch.setattr(ramp_model, "answer_to", answered)
     monkeypatch.setattr(ramp_model, "found", judged)
     estimate_ramp(scan, mode, ramp_model, calibration)
     shown = [profile.direction_rad for profile in press_profiles(scan)]
@@ -250,13 +250,13 @@ def test_ramps_are_answered_in_the_directions_that_their_frames_show(scan, ramp_
 
 
 def test_a_further_ramp_is_weighed_beside_those_so_far_in_their_directions(scan, ramp_model, calibration, monkeypatch):
-    asked, worth = [], estimate_module.worth_of_places
+    asked, worth = [], answers_module.worth_of_places
 
     def weighed(*told):
         asked.append(told[-1].tolist())
         return worth(*told)
 
-    monkeypatch.setattr(estimate_module, "worth_of_places", weighed)
+    monkeypatch.setattr(answers_module, "worth_of_places", weighed)
     advise_scan(scan, ramp_model, calibration)
     assert asked == [[profile.direction_rad for profile in press_profiles(scan)]]
 
@@ -305,7 +305,7 @@ def test_where_there_are_no_numbers_nothing_is_advised(pressed, ramp_model, cali
 
 def test_a_further_ramp_that_narrows_nothing_is_not_asked_for(ramp, ramp_model, calibration, monkeypatch):
     none = np.full((len(PLACES_MM), len(UNKNOWNS)), 1 - 0.9 * WORTH_A_RAMP)
-    monkeypatch.setattr(estimate_module, "worth_of_places", lambda *asked: none)
+    monkeypatch.setattr(answers_module, "worth_of_places", lambda *asked: none)
     advice = advise_scan(ramp, ramp_model, calibration)
     assert advice.next_offset_mm is None
     assert advice.expected_half_width == advice.half_width
@@ -314,7 +314,7 @@ def test_a_further_ramp_that_narrows_nothing_is_not_asked_for(ramp, ramp_model, 
 def test_of_places_the_one_that_narrows_most_all_told_is_advised(ramp, ramp_model, calibration, monkeypatch):
     parts = np.full((len(PLACES_MM), len(UNKNOWNS)), 0.9)
     parts[3] = 0.9, 0.6, 0.8
-    monkeypatch.setattr(estimate_module, "worth_of_places", lambda *asked: parts)
+    monkeypatch.setattr(answers_module, "worth_of_places", lambda *asked: parts)
     advice = advise_scan(ramp, ramp_model, calibration)
     assert advice.next_offset_mm == PLACES_MM[3]
     assert advice.expected_half_width["depth_mm"] == pytest.approx(0.6 * advice.half_width["depth_mm"])

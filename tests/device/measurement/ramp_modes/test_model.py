@@ -5,7 +5,7 @@ import pytest
 from small_surrogate import COLUMNS, REACH_MM, LinearRows, random_scan_surrogate, white_noise
 
 from device.measurement.parameters import COUNT, HIGH, PARAMETERS
-from device.measurement.ramp_modes import model as module
+from device.measurement.ramp_modes import answers as answers_module
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.model import NOT_TOLD_LOG_ODDS, found_values
@@ -97,13 +97,13 @@ def test_with_their_directions_presses_are_answered_as_if_none_mattered(answers,
 
 
 def test_a_scans_fit_begins_where_its_presses_are_explained_in_their_own_directions(answers, monkeypatch):
-    begun, starts = [], module.scan_starts
+    begun, starts = [], answers_module.scan_starts
 
     def asked(*told):
         begun.append(told[-1])
         return starts(*told)
 
-    monkeypatch.setattr(module, "scan_starts", asked)
+    monkeypatch.setattr(answers_module, "scan_starts", asked)
     direction_rad = np.array([0.4, -1.5])
     answers.answer(rows_at(answers, (1.2, 5.0)), FIRST_GUESSES, direction_rad)
     answers.answer(rows_at(answers, (1.2, 5.0)), FIRST_GUESSES)
