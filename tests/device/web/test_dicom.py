@@ -6,6 +6,7 @@ import types
 
 import httpx
 import pytest
+from dicom_sockets import no_sockets_left as no_sockets_left
 from written_exam import begin, measure
 
 from device.config import DicomSection
