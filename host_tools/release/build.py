@@ -11,7 +11,7 @@ from device.files.shipped import FOLDERS
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.release.checkout import LOCK, Checkout
 from host_tools.release.lock import needed, read_lock
-from host_tools.release.locked_wheels import locked_wheels
+from host_tools.release.locked_wheels import locked_wheels, name_in_release
 from host_tools.release.own_wheel import built_wheel, version_of
 from host_tools.release.parts_list import parts_list
 from host_tools.release.release_file import PRODUCT, Edition, manifest_of, write_release
@@ -93,7 +93,10 @@ def _files(order: ReleaseOrder, folder: Path, told: Callable[[str], None]) -> di
     order.checkout.copy(folder / "sources")
     units = folder / "sources" / FOLDERS["systemd"]
     return {
-        **{f"wheels/{wheel.name}": wheel for wheel in sorted([*wheels, own], key=lambda wheel: wheel.name)},
+        **{
+            f"wheels/{name_in_release(wheel.name)}": wheel
+            for wheel in sorted([*wheels, own], key=lambda wheel: wheel.name)
+        },
         **{f"systemd/{_below(path, units)}": path for path in sorted(units.rglob("*")) if path.is_file()},
         "sbom.json": listed,
     }

@@ -19,6 +19,9 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.release.lock import LockedRequirement
 from host_tools.release.target import ABI, PYTHON, Target
 
+MOST_NAME = 100
+"""Characters of a file's name in a POSIX archive of 1988, without its folder."""
+
 
 def locked_wheels(
     requirements: Sequence[LockedRequirement], target: Target, kept: Path, told: Callable[[LockedRequirement], None]
@@ -33,6 +36,18 @@ def locked_wheels(
         wheels.append(_best(one, target, kept) or _downloaded(one, target, kept))
         told(one)
     return wheels
+
+
+def name_in_release(name: str) -> str:
+    """Return the name of a wheel in a release file, whose headers hold `MOST_NAME` characters.
+
+    One that lists many platforms keeps the first of them: any of them is enough to be installed. Source: PEP 425,
+    compressed tag sets.
+    """
+    if len(name) <= MOST_NAME:
+        return name
+    *parts, platforms = name.removesuffix(".whl").split("-")
+    return "-".join([*parts, platforms.partition(".")[0]]) + ".whl"
 
 
 def sha256_of(path: Path) -> str:

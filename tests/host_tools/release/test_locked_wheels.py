@@ -1,9 +1,11 @@
+from pathlib import Path
+
 import pytest
 from small_wheels import locked, small_wheel
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.release.lock import read_lock
-from host_tools.release.locked_wheels import locked_wheels
+from host_tools.release.locked_wheels import locked_wheels, name_in_release
 from host_tools.release.target import Target
 
 ARM = Target.named("aarch64")
@@ -59,3 +61,12 @@ def test_a_wheel_with_another_hash_is_refused(index, tmp_path):
     small_wheel(index, "some-thing", metadata="Summary: changed since\n")
     with pytest.raises(InvalidQuantity, match="some-thing==1.0 is no wheel"):
         fetched(tmp_path, line)
+
+
+def test_a_wheel_of_many_platforms_has_a_name_that_a_release_holds():
+    """charset-normalizer's has 105 characters where a header holds 100; pip takes it by any of its platforms."""
+    long = "charset_normalizer-3.5.2-cp311-cp311-manylinux2014_x86_64.manylinux_2_17_x86_64.manylinux_2_28_x86_64.whl"
+    found = name_in_release(long)
+    assert found == "charset_normalizer-3.5.2-cp311-cp311-manylinux2014_x86_64.whl"
+    assert Target.named("x86_64").rank(Path(found)) is not None
+    assert name_in_release("numpy-2.3.1-cp311-cp311-any.whl") == "numpy-2.3.1-cp311-cp311-any.whl"
