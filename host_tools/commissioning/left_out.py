@@ -62,7 +62,7 @@ def left_out(
 
 
 def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
-    answer = answers.answer_to(ramp.seen, guess(ramp.seen.rows - answers.ordinary_shift(ramp.seen.rows)))
+    answer = _answer(answers, guess, ramp.seen)
     low, high = (denormalise_unknowns(ends) for ends in answer.intervals[:2])
     truth, value = denormalise_unknowns(ramp.stated[:COUNT]), denormalise_unknowns(answer.mean)
     return LeftOut(ramp.name, truth, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
@@ -72,9 +72,9 @@ def answers_to_seen(
     answers: RampAnswers, guess: Guess, seen: Sequence[SeenPresses], jobs: int = -1
 ) -> list[RampAnswer]:
     """Return the answers to what was read of presses or scans."""
+    return in_parallel(lambda number: _answer(answers, guess, seen[number]), len(seen), jobs)
 
-    def answer(number: int) -> RampAnswer:
-        one = seen[number]
-        return answers.answer_to(one, guess(one.rows - answers.ordinary_shift(one.rows)))
 
-    return in_parallel(answer, len(seen), jobs)
+def _answer(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:
+    """Return the answer to one press or scan, begun at the design's guess of what a press of its own would show."""
+    return answers.answer_to(seen, guess(seen.rows - answers.ordinary_shift(seen.rows)))

@@ -54,7 +54,8 @@ class OwnPosterior:
         self.presses, self.dimensions = len(seen.rows), OFFSET + AXES * len(seen.rows)
         self._bright_side_rad, self._surrogate, self._own = seen.direction_rad, surrogate, own
         self._units = reach_mm / float(HIGH[OFFSET])  # of `normalise`, for one of the offset's own
-        changes = self._changes = own.changes(self._place(at[None]), self._rows(at[None]))
+        place = self._place(at[None])
+        changes = self._changes = own.changes(place, self._rows(place))
         self._seen = _joined((np.hstack([seen.rows, seen.across]) - changes.shift)[None])[0]
         factor = _joined(changes.factor.transpose(2, 0, 1)).T
         covariance = seen_covariance(seen.rows, seen.across, noise) + factor @ factor.T
@@ -62,7 +63,8 @@ class OwnPosterior:
 
     def unlike(self, at: Array, number: int) -> UnlikeDesign:
         """Return what makes one of the presses another than the forward model's, at coordinates [8 + 2 N]."""
-        seen = _turned(self._rows(at[None]), self._place(at[None]).angle_rad)[number]
+        place = self._place(at[None])
+        seen = _turned(self._rows(place), place.angle_rad)[number]
         shift, factor = self._changes.shift[number], self._changes.factor[number]
         across = seen[SECOND_ACROSS] + shift[SECOND_ACROSS]
         return UnlikeDesign(seen[:COLUMNS], shift[:COLUMNS], factor[:COLUMNS], across)
@@ -75,15 +77,15 @@ class OwnPosterior:
     def whitened_changes(self, at: Array) -> Array:
         """Return what a unit of each direction of `DIRECTIONS` changes [S, COUNT], at coordinates [8 + 2 N]."""
         place = self._place(at[None])
-        changes = self._own.derivatives.changes(place.normalised, self._rows(at[None]))
+        changes = self._own.derivatives.changes(place.normalised, self._rows(place))
         seen = turned_columns(changes, place.angle_rad[:, None, None])
         return np.asarray(self._whitening @ _joined(seen.transpose(1, 0, 2)).T)
 
     def residuals(self, at: Array) -> Array:
         """Return whitened residuals [..., S] at coordinates [..., 8 + 2 N]."""
         points = at.reshape(-1, self.dimensions)
-        angle = self._place(points).angle_rad
-        seen = _turned(self._rows(points), angle).reshape(len(points), self.presses, SEEN_COLUMNS)
+        place = self._place(points)
+        seen = _turned(self._rows(place), place.angle_rad).reshape(len(points), self.presses, SEEN_COLUMNS)
         residuals = (_joined(seen) - self._seen) @ self._whitening.T
         return np.asarray(residuals.reshape(*at.shape[:-1], len(self._seen)))
 
@@ -118,9 +120,8 @@ class OwnPosterior:
         log[inside] = -0.5 * np.sum(self.residuals(at[inside]) ** 2, axis=1)
         return log
 
-    def _rows(self, at: Array) -> Array:
+    def _rows(self, place: Place) -> Array:
         """Return the forward model's rows [n N, P], in the inclusions' own directions."""
-        place = self._place(at)
         return self._surrogate.rows(place.normalised, self._directions(place))
 
     @staticmethod
