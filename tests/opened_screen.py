@@ -1,4 +1,4 @@
-"""The screen of a probe that a test brings into a state: opened at a size and in a language, and heard of by the page."""
+"""The screen of a probe that a test brings into a state: opened at a size, in a language, once it has heard it."""
 
 from __future__ import annotations
 
