@@ -1,7 +1,7 @@
-"""Times the screen's page from the probe's own daemon, in a real Chromium: when it paints, and when it shows the probe.
+"""Times the screen's page from the local daemon, in a real Chromium: when it paints, and when it shows the probe.
 
-The browser's own entries tell: `first-contentful-paint`, and the page's mark of its first status on the screen. The page
-is opened in a browser that has never seen it, as after a start of the probe, and again by a reload.
+The browser's own entries tell: `first-contentful-paint`, and the page's mark of its first status on the screen. The
+page is opened in a browser that has never seen it, as after a start of the probe, and again by a reload.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The page asks for every module of the screen at once, so that none waits until another has named it; and for no other."""
+"""The page asks for every module of the screen at once, so that none waits for another to name it; and for no other."""
 
 from __future__ import annotations
 
