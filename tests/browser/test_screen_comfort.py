@@ -53,6 +53,20 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
     page.context.close()
 
 
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_the_map_is_whole_without_scrolling(browser: Browser, probe: ServedProbe, size, language: str):
+    page = opened(browser, probe, size, locale=language)
+    page.locator("#exam-button").click()
+    page.locator("#patient-ref").fill("B-22")
+    page.locator("#operator").fill("Ada")
+    page.locator("#to-place").click()
+    targets = page.locator('[data-page="where"] :is(.hour, .button)').filter(visible=True)
+    for index in range(targets.count()):
+        expect(targets.nth(index)).to_be_in_viewport(ratio=0.99)
+    page.context.close()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", SIZES, ids=named)
 def test_every_page_can_be_read_in_both_schemes(browser: Browser, probe: ServedProbe, size, scheme: str):
