@@ -83,9 +83,11 @@ def _require_outputs(
 
 def _read(path: Path | None) -> Scene:
     """Return the file's scene, or the default one."""
+    if path is None:
+        return Scene()
     from host_tools.scenes.scene_file import read_scene
 
-    return read_scene(path) if path else Scene()
+    return read_scene(path)
 
 
 def _scene(

@@ -7,14 +7,12 @@ from typing import Any, NamedTuple
 from netgen.meshing import NgException
 
 from host_tools.forward.face_state import Rays
-from host_tools.forward.finite_strain.load_path import FiniteStrainModel
 from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
 from host_tools.forward.meshes.morph import morphed_mesh
 from host_tools.forward.meshes.solid_mesh import COARSE, FINE, LAYERED, SolidResolution, solid_mesh
 from host_tools.forward.plan import GRADED, ModelPlan
 from host_tools.forward.press_model import PressFailed, PressModel
 from host_tools.forward.sampling import FaceSampler
-from host_tools.forward.small_strain.domed_press import DomedModel
 from host_tools.forward.small_strain.linear_model import LinearModel
 from host_tools.forward.symmetry import AXISYMMETRIC, SOLID, Symmetry
 from host_tools.scenes.scene import Scene
@@ -63,8 +61,12 @@ def build(scene: Scene, plan: ModelPlan) -> Meshed:
     mixed = plan.formulation == "mixed"
     model: PressModel
     if plan.strain == "finite":
+        from host_tools.forward.finite_strain.load_path import FiniteStrainModel
+
         model = FiniteStrainModel(mesh, plan.order, rays)
     elif plan.contact == "unilateral":
+        from host_tools.forward.small_strain.domed_press import DomedModel
+
         model = DomedModel(
             mesh,
             symmetry,

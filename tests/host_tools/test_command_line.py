@@ -165,6 +165,15 @@ def test_phantom_records_over_nothing(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["phantom3"]
 
 
+def test_the_first_solve_waits_for_nothing_that_it_does_not_need():
+    """What is loaded until a scene is meshed: NumPy and NGSolve, and none of what takes as long as they do."""
+    code = (
+        "import sys, host_tools.__main__, host_tools.forward.ladder; "
+        "print([m for m in ('scipy', 'cv2', 'pydantic', 'xarray', 'matplotlib', 'pandas') if m in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
 def _interrupted(arguments, loaded):
     """Start a verb and interrupt it as soon as it has loaded a module; return it ended, with what else it told."""
     command = [sys.executable, "-X", "importtime", "-m", "host_tools", *arguments]
