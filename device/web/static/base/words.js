@@ -27,12 +27,13 @@ const together = (text) => text.replace(/([\d}]) (?=(?:%|mm|kPa|N|s)(?![\w]))/g,
 export const say = (key, values = {}) => together(filled(words[key] ?? key, values));
 export const isSaid = (key) => key in words;
 
-/** Fill the page's own texts: data-say, data-say-label and data-say-title hold keys. */
+/** Fill the page's own texts: data-say, data-say-label, data-say-title and data-say-alt hold keys. */
 export function sayPage(root = document) {
   document.documentElement.lang = language;
   for (const node of root.querySelectorAll("[data-say]")) node.textContent = say(node.dataset.say);
   for (const node of root.querySelectorAll("[data-say-label]")) node.setAttribute("aria-label", say(node.dataset.sayLabel));
   for (const node of root.querySelectorAll("[data-say-title]")) node.title = say(node.dataset.sayTitle);
+  for (const node of root.querySelectorAll("[data-say-alt]")) node.alt = say(node.dataset.sayAlt);
 }
 
 /** A number with so many decimals, as the language writes it. */
@@ -48,6 +49,20 @@ const MINUTE = { hour: "2-digit", minute: "2-digit" };
 export const moment = (at) => new Date(at).toLocaleString(locale, { ...DAY, ...MINUTE, timeZoneName: "short" });
 export const day = (at) => new Date(at).toLocaleDateString(locale, DAY);
 export const clock = (at) => new Date(at).toLocaleTimeString(locale, MINUTE);
+
+const DICOM_TIME = /^(\d{4})(\d{2})(\d{2})[ T]?(?:(\d{2})(\d{2}))?/;
+
+/** A day as DICOM writes it, YYYYMMDD, as the language does; what is none stays as it is. */
+export function dicomDay(text) {
+  const [, year, month, date] = DICOM_TIME.exec(text) ?? [];
+  return year ? new Date(year, month - 1, date).toLocaleDateString(locale, DAY) : text;
+}
+
+/** The hour and minute of a moment as DICOM writes it, "" where it has none. */
+export function dicomTime(text) {
+  const [, year, month, date, hour, minute] = DICOM_TIME.exec(text) ?? [];
+  return hour ? new Date(year, month - 1, date, hour, minute).toLocaleTimeString(locale, MINUTE) : "";
+}
 
 const asPattern = (text) => text.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+?)");
 const patterns = Object.entries(sentences).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
