@@ -39,6 +39,8 @@ FINITE_RUNGS = (
     Level("sliding_fine", 4),
     Level("sliding_fine", 5),
 )
+WIDEST_RIM = (Level("sliding_coarse", 3), Level("sliding_coarse", 4))
+"""What is tried where the tissue slips further along the rim than elements there are long."""
 FIRST_ORDERS = {0.05: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
 """By the tolerance from which on it is worth beginning there."""
 FIRST_FINITE = {0.15: 0, 0.02: 1, 0.005: 2, 0.002: 3, 0.0: 4}
@@ -125,7 +127,7 @@ def climb(
         try:
             found = rung.solved(level, told)
         except PressFailed as failed:
-            best = replace(best or rung.lowest(failed), ended=f"the next level gives way: {failed}")
+            best = replace(rung.at_widest_rim(best, failed), ended=f"the next level gives way: {failed}")
             break
         best = min((one for one in (best, found) if one), key=lambda one: one.reached)
         if found.reached <= tolerance:
@@ -168,11 +170,22 @@ class _Rung:
         feature, reached = max((worst_error(one) for one in solutions), key=lambda pair: pair[1])
         return Climb(solutions, self.tolerance, reached, feature)
 
-    def lowest(self, failed: PressFailed) -> Climb:
-        """Return what the lowest rung reaches where the first gave way; raise its failure where it is no other."""
-        if self.plan.strain != "finite" or self.tolerance >= max(FIRST_FINITE):
+    def at_widest_rim(self, best: Climb | None, failed: PressFailed) -> Climb:
+        """Return what is best where a rung gave way: its rim slips too far, and wider ones may still hold.
+
+        Raise the failure where nothing can be had.
+        """
+        for level in WIDEST_RIM if self.plan.strain == "finite" else ():
+            if best and (best.reached <= self.tolerance or best.solutions[0].plan.grading != level.grading):
+                break
+            try:
+                found = self.solved(level, f"finer rims give way: {failed}")
+            except PressFailed:
+                break
+            best = min((one for one in (best, found) if one), key=lambda one: one.reached)
+        if best is None:
             raise failed
-        return self.solved(FINITE_RUNGS[0], "")
+        return best
 
     def _plan(self, level: Level, told: str) -> ModelPlan:
         why = f"the lowest that may state {100 * self.tolerance:g} %" + (f"; {told}" if told else "")

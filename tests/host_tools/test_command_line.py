@@ -18,6 +18,7 @@ from device.simulation.scenario import Scenario
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
+PRESS = [*SCENE, "--force-n", "0.5", "--strain", "small"]
 
 
 def test_simulate_prints_the_contracts_fields_as_json():
@@ -33,9 +34,7 @@ def test_simulate_prints_the_contracts_fields_as_json():
 
 
 def test_simulate_writes_a_figure_and_a_frame(tmp_path):
-    done = run_toolkit(
-        "simulate", *SCENE, "--force-n", 0.5, "--plot", tmp_path / "w.png", "--frame", tmp_path / "frame.png"
-    )
+    done = run_toolkit("simulate", *PRESS, "--plot", tmp_path / "w.png", "--frame", tmp_path / "frame.png")
     assert done.returncode == 0, done.stderr
     frame = cv2.imread(str(tmp_path / "frame.png"), cv2.IMREAD_UNCHANGED)
     assert frame.shape == (492, 768)
@@ -46,7 +45,7 @@ def test_simulate_writes_a_figure_and_a_frame(tmp_path):
 
 
 def test_a_long_exposure_saturates_the_frame(tmp_path):
-    run_toolkit("simulate", *SCENE, "--force-n", 0.5, "--frame", tmp_path / "frame.png", "--exposure-us", 40_000)
+    run_toolkit("simulate", *PRESS, "--frame", tmp_path / "frame.png", "--exposure-us", 40_000)
     assert cv2.imread(str(tmp_path / "frame.png"), cv2.IMREAD_UNCHANGED)[246, 384] == 255
 
 

@@ -32,14 +32,19 @@ CANCELLING = ("total_deformation_mm3", "deformation_area_mm2")
 """At equal force the total all but cancels, and the area steps when the half maximum leaves the window."""
 
 
-def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, baseline: Loaded) -> dict[str, float]:
+def stated_error(
+    plan: ModelPlan, rays: Rays, pressed: Loaded, baseline: Loaded, *, by_force: bool = False
+) -> dict[str, float]:
     """Return the estimated relative error by feature; empty when no other order was solved for.
 
     Of force and indentation the one that was prescribed has none.
     """
     if pressed.other is None or baseline.other is None:
         return {}
-    found, other = numbers(rays, pressed.state, baseline.state), numbers(rays, pressed.other, baseline.other)
+    others = pressed.other, baseline.other
+    if by_force and plan.grading in SLIDING:
+        others = at_force(pressed.other, pressed.state.force_n), at_force(baseline.other, baseline.state.force_n)
+    found, other = numbers(rays, pressed.state, baseline.state), numbers(rays, *others)
     steps = {name: _step(value, other[name]) for name, value in found.items()}
     if plan.grading in SLIDING:
         return {name: CORRECTED_FACTOR * step for name, step in steps.items()}
@@ -48,6 +53,14 @@ def stated_error(plan: ModelPlan, rays: Rays, pressed: Loaded, baseline: Loaded)
         return {name: factor * step for name, step in steps.items()}
     largest = max(step for name, step in steps.items() if name not in CANCELLING)
     return {name: factor * largest if step else 0.0 for name, step in steps.items()}
+
+
+def at_force(corrected: FaceState, force_n: float) -> FaceState:
+    """Return a face that was corrected at a fixed indentation at the force prescribed, both of them all but equal.
+
+    At slightly different forces what an inclusion adds would be lost in what the force does.
+    """
+    return corrected.scaled(force_n / corrected.force_n)
 
 
 def _factor(plan: ModelPlan) -> float:
