@@ -6,6 +6,7 @@ has compared its SHA-256.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -34,7 +35,7 @@ def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_
     page.get_by_label("Name of the other machine").fill("Ward PC")
     page.get_by_label("What it may").select_option("measure")
     page.get_by_role("button", name="Show a code").click()
-    page.wait_for_function("document.getElementById('shown-code').textContent.length === 9")
+    expect(page.locator("#shown-code")).to_have_text(re.compile("^.{9}$"))
     code = page.locator("#shown-code").inner_text()
     shown = page.locator("#shown-sha256").inner_text()
     assert shown == probe.daemon.ask("/api/v1/device").json["network"]["certificate_sha256"]
