@@ -13,6 +13,7 @@ from dataclasses import field
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Literal
+from urllib.parse import urlsplit
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -41,6 +42,11 @@ DICOM_LINE = r"^[^\\\x00-\x1f\x7f]*$"
 """Text that DICOM takes for one value: a backslash would begin the next one (PS3.5 section 6.2)."""
 AeTitle = Annotated[str, Field(pattern=r"^[!-\[\]-~]([ -\[\]-~]{0,14}[!-\[\]-~])?$")]
 """Name of a program in DICOM's network, 1 to 16 characters of ASCII without a backslash."""
+
+
+WebhookUrl = Annotated[str, Field(pattern=r'^https?://[!"$->A-\[\]-~]+$')]
+"""An address without a user, a password or a query: the signature says who sends."""
+THIS_MACHINE = ("127.0.0.1", "::1", "localhost")
 
 
 class Conflict(InvalidQuantity):
@@ -475,6 +481,45 @@ class DicomSection(Section):
 
 
 @dataclass(frozen=True, config=STRICT)
+class WebhookSection(Section):
+    """The hospital's address for notices of each new or changed measurement and exam; without one none is sent."""
+
+    url: Annotated[
+        WebhookUrl | None,
+        Doc("Address that gets a signed notice of each new or changed measurement and exam; https, or this machine."),
+    ] = None
+    secret_file: Annotated[
+        Path | None, Doc("File with the secret that notices are signed with: `whsec_` and 24 to 64 bytes in base64.")
+    ] = None
+    tls_authority: Annotated[
+        Path | None, Doc("Certificates (PEM) that the address' own must be signed by; the system's unless given.")
+    ] = None
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield an address that is none or in clear to another machine, and one without a secret."""
+        if self.url is None:
+            return
+        if not _is_guarded(self.url):
+            yield Conflict(
+                "webhook.url", self.url, "https, or http to 127.0.0.1", (), "name a port below 65536 and https"
+            )
+        if self.secret_file is None:
+            yield Conflict(
+                "webhook.secret_file", "not set", "a file", ("webhook.url",), "make one; see docs/webhook.md"
+            )
+
+
+def _is_guarded(url: str) -> bool:
+    """Return whether nobody on the way reads what is sent to an address, and it names a host and a port that is one."""
+    try:
+        place = urlsplit(url)
+        is_place = place.hostname is not None and place.port != 0
+    except ValueError:
+        return False
+    return is_place and (place.scheme == "https" or place.hostname in THIS_MACHINE)
+
+
+@dataclass(frozen=True, config=STRICT)
 class Config(Section):
     """All settings of the daemon."""
 
@@ -503,6 +548,7 @@ class Config(Section):
     clock: ClockSection = field(default_factory=ClockSection)
     server: ServerSection = field(default_factory=ServerSection)
     dicom: DicomSection = field(default_factory=DicomSection)
+    webhook: WebhookSection = field(default_factory=WebhookSection)
 
     def conflicts(self) -> Iterator[Conflict]:
         """Yield exposure and frame rate that the light does not allow, and a chip at the bus and address of another."""

@@ -181,6 +181,15 @@ class ArchiveRefuses(DeviceError):  # noqa: N818 - the name is what the operator
     severity = "warning"
 
 
+class WebhookFailed(DeviceError):  # noqa: N818 - the name is what the operator reads
+    """The hospital's address for notices does not take them; they wait on the probe and are sent when it does."""
+
+    code = "E032"
+    title = "Notices not taken"
+    status = 502
+    severity = "warning"
+
+
 class CameraError(DeviceError):
     """The camera gives no image, or one of the wrong shape."""
 

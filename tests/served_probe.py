@@ -29,10 +29,10 @@ class ServedProbe:
 
 
 @contextmanager
-def served_probe(folder: Path, *, is_running: bool) -> Iterator[ServedProbe]:
+def served_probe(folder: Path, *, is_running: bool, scenario: Scenario | None = None) -> Iterator[ServedProbe]:
     """Serve a simulated probe; one that does not run stays in the state that the test writes on its board."""
     config = replace(simulated_config(), data=folder, camera=CameraSection(late_frames=100.0))
-    procedure = open_simulated_probe(config, Scenario())
+    procedure = open_simulated_probe(config, scenario or Scenario())
     procedure.start()
     if not is_running:
         procedure.stop()

@@ -46,6 +46,11 @@ FORBIDDEN = {
         "device.dicom.objects",
         "device.instrument.press.picture",
     ),
+    "Notices read records, and know nothing of the instrument or the web": (
+        "device.webhook.notifier",
+        "device.instrument.status",
+    ),
+    "Sending knows neither what is sent nor to whom": ("device.sending.persistent_sender", "device.records.outbox"),
     "Exports read records and files, and know nothing of the instrument or the web": (
         "device.exports.archive",
         "device.instrument.status",

@@ -6,12 +6,13 @@ import argparse
 import json
 import sqlite3
 from contextlib import closing
+from datetime import datetime
 from pathlib import Path
 
 from device.config import Config
 from device.errors import AuditChanged, StorageError
 from device.files.text_table import aligned
-from device.records.audit import AuditHead, require_head, verify_chain
+from device.records.audit import AuditHead, recorded, require_head, verify_chain
 from device.records.listing import NEWEST
 from device.records.store import Store
 
@@ -21,6 +22,7 @@ COLUMNS = ("row", "at", "by", "what", "subject", "reason")
 EXAMPLES = """examples:
   python -m device audit verify                         every entry; the first row that was changed is named
   python -m device audit verify --head 1204:9f2c...     also that the chain went through a hash kept elsewhere
+  python -m device audit list --from 2026-11-23T08:00:00+01:00
   python -m device audit list --subject ID --json       what was done to an exam or a measurement, newest first
 """
 
@@ -34,8 +36,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     verify.add_argument("--json", action="store_true", help="print a JSON object")
     listed = actions.add_parser("list", help="print what was done, newest first")
     listed.add_argument("--subject", metavar="ID", help="to one exam, measurement, press or token")
+    for name, what in (("from", "then on"), ("to", "before then")):
+        listed.add_argument(f"--{name}", dest=name, type=_moment, metavar="TIME", help=f"{what}: 2026-11-23T08:00:00Z")
     listed.add_argument("--limit", type=int, default=MOST_SHOWN, metavar="N", help=f"{MOST_SHOWN} unless given")
     listed.add_argument("--json", action="store_true", help="print a JSON object a line")
+
+
+def _moment(text: str) -> str:
+    """Return a time with its offset as entries have it."""
+    moment = datetime.fromisoformat(text)
+    if moment.tzinfo is None:
+        raise ValueError("a time without an offset is many times")
+    return recorded(moment)
 
 
 def run_audit_command(options: argparse.Namespace, config: Config) -> int:
@@ -56,7 +68,8 @@ def run_audit_command(options: argparse.Namespace, config: Config) -> int:
 
 def _list(options: argparse.Namespace, config: Config) -> int:
     with closing(Store(config.data, to_read=True)) as store:
-        entries = store.audit.entries(subject=options.subject, before_seq=NEWEST, limit=options.limit)
+        times = {"since": getattr(options, "from"), "until": options.to}
+        entries = store.audit.entries(subject=options.subject, **times, before_seq=NEWEST, limit=options.limit)
     if options.json:
         print("\n".join(map(json.dumps, entries)))
         return 0

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from device.dicom.hospital import Hospital
     from device.instrument.procedure import Procedure
     from device.web.entrance.network import NetworkPort
+    from device.webhook.notifier import Notifier
 
 log = logging.getLogger(__name__)
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
@@ -73,9 +74,13 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
             hospital = _hospital(procedure)
             hospital.start()
             ending.callback(hospital.close)
+            notifier = _notifier(procedure)
+            if notifier:
+                notifier.start()
+                ending.callback(notifier.close)
             if procedure.bench.force.fault is None:  # else `cell.device` may be what is wrong
                 settings.keep()
-            _run_server(procedure, hospital, [port.listening(), *sockets], network)
+            _run_server(procedure, hospital, [port.listening(), *sockets], network, notifier)
     return 0
 
 
@@ -191,17 +196,34 @@ def _hospital(procedure: Procedure) -> Hospital:
     """Return what sends to the hospital's archive; the status tells when it does not get there."""
     from device.dicom.hospital import Hospital
     from device.instrument.press.picture import kept_or_drawn
-    from device.records.store import ENDED
 
     def tell(fault: DeviceError | None) -> None:
         if procedure.board.now.archive is not fault:
             procedure.board.update(archive=fault)
 
-    def is_busy() -> bool:
-        press = procedure.board.now.press
-        return press is not None and press.state not in ENDED
+    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell, lambda: _is_pressed(procedure))
 
-    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell, is_busy)
+
+def _notifier(procedure: Procedure) -> Notifier | None:
+    """Return what tells the hospital's address of changes, None where none is set."""
+    settings = procedure.config.webhook
+    if settings.url is None:
+        return None
+    from device.webhook.notifier import Notifier
+
+    def tell(fault: DeviceError | None) -> None:
+        if procedure.board.now.webhook is not fault:
+            procedure.board.update(webhook=fault)
+
+    return Notifier(settings, procedure.store, procedure.config.serial, tell, lambda: _is_pressed(procedure))
+
+
+def _is_pressed(procedure: Procedure) -> bool:
+    """Return whether a press has the probe to itself."""
+    from device.records.store import ENDED
+
+    press = procedure.board.now.press
+    return press is not None and press.state not in ENDED
 
 
 def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], NetworkPort | None]:
@@ -217,7 +239,11 @@ def _beside(config: Config, opened: ExitStack) -> tuple[list[socket.socket], Net
 
 
 def _run_server(
-    procedure: Procedure, hospital: Hospital, listening: Sequence[socket.socket], network: NetworkPort | None
+    procedure: Procedure,
+    hospital: Hospital,
+    listening: Sequence[socket.socket],
+    network: NetworkPort | None,
+    notifier: Notifier | None,
 ) -> None:
     from device.web.server import run_server
 
@@ -228,4 +254,4 @@ def _run_server(
         others = f"{network.served.url} (certificate SHA-256 {network.served.certificate_sha256}), here "
     local = LOOPBACK_ADDRESS if network else listening[0].getsockname()[0]
     print(f"TSIS {kind} {procedure.config.serial}: screen and API at {others}http://{local}:{port}/", flush=True)
-    run_server(procedure, hospital, listening, network)
+    run_server(procedure, hospital, listening, network, notifier)

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from device.config import DicomSection
-from device.dicom.sender import Sender, SenderState
+from device.dicom.sender import Sender
 from device.dicom.subject import OrderedStudy, require_writable
 from device.errors import DeviceError, InvalidRequest, UnknownResource
 from device.records.asked_once import AskedOnce
 from device.records.exams import exam_content
 from device.records.store import Store, StoredRecord
+from device.sending.persistent_sender import SenderState
 
 if TYPE_CHECKING:
     from device.dicom.delivery import Delivery

@@ -24,6 +24,7 @@ from device.exports.printed_text import paragraph, printable, register_fonts
 from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.repeats import repeats_by_unknown
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
 
@@ -45,6 +46,10 @@ NUMBER = ParagraphStyle("number", STRONG, fontSize=12, leading=15)
 TITLE = ParagraphStyle("title", STRONG, fontSize=17, leading=21)
 HEADING = ParagraphStyle("heading", STRONG, fontSize=11, leading=14)
 WARNING = ParagraphStyle("warning", TEXT, textColor=ALERT)
+AGREEMENT = (
+    "Presses of this lesion that determine the quantity. Repeatability index: two presses differ by less than this "
+    "part of the mean in 95 % of cases."
+)
 NOT_A_DIAGNOSIS = (
     "Not a diagnosis. This page says what the probe measured: size, depth and Young's modulus of an inclusion, each "
     "with the interval that holds it in 9 of 10 measurements. What it means is for a physician to say."
@@ -63,7 +68,7 @@ def report_of(store: Store, exam_id: str, serial: str, picture_of: _PictureOf) -
 
     def parts() -> list[Flowable]:
         shown = [KeepTogether(_measurement(store, one, picture_of)) for one in counting[:MOST]]
-        return [*_head(exam, serial), *_counted(len(counting), len(measured)), *shown]
+        return [*_head(exam, serial), *_counted(len(counting), len(measured)), *_agreement(counting), *shown]
 
     pages, _ = _printed(parts(), exam, serial, pages=0)
     return _printed(parts(), exam, serial, pages)[1]
@@ -123,6 +128,23 @@ def _counted(counting: int, measured: int) -> list[Flowable]:
     if counting > MOST:
         said.append(f"The {counting - MOST} oldest are left out: export them as a table.")
     return [Spacer(0, 4 * mm), paragraph(" ".join(said), STRONG)]
+
+
+def _agreement(counting: Sequence[Exported]) -> list[Flowable]:
+    """Return how far the presses of the lesion agree, nothing of fewer than two."""
+    repeats = repeats_by_unknown([one.measurement["estimate"] for one in counting])
+    rows = [(name, one) for name, one in repeats.items() if one.mean is not None and one.spread is not None]
+    if not rows:
+        return []
+    head = ("", "presses", "mean", "spread", "repeatability index")
+    told = [
+        (NAMES[name], f"{one.presses}", f"{one.mean:.{DECIMALS[name]}f} {UNITS[name]}",
+         f"{one.spread:.{DECIMALS[name] + 1}f} {UNITS[name]}", f"{one.repeatability_index:.2f}")
+        for name, one in rows
+    ]  # fmt: skip
+    cells = [[paragraph(cell, SMALL) for cell in head], *([paragraph(cell, TEXT) for cell in row] for row in told)]
+    table = Table(cells, colWidths=[34 * mm, 20 * mm, 32 * mm, 32 * mm, None], style=TIGHT)
+    return [Spacer(0, 2 * mm), table, paragraph(AGREEMENT, SMALL)]
 
 
 def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Flowable]:

@@ -18,6 +18,7 @@ FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 """What a cell of a formula begins with (OWASP, CSV injection)."""
 OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
 PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open")
+WITH_UNIT = ("low", "high", "std", "mean", "spread")
 UNIT_ENDINGS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa"}
 """The unit of a feature, by how its name ends; of any other it is a ratio."""
 LONG_COLUMNS = (
@@ -49,12 +50,12 @@ def _of_part(whole: str, name: str) -> CellOf:
     return lambda one: (one.measurement[whole] or {}).get(name)
 
 
-def _column(name: str, part: str) -> str:
-    """Return `size_low_mm` of `size_mm` and `low`: the unit stays last."""
+def column_of(name: str, part: str) -> str:
+    """Return the name of a column: `size_low_mm` of `size_mm` and `low`, the unit last if the part has it."""
     if part == "value":
         return name
     stem, unit = name.rsplit("_", 1)
-    return f"{stem}_{part}_{unit}" if part in ("low", "high", "std") else f"{stem}_{part}"
+    return f"{stem}_{part}_{unit}" if part in WITH_UNIT else f"{stem}_{part}"
 
 
 WIDE_COLUMNS: Mapping[str, CellOf] = {
@@ -66,7 +67,7 @@ WIDE_COLUMNS: Mapping[str, CellOf] = {
     **{name: _of_exam(name) for name in OF_EXAM},
     "mode": _of_measurement("mode"),
     **{name: _of_estimate(name) for name in ("status", "reason")},
-    **{_column(name, part): _of_unknown(name, part) for name in UNKNOWNS for part in PARTS_OF_UNKNOWN},
+    **{column_of(name, part): _of_unknown(name, part) for name in UNKNOWNS for part in PARTS_OF_UNKNOWN},
     **{name: _of_measurement(name) for name in ("force_n", "frames", "ramps", "reached")},
     "warnings": lambda one: " ".join(warning["code"] for warning in one.measurement["warnings"]),
     **{f"voided_{name}": _of_part("voided", name) for name in ("at", "by", "reason")},
@@ -79,12 +80,12 @@ WIDE_COLUMNS: Mapping[str, CellOf] = {
 
 def wide_table(exported: Iterable[Exported]) -> Iterator[bytes]:
     """Yield the table's bytes, the header and then row by row; the interval is that of 90 %."""
-    return _written(WIDE_COLUMNS, ([cell(one) for cell in WIDE_COLUMNS.values()] for one in exported))
+    return written(WIDE_COLUMNS, ([cell(one) for cell in WIDE_COLUMNS.values()] for one in exported))
 
 
 def long_table(exported: Iterable[Exported]) -> Iterator[bytes]:
     """Yield the tidy table's bytes: of each measurement the unknowns, the force, and every feature."""
-    return _written(LONG_COLUMNS, (row for one in exported for row in _quantities(one)))
+    return written(LONG_COLUMNS, (row for one in exported for row in _quantities(one)))
 
 
 def _quantities(one: Exported) -> Iterator[list[Cell]]:
@@ -104,7 +105,8 @@ def unit_of(name: str) -> str:
     return next((unit for ending, unit in UNIT_ENDINGS.items() if name.endswith(ending)), "1")
 
 
-def _written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:
+def written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:
+    """Yield a table's bytes, the header and then row by row."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(columns)

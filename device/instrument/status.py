@@ -99,7 +99,8 @@ class ProcedureStatus:
     `state` is that of the press under way, or how the last one ended; `wanted_n` the forces at which it still wants
     frames. `scan`: how far a scan is, once its first press on the lesion is complete. `warnings`: those of the last
     press, or of the time since, and the lasting ones. `stall`: a part that makes no progress, by the watchdog's thread.
-    `archive`: why the hospital's archive has not got what it is to have, by the thread that sends.
+    `archive`, `webhook`: why the hospital's archive, or its address for notices, has not got what it is to have, by the
+    threads that send.
     `answer`: what the press says while that is being kept, without an id; from then on `measurement_id`.
     """
 
@@ -117,6 +118,7 @@ class ProcedureStatus:
     warnings: tuple[DeviceError, ...] = ()
     stall: DeviceError | None = None
     archive: DeviceError | None = None
+    webhook: DeviceError | None = None
 
     @property
     def hindrance(self) -> DeviceError | None:

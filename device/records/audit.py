@@ -183,12 +183,29 @@ class Audit:
         log.info("audit whole head=%s", head)
         return None
 
-    def entries(self, *, subject: str | None = None, before_seq: int, limit: int) -> list[_Record]:
-        """Return what was done, to one subject or to all, newest first, each with its hash."""
-        where, values = ("AND subject = ? ", (subject,)) if subject else ("", ())
-        query = f"SELECT seq, hash, record FROM audit WHERE seq < ? {where}ORDER BY seq DESC LIMIT ?"
+    def entries(
+        self,
+        *,
+        subject: str | None = None,
+        since: str | None = None,
+        until: str | None = None,
+        before_seq: int,
+        limit: int,
+    ) -> list[_Record]:
+        """Return what was done, to one subject or to all, newest first, each with its hash.
+
+        `since` and `until`: RFC 3339 in UTC with milliseconds, as entries have it; the second is not in it any more.
+        """
+        where = {
+            "subject = ?": subject,
+            "json_extract(record, '$.at') >= ?": since,
+            "json_extract(record, '$.at') < ?": until,
+        }
+        asked = {condition: value for condition, value in where.items() if value}
+        conditions = " AND ".join(["seq < ?", *asked])
+        query = f"SELECT seq, hash, record FROM audit WHERE {conditions} ORDER BY seq DESC LIMIT ?"
         with self._transaction() as db:
-            rows = db.execute(query, (before_seq, *values, limit))
+            rows = db.execute(query, (before_seq, *asked.values(), limit))
             return [{"seq": seq, "hash": own, **json.loads(record)} for seq, own, record in rows]
 
     def note_in_use(self, present: _Record) -> None:
@@ -216,4 +233,9 @@ def _in_use(entry: _Record) -> _Record:
 
 def utc_now() -> str:
     """Return the wall clock as RFC 3339 with milliseconds, UTC."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return recorded(datetime.now(UTC))
+
+
+def recorded(moment: datetime) -> str:
+    """Return a moment with its offset as records have it: RFC 3339 with milliseconds, UTC."""
+    return moment.astimezone(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

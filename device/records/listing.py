@@ -46,9 +46,15 @@ class Page:
 
 @dataclass(frozen=True)
 class Change:
-    """A measurement or an exam as it is now, and the number of the audit's entry by which it came to be or changed."""
+    """A measurement or an exam as it is now, and the audit's entry by which it came to be or changed.
+
+    Of the entry: its number, its hash, when it was written (RFC 3339 UTC), and what was done.
+    """
 
     number: int
+    hash: str
+    at: str
+    what: str
     kind: Literal["measurement", "exam"]
     record: _Record
 
@@ -128,10 +134,21 @@ class Listing:
 
     def changes(self, *, after: int, limit: int) -> list[Change]:
         """Return what was made or changed after an entry of the audit, oldest first."""
-        query = f"SELECT seq, subject, record FROM audit WHERE seq > ? AND {_TOLD} ORDER BY seq LIMIT ?"
+        query = f"SELECT seq, hash, subject, record FROM audit WHERE seq > ? AND {_TOLD} ORDER BY seq LIMIT ?"
         with self._transaction() as db:
             rows = db.execute(query, (after, limit)).fetchall()
-            return [_change(db, seq, subject, json.loads(record)) for seq, subject, record in rows]
+            return [_change(db, seq, own, subject, json.loads(record)) for seq, own, subject, record in rows]
+
+    def told(self, whom: str) -> int | None:
+        """Return the number of the last change that somebody elsewhere was told of, None of nobody."""
+        with self._transaction() as db:
+            row = db.execute("SELECT value FROM counter WHERE name = ?", (_counter(whom),)).fetchone()
+            return int(row[0]) if row else None
+
+    def note_told(self, whom: str, number: int) -> None:
+        """Keep that somebody elsewhere was told of the changes up to a number."""
+        with self._transaction() as db:
+            db.execute("INSERT OR REPLACE INTO counter VALUES (?, ?)", (_counter(whom), number))
 
     def _rows(
         self, columns: str, table: str, number: str, where: Mapping[str, str | None], before: int, limit: int
@@ -151,13 +168,18 @@ _TOLD = (
 """The audit's entries of exams and measurements: the end of a press names the measurement that it made."""
 
 
-def _change(db: sqlite3.Connection, seq: int, subject: str, entry: _Record) -> Change:
-    if entry["what"].startswith("exam_"):
-        return Change(seq, "exam", exam_of(db, subject))
+def _counter(whom: str) -> str:
+    return f"told {whom}"
+
+
+def _change(db: sqlite3.Connection, seq: int, own: str, subject: str, entry: _Record) -> Change:
+    at, what = entry["at"], entry["what"]
+    if what.startswith("exam_"):
+        return Change(seq, own, at, what, "exam", exam_of(db, subject))
     query = f"SELECT record, exam_id, voided, version FROM {_MEASUREMENTS} WHERE id = ?"
     identifier = entry["after"].get("measurement_id") or subject
     record, *filing = db.execute(query, (identifier,)).fetchone()
-    return Change(seq, "measurement", {**json.loads(record), **filed(*filing)})
+    return Change(seq, own, at, what, "measurement", {**json.loads(record), **filed(*filing)})
 
 
 def _page(numbered: list[tuple[int, _Record]], limit: int) -> Page:

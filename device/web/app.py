@@ -50,9 +50,11 @@ from device.web.schema import (
 )
 from device.web.service.manual import add_manual
 from device.web.service.metrics import add_metrics
+from device.web.service.webhook import add_webhook
 from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.streams.live_view import add_live_view
 from device.web.updates import add_updates
+from device.webhook.notifier import Notifier
 
 API = "/api/v1"
 STATIC = Path(__file__).parent / "static"
@@ -76,8 +78,9 @@ def create_app(
     answers: OpenAnswers | None = None,
     network: ServedNetwork | None = None,
     hospital: Hospital | None = None,
+    notifier: Notifier | None = None,
 ) -> FastAPI:
-    """Return the web application of a running procedure, with what tells of its updates and of the hospital.
+    """Return the web application of a running procedure, with what tells of its updates, and what tells the hospital.
 
     It is asked under the names `hosts`, the machine's own unless given; every request goes through the rules of
     device/access/request_rules.py first. Unless a `door` says otherwise, the own screen alone is let in; `answers` can
@@ -111,6 +114,7 @@ def create_app(
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
     add_dicom(app, API, hospital or Hospital(DicomSection(), store, kept_or_drawn))
+    add_webhook(app, API, notifier)
     add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)

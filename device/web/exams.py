@@ -83,7 +83,10 @@ def add_exams(app: FastAPI, api: str, store: Store) -> None:
     @app.get(f"{api}/audit", responses=answers(200, AuditList, "ETag"), tags=["exams"])
     def list_audit(asked: Annotated[AuditQuery, Query()]) -> dict[str, Any]:
         """Return what people have changed, newest first, all or of one exam or measurement."""
-        entries = store.audit.entries(subject=asked.subject, before_seq=asked.before, limit=asked.limit + 1)
+        since, until = asked.times.values()
+        entries = store.audit.entries(
+            subject=asked.subject, since=since, until=until, before_seq=asked.before, limit=asked.limit + 1
+        )
         return paged("entries", entries, asked.limit)
 
 

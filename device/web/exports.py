@@ -3,20 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import FastAPI, Query, Response
 from fastapi.responses import StreamingResponse
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from device.exports.archive import archive_of
 from device.exports.arrays import npz_of
+from device.exports.lesions import lesion_table, lesions_of
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
+from device.measurement.repeats import repeats_by_unknown
+from device.records.listing import Wanted
 from device.records.store import Store
-from device.web.contract import CSV, NPZ, PDF, ZIP, media
+from device.web.contract import CSV, NPZ, PDF, ZIP, answers, media
 from device.web.paging import MeasurementFilter
+
+
+class Agreement(BaseModel):
+    """Presses that determine an unknown, with their mean and spread (standard deviation) in its unit.
+
+    `repeatability_index`: 1.96 sqrt(2) spread over mean, by which two presses differ at most in 19 of 20 cases. What
+    too few presses do not tell is null.
+    """
+
+    presses: int
+    mean: float | None
+    spread: float | None
+    repeatability_index: float | None
+
+
+class LesionResource(BaseModel):
+    """The presses of one lesion: how many measurements of an exam count, and how far they agree in each unknown."""
+
+    exam_id: str
+    measurements: int
+    size_mm: Agreement
+    depth_mm: Agreement
+    youngs_modulus_kpa: Agreement
 
 
 class ExportQuery(MeasurementFilter):
@@ -30,9 +57,12 @@ class ExportQuery(MeasurementFilter):
 
 
 class TableQuery(ExportQuery):
-    """Which measurements are taken away, and whether as a row each, or as a row for each quantity of each."""
+    """Which measurements are taken away: as a row each, as a row for each quantity of each, or as a row a lesion."""
 
-    form: Literal["wide", "long"] = "wide"
+    form: Literal["wide", "long", "lesions"] = "wide"
+
+
+TABLES = {"wide": wide_table, "long": long_table, "lesions": lesion_table}
 
 
 def add_exports(
@@ -46,13 +76,13 @@ def add_exports(
     @app.get(
         f"{api}/exports/measurements.csv",
         response_class=Response,
-        responses=media(CSV, "A header, and a row a measurement, or a row a quantity."),
+        responses=media(CSV, "A header, and a row a measurement, a row a quantity, or a row a lesion."),
         tags=["exports"],
     )
     def export_table(asked: Annotated[TableQuery, Query()]) -> Response:
         """Return measurements with their exams as a table."""
-        written = wide_table if asked.form == "wide" else long_table
-        return _file(written(asked.selection(store)), CSV, "measurements.csv")
+        name = "lesions.csv" if asked.form == "lesions" else "measurements.csv"
+        return _file(TABLES[asked.form](asked.selection(store)), CSV, name)
 
     @app.get(
         f"{api}/exports/measurements.npz",
@@ -73,6 +103,15 @@ def add_exports(
     def export_recordings(asked: Annotated[ExportQuery, Query()]) -> Response:
         """Return the recordings of measurements, and their table."""
         return _file(archive_of(store, asked.selection(store)), ZIP, "recordings.zip")
+
+    @app.get(f"{api}/exams/{{exam_id}}/lesion", responses=answers(200, LesionResource), tags=["exports"])
+    def get_lesion(exam_id: str) -> dict[str, Any]:
+        """Say how far the measurements of an exam agree that count: they are presses of one lesion."""
+        store.exams.exam(exam_id)
+        lesions = lesions_of(Selection.of_now(store, Wanted(exam_id=exam_id)))
+        estimates = lesions[0].estimates if lesions else []
+        agreed = {name: asdict(one) for name, one in repeats_by_unknown(estimates).items()}
+        return {"exam_id": exam_id, "measurements": len(estimates), **agreed}
 
     @app.get(
         f"{api}/exams/{{exam_id}}/report.pdf",

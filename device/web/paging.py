@@ -13,6 +13,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, 
 from device.instrument.status import JobState
 from device.measurement.estimate import EstimateStatus
 from device.measurement.mode import Mode
+from device.records.audit import recorded
 from device.records.exams import ExamId, ExamKind
 from device.records.listing import NEWEST, Page, Wanted
 
@@ -108,14 +109,14 @@ class ExamQuery(TimedQuery, PageQuery):
     order_number: str | None = None
 
 
-class AuditQuery(PageQuery):
-    """A page of the audit, of all or of one subject."""
+class AuditQuery(TimedQuery, PageQuery):
+    """A page of the audit, of all or of one subject, by when it was done."""
 
     subject: str | None = None
 
 
 def _recorded(moment: datetime | None) -> str | None:
-    return None if moment is None else moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return None if moment is None else recorded(moment)
 
 
 def page_of(name: str, page: Page) -> dict[str, Any]:

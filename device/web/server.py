@@ -27,6 +27,7 @@ from device.web.entrance.connection import PatientProtocol
 from device.web.entrance.door import Door
 from device.web.entrance.network import NetworkPort
 from device.web.entrance.open_answers import OpenAnswers
+from device.webhook.notifier import Notifier
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +37,11 @@ MOST_HEAD_BYTES = 16 * 1024
 
 
 def run_server(
-    procedure: Procedure, hospital: Hospital, listening: Sequence[socket.socket], network: NetworkPort | None = None
+    procedure: Procedure,
+    hospital: Hospital,
+    listening: Sequence[socket.socket],
+    network: NetworkPort | None = None,
+    notifier: Notifier | None = None,
 ) -> None:
     """Serve a running procedure on ports that listen, until SIGTERM or SIGINT."""
     stated, answers = procedure.config.server, OpenAnswers()
@@ -50,6 +55,7 @@ def run_server(
         hosts=hosts,
         updates=updates,
         hospital=hospital,
+        notifier=notifier,
         door=door,
         answers=answers,
         network=served,

@@ -6,20 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium import chromium_page
-from daemon_process import ROOT, wait_for
+from daemon_process import wait_for
 from fallback_process import Fallback, ProbeRoot, failed_start, good_daemon
+from opened_screen import shoot
 from playwright.sync_api import Page, expect
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
-SHOTS = ROOT / "build" / "screens"
 BAD = '[press]\ntarget_n = 99\n[camera]\nexposure_ms = 4\nwidth_px = "wide"\n'
-
-
-@pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
-    with chromium_page() as page:
-        yield page
 
 
 @pytest.fixture
@@ -30,11 +23,6 @@ def fallback(page: Page, tmp_path: Path) -> Iterator[Fallback]:
     yield running
     page.goto("about:blank")
     assert running.stop() == 0
-
-
-def shoot(page: Page, name: str) -> None:
-    SHOTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=str(SHOTS / f"{name}.png"))
 
 
 def test_bad_settings_are_a_page_that_says_what_is_wrong_and_the_mended_probe_is_the_screen_again(page, fallback):

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 import uvicorn
-from chromium import chromium_page
-from daemon_process import PATIENT, QUICK_HAND, ROOT, Daemon, wait_for
+from daemon_process import PATIENT, QUICK_HAND, Daemon, wait_for
+from opened_screen import shoot
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
 from small_release import tar
@@ -42,14 +42,7 @@ from device.web.app import create_app
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 WAITS_AT_N = 0.3
-SHOTS = ROOT / "build" / "screens"
 BEGINNING = "Choose whose exam it is"
-
-
-@pytest.fixture(scope="module")
-def page():
-    with chromium_page() as page:
-        yield page
 
 
 class WaitingHand(VirtualHand):
@@ -192,11 +185,6 @@ def no_numbers_in_any_mode(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, no_advice))
 
 
-def _shoot(page: Page, name: str) -> None:
-    SHOTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=str(SHOTS / f"{name}.png"))
-
-
 def _require_fits(page: Page) -> None:
     """Nothing scrolls, is cut off or too small on an 800 x 480 panel."""
     assert wrong_in(page) == []
@@ -223,15 +211,15 @@ def test_a_new_user_presses_the_simulated_probe_and_reads_the_result(page: Page,
     button = page.locator("#press-button")
     expect(button).to_contain_text("simulated probe")
     expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
-    _shoot(page, "ready")
+    shoot(page, "ready")
     button.click()
     expect(page.locator("#instruction")).to_have_text("Press slowly harder")
-    _shoot(page, "press-slowly-harder")
+    shoot(page, "press-slowly-harder")
     _require_fits(page)
     probe.hand.go_on()
     expect(page.locator("#image-title")).to_have_text("Measurement 1, Standard")
     expect(page.locator("#size-value")).to_be_visible()
-    _shoot(page, "result")
+    shoot(page, "result")
     _require_fits(page)
     newest = probe.procedure.store.measurement(probe.procedure.board.now.measurement_id)
     size = newest["estimate"]["size_mm"]
@@ -261,7 +249,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#instruction")).to_have_text("Press beside the lesion")
     expect(page.locator("#force-band-text")).to_have_text("target 0.475 to 0.525 N")
     expect(page.locator("#frames")).to_have_text("0 of 1 images")
-    _shoot(page, "modes")
+    shoot(page, "modes")
     _require_fits(page)
     modes.filter(has_text="paper").click()
     modes.filter(has_text="standard").click()
@@ -272,7 +260,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#frames")).to_have_text(re.compile("[3-7] of 10 images"))
     expect(page.locator("#press-state")).to_have_text("taking images")
     assert 0 < wanted.count() < 10
-    _shoot(page, "ramp")
+    shoot(page, "ramp")
     _require_fits(page)
     probe.hand.go_on()
     expect(wanted).to_have_count(0)
@@ -283,7 +271,7 @@ def test_the_operator_chooses_between_speed_and_accuracy(page: Page, probe: Serv
     expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
     expect(page.locator("#depth-interval")).to_have_text("7.2 mm or less")
     expect(page.locator("#modulus-interval")).to_have_text("48 kPa or more")
-    _shoot(page, "result-standard")
+    shoot(page, "result-standard")
     _require_fits(page)
 
 
@@ -301,7 +289,7 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
     expect(steps.nth(3).locator("input")).to_be_disabled()
     expect(page.locator("#status-reason")).to_have_text(re.compile("^A scan: one press beside the lesion, then two to"))
     steps.nth(2).click()
-    _shoot(page, "scan-asked")
+    shoot(page, "scan-asked")
     _require_fits(page)
     page.locator("#press-button").click()
     probe.hand.go_on()
@@ -310,14 +298,14 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
     values, told = page.locator("#scan .scan-value"), page.locator("#scan .scan-told")
     expect(values).to_have_text(["12.2 ± 2.6 mm", "6.1 ± 1.4 mm", "not known yet"])
     expect(told.nth(0)).to_have_text("next press: ± 1.3 mm asked: ± 1.0 mm")
-    _shoot(page, "scan-after-one-press")
+    shoot(page, "scan-after-one-press")
     _require_fits(page)
     _require_whole_scan(page)
     probe.hand.go_aside(too_hard=True)
     expect(page.locator("#status-word")).to_have_text("That press does not count.")
     expect(page.locator("#status-reason")).to_contain_text("more than 1.00 N.")
     expect(page.locator("#instruction")).to_have_text("Move about 4 mm to the side, touch again")
-    _shoot(page, "scan-press-that-does-not-count")
+    shoot(page, "scan-press-that-does-not-count")
     _require_fits(page)
     _require_whole_scan(page)
     probe.hand.go_aside()
@@ -325,19 +313,19 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
     expect(page.locator("#status-reason")).to_have_text(
         re.compile(r"^Press 2 on the lesion: about 4\smm from its middle")
     )
-    _shoot(page, "scan-second-press")
+    shoot(page, "scan-second-press")
     _require_fits(page)
     expect(page.locator("#scan-count")).to_have_text("2 of at most 5 presses")
     expect(values).to_have_text(["12.2 ± 1.3 mm", "6.1 ± 0.70 mm", "63 ± 17 kPa"])
     expect(page.locator('.scan-row[data-reached="true"]')).to_have_count(1)
     expect(page.locator("#instruction")).to_have_text("Move about 4 mm to the side, touch again")
-    _shoot(page, "scan-after-two-presses")
+    shoot(page, "scan-after-two-presses")
     _require_whole_scan(page)
     page.locator("#enough-button").click()
     expect(page.locator("#image-title")).to_have_text("Measurement 1, Precise")
     expect(page.locator("#status-reason")).to_contain_text("2 presses on the lesion. Not as sure as asked for.")
     expect(page.locator("#enough-button")).to_be_hidden()
-    _shoot(page, "scan-result")
+    shoot(page, "scan-result")
     _require_fits(page)
     kept = probe.procedure.store.measurement(probe.procedure.board.now.measurement_id)
     assert (kept["ramps"], kept["frames"], kept["reached"]) == (2, 20, False)
@@ -367,7 +355,7 @@ def test_the_answer_is_on_the_screen_before_the_disk_has_it(
     expect(page.locator("#size-interval")).to_have_text("9.6 – 14.4 mm")
     expect(page.locator("#size-value")).to_be_visible()
     expect(page.locator("#image-title")).to_have_text("Being kept, Standard")
-    _shoot(page, "result-being-kept")
+    shoot(page, "result-being-kept")
     _require_fits(page)
     disk_answers.set()
     if is_kept:
@@ -391,7 +379,7 @@ def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Serv
     expect(page.locator("#size-value")).to_have_text("not determined")
     expect(page.locator("#instruction")).to_have_text("No numbers")
     expect(page.locator("#status-reason")).to_contain_text("note the finding without numbers.")
-    _shoot(page, "result-without-numbers")
+    shoot(page, "result-without-numbers")
     _require_fits(page)
     cut = "tiles => tiles.filter(t => t.scrollHeight > t.clientHeight + 1).map(t => t.id)"
     assert page.locator(".tile").evaluate_all(cut) == []
@@ -412,7 +400,7 @@ def test_a_warning_is_amber_with_its_code_and_leaves_the_result_readable(page: P
     expect(warning.locator(".fault-code")).to_have_css("background-color", "rgb(122, 77, 0)")
     expect(page.locator("#size-value")).to_be_visible()
     expect(page.locator("#size-value")).to_have_text(re.compile(r"\d+\.\d mm"))
-    _shoot(page, "warning")
+    shoot(page, "warning")
     _require_fits(page)
     daemon.stop()
 
@@ -425,7 +413,7 @@ def test_the_screen_says_when_the_daemon_is_gone_and_recovers(page: Page, tmp_pa
     expect(page.locator("#connection-lost")).to_be_hidden()
     daemon.stop()
     expect(page.locator("#connection-lost")).to_be_visible()
-    _shoot(page, "connection-lost")
+    shoot(page, "connection-lost")
     again = Daemon(tmp_path, QUICK_HAND, port=int(daemon.url.rpartition(":")[2]))
     expect(page.locator("#connection-lost")).to_be_hidden()
     expect(page.locator("#instruction")).to_have_text(BEGINNING)
@@ -442,7 +430,7 @@ def test_a_fault_takes_the_view_with_its_code_and_title(page: Page, tmp_path: Pa
     expect(fault.locator(".fault-title")).to_have_text("The light's line is stuck")
     expect(fault.locator(".fault-remedy")).to_contain_text("Switch the probe off and on.")
     expect(page.locator("#status-line")).not_to_contain_text("bus")
-    _shoot(page, "fault")
+    shoot(page, "fault")
     _require_fits(page)
     daemon.stop()
 
@@ -481,7 +469,7 @@ def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page,
     expect(failed).to_have_count(2)
     expect(failed.nth(0)).to_contain_text("It lights -x: put the plugs of +x and -x where they belong.")
     assert page.locator(".check").first.get_attribute("data-verdict") == "failed"
-    _shoot(page, "self-test")
+    shoot(page, "self-test")
     _require_fits(page)
     keys = page.locator("#self-test-keys")
     expect(keys).to_be_hidden()
@@ -489,7 +477,7 @@ def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page,
     for key in ("9", ".", "Erase", "9"):  # the probe's panel has no keyboard
         keys.get_by_role("button", name=key, exact=True).click()
     expect(page.locator("#self-test-weight")).to_have_value("99")
-    _shoot(page, "self-test-keys")
+    shoot(page, "self-test-keys")
     _require_fits(page)
     page.locator("#self-test-run").click()
     expect(line).to_contain_text("Take another weight: between 0.1 and 5 N")
@@ -513,7 +501,7 @@ def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_fr
     release.write_bytes(tar({"manifest.json": b'{"product": "tsis"}'}))
     page.locator("#release-file").set_input_files(holiday)
     expect(page.locator("#releases-line")).to_contain_text("holiday.jpg is no release file")
-    _shoot(page, "software")
+    shoot(page, "software")
     _require_fits(page)
     page.locator("#release-file").set_input_files(release)
     handed = probe.updates / "incoming" / "update.release"
@@ -525,7 +513,7 @@ def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_fr
     expect(page.locator("#releases-line")).to_have_text("Version 0.2.0 is being installed.")
     expect(page.locator("#release-progress")).to_have_js_property("value", 0.42)
     expect(page.locator("#release-file")).to_be_disabled()
-    _shoot(page, "software-update")
+    shoot(page, "software-update")
     _require_fits(page)
     page.locator("#releases-close").click()
     expect(page.locator("#status-line")).to_have_text("Version 0.2.0 is being installed. Now: unpacking, 42 %.")
@@ -550,7 +538,7 @@ def test_an_update_that_was_taken_back_is_a_lasting_warning_that_leaves_the_view
     warning = page.locator('.fault[data-severity="warning"]')
     expect(warning.locator(".fault-code")).to_have_text("E013")
     expect(warning.locator(".fault-title")).to_have_text("Update taken back")
-    _shoot(page, "update-taken-back")
+    shoot(page, "update-taken-back")
     _require_fits(page)
     assert daemon.ask("/api/v1/updates").json["outcome"].startswith("Version 0.2.0 did not work")
     (folder / "progress.json").write_text(json.dumps(told | {"state": "switching", "release": "0.3.0+420"}))
@@ -558,4 +546,4 @@ def test_an_update_that_was_taken_back_is_a_lasting_warning_that_leaves_the_view
     daemon.stop()
     expect(page.locator("#connection-lost")).to_be_visible()
     expect(page.locator("#lost-title")).to_have_text("The probe is being updated")
-    _shoot(page, "being-updated")
+    shoot(page, "being-updated")

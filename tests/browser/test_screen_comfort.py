@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from chromium import chromium_page
-from daemon_process import ROOT
-from playwright.sync_api import Browser, Page, expect
+from opened_screen import SIZES, named, opened, shoot
+from playwright.sync_api import Browser, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe, served_probe
 
@@ -17,40 +15,9 @@ from device.instrument.press.states import Guidance
 from device.instrument.status import PressJob
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
-SHOTS = ROOT / "build" / "screens" / "comfort"
-SIZES = [(800, 480), (480, 320), (390, 844), (1280, 800)]
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium_page() as page:
-        browser = page.context.browser
-        assert browser is not None
-        page.close()
-        yield browser
-
-
-@pytest.fixture(scope="module")
-def probe(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedProbe]:
-    with served_probe(tmp_path_factory.mktemp("probe"), is_running=False) as served:
-        yield served
-
-
-def opened(browser: Browser, probe: ServedProbe, size: tuple[int, int] = SIZES[0], **context: object) -> Page:
-    options = {"locale": "en-GB", "viewport": {"width": size[0], "height": size[1]}} | context
-    page = browser.new_context(**options).new_page()  # type: ignore[arg-type]
-    probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, fault=None, warnings=(), press=None)
-    page.goto(probe.url)
-    expect(page.locator("#modes")).to_be_visible()
-    return page
-
-
-def shoot(page: Page, name: str) -> None:
-    SHOTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=str(SHOTS / f"{name}.png"))
-
-
-@pytest.mark.parametrize("size", SIZES[:2], ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
 def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, probe: ServedProbe, size):
     page = opened(browser, probe, size, has_touch=True, is_mobile=True)
     page.locator("#press-button").tap()
@@ -61,7 +28,7 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
     assert keys is not None
     assert field["y"] >= 0
     assert field["y"] + field["height"] <= keys["y"] + 1
-    shoot(page, f"keys-{size[0]}")
+    shoot(page, f"comfort/keys-{size[0]}")
     for key in ("Capitals", "A", "1", "7", "x", "Erase"):
         page.locator("#keys").get_by_role("button", name=key, exact=True).tap()
     expect(page.locator("#patient-ref")).to_have_value("A17")
@@ -74,7 +41,7 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", SIZES, ids=named)
 def test_every_page_can_be_read_in_both_schemes(browser: Browser, probe: ServedProbe, size, scheme: str):
     page, axe = opened(browser, probe, size, color_scheme=scheme), Axe()
     opens = {"chooser": "#exam-button", "menu": "#menu-open"}
@@ -86,7 +53,7 @@ def test_every_page_can_be_read_in_both_schemes(browser: Browser, probe: ServedP
         if name in opens:
             page.locator(opens[name]).click()
             expect(page.locator(f"#{name}")).to_be_visible()
-        shoot(page, f"{name}-{scheme}-{size[0]}")
+        shoot(page, f"comfort/{name}-{scheme}-{size[0]}")
         found = axe.run(page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa"]})
         assert [one["id"] for one in found.response["violations"]] == [], (name, found.generate_report())
         assert wrong_in(page) == [], name
@@ -102,7 +69,7 @@ def test_forced_colours_and_reduced_motion_keep_every_mark(browser: Browser, pro
     assert band != ground
     moved = page.locator(".gauge-fill div").evaluate("node => getComputedStyle(node).transitionDuration")
     assert moved == "0s"
-    shoot(page, "forced-colours")
+    shoot(page, "comfort/forced-colours")
     assert wrong_in(page) == []
     page.context.close()
 
@@ -152,6 +119,6 @@ def test_nothing_can_be_pressed_under_the_curtain(browser: Browser, tmp_path: Pa
     expect(page.locator("#connection-lost")).to_be_visible()
     for id in ("main", "header", "footer"):
         expect(page.locator(f"#{id}")).to_have_js_property("inert", value=True)
-    shoot(page, "lost")
+    shoot(page, "comfort/lost")
     assert wrong_in(page) == []
     page.context.close()

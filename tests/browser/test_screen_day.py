@@ -6,18 +6,16 @@ Every state on the way is looked at by axe, and measured: nothing cut off, nothi
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from chromium import chromium_page
-from daemon_process import QUICK_HAND, ROOT, Daemon
+from daemon_process import QUICK_HAND, Daemon
+from opened_screen import shoot
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
-SHOTS = ROOT / "build" / "screens" / "day"
 MORNING = """[[faults]]
 kind = "wet_face"
 ratio = 1.0
@@ -30,12 +28,6 @@ until_s = 3.0
 """
 
 
-@pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
-    with chromium_page() as page:
-        yield page
-
-
 class Nurse:
     """Somebody at the screen; each state she comes to is looked at once."""
 
@@ -44,8 +36,7 @@ class Nurse:
 
     def look(self, name: str) -> None:
         """Have axe and the ruler look at the page as it is, and take a photograph."""
-        SHOTS.mkdir(parents=True, exist_ok=True)
-        self.page.screenshot(path=str(SHOTS / f"{name}.png"))
+        shoot(self.page, f"day/{name}")
         found = self.axe.run(self.page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa"]})
         assert [one["id"] for one in found.response["violations"]] == [], (name, found.generate_report())
         assert wrong_in(self.page) == [], name

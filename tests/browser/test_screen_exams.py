@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium import chromium_page
 from daemon_process import QUICK_HAND, Daemon
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
@@ -20,12 +19,6 @@ EXAM = {
     "nipple_distance_mm": 35.0,
     "operator": "Ada",
 }
-
-
-@pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
-    with chromium_page() as page:
-        yield page
 
 
 @pytest.fixture

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 import pytest
-from chromium import chromium_page
-from daemon_process import ROOT
-from playwright.sync_api import Browser, Page, expect
+from opened_screen import SIZES, named, opened, shoot
+from playwright.sync_api import Browser, expect
 from screen_layout import wrong_in
-from served_probe import ServedProbe, served_probe
+from served_probe import ServedProbe
 
 from device.errors import DeviceError
 from device.fault_table import FAULTS
@@ -18,8 +16,6 @@ from device.instrument.press.states import Guidance
 from device.instrument.status import PressJob
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
-SHOTS = ROOT / "build" / "screens" / "faults"
-SIZES = [(800, 480), (480, 320), (390, 844), (1280, 800)]
 LANGUAGES = ["en-GB", "de-DE"]
 SERVICE = "Load cell on /dev/tsis-force gave no reading: [Errno 5] the last b'\\x8a|\\x82'."
 ERRORS = {entry.code: DeviceError.by_code[entry.code](SERVICE, f"Service of {entry.code}.") for entry in FAULTS}
@@ -32,40 +28,10 @@ STEPS = {
 }
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium_page() as page:
-        browser = page.context.browser
-        assert browser is not None
-        page.close()
-        yield browser
-
-
-@pytest.fixture(scope="module")
-def probe(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedProbe]:
-    with served_probe(tmp_path_factory.mktemp("probe"), is_running=False) as served:
-        yield served
-
-
-def opened(browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]) -> Page:
-    """Return the screen of a language and a size, once it has heard of the probe."""
-    context = browser.new_context(locale=language, viewport={"width": size[0], "height": size[1]})
-    page = context.new_page()
-    probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, fault=None, warnings=(), press=None)
-    page.goto(probe.url)
-    expect(page.locator("#modes")).to_be_visible()
-    return page
-
-
-def shoot(page: Page, name: str) -> None:
-    SHOTS.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=str(SHOTS / f"{name}.png"))
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", SIZES, ids=named)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_fault_is_whole_and_said_once(browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]):
-    page, wrong = opened(browser, probe, language, size), {}
+    page, wrong = opened(browser, probe, size, locale=language), {}
     for code, error in ERRORS.items():
         if error.severity == "fault":
             probe.procedure.board.update(step="fault", guidance=Guidance.FAULT, fault=error, warnings=())
@@ -80,17 +46,17 @@ def test_every_fault_is_whole_and_said_once(browser: Browser, probe: ServedProbe
         assert "/dev" not in shown
         assert "Errno" not in shown
         if size == SIZES[0] and language == LANGUAGES[0]:
-            shoot(page, code)
+            shoot(page, f"faults/{code}")
     page.context.close()
     assert {code: found for code, found in wrong.items() if found} == {}
 
 
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", SIZES, ids=named)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_warnings_take_room_of_their_own_in_every_step(
     browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]
 ):
-    page, wrong = opened(browser, probe, language, size), {}
+    page, wrong = opened(browser, probe, size, locale=language), {}
     at_most = 1 if size[1] < 420 else 2
     for step, guidance in STEPS.items():
         press = PressJob("p", "standard", "capturing") if step in ("reference", "lesion") else None
@@ -102,13 +68,13 @@ def test_warnings_take_room_of_their_own_in_every_step(
             more = [re.compile(f" {count - at_most} ")] if count > at_most else []
             expect(page.locator(".fault-more")).to_have_text(more)
             wrong[step, count] = wrong_in(page)
-            shoot(page, f"{step}-{count}-{language[:2]}-{size[0]}")
+            shoot(page, f"faults/{step}-{count}-{language[:2]}-{size[0]}")
     page.context.close()
     assert {state: found for state, found in wrong.items() if found} == {}
 
 
 def test_what_service_needs_is_one_tap_away(browser: Browser, probe: ServedProbe):
-    page = opened(browser, probe, "en-GB", SIZES[0])
+    page = opened(browser, probe)
     probe.procedure.board.update(step="fault", guidance=Guidance.FAULT, fault=ERRORS["E304"], warnings=WARNINGS[:4])
     expect(page.locator(".fault-code")).to_have_count(3)
     expect(page.locator(".fault-more")).to_have_text("and 2 more")

@@ -6,26 +6,18 @@ A scenario with which the daemon does not start has another page (test_fallback.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium import chromium_page
 from daemon_process import QUICK_HAND, ROOT, Daemon
+from opened_screen import shoot
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long]
-SHOTS = ROOT / "build" / "screens" / "scenarios"
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
 NO_START = {"bundle_tampered", "calibration_foreign", "calibration_missing", "enable_busy"}
 ENDED = "#panel:is([data-view='result'], [data-step='fault'], [data-step='rejected']), .fault, #status-word:not(:empty)"
-
-
-@pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
-    with chromium_page() as page:
-        yield page
 
 
 def scene_of(path: Path) -> str:
@@ -45,8 +37,7 @@ def test_the_screen_of_a_scenario_is_whole(page: Page, tmp_path: Path, path: Pat
         page.locator("#free-yes").click()
         page.locator("#press-button").click()
         expect(page.locator(ENDED).first).to_be_attached()
-        SHOTS.mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=str(SHOTS / f"{path.stem}.png"))
+        shoot(page, f"scenarios/{path.stem}")
         assert wrong_in(page) == []
         words = page.locator("#panel").inner_text()
         for remedy in page.locator(".fault-remedy").all_inner_texts():

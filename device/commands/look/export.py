@@ -15,6 +15,7 @@ from device.config import Config
 from device.errors import StorageError
 from device.exports.archive import archive_of
 from device.exports.arrays import npz_of
+from device.exports.lesions import lesion_table
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.files.durable import synced_file
@@ -25,6 +26,7 @@ from device.records.store import Store
 EXAMPLES = """examples:
   python -m device export                          a row a measurement, to the screen
   python -m device export --out all.csv --long     a row a quantity
+  python -m device export --lesions                a row a lesion: mean, spread, repeatability
   python -m device export --out exam.zip --exam ID recordings with a table of them
   python -m device export --out all.npz            arrays for NumPy
 """
@@ -39,7 +41,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=SCREEN, metavar="FILE", help=f"a new file: {kinds}; else a table")
     parser.add_argument("--exam", metavar="ID", help="measurements of one exam")
     parser.add_argument("--mode", help="measurements of one mode")
-    parser.add_argument("--long", action="store_true", help="a table with a row for each quantity")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--long", action="store_true", help="a table with a row for each quantity")
+    form.add_argument(
+        "--lesions", action="store_true", help="a table with a row for each lesion: how far presses agree"
+    )
     parser.add_argument("--with-void", action="store_true", help="also what does not count")
 
 
@@ -50,7 +56,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
         raise InvalidQuantity("--out", out, f"a new file that ends with {' or '.join(KINDS)}", "choose another name")
     with closing(Store(config.data, to_read=True)) as store:
         wanted = Wanted(exam_id=options.exam, mode=options.mode)
-        pieces = _pieces(Selection.of_now(store, wanted, with_void=options.with_void), store, out, long=options.long)
+        pieces = _pieces(Selection.of_now(store, wanted, with_void=options.with_void), store, out, options)
         if out == SCREEN:
             for piece in pieces:
                 sys.stdout.buffer.write(piece)
@@ -60,13 +66,14 @@ def run(options: argparse.Namespace, config: Config) -> int:
     return 0
 
 
-def _pieces(selection: Selection, store: Store, out: Path, *, long: bool) -> Iterable[bytes]:
+def _pieces(selection: Selection, store: Store, out: Path, options: argparse.Namespace) -> Iterable[bytes]:
     match out.suffix:
         case ".npz":
             return [npz_of(selection)]
         case ".zip":
             return archive_of(store, selection)
-    return (long_table if long else wide_table)(selection)
+    table = long_table if options.long else lesion_table if options.lesions else wide_table
+    return table(selection)
 
 
 def _write(out: Path, pieces: Iterable[bytes]) -> None:

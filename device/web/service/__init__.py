@@ -1,6 +1,6 @@
-"""What who looks after the probe reads: its figures for a monitoring system, and the API's description as a page.
+"""What who looks after the probe reads: figures for a monitoring system, the API as a page, how far notices got.
 
-Modules in reading order: `metrics`, `manual`.
+Modules in reading order: `metrics`, `manual`, `webhook`.
 
 Nothing here is for the operator, and nothing tells who a patient is.
 """

@@ -6,6 +6,7 @@ import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./b
 import { showIdentity } from "./base/menu.js";
 import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, startPress, takeTare } from "./base/probe.js";
 import { figure, say, sayPage } from "./base/words.js";
+import { showBeside, useBeside } from "./exam/beside.js";
 import { chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
 import { finish, isChosen, isFreeChosen, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
 import { openHistory } from "./exam/history.js";
@@ -15,6 +16,7 @@ import { askVoid } from "./exam/void.js";
 import { openService, showFaults } from "./press/faults.js";
 import { showGauge } from "./press/gauge.js";
 import { endWords, guidanceWords, showInstruction, stepHint } from "./press/instruction.js";
+import { showLive } from "./press/live_view.js";
 import { asChosen, chosenMode, modeName, offerModes, onChoice, showModes } from "./press/modes.js";
 import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./press/scan.js";
 import { openDetails } from "./result/details.js";
@@ -28,6 +30,7 @@ const STEP_INDEX = { reference: 0, lesion: 1, computing: 2, result: 2 };
 const SOUNDS = {
   touch_lesion: "step", press_lesion: "step", move_aside: "step", lift: "good", done: "good", rejected: "caution", fault: "bad",
 };
+const AROUND = ["header", "beside", "footer"];
 const RELOAD_MS = 1000;
 const TOLD_MS = 6000;
 
@@ -140,7 +143,7 @@ function showButtons(measurement) {
   setEnabled(byId("tare"), !sending && !pressUnderWay() && status.step !== "self_test");
   whyButton.hidden = !service;
   // A hand that holds the probe must not press what it does not mean: all but this one button is out of reach.
-  for (const id of ["header", "footer"]) byId(id).inert = pressUnderWay();
+  for (const id of AROUND) byId(id).inert = pressUnderWay();
 }
 
 function showActs(measurement) {
@@ -177,6 +180,7 @@ function show() {
   showAccuracy(!pressUnderWay() && chosenMode());
   showScan(status);
   showGauge(seen);
+  showLive(pressUnderWay() && status.press.state !== "computing");
   showSelfTest(status);
 }
 
@@ -196,6 +200,7 @@ async function load(fetchAndShow) {
 
 async function loadDevice() {
   await refresh();
+  showBeside();
   offerModes(await fetchDevice());
   offersAreKnown = true;
 }
@@ -219,7 +224,7 @@ function showConnection(lost) {
   setAttribute(byId("lost-icon"), "href", absenceWords() ? "#icon-wait" : "#icon-fault");
   byId("connection-lost").dataset.tone = absenceWords() ? "caution" : "bad";
   byId("connection-lost").hidden = !lost;
-  for (const id of ["main", "header", "footer"]) byId(id).inert = lost || (id !== "main" && pressUnderWay());
+  for (const id of ["main", ...AROUND]) byId(id).inert = lost || (id !== "main" && pressUnderWay());
   if (lost) closeDialogs(); // they lie above everything
   if (lost) offersAreKnown = false; // whoever comes back may be another probe
 }
@@ -327,7 +332,7 @@ enoughButton.addEventListener("click", () => { if (isEnabled(enoughButton)) send
 whyButton.addEventListener("click", () => openService(service));
 byId("tare").addEventListener("click", () => { if (isEnabled(byId("tare"))) send(tare); });
 byId("exam-button").addEventListener("click", () => chooseExam());
-byId("history-open").addEventListener("click", () => openHistory((id) => send(() => showOlder(id))));
+byId("history-open").addEventListener("click", () => openHistory(openOlder));
 byId("act-details").addEventListener("click", () => openDetails(shown()));
 byId("act-void").addEventListener("click", () => askVoid(shown(), (after) => send(() => replace(after))));
 byId("act-file").addEventListener("click", () => send(file));
@@ -336,6 +341,8 @@ byId("act-place").addEventListener("click", chooseAnotherPlace);
 byId("act-finish").addEventListener("click", finishExam);
 byId("act-now").addEventListener("click", () => send(showNow));
 onChoice(show);
+
+const openOlder = (id) => send(() => showOlder(id));
 
 let examShown = null;
 onExam(() => {
@@ -348,4 +355,5 @@ sayPage();
 useComfort();
 useKeyboard();
 followScanner(scanned);
-followStatus(receive, () => showConnection(true));
+useBeside(openOlder);
+followStatus(receive, () => showConnection(true), showBeside);

@@ -68,3 +68,26 @@ def test_what_was_done_is_listed_newest_first_beside_a_daemon(kept, capsys):
     header, row = capsys.readouterr().out.splitlines()
     assert header.split()[:2] == ["row", "at"]
     assert row.split()[0] == "2"
+
+
+def test_what_was_done_is_listed_of_a_time(kept, capsys):
+    _, command = kept
+    listing = [*command[:-1], "list", "--json"]
+    assert main(listing) == 0
+    entries = list(map(json.loads, capsys.readouterr().out.splitlines()))
+    for options, found in (
+        (["--from", "2000-01-01T00:00:00+01:00"], entries),
+        (["--to", entries[-1]["at"]], []),
+        (["--from", "9998-12-31T00:00:00Z"], []),
+        (["--from", entries[-1]["at"], "--to", "9998-12-31T00:00:00Z"], entries),
+    ):
+        assert main([*listing, *options]) == 0
+        assert [json.loads(line) for line in capsys.readouterr().out.splitlines() if line] == found
+
+
+@pytest.mark.parametrize("moment", ["yesterday", "2026-11-23T08:00:00", "1700000000"])
+def test_a_time_that_is_none_or_has_no_offset_is_refused(kept, capsys, moment):
+    _, command = kept
+    with pytest.raises(SystemExit):
+        main([*command[:-1], "list", "--from", moment])
+    assert "invalid" in capsys.readouterr().err

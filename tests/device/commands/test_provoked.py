@@ -27,6 +27,7 @@ PROVOKED_BY = {
     "E021": "device/access/test_certificate.py::test_files_that_are_none_or_do_not_belong_together_are_refused",
     "E030": "device/dicom/test_sender.py::test_an_archive_that_is_down_is_told_of_and_gets_all_once_it_is_there",
     "E031": "device/dicom/test_sender.py::test_what_the_archive_refuses_is_told_of_until_it_is_sent_again",
+    "E032": "device/webhook/test_notifier.py::test_an_address_that_is_down_is_told_of_and_gets_all_once_it_is_there",
     "E603": "test_kept_over_restart.py::test_a_damaged_database_starts_at_fault_and_shows_what_can_be_read",
     "E604": "device/records/test_recordings.py::"
     "test_a_recording_that_was_changed_is_not_handed_out_while_its_numbers_are",

@@ -13,11 +13,11 @@ from daemon_process import ROOT, wait_for
 from orthanc import OWN_TITLE, TITLE, Orthanc, needs_orthanc
 from written_exam import begin, measure
 
-from device.dicom import sender
 from device.dicom.hospital import Hospital
 from device.errors import InvalidRequest
 from device.files.recording_file import read_picture
 from device.records.store import Store
+from device.sending import persistent_sender
 
 UNCLOSED = pytest.mark.filterwarnings("ignore:.*<socket.socket:pytest.PytestUnraisableExceptionWarning")
 pytestmark = [needs_orthanc, UNCLOSED]
@@ -50,7 +50,7 @@ def queued(store, archive, measurements=MEASUREMENTS):
 
 
 def test_an_archive_that_is_down_is_told_of_and_gets_all_once_it_is_there(store, archive, monkeypatch):
-    monkeypatch.setattr(sender, "FIRST_WAIT_S", 0.1)
+    monkeypatch.setattr(persistent_sender, "FIRST_WAIT_S", 0.1)
     hospital, told = queued(store, archive, measurements=2)
     hospital.start()
     try:
@@ -86,18 +86,8 @@ def test_what_the_archive_refuses_is_told_of_until_it_is_sent_again(store, archi
         hospital.close()
 
 
-def test_waiting_grows_up_to_a_bound(store, archive):
-    waiting = sender.Sender(store.outbox, lambda: None, keep_patients_days=7, tell=lambda fault: None, is_busy=bool)
-    waits = []
-    for _ in range(12):
-        waiting._failures += 1
-        waits.append(waiting._wait_s())
-    assert waits[:4] == [2, 4, 8, 16]
-    assert waits[-1] == sender.LONGEST_WAIT_S
-
-
 def test_nothing_is_sent_while_the_probe_is_busy_and_all_after_that(store, archive, monkeypatch):
-    monkeypatch.setattr(sender, "BUSY_LOOK_S", 0.02)
+    monkeypatch.setattr(persistent_sender, "BUSY_LOOK_S", 0.02)
     exam, looks, is_free = begin(store), [], []
     measure(store, exam)
     told = []
@@ -138,7 +128,7 @@ def test_a_stop_waits_for_no_archive_that_is_silent(store, archive):
 
 
 def test_what_an_archive_answers_can_not_end_the_thread(store, archive, monkeypatch):
-    monkeypatch.setattr(sender, "FIRST_WAIT_S", 0.05)
+    monkeypatch.setattr(persistent_sender, "FIRST_WAIT_S", 0.05)
     hospital, told = queued(store, archive, measurements=1)
 
     class Broken:

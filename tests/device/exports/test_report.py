@@ -53,6 +53,16 @@ def exam(store, **fields):
     return store.exams.make(ExamContent(**{"kind": "patient", "patient_ref": "A-17", "operator": "Ada", **fields}))
 
 
+def test_it_says_how_far_presses_of_the_lesion_agree(store, recording, printed):
+    made = exam(store)
+    keep(store, 1, exam_id=made["id"], recording=recording)
+    assert "repeatability" not in printed(made).lower()
+    keep(store, 2, exam_id=made["id"], recording=recording)
+    text = " ".join(printed(made).split())
+    for said in ("repeatability index", "0.00", "10.2 mm", "95 % of cases"):
+        assert said in text
+
+
 def test_it_says_whose_it_is_and_what_was_measured(store, recording, printed):
     made = exam(store, side="left", clock_position=10, nipple_distance_mm=35.0, order_number="4711", note="One\nTwo")
     keep(store, 1, exam_id=made["id"], recording=recording, picture=tactile_png(recording))

@@ -107,3 +107,20 @@ def test_every_reference_leads_somewhere():
     there = {f"{kind}/{name}" for kind, parts in DOCUMENT["components"].items() for name in parts}
     assert named <= there
     assert {f"schemas/{name}" for name in ("Measurement", "EstimateResource", "Device", "Health", "Problem")} <= named
+
+
+def test_no_request_names_an_address_to_connect_to():
+    """Where the probe connects to is a setting: no parameter and no field of a request is an address, but `Host`."""
+    bodies = json.dumps([one["requestBody"] for one in OPERATIONS.values() if "requestBody" in one])
+    named = {one["name"] for operation in OPERATIONS.values() for one in operation.get("parameters", ())}
+    waiting = re.findall(r"schemas/(\w+)", bodies)
+    seen = set()
+    while waiting:
+        name = waiting.pop()
+        schema = DOCUMENT["components"]["schemas"][name]
+        assert schema.get("format") not in ("uri", "hostname", "ipv4", "ipv6")
+        named |= set(schema.get("properties", {}))
+        seen.add(name)
+        waiting += [one for one in re.findall(r"schemas/(\w+)", json.dumps(schema)) if one not in seen]
+    assert {"ExamContent", "PressRequest", "ScheduledExam"} <= seen
+    assert not [name for name in named if re.search(r"ur[il]|host|addr|callback|hook|target|port$", name.lower())]

@@ -1,44 +1,24 @@
 """Exports over REST: files with their types and names, of what was asked for, refused where that is none."""
 
-import asyncio
+import csv
 import io
-import types
 import zipfile
 
-import httpx
 import numpy as np
 import pytest
 from kept_measurements import keep
 
-from device.records.store import Store
-from device.web.app import create_app
+from device.records.exams import ExamContent
 
 
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
+@pytest.fixture(autouse=True)
+def _kept(store):
     for number in (1, 2, 3):
-        keep(opened, number, mode="quick" if number == 2 else "standard")
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
-def get(store):
-    app = create_app(types.SimpleNamespace(), store)
-
-    def getting(path, **query):
-        async def answer():
-            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
-                return await client.get(f"/api/v1/exports/{path}", params=query)
-
-        return asyncio.run(answer())
-
-    return getting
+        keep(store, number, mode="quick" if number == 2 else "standard")
 
 
 def test_a_table_is_downloaded_as_one(get):
-    answer = get("measurements.csv", mode="quick")
+    answer = get("exports/measurements.csv", mode="quick")
     assert answer.headers["content-type"] == "text/csv; charset=utf-8"
     assert answer.headers["content-disposition"] == 'attachment; filename="tsis-measurements.csv"'
     header, row = answer.text.splitlines()
@@ -46,27 +26,49 @@ def test_a_table_is_downloaded_as_one(get):
 
 
 def test_the_long_form_has_a_row_a_quantity(get):
-    assert len(get("measurements.csv", form="long", mode="quick").text.splitlines()) == 1 + 5
+    assert len(get("exports/measurements.csv", form="long", mode="quick").text.splitlines()) == 1 + 5
+
+
+def test_presses_of_a_lesion_are_its_row_and_the_same_is_said_of_its_exam(store, get):
+    exam = store.exams.make(ExamContent(kind="patient", patient_ref="A-1", operator="Ada"))
+    for number in (4, 5, 6):
+        keep(store, number, exam_id=exam["id"])
+    store.exams.void("m-6", version=1, by="Ada", reason="Slipped")
+    answer = get("exports/measurements.csv", form="lesions")
+    assert answer.headers["content-disposition"] == 'attachment; filename="tsis-lesions.csv"'
+    [row] = csv.DictReader(io.StringIO(answer.text, newline=""))
+    assert (row["exam_id"], row["measurements"], row["size_presses"]) == (exam["id"], "2", "2")
+    said = get(f"exams/{exam['id']}/lesion").json()
+    assert (said["measurements"], said["youngs_modulus_kpa"]["presses"]) == (2, 0)
+    assert said["size_mm"] == {"presses": 2, "mean": 10.2, "spread": 0.0, "repeatability_index": 0.0}
+    assert float(row["size_mean_mm"]) == said["size_mm"]["mean"]
+
+
+def test_an_exam_without_measurements_has_no_agreement_and_none_is_not_found(store, get):
+    exam = store.exams.make(ExamContent(kind="patient", patient_ref="A-1", operator="Ada"))
+    said = get(f"exams/{exam['id']}/lesion").json()
+    assert (said["measurements"], said["size_mm"]["mean"]) == (0, None)
+    assert get("exams/0b0f7f2e-6a1f-4d53-9d5e-0a8a4a2f6c11/lesion").status_code == 404
 
 
 def test_arrays_are_numpys(get):
-    with np.load(io.BytesIO(get("measurements.npz").content), allow_pickle=False) as file:
+    with np.load(io.BytesIO(get("exports/measurements.npz").content), allow_pickle=False) as file:
         assert list(file["measurement_id"]) == ["m-3", "m-2", "m-1"]
 
 
 def test_recordings_are_one_zip(get):
-    with zipfile.ZipFile(io.BytesIO(get("recordings.zip", mode="standard").content)) as archive:
+    with zipfile.ZipFile(io.BytesIO(get("exports/recordings.zip", mode="standard").content)) as archive:
         assert archive.namelist() == ["measurements.csv", "recordings/r-3.zip", "recordings/r-1.zip", "missing.csv"]
 
 
 def test_what_was_voided_comes_only_when_it_is_asked_for(store, get):
     store.exams.void("m-3", version=1, by="Ada", reason="Slipped")
-    assert len(get("measurements.csv").text.splitlines()) == 1 + 2
-    assert len(get("measurements.csv", with_void="true").text.splitlines()) == 1 + 3
+    assert len(get("exports/measurements.csv").text.splitlines()) == 1 + 2
+    assert len(get("exports/measurements.csv", with_void="true").text.splitlines()) == 1 + 3
 
 
 @pytest.mark.parametrize("path", ["measurements.csv", "measurements.npz", "recordings.zip"])
 @pytest.mark.parametrize("query", [{"exam": "x"}, {"mode": "fast"}, {"outcome": "done"}, {"from": "now"}, {"limit": 1}])
 def test_a_selection_that_is_none_is_refused(get, path, query):
-    answer = get(path, **query)
+    answer = get(f"exports/{path}", **query)
     assert (answer.status_code, answer.json()["code"]) == (422, "E803")

@@ -1,40 +1,17 @@
 """Lists over REST: followed by `next` to their end, filtered, and refused where what is asked for is none."""
 
-import asyncio
-import types
-
-import httpx
 import pytest
 from kept_measurements import keep, taken
 
 from device.records.exams import ExamContent
-from device.records.store import Store
 from device.web import schema
-from device.web.app import create_app
 
 
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
+@pytest.fixture(autouse=True)
+def _kept(store):
     for number in range(1, 6):
-        opened.exams.make(ExamContent(kind="patient", patient_ref=f"A-{number}", operator="Ada"))
-        keep(opened, number, mode="quick" if number == 2 else "standard")
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
-def get(store):
-    app = create_app(types.SimpleNamespace(), store)
-
-    def getting(path, **query):
-        async def answer():
-            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
-                return await client.get(f"/api/v1/{path}", params=query)
-
-        return asyncio.run(answer())
-
-    return getting
+        store.exams.make(ExamContent(kind="patient", patient_ref=f"A-{number}", operator="Ada"))
+        keep(store, number, mode="quick" if number == 2 else "standard")
 
 
 LISTS = {
@@ -97,7 +74,17 @@ def test_a_page_that_is_none_and_a_filter_that_there_is_not_are_refused(get, pat
     assert (answer.status_code, answer.json()["code"]) == (422, "E803")
 
 
-@pytest.mark.parametrize("path", ["measurements", "presses", "exams"])
+def test_the_audit_is_listed_of_a_time(get):
+    entries = get("audit", limit=200).json()["entries"]
+    first = min(one["at"] for one in entries)
+    assert get("audit", to=first).json()["entries"] == []
+    assert get("audit", **{"from": first, "limit": 200}).json()["entries"] == entries
+    later = [one for one in entries if one["at"] > first]
+    found = get("audit", **{"from": later[-1]["at"], "to": "9999-01-01T00:00:00+01:00", "limit": 200}).json()
+    assert found["entries"] == later
+
+
+@pytest.mark.parametrize("path", LISTS)
 @pytest.mark.parametrize(
     "moment",
     ["1700000000", "1e999", "NaN", "-Infinity", "2026-03-04", "2026-03-04T10:00:00", "0001-01-01T00:00:00+14:00",

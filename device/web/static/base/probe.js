@@ -15,8 +15,8 @@ async function loadFallback() {
   if (response?.ok) location.reload();
 }
 
-/** Call onStatus with each status, and onSilence again and again while none arrives. */
-export function followStatus(onStatus, onSilence) {
+/** Call onStatus with each status, onChange when exams or measurements have changed, onSilence while nothing arrives. */
+export function followStatus(onStatus, onSilence, onChange) {
   let source = null;
   let openedAt = 0;
   let heardAt = performance.now();
@@ -30,6 +30,7 @@ export function followStatus(onStatus, onSilence) {
       heardAt = performance.now();
       onStatus(status);
     });
+    for (const kind of ["exam", "measurement"]) source.addEventListener(kind, onChange);
   }
 
   // EventSource gives up for good after an HTTP error and never notices a pulled cable, so the page reopens it itself.
@@ -92,6 +93,7 @@ export const startSelfTest = (wanted) => post("/self-test", wanted);
 export const fetchSelfTest = () => get("/self-test");
 export const fetchDevice = () => get("/device");
 
+export const liveUrl = `${API}/live.mjpeg`;
 export const imageUrl = (id) => `${API}/measurements/${of(id)}/image.png`;
 export const recordingUrl = (id) => `${API}/measurements/${of(id)}/recording.zip`;
 export const reportUrl = (examId) => `${API}/exams/${of(examId)}/report.pdf`;

@@ -27,12 +27,13 @@ const together = (text) => text.replace(/([\d}]) (?=(?:%|mm|kPa|N|s)(?![\w]))/g,
 export const say = (key, values = {}) => together(filled(words[key] ?? key, values));
 export const isSaid = (key) => key in words;
 
-/** Fill the page's own texts: data-say, data-say-label and data-say-title hold keys. */
+/** Fill the page's own texts: data-say, data-say-label, data-say-title and data-say-alt hold keys. */
 export function sayPage(root = document) {
   document.documentElement.lang = language;
   for (const node of root.querySelectorAll("[data-say]")) node.textContent = say(node.dataset.say);
   for (const node of root.querySelectorAll("[data-say-label]")) node.setAttribute("aria-label", say(node.dataset.sayLabel));
   for (const node of root.querySelectorAll("[data-say-title]")) node.title = say(node.dataset.sayTitle);
+  for (const node of root.querySelectorAll("[data-say-alt]")) node.alt = say(node.dataset.sayAlt);
 }
 
 /** A number with so many decimals, as the language writes it. */

@@ -1,12 +1,13 @@
 // Choose whose exam it is: scan or type a patient, go on with an exam, begin one at a place of the body, take a phantom,
 // or press freely, which is asked twice.
 
-import { button, byId, element, setText } from "../base/dom.js";
+import { byId, element, setText } from "../base/dom.js";
 import { remember, remembered } from "../base/memory.js";
 import { fetchExams, makeExam } from "../base/probe.js";
-import { moment, say } from "../base/words.js";
+import { say } from "../base/words.js";
 import { beginMap, chosenPlace } from "./body_map.js";
-import { open, openExam, openFree, placeWords, whoWords } from "./current.js";
+import { open, openExam, openFree } from "./current.js";
+import { examRow } from "./row.js";
 
 const RECENT = 12;
 const dialog = byId("chooser");
@@ -34,18 +35,12 @@ function goOn(exam) {
   close();
 }
 
-function row(exam) {
-  const node = button("recent", "", () => goOn(exam));
-  node.append(element("strong", "", whoWords(exam)), element("span", "", placeWords(exam)), element("small", "", moment(exam.made_at)));
-  return node;
-}
-
 /** Show the exams of before: of the patient that is typed, else the newest of all. */
 async function showRecent() {
   const patientRef = typed("patient_ref") || null;
   const found = await fetchExams({ patientRef, limit: RECENT }).catch(() => []);
   if ((typed("patient_ref") || null) !== patientRef) return;
-  byId("recent").replaceChildren(...(found.length ? found.map(row) : [element("p", "", say("exam.recent_none"))]));
+  byId("recent").replaceChildren(...(found.length ? found.map((exam) => examRow(exam, goOn)) : [element("p", "", say("exam.recent_none"))]));
 }
 
 /** Open the page, with a patient who was scanned or without. */

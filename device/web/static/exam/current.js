@@ -7,7 +7,7 @@ import { figure, say } from "../base/words.js";
 
 let exam = null;
 let isFree = false;
-let listener = () => {};
+const listeners = [];
 
 /** The exam that is open, with the version that is shown, or null. */
 export const openExam = () => exam;
@@ -17,14 +17,14 @@ export const isFreeChosen = () => isFree;
 
 /** Call back whenever it becomes another exam, or another version of it. */
 export function onExam(act) {
-  listener = act;
+  listeners.push(act);
 }
 
 function become(next, free) {
   exam = next;
   isFree = free;
   remember("exam", next?.id ?? null);
-  listener();
+  for (const act of listeners) act();
 }
 
 export const open = (next) => become(next, false);

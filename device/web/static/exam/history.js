@@ -2,12 +2,13 @@
 // side; a patient's exams make a trend.
 
 import { button, byId, element } from "../base/dom.js";
-import { fetchExam, fetchExams, fetchMeasurements, imageUrl, reportUrl, tableUrl } from "../base/probe.js";
+import { fetchExam, fetchExams, fetchMeasurements, reportUrl, tableUrl } from "../base/probe.js";
 import { moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
 import { UNKNOWNS, shortWords } from "../result/quantities.js";
 import { showComparison } from "./comparison.js";
 import { openExam, placeWords, whoWords } from "./current.js";
+import { thumbnail } from "./row.js";
 import { showTrend } from "./trend.js";
 
 const PAGE = 30;
@@ -25,12 +26,6 @@ async function examOf({ exam_id: id }) {
 }
 
 const ownerWords = (exam) => (exam ? `${whoWords(exam)} ${placeWords(exam)}` : say("history.free"));
-
-function thumbnail({ id }) {
-  const image = element("img", "thumbnail");
-  Object.assign(image, { src: imageUrl(id), alt: "", loading: "lazy" });
-  return image;
-}
 
 /** Mark a measurement for the comparison; the third one takes the place of the first. */
 function mark(measurement, isMarked) {

@@ -1,0 +1,73 @@
+"""A row a lesion: its exam, how many presses count, and how far they agree."""
+
+import csv
+import io
+
+import pytest
+from kept_measurements import ESTIMATE, keep, taken, unknown
+
+from device.exports.lesions import LESION_COLUMNS, lesion_table
+from device.exports.selection import Selection
+from device.measurement.repeats import repeats_of
+from device.records.exams import ExamContent
+from device.records.listing import Wanted
+from device.records.store import Store
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+def rows(parts):
+    return list(csv.DictReader(io.StringIO(b"".join(parts).decode(), newline=""), strict=True))
+
+
+def exam(store, **fields):
+    return store.exams.make(ExamContent(**{"kind": "patient", "patient_ref": "A-17", "operator": "Ada", **fields}))
+
+
+def pressed(store, number, size_mm, **said):
+    return keep(store, number, estimate={**ESTIMATE, "size_mm": unknown(size_mm, half_width=0.3)}, **said)
+
+
+def test_presses_of_one_lesion_are_one_row(store):
+    left, right = exam(store, side="left", clock_position=10), exam(store, side="right")
+    for number, size_mm in enumerate((9.0, 10.0, 11.5), 1):
+        pressed(store, number, size_mm, exam_id=left["id"], mode="quick" if number == 2 else "standard")
+    pressed(store, 4, 7.0, exam_id=right["id"])
+    pressed(store, 5, 99.0)
+    other, one = rows(lesion_table(Selection(store)))
+    assert list(one) == list(LESION_COLUMNS)
+    assert (one["exam_id"], one["patient_ref"], one["side"], one["clock_position"]) == (
+        left["id"],
+        "A-17",
+        "left",
+        "10",
+    )
+    assert (one["measurements"], one["modes"], one["simulated"]) == ("3", "quick standard", "true")
+    assert (one["first_taken_at_utc"], one["last_taken_at_utc"]) == (taken(1), taken(3))
+    agreed = repeats_of([9.0, 10.0, 11.5])
+    columns = ("size_mean_mm", "size_spread_mm", "size_repeatability_index")
+    assert [float(one[name]) for name in columns] == pytest.approx(
+        [agreed.mean, agreed.spread, agreed.repeatability_index]
+    )
+    assert (one["size_presses"], one["youngs_modulus_presses"], one["youngs_modulus_mean_kpa"]) == ("3", "0", "")
+    assert (other["exam_id"], other["size_presses"], other["size_spread_mm"]) == (right["id"], "1", "")
+
+
+def test_what_is_void_or_not_selected_is_in_no_row(store):
+    made = exam(store)
+    for number, size_mm in enumerate((9.0, 30.0, 10.0), 1):
+        pressed(store, number, size_mm, exam_id=made["id"], mode="quick" if number == 3 else "standard")
+    store.exams.void("m-2", version=1, by="Ada", reason="Slipped")
+    [row] = rows(lesion_table(Selection(store)))
+    assert (row["size_presses"], float(row["size_mean_mm"])) == ("2", 9.5)
+    [row] = rows(lesion_table(Selection(store, Wanted(mode="quick"))))
+    assert (row["size_presses"], float(row["size_mean_mm"])) == ("1", 10.0)
+
+
+def test_a_table_of_nothing_is_its_header(store):
+    assert rows(lesion_table(Selection(store))) == []

@@ -1,0 +1,36 @@
+"""How far presses agree, against numbers computed by hand and by NumPy, and what too few do not tell."""
+
+import numpy as np
+import pytest
+
+from device.measurement.repeats import Repeats, repeats_by_unknown, repeats_of
+
+
+def test_the_index_is_the_repeatability_coefficient_over_the_mean():
+    found = repeats_of([9.0, 10.0, 11.0])
+    assert (found.presses, found.mean, found.spread) == (3, 10.0, 1.0)
+    assert found.repeatability_index == pytest.approx(0.2772, abs=1e-4)
+
+
+def test_two_presses_differ_by_less_than_it_says_in_nineteen_of_twenty_cases():
+    rng = np.random.default_rng(1)
+    presses = rng.normal(80.0, 4.0, 20_000)
+    apart = np.abs(presses[::2] - presses[1::2])
+    within = apart < repeats_of(list(presses)).repeatability_index * 80.0
+    assert within.mean() == pytest.approx(0.95, abs=0.01)
+
+
+def test_too_few_presses_tell_no_spread():
+    assert repeats_of([]) == Repeats(0, None, None, None)
+    assert repeats_of([8.0]) == Repeats(1, 8.0, None, None)
+    assert repeats_of([8.0, 8.0]) == Repeats(2, 8.0, 0.0, 0.0)
+
+
+def test_only_presses_that_determine_an_unknown_count_for_it():
+    known, half, none = ({"value": value, "identifiable": is_} for value, is_ in ((8, True), (9, False), (None, False)))
+    estimates = [
+        {"size_mm": known, "depth_mm": half, "youngs_modulus_kpa": none},
+        {"size_mm": known, "depth_mm": known, "youngs_modulus_kpa": none},
+    ]
+    found = repeats_by_unknown(estimates)
+    assert [one.presses for one in found.values()] == [2, 1, 0]
