@@ -22,7 +22,7 @@ from host_tools.commands.paper import paper
 from host_tools.commands.probe import probe
 from host_tools.commands.release import deploy, provision, release
 from host_tools.commands.simulate import simulate
-from host_tools.commands.sweep import sweep
+from host_tools.commands.sweep import netcdf, sweep
 from host_tools.commands.tradeoff import tradeoff
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
@@ -37,6 +37,7 @@ app = typer.Typer(
 app.command(epilog="Example: host_tools simulate --size-mm 10 --depth-mm 6 --modulus-kpa 80 --explain")(simulate)
 app.command(epilog="Example: host_tools verify --short --out build/verification.md")(verify)
 app.command(epilog="Example: host_tools sweep --scenes 134 --seed 1 --out build/sweep.nc")(sweep)
+app.command(epilog="Example: host_tools netcdf tsis-measurements.npz --out measurements.nc")(netcdf)
 app.command(epilog="Example: host_tools train --mode standard --out models/standard")(train)
 app.command(epilog="Example: host_tools table --out models/simulated_probe")(table)
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)

@@ -10,9 +10,12 @@ import re
 from collections.abc import Iterator
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from chromium import chromium_page
 from networked_daemon import NetworkedDaemon
+from opened_screen import SIZES, named, shoot
 from playwright.sync_api import Page, expect
+from screen_layout import wrong_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 
@@ -45,7 +48,9 @@ def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_
     assert elsewhere.url == f"{probe.url}/pair"
     elsewhere.get_by_label("Code on the probe's screen").fill("AAAA-AAAA")
     elsewhere.get_by_role("button", name="Pair").click()
-    expect(elsewhere.locator("#line")).to_contain_text("not the code")
+    expect(elsewhere.locator("#line")).to_have_text(
+        "The pairing code is wrong or has ended. Ask for a new one at the probe's screen."
+    )
     elsewhere.get_by_label("Code on the probe's screen").fill(code.lower())
     with elsewhere.expect_event("framenavigated"):
         elsewhere.get_by_role("button", name="Pair").click()
@@ -59,3 +64,37 @@ def test_a_browser_elsewhere_is_paired_by_the_code_of_the_own_screen_and_turned_
     assert elsewhere.evaluate("fetch('/api/v1/status').then((answer) => answer.status)") == 401
     elsewhere.goto(f"{probe.url}/")
     assert elsewhere.url == f"{probe.url}/pair"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+@pytest.mark.parametrize("size", [*SIZES[:3]], ids=named)
+def test_the_page_is_in_both_languages_and_schemes_whole_at_every_size(probe, page, size, language: str, scheme: str):
+    for url, name in ((f"{probe.daemon.url}/pair", "offer"), (f"{probe.url}/pair", "bring")):
+        viewport = {"width": size[0], "height": size[1]}
+        options = {"locale": language, "color_scheme": scheme, "viewport": viewport, "ignore_https_errors": True}
+        other = page.context.browser.new_context(**options).new_page()
+        other.goto(url)
+        expect(other.locator(f"#{name}")).to_be_visible()
+        if name == "offer":
+            other.locator("#name").fill("Ward PC")
+            other.locator("#ask button").click()
+            expect(other.locator("#shown-valid")).not_to_have_text("")
+        words = "Mit der Sonde koppeln" if language == "de-DE" else "Pair with the probe"
+        expect(other.locator("h1")).to_have_text(words)
+        shoot(other, f"pair/{name}-{language[:2]}-{scheme}-{size[0]}")
+        found = [one for one in wrong_in(other) if not one.startswith(("page ", "outside "))]  # the page scrolls
+        assert found == []
+        assert other.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert Axe().run(other).response["violations"] == []
+        other.context.close()
+
+
+def test_the_probes_own_panel_has_keys_for_the_name(probe, page):
+    options = {"viewport": {"width": 480, "height": 320}, "has_touch": True, "is_mobile": True}
+    panel = page.context.browser.new_context(**options).new_page()
+    panel.goto(f"{probe.daemon.url}/pair")
+    panel.locator("#name").tap()
+    panel.locator("#keys").get_by_role("button", name="w", exact=True).tap()
+    expect(panel.locator("#name")).to_have_value("w")
+    panel.context.close()

@@ -26,7 +26,10 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
     field, keys = page.locator("#patient-ref").bounding_box(), page.locator("#keys").bounding_box()
     assert field is not None
     assert keys is not None
-    assert field["y"] >= 0
+    label = page.locator("label:has(#patient-ref) > span").bounding_box()
+    assert label is not None
+    assert min(field["y"], label["y"]) >= 0
+    assert label["y"] + label["height"] <= keys["y"] + 1
     assert field["y"] + field["height"] <= keys["y"] + 1
     shoot(page, f"comfort/keys-{size[0]}")
     for key in ("Capitals", "A", "1", "7", "x", "Erase"):

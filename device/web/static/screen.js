@@ -6,6 +6,7 @@ import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./b
 import { showIdentity } from "./base/menu.js";
 import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, startPress, takeTare } from "./base/probe.js";
 import { figure, say, sayPage } from "./base/words.js";
+import { loadHospital } from "./exam/archive.js";
 import { showBeside, useBeside } from "./exam/beside.js";
 import { chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
 import { finish, isChosen, isFreeChosen, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
@@ -202,6 +203,7 @@ async function loadDevice() {
   await refresh();
   showBeside();
   offerModes(await fetchDevice());
+  await loadHospital();
   offersAreKnown = true;
 }
 
@@ -258,12 +260,14 @@ function receive(next) {
   // After an update of the probe, the page that is already open must not stay the old one.
   if (status && status.release !== next.release) location.reload();
   if (status && status.step !== next.step) told = null;
+  const isFirst = status === null;
   follow(status, next);
   status = next;
   showConnection(false);
   loadWhatIsMissing();
   followAnswer(status);
   show();
+  if (isFirst) performance.mark("first status shown"); // for `make bench screen`
 }
 
 /** Send one command at a time; a refusal takes the place of what was said of the one before. */

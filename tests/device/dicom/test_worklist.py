@@ -6,10 +6,8 @@ from datetime import date
 
 import pydicom
 import pytest
-from orthanc import OWN_TITLE, Orthanc, free_port, needs_orthanc
-from pydicom.dataset import Dataset, FileMetaDataset
-from pydicom.sequence import Sequence
-from pydicom.uid import ExplicitVRLittleEndian
+from ordered_step import ordered
+from orthanc import Orthanc, free_port, needs_orthanc
 from written_exam import measure, needs_dciodvfy, verdict
 
 from device.dicom.hospital import Hospital
@@ -20,31 +18,7 @@ from device.records.store import Store
 
 UNCLOSED = pytest.mark.filterwarnings("ignore:.*<socket.socket:pytest.PytestUnraisableExceptionWarning")
 pytestmark = [needs_orthanc, UNCLOSED]
-ANA = {
-    "PatientID": "A-17", "PatientName": "Müller^Ana", "PatientBirthDate": "19700102", "PatientSex": "F",
-    "AccessionNumber": "2026/1", "StudyInstanceUID": "1.2.3.4", "RequestedProcedureID": "RP-1",
-    "RequestedProcedureDescription": "Palpable lesion", "IssuerOfPatientID": "HOSP",
-}  # fmt: skip
 SAID = {"operator": "Ada", "side": "left"}
-
-
-def ordered(folder, name, *, station=OWN_TITLE, day="20261123", charset="ISO_IR 192", **said):
-    """Put a step into the worklist's folder."""
-    data, step = Dataset(), Dataset()
-    data.file_meta = FileMetaDataset()
-    data.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
-    data.file_meta.MediaStorageSOPClassUID, data.file_meta.MediaStorageSOPInstanceUID = (
-        "1.2.276.0.7230010.3.1.0.1",
-        "1.2.9",
-    )
-    data.SpecificCharacterSet = charset
-    for keyword, value in {**ANA, **said}.items():
-        setattr(data, keyword, value)
-    step.ScheduledStationAETitle, step.Modality = station, "OT"
-    step.ScheduledProcedureStepStartDate, step.ScheduledProcedureStepStartTime = day, "101500"
-    step.ScheduledProcedureStepID, step.ScheduledProcedureStepDescription = f"SPS-{name}", "Tactile"
-    data.ScheduledProcedureStepSequence = Sequence([step])
-    data.save_as(folder / f"{name}.wl", enforce_file_format=True)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ const SILENCE_MS = 2000; // a status arrives at least twice a second: after this
 const REOPEN_MS = 3000;
 const WATCH_MS = 250;
 const ANSWER_MS = 5000;
+const HOSPITAL_MS = 30000; // another machine answers, or does not
 const RELEASE_MS = 600000; // a slow stick
 
 /** Load the page anew when it is no longer the daemon that answers, but what stands in for it and says why. */
@@ -120,6 +121,21 @@ export async function fetchExams({ kind = "patient", patientRef = null, limit = 
   if (patientRef) asked.set("patient_ref", patientRef);
   return (await get(`/exams?${asked}`)).exams;
 }
+
+export const fetchHospital = () => get("/dicom");
+export const fetchSent = (examId) => get(`/exams/${of(examId)}/dicom`);
+export const sendToArchive = (exam, by) => post(`/exams/${of(exam.id)}/dicom`, { by }, seen(exam));
+
+/** Steps of the hospital's worklist: of a patient, or of this day. */
+export async function fetchWorklist(patientRef) {
+  const now = new Date();
+  const today = [now.getFullYear(), now.getMonth() + 1, now.getDate()].map((part) => String(part).padStart(2, "0")).join("-");
+  const asked = new URLSearchParams(patientRef ? { patient_ref: patientRef } : { day: today });
+  return (await asJson(ask("GET", `/worklist?${asked}`, undefined, { withinMs: HOSPITAL_MS }))).steps;
+}
+
+/** Begin the exam of a step that the worklist has shown. */
+export const makeOrderedExam = (content) => post("/worklist/exams", content, onceKey());
 
 export const fetchUpdates = () => get("/updates");
 export const goBack = () => post("/updates/roll-back", {});

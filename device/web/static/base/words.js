@@ -50,6 +50,20 @@ export const moment = (at) => new Date(at).toLocaleString(locale, { ...DAY, ...M
 export const day = (at) => new Date(at).toLocaleDateString(locale, DAY);
 export const clock = (at) => new Date(at).toLocaleTimeString(locale, MINUTE);
 
+const DICOM_TIME = /^(\d{4})(\d{2})(\d{2})[ T]?(?:(\d{2})(\d{2}))?/;
+
+/** A day as DICOM writes it, YYYYMMDD, as the language does; what is none stays as it is. */
+export function dicomDay(text) {
+  const [, year, month, date] = DICOM_TIME.exec(text) ?? [];
+  return year ? new Date(year, month - 1, date).toLocaleDateString(locale, DAY) : text;
+}
+
+/** The hour and minute of a moment as DICOM writes it, "" where it has none. */
+export function dicomTime(text) {
+  const [, year, month, date, hour, minute] = DICOM_TIME.exec(text) ?? [];
+  return hour ? new Date(year, month - 1, date, hour, minute).toLocaleTimeString(locale, MINUTE) : "";
+}
+
 const asPattern = (text) => text.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+?)");
 const patterns = Object.entries(sentences).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
 

@@ -6,6 +6,7 @@ import { fetchExam, fetchExams, fetchMeasurements, reportUrl, tableUrl } from ".
 import { moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
 import { UNKNOWNS, shortWords } from "../result/quantities.js";
+import { showArchive } from "./archive.js";
 import { showComparison } from "./comparison.js";
 import { openExam, placeWords, whoWords } from "./current.js";
 import { thumbnail } from "./row.js";
@@ -101,6 +102,7 @@ async function show(beforeSeq = null) {
   more.hidden = scope !== "all" || measurements.length < PAGE;
   more.dataset.before = measurements.at(-1)?.seq ?? "";
   showTrend(scope === "patient" ? measurements : []);
+  showArchive(scope === "exam", measurements);
 }
 
 function choose(next) {

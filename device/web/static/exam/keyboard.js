@@ -55,10 +55,10 @@ function hide() {
 
 function show(wanted) {
   field = wanted;
-  wanted.closest("dialog").append(box); // whatever lies above everything must hold its keyboard, too
+  (wanted.closest("dialog") ?? box.parentElement).append(box); // what lies above everything must hold its keyboard, too
   box.hidden = false;
   shift(false);
-  wanted.scrollIntoView({ block: "center" });
+  (wanted.closest("label") ?? wanted).scrollIntoView({ block: "nearest" }); // with the words that say what is asked for
 }
 
 const rows = LETTERS[language].map((letters) => [...letters].map(key));

@@ -1,0 +1,95 @@
+// An exam on its way to the hospital's archive: a button that sends it, and how far each of its objects is. Shown where an
+// archive is set; nothing is ever sent that nobody has sent.
+
+import { button, byId, element, setEnabled, setText } from "../base/dom.js";
+import { remembered } from "../base/memory.js";
+import { fetchHospital, fetchSent, sendToArchive } from "../base/probe.js";
+import { clock, say } from "../base/words.js";
+import { openExam, refresh } from "./current.js";
+
+const LOOK_MS = 2000;
+const ON_ITS_WAY = new Set(["queued", "sent"]);
+const box = byId("archive");
+const state = element("p", "archive-state");
+const sendButton = button("button button-quiet", "", send);
+let hospital = null;
+let shown = null; // the exam whose way is shown
+let looking = null;
+
+state.setAttribute("role", "status");
+sendButton.id = "archive-send";
+box.append(sendButton, state);
+
+/** Ask the probe whether there are an archive and a worklist; who may not ask has none. */
+export async function loadHospital() {
+  hospital = await fetchHospital().catch(() => null);
+}
+
+export const hasWorklist = () => Boolean(hospital?.worklist);
+
+const count = (objects, one) => objects.filter(({ state: is }) => is === one).length;
+
+/** What has become of an exam, in words: what is wrong first, then what is under way, then what is done. */
+function words(objects, { fault, next_try_at: next }) {
+  const n = objects.length;
+  if (n === 0) return say("archive.not_sent");
+  if (count(objects, "refused")) return say("archive.refused", { some: count(objects, "refused"), n });
+  if (count(objects, "queued") && fault) return say("archive.waits", { at: next ? clock(next) : "–" });
+  if (count(objects, "queued")) return say("archive.queued", { some: count(objects, "queued"), n });
+  if (count(objects, "sent")) return say("archive.sent");
+  const confirmed = count(objects, "confirmed");
+  return confirmed ? say("archive.confirmed", { some: confirmed }) : say("archive.taken_back");
+}
+
+function tell(text, tone = "calm") {
+  setText(state, text);
+  state.dataset.tone = tone;
+}
+
+function show(objects) {
+  const isWrong = objects.some(({ state: is }) => is === "refused");
+  tell(words(objects, hospital), isWrong ? "caution" : "calm");
+  setText(sendButton, say(objects.length ? "archive.again" : "archive.send"));
+  setEnabled(sendButton, !objects.some(({ state: is }) => is === "queued"));
+  clearTimeout(looking);
+  if (objects.some(({ state: is }) => ON_ITS_WAY.has(is))) looking = setTimeout(look, LOOK_MS);
+}
+
+/** Ask how far the exam is, and again while something is on its way and somebody looks. */
+async function look() {
+  if (!shown || !byId("history").open) return;
+  const exam = shown;
+  try {
+    const [sent] = await Promise.all([fetchSent(exam.id), loadHospital()]);
+    if (exam === shown && hospital) show(sent.objects);
+  } catch (error) {
+    tell(error.message, "caution");
+    looking = setTimeout(look, LOOK_MS);
+  }
+}
+
+async function send() {
+  if (sendButton.getAttribute("aria-disabled") === "true") return;
+  setEnabled(sendButton, false);
+  try {
+    show((await sendToArchive(shown, shown.operator || remembered("operator"))).objects);
+  } catch (error) {
+    if (error.status === 412) await refresh();
+    tell(error.status === 412 ? say("archive.stale") : error.message, "caution");
+    setEnabled(sendButton, true);
+    shown = openExam();
+  }
+}
+
+/** Show how far the open exam is, if there is an archive; phantoms, and what holds nothing that counts, are not sent. */
+export function showArchive(isOfExam, measurements) {
+  const exam = openExam();
+  const counts = measurements.some(({ voided }) => !voided);
+  clearTimeout(looking);
+  shown = hospital?.archive && isOfExam && exam?.kind === "patient" && counts ? exam : null;
+  box.hidden = !shown;
+  if (!shown) return;
+  setText(sendButton, say("archive.send"));
+  tell(say("archive.asking"));
+  look();
+}

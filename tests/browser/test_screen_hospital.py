@@ -1,0 +1,114 @@
+"""The hospital at the screen, by a real archive and worklist: an ordered exam is begun, sent and confirmed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from daemon_process import QUICK_HAND, Daemon
+from opened_screen import SIZES, shoot
+from ordered_step import ordered
+from orthanc import OWN_TITLE, TITLE, Orthanc, needs_orthanc
+from playwright.sync_api import Page, expect
+from screen_layout import wrong_in
+
+pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long, needs_orthanc]
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Iterator[Orthanc]:
+    """An archive that is not running yet, with a step of today in its worklist."""
+    made = Orthanc(tmp_path)
+    ordered(made.worklists, "ana", day=f"{date.today():%Y%m%d}")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def daemon(page: Page, archive: Orthanc, tmp_path: Path) -> Iterator[Daemon]:
+    scene = (
+        f'[settings.dicom]\narchive_host = "127.0.0.1"\narchive_port = {archive.port}\narchive_title = "{TITLE}"\n'
+        f'worklist_host = "127.0.0.1"\nworklist_port = {archive.port}\nworklist_title = "{TITLE}"\n'
+        f'own_title = "{OWN_TITLE}"\n'
+    )
+    running = Daemon(tmp_path, scene + QUICK_HAND)
+    yield running
+    page.goto("about:blank")
+    running.stop()
+
+
+def look(page: Page, name: str) -> None:
+    """Have axe and the ruler look at the page at both sizes of a panel."""
+    for width, height in SIZES[:2]:
+        page.set_viewport_size({"width": width, "height": height})
+        shoot(page, f"hospital/{name}-{width}")
+        assert wrong_in(page) == [], (name, width)
+    page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
+    assert Axe().run(page).response["violations"] == [], name
+
+
+def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc, daemon: Daemon):
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    expect(page.locator("#ordered")).to_have_text("The hospital's worklist does not answer. Scan or type the patient.")
+    look(page, "worklist-silent")
+    page.locator("#chooser-close").click()
+    archive.start()
+    page.locator("#exam-button").click()
+    steps = page.locator("#ordered .recent")
+    expect(steps).to_have_text(["Ana MüllerA-17born 02/01/1970 · 10:15 · Palpable lesion · 2026/1"])
+    look(page, "worklist")
+    page.locator("#operator").fill("Ada")
+    steps.first.click()
+    expect(page.locator("#where-of")).to_have_text("Where is the lesion of Ana Müller?")
+    page.locator('.hour[data-side="left"][data-hour="10"]').click()
+    page.locator("#begin-exam").click()
+    expect(page.locator("#exam-who")).to_have_text("A-17")
+    made = daemon.ask("/api/v1/exams").json["exams"][0]
+    assert (made["patient_ref"], made["order_number"], made["operator"]) == ("A-17", "2026/1", "Ada")
+    page.locator("#history-open").click()
+    expect(page.locator("#history-none")).to_be_visible()
+    expect(page.locator("#archive")).to_be_hidden()  # there is nothing to send
+    page.locator("#history-close").click()
+    page.locator("#modes label").filter(has_text="Quick").click()
+    page.locator("#press-button").click()
+    expect(page.locator("#image-title")).to_have_text("Measurement 1, Quick")
+    archive.kill()
+    page.locator("#history-open").click()
+    state, send = page.locator(".archive-state"), page.locator("#archive-send")
+    expect(state).to_have_text("Not sent yet.")
+    look(page, "archive-not-sent")
+    send.click()
+    expect(state).to_contain_text("The archive does not answer. It is tried again at")
+    expect(send).to_have_attribute("aria-disabled", "true")
+    look(page, "archive-waits")
+    archive.start()
+    expect(state).to_have_text("In the archive: 2 objects, confirmed.")
+    look(page, "archive-confirmed")
+    assert sorted(one["PatientName"] for one in archive.kept()) == ["Müller^Ana"] * 2
+    page.locator("#history-all").click()
+    expect(page.locator("#archive")).to_be_hidden()
+
+
+def test_without_archive_and_worklist_nothing_of_them_is_there(page: Page, tmp_path: Path):
+    daemon = Daemon(tmp_path, QUICK_HAND)
+    exam = {"kind": "patient", "patient_ref": "A-17", "side": "left", "clock_position": 10, "operator": "Ada"}
+    daemon.ask("/api/v1/exams", "POST", exam)
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    expect(page.locator("#ordered-today")).to_be_hidden()
+    page.locator(".recent").click()
+    expect(page.locator("#exam-who")).to_have_text("A-17")
+    page.locator("#modes label").filter(has_text="Quick").click()
+    page.locator("#press-button").click()
+    expect(page.locator("#image-title")).to_have_text("Measurement 1, Quick")
+    page.locator("#history-open").click()
+    expect(page.locator(".kept")).to_have_count(1)
+    expect(page.locator("#archive")).to_be_hidden()
+    page.goto("about:blank")
+    daemon.stop()
