@@ -13,7 +13,7 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.calibrate import calibrate, commission
 from host_tools.commands.evaluate import evaluate
 from host_tools.commands.limits import limits
-from host_tools.commands.model import phantom, table
+from host_tools.commands.model import import_press, phantom, table
 from host_tools.commands.modes import modes
 from host_tools.commands.optics import optics
 from host_tools.commands.output import note
@@ -22,7 +22,7 @@ from host_tools.commands.paper import paper
 from host_tools.commands.probe import probe
 from host_tools.commands.release import deploy, provision, release
 from host_tools.commands.simulate import simulate
-from host_tools.commands.sweep import sweep
+from host_tools.commands.sweep import netcdf, sweep
 from host_tools.commands.tradeoff import tradeoff
 from host_tools.commands.train import train
 from host_tools.commands.verify import verify
@@ -37,9 +37,15 @@ app = typer.Typer(
 app.command(epilog="Example: host_tools simulate --size-mm 10 --depth-mm 6 --modulus-kpa 80 --explain")(simulate)
 app.command(epilog="Example: host_tools verify --short --out build/verification.md")(verify)
 app.command(epilog="Example: host_tools sweep --scenes 134 --seed 1 --out build/sweep.nc")(sweep)
+app.command(epilog="Example: host_tools netcdf tsis-measurements.npz --out measurements.nc")(netcdf)
 app.command(epilog="Example: host_tools train --mode standard --out models/standard")(train)
 app.command(epilog="Example: host_tools table --out models/simulated_probe")(table)
 app.command(epilog="Example: host_tools phantom --out build/phantoms")(phantom)
+app.command(
+    "import",
+    epilog="Example: host_tools import bench/A1 --probe probe.toml --exposure-us 4000 "
+    "--started-at 2026-11-02T09:30:00+01:00 --out ramps/A1.zip",
+)(import_press)
 app.command(epilog="Example: host_tools worlds --count 20 --seed 1 --out scenarios/worlds")(worlds)
 app.command(epilog="Example: host_tools robustness --probes 3 --presses 20")(robustness)
 app.command(

@@ -20,11 +20,11 @@ SIZE_MB = 96
 class CutDisk:
     """An ext4 file system in a file, mounted on a folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, size_mb: int = SIZE_MB) -> None:
         self.image, self.mount = folder / "disk.img", folder / "mnt"
         self.mount.mkdir()
         with self.image.open("wb") as file:
-            file.truncate(SIZE_MB * 2**20)
+            file.truncate(size_mb * 2**20)
         run("mkfs.ext4", "-q", "-F", str(self.image))
         self.up()
 

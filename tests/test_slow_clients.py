@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import socket
 import urllib.request
-from collections.abc import Iterator
 
 import pytest
-from daemon_process import QUICK_HAND, WAIT_S, Daemon
+from daemon_process import QUICK_HAND, Daemon
+from hostile_clients import EVENTS, connections
 
 pytestmark = pytest.mark.real_time
 NEVER_SENDING, NEVER_READING, SCREENS = 100, 50, 10
 MOST_GROWTH_MB = 30.0
-EVENTS = b"GET /api/v1/events HTTP/1.1\r\nhost: 127.0.0.1\r\n\r\n"
-
-
-@contextlib.contextmanager
-def connections(daemon: Daemon, count: int, sent: bytes) -> Iterator[list[socket.socket]]:
-    port = int(daemon.url.rpartition(":")[2])
-    with contextlib.ExitStack() as opened:
-        lines = [opened.enter_context(socket.create_connection(("127.0.0.1", port), WAIT_S)) for _ in range(count)]
-        for line in lines:
-            line.sendall(sent)
-        yield lines
 
 
 def memory_mb(daemon: Daemon) -> float:
@@ -36,9 +24,9 @@ def test_a_press_is_done_beside_clients_that_neither_send_nor_read(daemon):
     assert daemon.press("quick")["state"] == "done"  # what a press loads is there
     before_mb = memory_mb(daemon)
     with (
-        connections(daemon, NEVER_SENDING // 2, b"") as silent,
-        connections(daemon, NEVER_SENDING // 2, b"GET /api/v1/st") as halting,
-        connections(daemon, NEVER_READING, EVENTS),
+        connections(daemon.url, NEVER_SENDING // 2, b"") as silent,
+        connections(daemon.url, NEVER_SENDING // 2, b"GET /api/v1/st") as halting,
+        connections(daemon.url, NEVER_READING, EVENTS),
     ):
         assert daemon.press("quick")["state"] == "done"
         assert daemon.ask("/api/v1/health/ready").status == 200
@@ -55,7 +43,7 @@ def test_a_stop_ends_ten_streams_as_if_they_had_come_to_their_end(tmp_path):
         screens = [opened.enter_context(urllib.request.urlopen(daemon.url + "/api/v1/events")) for _ in range(SCREENS)]
         for screen in screens:
             assert screen.readline() == b"event: status\n"
-        unread = opened.enter_context(connections(daemon, 1, EVENTS))
+        unread = opened.enter_context(connections(daemon.url, 1, EVENTS))
         daemon.process.terminate()
         for screen in screens:
             while screen.readline():

@@ -11,6 +11,7 @@ from daemon_process import ROOT
 
 sys.path.append(str(ROOT / "tests" / "torture"))
 from cuts import cut_often
+from daemon_cuts import cut
 from kills import killed
 
 pytestmark = [pytest.mark.real_time, pytest.mark.long]
@@ -24,7 +25,18 @@ def test_no_kill_of_the_daemon_loses_doubles_or_alters_what_clients_were_told(tm
     assert told.done
 
 
-@pytest.mark.skipif(not can_cut(), reason="root, loop devices and ext4 are needed to cut the power")
+needs_cut_disk = pytest.mark.skipif(not can_cut(), reason="root, loop devices and ext4 are needed to cut the power")
+
+
+@needs_cut_disk
+def test_no_power_cut_of_the_daemon_loses_what_clients_were_told_and_without_synchronising_one_does() -> None:
+    told = cut(CUTS, 3, synchronises=True).told
+    assert told.problems == []
+    assert told.done
+    assert cut(4 * CUTS, 3, synchronises=False).told.problems
+
+
+@needs_cut_disk
 def test_no_power_cut_loses_what_was_acknowledged_and_without_synchronising_one_does() -> None:
     story = cut_often(CUTS, 3, synchronises=True)
     assert story.problems == []

@@ -12,15 +12,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from device.exports.selection import Exported
-from device.measurement.quantities import UNKNOWNS
+from device.measurement.quantities import UNKNOWNS, unit_of
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 """What a cell of a formula begins with (OWASP, CSV injection)."""
 OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
 PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open")
 WITH_UNIT = ("low", "high", "std", "mean", "spread")
-UNIT_ENDINGS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa"}
-"""The unit of a feature, by how its name ends; of any other it is a ratio."""
 LONG_COLUMNS = (
     "measurement_id", "taken_at_utc", "exam_id", "patient_ref", "mode", "status", "quantity", "unit",
     "value", "low", "high", "std", "identifiable",
@@ -98,11 +96,6 @@ def _quantities(one: Exported) -> Iterator[list[Cell]]:
         yield [*of_all, name, unit_of(name), *told]
     for name, value in ({"force_n": None} | measurement["features"] | {"force_n": measurement["force_n"]}).items():
         yield [*of_all, name, unit_of(name), value, None, None, None, None]
-
-
-def unit_of(name: str) -> str:
-    """Return the unit that the name of a quantity ends with, "1" of a ratio."""
-    return next((unit for ending, unit in UNIT_ENDINGS.items() if name.endswith(ending)), "1")
 
 
 def written(columns: Iterable[str], rows: Iterable[Iterable[Cell]]) -> Iterator[bytes]:

@@ -287,6 +287,8 @@ class Procedure:
         self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded()
+        if self._capture.stopping.is_set():
+            return  # it may have too few frames to judge
         self._require_no_drift(unloaded)
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.config.press.mode)

@@ -78,6 +78,15 @@ def require(quantity: str, value: object, bound: Bound, action: str) -> float:
     return float(value)
 
 
+UNIT_ENDINGS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3", "_kpa": "kPa"}
+"""The unit of a quantity, by how its name ends; of any other it is a ratio."""
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that the name of a quantity ends with, "1" of a ratio."""
+    return next((unit for ending, unit in UNIT_ENDINGS.items() if name.endswith(ending)), "1")
+
+
 @dataclass(frozen=True)
 class Inclusion:
     """One stiff sphere below the surface: the truth of a phantom, or a simulated scene's inclusion."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from device.errors import DamagedStoreError, NewerDataError, StorageError
+from device.records.listing import INDEXES
 from device.records.migrations import bring_forward, form_of
 from device.records.schema import STORE_READS, STORE_WRITES, UNNUMBERED, store_schema
 
@@ -61,6 +62,7 @@ def open_database(folder: Path) -> OpenedDatabase:
             return OpenedDatabase(_salvaged(db), damage)
         _make_durable(db, folder)
         bring_forward(db)
+        _index(db)
         _number_in_file(db, folder)
         opened.pop_all()
     return OpenedDatabase(db)
@@ -157,6 +159,14 @@ def _is_sound(record: object) -> bool:
         return isinstance(record, str) and isinstance(json.loads(record), dict)
     except ValueError:
         return False
+
+
+def _index(db: sqlite3.Connection) -> None:
+    """Make what lists are looked up by, where it is missing; without it they are slower, and all else is the same."""
+    try:
+        db.executescript(INDEXES)
+    except sqlite3.Error as error:  # as on a full disk, which must not keep the probe from starting
+        log.warning("lists are slow without their indexes: %s", error)
 
 
 def _number_in_file(db: sqlite3.Connection, folder: Path) -> None:

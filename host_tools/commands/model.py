@@ -139,6 +139,35 @@ def phantom(
         note.print(f"{out / one.name}: {_told(one.truth)}")
 
 
+def import_press(
+    folder: Annotated[Path, typer.Argument(help="Folder of the frames: mono PNG or TIFF, 8 or 16 bit.")],
+    probe: Annotated[Path, typer.Option(help="File of the probe that took them, probe.toml.")],
+    out: Annotated[Path, typer.Option(help="New recording, NAME.zip or a folder; a phantom's has its name.")],
+    exposure_us: Annotated[float, typer.Option(help="Exposure of the frames.")],
+    started_at: Annotated[str, typer.Option(help="When the press began, 2026-11-02T09:30:00+01:00.")],
+    gain: Annotated[float, typer.Option(help="Gain of the camera.")] = 1.0,
+    frames: Annotated[
+        Path | None,
+        typer.Option(help="Table with the columns file, role, force_n, t_s; frames.csv in the folder by default."),
+    ] = None,
+) -> None:
+    """Make a recording of frames that a bench took, from a folder of images and a table of forces.
+
+    Roles are dark, reference and press. Everything that is wrong is named at once, by its line, and nothing is written.
+    """
+    from device.files.recording_file import write_recording
+    from host_tools.calibration.bench_folder import PressOnBench, bench_recording
+    from host_tools.scenes.probe_file import probe_of
+
+    _require_room([out])
+    name = out.stem if out.suffix == ".zip" else out.name
+    press = PressOnBench(name, started_at, exposure_us, gain)
+    recording = bench_recording(folder, frames or folder / "frames.csv", press, probe_of(probe))
+    write_recording(recording, out)
+    counts = ", ".join(f"{len(recording.with_role(role))} {role}" for role in ("dark", "reference", "press"))
+    note.print(f"{out}: frames {counts}", soft_wrap=True)
+
+
 def _record_grid(
     out: Path,
     count: int,

@@ -1,4 +1,4 @@
-"""`host_tools sweep`: random scenes of the paper's box to one data set, on this machine or on a cluster."""
+"""`host_tools sweep` and `netcdf`: random scenes of the paper's box, or a probe's measurements, to one data set."""
 
 from __future__ import annotations
 
@@ -52,3 +52,13 @@ def sweep(
             note.print(f"Interrupted. Solved scenes are kept in {out}.partial: run the same command to go on.")
             raise typer.Exit(1) from None
     note.print(f"{out}: {scenes} scenes, {failed} of those solved now failed.")
+
+
+def netcdf(
+    measurements: Annotated[Path, typer.Argument(help="File of `python -m device export` or of the API, NAME.npz.")],
+    out: Annotated[Path, typer.Option(help="netCDF file to write, a new one.")],
+) -> None:
+    """Write measurements that a probe has exported as a netCDF data set with units."""
+    from host_tools.data.exported import write_netcdf
+
+    note.print(f"{out}: {write_netcdf(measurements, out)} measurements.")

@@ -55,7 +55,7 @@ def left_out(
     def answered(place: int) -> LeftOut:
         ramp = ramps[chosen[place]]
         others = [one for one in ramps if one is not ramp]
-        alone = fit_probe(others, design, model_ratios=(fit.levels.model_ratio,))
+        alone = fit_probe(others, design, (fit.levels.model_ratio,), (fit.levels.flat_field_ratio,))
         return _answered(ramp, answers_of(design, alone), guess)
 
     return in_parallel(answered, len(chosen), jobs)

@@ -76,6 +76,7 @@ def _record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) 
         "made_at": made_at.isoformat(timespec="seconds").replace("+00:00", "Z"),
         **origin,
         "model_ratio": done.fit.levels.model_ratio,
+        "flat_field_ratio": done.fit.levels.flat_field_ratio,
         "probe": {
             NAMES[number]: {"mean": round(float(mean), 5), "std": round(float(own), 5), "tolerance": float(STD[number])}
             for number, mean, own in zip(PROBE, done.fit.mean, std, strict=True)

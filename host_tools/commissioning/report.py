@@ -20,6 +20,7 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
     for number, mean, own in zip(directions, fit.mean, std, strict=True):
         yield f"{NAMES[number]:28} {mean:8.4f} {own:8.4f} {STD[number]:10.3g}"
     yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
+    yield f"{'skin and flat field':28} {fit.levels.flat_field_ratio:8.2%}"
 
 
 def phantom_lines(phantoms: Sequence[LeftOut]) -> Iterator[str]:

@@ -203,8 +203,9 @@ class PressedScene:
             self._baseline = self._lights(inclusion, ProbePlacement(*BESIDE_MM), self._reference_n)
             baseline = np.array([self._means(light).mean for light in self._baseline])
             self._reference_response = np.log(baseline[:-1] / baseline[-1])
-        across = at["offset_mm"] * np.array([np.cos(direction_rad), np.sin(direction_rad)])
-        lights = self._lights(inclusion, ProbePlacement(*map(float, across)), self._forces_n)
+        # The probe stands on the other side of the inclusion than the inclusion in the image.
+        away = -at["offset_mm"] * np.array([np.cos(direction_rad), np.sin(direction_rad)])
+        lights = self._lights(inclusion, ProbePlacement(*map(float, away)), self._forces_n)
         rings = [
             self._means(light / baseline - np.float32(1))
             for light, baseline in zip(lights, self._baseline, strict=True)

@@ -81,13 +81,16 @@ class Told:
 class Kills:
     """A daemon that is killed again and again on one data folder."""
 
+    program: tuple[str, ...] = ("-m", "device")
+
     def __init__(self, folder: Path, seed: int) -> None:
         self.folder, self.random, self.told = folder, random.Random(seed), Told()
         self.count, self.seen_states = 0, dict[str, int]()
+        self._ending = threading.Event()
         self.daemon = self._start()
 
     def _start(self) -> Daemon:
-        return Daemon(self.folder, QUICK_HAND, own_group=True)
+        return Daemon(self.folder, QUICK_HAND, program=self.program, own_group=True)
 
     def _kill(self) -> None:
         os.killpg(self.daemon.process.pid, signal.SIGKILL)
@@ -99,6 +102,7 @@ class Kills:
         killer = threading.Thread(target=self._kill_at_random)
         late = self.random.random() < 0.5
         self._computing, self._late = threading.Event(), late
+        self._ending.clear()
         killer.start()
         answer = self._press_until_killed()
         killer.join()
@@ -113,6 +117,7 @@ class Kills:
             time.sleep(self.random.uniform(0.0, KEPT_WITHIN_S))
         else:
             time.sleep(self.random.uniform(0.0, 1.3 * PRESS_S))
+        self._ending.set()
         self._kill()
 
     def _press_until_killed(self) -> Answer | None:
@@ -124,6 +129,8 @@ class Kills:
                 accepted, n = None, n + 1
                 key = {"Idempotency-Key": f"k-{self.count}-{n}"}
                 answer = self.daemon.ask(f"{API}/presses", "POST", {"mode": "quick"}, headers=key)
+                if answer.status != 202 and self._ending.is_set():
+                    return None  # its disk is gone already
                 if answer.status != 202:
                     self.told.problems.append(f"a press was refused: {answer.body!r}")
                     return None
@@ -135,16 +142,26 @@ class Kills:
             return accepted
 
     def _follow(self, location: str) -> str:
-        while (job := self.daemon.ask(location).json)["state"] not in ENDED:
+        while (job := self._read(location))["state"] not in ENDED:
             if job["state"] == "computing":
                 self._computing.set()
             time.sleep(0.01)
         if job["state"] == "done":
-            measurement = self.daemon.ask(f"{API}/measurements/{job['measurement_id']}").json
+            measurement = self._read(f"{API}/measurements/{job['measurement_id']}")
             self.told.done[job["id"]] = measurement
-            body = self.daemon.ask(f"{API}/measurements/{job['measurement_id']}/recording.zip").body
-            self.told.hashes[measurement["id"]] = hashlib.sha256(body).hexdigest()
+            recording = self.daemon.ask(f"{API}/measurements/{job['measurement_id']}/recording.zip")
+            if recording.status == 200:
+                self.told.hashes[measurement["id"]] = hashlib.sha256(recording.body).hexdigest()
         return str(job["state"])
+
+    def _read(self, location: str) -> dict[str, Any]:
+        answer = self.daemon.ask(location)
+        if answer.status == 200:
+            record: dict[str, Any] = answer.json
+            return record
+        if not self._ending.is_set():
+            self.told.problems.append(f"what was accepted or done is answered so: {answer.body!r}")
+        raise ValueError("it is ending")
 
     def _send_again(self, first: Answer) -> None:
         """Send the request of the killed press once more: it was obeyed, and is not obeyed again."""

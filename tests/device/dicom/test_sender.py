@@ -10,6 +10,7 @@ from contextlib import closing
 
 import pytest
 from daemon_process import ROOT, wait_for
+from hurried_sender import hurry
 from orthanc import OWN_TITLE, TITLE, Orthanc, needs_orthanc
 from written_exam import begin, measure
 
@@ -66,6 +67,25 @@ def test_an_archive_that_is_down_is_told_of_and_gets_all_once_it_is_there(store,
         assert len(archive.ask("instances")) == 4
     finally:
         hospital.close()
+
+
+def test_an_archive_that_is_down_for_two_hours_is_tried_by_the_schedule_and_gets_all(store, archive):
+    """The hours are the sender's own: what it waits is added up, and takes no time."""
+    hospital, told = queued(store, archive, measurements=2)
+    uids = {row["uid"] for row in store.outbox.in_state("queued", limit=99)}
+    waiting = hurry(hospital._sender)
+    hospital.start()
+    try:
+        wait_for(lambda: sum(waiting.waited_s), lambda seconds: seconds >= 2 * 3600.0)
+        assert waiting.waited_s[:9] == [2, 4, 8, 16, 32, 64, 128, 256, 300]
+        assert max(waiting.waited_s) == persistent_sender.LONGEST_WAIT_S
+        assert store.outbox.counts() == {"queued": 4}
+        assert told[-1].code == "E030"
+        archive.start()
+        wait_for(store.outbox.counts, lambda counts: counts == {"confirmed": 4})
+    finally:
+        hospital.close()
+    assert sorted(one["SOPInstanceUID"] for one in archive.kept()) == sorted(uids)
 
 
 def test_what_the_archive_refuses_is_told_of_until_it_is_sent_again(store, archive, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 from kept_measurements import keep, taken
 
 from device.exports.selection import Selection
-from device.exports.table import LONG_COLUMNS, WIDE_COLUMNS, long_table, unit_of, wide_table
+from device.exports.table import LONG_COLUMNS, WIDE_COLUMNS, long_table, wide_table
 from device.records.exams import ExamContent
 from device.records.listing import Wanted
 from device.records.store import Store
@@ -118,12 +118,3 @@ def test_a_selection_is_newest_first_over_pages_without_what_is_void_or_came_lat
 def test_a_table_of_nothing_is_its_header(store):
     assert b"".join(wide_table(Selection.of_now(store, Wanted()))).decode().split(",")[0] == "measurement_id"
     assert rows(long_table(Selection(store))) == []
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [("force_n", "N"), ("size_mm", "mm"), ("central_deformation_mm3", "mm3"), ("deformation_area_mm2", "mm2"),
-     ("tissue_modulus_std_kpa", "kPa"), ("misfit_ratio", "1"), ("contrast_3", "1")],
-)  # fmt: skip
-def test_a_unit_is_that_of_the_name(name, unit):
-    assert unit_of(name) == unit

@@ -830,3 +830,12 @@ def test_a_store_that_cannot_be_written_is_a_fault_and_not_ready(rig, monkeypatc
         rig.until(lambda: rig.board.now.fault is not None)
         assert rig.procedure.parts()["store"] == PartHealth(False, "E601")
     rig.until(lambda: rig.procedure.parts()["store"].ready)
+
+
+def test_a_stop_before_the_untouched_probe_was_seen_is_no_fault(rig, caplog):
+    rig.procedure.stop()
+    rig.procedure._thread.join()
+    rig.procedure._capture._untouched_frames = lambda: []  # what a stop leaves of them
+    rig.procedure._one_press()
+    assert rig.board.now.fault is None
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]

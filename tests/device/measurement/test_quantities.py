@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
+from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require, unit_of
 
 CLOSED = Bound(0.5, 2.0, "mm")
 HALF_OPEN = Bound(0.0, 2.0, "mm", low_included=False)
@@ -89,3 +89,12 @@ def test_an_impossible_inclusion_is_refused_by_the_name_of_what_is_impossible(in
 
 def test_an_inclusion_of_no_size_is_tissue_without_an_inclusion():
     assert Inclusion(0.0, 5.0, 80.0).size_mm == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("force_n", "N"), ("size_mm", "mm"), ("central_deformation_mm3", "mm3"), ("deformation_area_mm2", "mm2"),
+     ("tissue_modulus_std_kpa", "kPa"), ("misfit_ratio", "1"), ("contrast_3", "1")],
+)  # fmt: skip
+def test_a_unit_is_that_of_the_name(name, unit):
+    assert unit_of(name) == unit

@@ -96,3 +96,52 @@ def test_exams_are_listed_by_patient_order_kind_and_time(store, exam):
     assert listed(kind="phantom") == [phantom["id"]]
     assert listed(Wanted(since="9999-01-01T00:00:00.000Z")) == []
     assert store.listing.exams(Wanted(), kind="patient", limit=1).next_before == other["seq"]
+
+
+@pytest.mark.parametrize(
+    ("listed", "wanted", "more"),
+    [
+        ("measurements", Wanted(mode="quick"), {}),
+        ("measurements", Wanted(outcome="ok"), {}),
+        ("measurements", Wanted(exam_id="e"), {}),
+        ("measurements", Wanted(since=taken(1)), {}),
+        ("measurements", Wanted(until=taken(2)), {}),
+        ("measurements", Wanted(mode="quick", since=taken(1), until=taken(2)), {}),
+        ("presses", Wanted(exam_id="e"), {}),
+        ("presses", Wanted(until=taken(2)), {}),
+        ("exams", Wanted(), {"kind": "patient", "patient_ref": "A-17"}),
+        ("exams", Wanted(), {"kind": "patient", "order_number": "4711"}),
+        ("exams", Wanted(until=taken(2)), {"kind": "patient"}),
+    ],
+)
+def test_a_filter_is_looked_up_and_not_read_record_by_record(seven, listed, wanted, more):
+    asked = []
+    seven._db.set_trace_callback(asked.append)
+    getattr(seven.listing, listed)(wanted, limit=3, **more)
+    seven._db.set_trace_callback(None)
+    [query] = [one for one in asked if one.startswith("SELECT")]
+    plan = [row[3] for row in seven._db.execute(f"EXPLAIN QUERY PLAN {query}")]
+    assert not [line for line in plan if line.startswith("SCAN")], plan
+    assert [line for line in plan if "_by_" in line], plan
+
+
+def test_an_older_store_is_indexed_when_it_is_opened_and_one_that_cannot_be_still_opens(seven, caplog):
+    folder = seven.folder
+    names = [name for (name,) in seven._db.execute("SELECT name FROM sqlite_master WHERE name LIKE 'measurement_by%'")]
+    assert len(names) == 3
+    for name in names:
+        seven._db.execute(f"DROP INDEX {name}")
+    seven._db.commit()
+    seven.close()
+    again = Store(folder)
+    assert again._db.execute("SELECT count(*) FROM sqlite_master WHERE name LIKE 'measurement_by%'").fetchone() == (3,)
+    assert again.listing.measurements(Wanted(mode="quick"), limit=9).records
+    for name in names:
+        again._db.execute(f"DROP INDEX {name}")
+    again._db.execute("CREATE TABLE measurement_by_time (x)")  # so the index cannot be made
+    again._db.commit()
+    again.close()
+    last = Store(folder)
+    assert "lists are slow without their indexes" in caplog.text
+    assert ids(last.listing.measurements(Wanted(until=taken(3)), limit=9)) == [2, 1]
+    last.close()

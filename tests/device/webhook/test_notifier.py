@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from daemon_process import ROOT, wait_for
+from hurried_sender import hurry
 from notice_receiver import NoticeReceiver, write_secret
 from written_exam import begin, measure
 
@@ -81,6 +82,29 @@ def test_an_address_that_is_down_is_told_of_and_gets_all_once_it_is_there(store,
     finally:
         there.close()
     assert there.types() == ["exam.made", *["measurement.voided"] * 3]
+
+
+def test_an_address_that_is_down_for_two_hours_gets_all_in_their_order(store, tmp_path):
+    """The hours are the notifier's own: what it waits is added up, and takes no time."""
+    found = NoticeReceiver()
+    found.close()
+    secret = write_secret(tmp_path)
+    notifier = Notifier(WebhookSection(url=found.url, secret_file=secret), store, "S")
+    waiting = hurry(notifier)
+    notifier.start()
+    try:
+        exam = begin(store)
+        for _ in range(5):
+            store.exams.void(measure(store, exam)["id"], version=1, by="Ada", reason="Slipped")
+        wait_for(lambda: sum(waiting.waited_s), lambda seconds: seconds >= 2 * 3600.0)
+        there = NoticeReceiver(found.port)
+        try:
+            wait_for(lambda: len(there.taken), lambda number: number == 6)
+        finally:
+            there.close()
+    finally:
+        notifier.close()
+    assert there.ids() == [change.hash for change in store.listing.changes(after=0, limit=99)]
 
 
 def test_what_is_not_taken_is_sent_again_under_its_id_and_nothing_overtakes_it(store, receiver, notifying):

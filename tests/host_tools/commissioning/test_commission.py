@@ -22,7 +22,7 @@ from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning import commission as commission_module
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, commission, gates_of
-from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design, fit_probe
+from host_tools.commissioning.joint_fit import FLAT_FIELD_RATIO, FLOOR, PROBE, Design, fit_probe
 from host_tools.commissioning.left_out import left_out
 from host_tools.commissioning.own_bundle import write_own_bundle
 from host_tools.commissioning.phantom_ramps import phantom_ramps
@@ -59,7 +59,7 @@ def ramps(tables, model, phantoms):
 
 @pytest.fixture(scope="module")
 def fit(ramps, model, derivatives):
-    return fit_probe(ramps, Design(model.answers, derivatives), model_ratios=(0.002, 0.006))
+    return fit_probe(ramps, Design(model.answers, derivatives), (0.002, 0.006), (FLAT_FIELD_RATIO,))
 
 
 def test_phantoms_tell_the_contact_law_of_a_probe(fit):
@@ -73,7 +73,7 @@ def test_phantoms_tell_the_contact_law_of_a_probe(fit):
 
 def test_the_level_of_the_models_error_is_the_likeliest(fit, ramps, model, derivatives):
     """Those are presses of the design's own physics: a small error explains them better than a large one."""
-    large = fit_probe(ramps, Design(model.answers, derivatives), model_ratios=(0.013,))
+    large = fit_probe(ramps, Design(model.answers, derivatives), (0.013,), (FLAT_FIELD_RATIO,))
     assert fit.log_evidence > large.log_evidence
     assert fit.levels.model_ratio == 0.002
 
@@ -87,7 +87,7 @@ def test_what_is_believed_is_no_narrower_than_part_of_the_tolerance(fit, derivat
 
 def test_probe_and_phantoms_are_reported_in_words(fit):
     lines = list(probe_lines(fit, PROBE))
-    assert len(lines) == len(PROBE) + 2
+    assert len(lines) == len(PROBE) + 3
     assert lines[1].startswith("contact_exponent")
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from device.files.shipped import SIMULATED_PROBE
-from device.measurement.parameters import HIGH, LOW, normalise
+from device.files.bundle_file import read_ramp_model
+from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.parameters import HIGH, LOW, denormalise, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.noise import light_ratio
 from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE
@@ -39,6 +40,19 @@ def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
     for name, columns in (("contact_exponent", RESPONSE), ("tilt_lesion_deg", FIRST), ("face_motion_ratio", RESPONSE)):
         one, found = changes[:, NAMES.index(name), columns], kept[:, NAMES.index(name), columns]
         assert np.sqrt(np.mean((found - one) ** 2)) < 0.2 * np.sqrt(np.mean(one**2)), name
+
+
+def test_rows_and_changes_have_the_inclusion_where_the_forward_model_has_it(tables):
+    """First harmonics point at the inclusion; those of a softer contact grow where the inclusion's own are."""
+    parameters, direction_rad = denormalise(np.array([[0.3, -0.4, 0.8, *np.zeros(5), 0.8]])), np.array([0.7])
+    surrogate = read_ramp_model(MODELS / "standard").answers.surrogate
+    rows, changes = changes_of_presses(tables, parameters, direction_rad)
+    (expected,) = surrogate.rows(normalise(parameters), direction_rad)
+    assert rows[0, FIRST] == pytest.approx(expected[FIRST], abs=0.01 * np.abs(expected[FIRST]).max())
+    kept = load_derivatives(SIMULATED_PROBE).changes(normalise(parameters), rows)
+    for name in ("contact_exponent", "contact_pressure_log_ratio"):
+        found, true = (one[0, NAMES.index(name), FIRST] for one in (kept, changes))
+        assert np.linalg.norm(found - true) < 0.3 * np.linalg.norm(true), name
 
 
 def test_changes_that_are_polynomials_are_given_back():

@@ -1,0 +1,204 @@
+"""Frames that a bench took, a folder of images and a table of forces, to a recording as the probe's own software makes.
+
+The table has a line for each frame: which file, what it shows, the force and the time. How the frames were taken is in
+the probe's file and in `PressOnBench`. Everything that is wrong is named at once, each with its line.
+Source of the form: docs/own_probe.md, "Frames from a bench".
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path, PurePosixPath
+from typing import cast, get_args
+
+import cv2
+import numpy as np
+
+from device.files.toml_record import InvalidRecord
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.led_sides import LedRatio
+from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
+from device.measurement.recording.tactile_image import Counts, Frame, Role
+from host_tools.scenes.probe import Probe
+
+NEEDED = ("file", "role", "force_n", "t_s")
+LEDS = ("led_x", "led_y", "led_minus_x", "led_minus_y")
+"""Brightness of the sides, 0 to 1 of their full: all four columns or none, which says that all were full on."""
+OPTIONAL = ("ramp", *LEDS)
+ROLES = get_args(Role)
+ACTION = "correct the table"
+
+TableLine = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class PressOnBench:
+    """What a table of frames does not say: the press' name, when it began (RFC 3339), and how the camera was set."""
+
+    id: str
+    started_at: str
+    exposure_us: float
+    gain: float
+    software: str = "bench"
+
+    def __post_init__(self) -> None:
+        try:
+            has_zone = datetime.fromisoformat(self.started_at).tzinfo is not None
+        except ValueError:
+            has_zone = False
+        if not has_zone:
+            bound, action = "a time of RFC 3339 with its zone", "write it as 2026-11-02T09:30:00+01:00"
+            raise InvalidQuantity("started_at", repr(self.started_at), bound, action)
+
+
+def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe) -> Recording:
+    """Return the recording that a table of frames (CSV) and the folder of their images make.
+
+    Images are mono PNG or TIFF of the size and depth of the probe's file. Raises `InvalidQuantity`, with all
+    `problems`, for a column that is missing or unknown, for each line that is no frame, and for missing roles.
+    """
+    rows = _rows(table)
+    problems: list[InvalidQuantity] = []
+    frames: list[Frame] = []
+    for number, row in enumerate(rows, start=2):
+        try:
+            frames.append(_frame(row, folder, probe))
+        except InvalidQuantity as error:
+            found = f"{table.name}, line {number}: {error.quantity}"
+            problems.append(InvalidQuantity(found, error.value, error.bound, error.action))
+    problems += [] if problems else _missing_roles(frames)
+    if problems:
+        raise InvalidRecord(problems)
+    ordered = sorted(_at_the_top(frames, probe.camera.bits), key=lambda frame: frame.t_s)
+    return Recording(
+        id=press.id,
+        serial=probe.serial,
+        software=press.software,
+        started_at=press.started_at,
+        camera=_camera(press, probe, 8 * ordered[0].counts.itemsize),
+        frames=tuple(ordered),
+        cell=RecordedCell(probe.cell.counts_per_n),
+    )
+
+
+def _camera(press: PressOnBench, probe: Probe, bits: int) -> CameraSettings:
+    camera = probe.camera
+    return CameraSettings(
+        camera.width_px,
+        camera.height_px,
+        8 if bits == 8 else 16,
+        camera.mm_per_px_x,
+        camera.mm_per_px_y,
+        press.exposure_us,
+        press.gain,
+    ).seen_as(probe.geometry)
+
+
+def _rows(table: Path) -> list[TableLine]:
+    """Return the lines of a table; raise `InvalidQuantity` when it cannot be read, or for its columns."""
+    try:
+        with table.open(newline="", encoding="utf-8-sig") as file:  # a spreadsheet begins its files with a mark
+            reader = csv.DictReader(file, strict=True)
+            columns = [name.strip() for name in reader.fieldnames or ()]
+            reader.fieldnames = columns
+            rows: list[TableLine] = list(reader)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InvalidQuantity(str(table), error, "a table of comma separated values, UTF-8", ACTION) from error
+    if problems := list(_of_columns(columns, table)):
+        raise InvalidRecord(problems)
+    if not rows:
+        raise InvalidQuantity(f"frames in {table}", 0, "at least one line below the names", "add a line for each frame")
+    return rows
+
+
+def _of_columns(columns: Sequence[str], table: Path) -> Iterator[InvalidQuantity]:
+    known = (*NEEDED, *OPTIONAL)
+    for name in NEEDED:
+        if name not in columns:
+            yield InvalidQuantity(
+                f"column {name} of {table}", "missing", "there", f"name the columns {', '.join(known)}"
+            )
+    for name in columns:
+        if name not in known or columns.count(name) > 1:
+            found = "unknown" if name not in known else "there twice"
+            yield InvalidQuantity(
+                f"column {name or '(no name)'} of {table}", found, f"one of {', '.join(known)}", ACTION
+            )
+    given = [name for name in LEDS if name in columns]
+    if given and len(given) < len(LEDS):
+        yield InvalidQuantity(f"columns of LEDs in {table}", ", ".join(given), f"{', '.join(LEDS)}, or none", ACTION)
+
+
+def _frame(row: TableLine, folder: Path, probe: Probe) -> Frame:
+    if None in row or None in row.values():
+        raise InvalidQuantity("values", "too many or too few", "one for each column", ACTION)
+    role = row["role"].strip()
+    if role not in ROLES:
+        raise InvalidQuantity("role", repr(role), f"one of {', '.join(ROLES)}", "say what the frame shows")
+    leds = cast(LedRatio, tuple(_number(row, name) for name in LEDS) if LEDS[0] in row else (1.0,) * len(LEDS))
+    ramp = _number(row, "ramp") if row.get("ramp", "").strip() else 0.0
+    if not ramp.is_integer():
+        raise InvalidQuantity("ramp", ramp, "a whole number", "number the presses on the lesion from 0")
+    counts = _counts(row["file"].strip(), folder, probe)
+    dark: LedRatio = (0.0, 0.0, 0.0, 0.0)
+    lit = dark if role == "dark" and LEDS[0] not in row else leds
+    return Frame(counts, cast(Role, role), _number(row, "t_s"), _number(row, "force_n"), lit, int(ramp))
+
+
+def _number(row: TableLine, name: str) -> float:
+    try:
+        value = float(row[name])
+    except ValueError:
+        raise InvalidQuantity(name, repr(row[name]), "a number with a point", ACTION) from None
+    if not np.isfinite(value):
+        raise InvalidQuantity(name, value, "a finite number", ACTION)
+    return value
+
+
+def _counts(name: str, folder: Path, probe: Probe) -> Counts:
+    """Return an image of the folder as the camera gave it; raise for one of another size, depth or with colours."""
+    parts = PurePosixPath(name).parts
+    if not parts or PurePosixPath(name).is_absolute() or ".." in parts:
+        raise InvalidQuantity("file", repr(name), "a path inside the folder", ACTION)
+    try:
+        content = (folder / name).read_bytes()
+    except OSError as error:
+        bound = f"a file of {folder} that can be read"
+        raise InvalidQuantity("file", f"{name} ({error.strerror})", bound, "name the frame's file") from None
+    counts = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
+    if counts is None:
+        raise InvalidQuantity("file", name, "a PNG or TIFF", "save frames without loss")
+    camera = probe.camera
+    if counts.shape != (camera.height_px, camera.width_px) or counts.dtype not in (np.uint8, np.uint16):
+        kind = "mono" if counts.ndim == 2 else f"{counts.shape[2]} colours"
+        found = f"{name}: {kind}, {counts.shape[1]} x {counts.shape[0]} px of {counts.dtype}"
+        bound = f"mono, {camera.width_px} x {camera.height_px} px as in the probe's file, of 8 or 16 bit"
+        raise InvalidQuantity("file", found, bound, "save the frames as the camera gives them")
+    return cast(Counts, counts)
+
+
+def _at_the_top(frames: Sequence[Frame], sensor_bits: int) -> list[Frame]:
+    """Return frames of 16 bit whose sensor's bits lie at the top, as in a recording; many programs leave them below.
+
+    All lie below when no count of any frame is beyond the sensor's own: a lit face is brighter than that at the top.
+    """
+    if any(frame.counts.dtype == np.uint8 or frame.counts.max() >= 1 << sensor_bits for frame in frames):
+        return list(frames)
+    return [replace(frame, counts=frame.counts << np.uint16(16 - sensor_bits)) for frame in frames]
+
+
+def _missing_roles(frames: Sequence[Frame]) -> list[InvalidQuantity]:
+    """Return what no reader can do without: frames of each role, and a table whose times differ."""
+    counts = {role: sum(frame.role == role for frame in frames) for role in ROLES}
+    problems = [
+        InvalidQuantity(f"{role} frames", 0, "at least 1", "take them, and add their lines to the table")
+        for role, count in counts.items()
+        if not count
+    ]
+    if len({frame.t_s for frame in frames}) < len(frames):
+        action = "give each frame the time at which it was taken"
+        problems.append(InvalidQuantity("t_s", "there twice", "another in each line", action))
+    return problems

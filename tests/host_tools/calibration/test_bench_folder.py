@@ -1,0 +1,127 @@
+"""Frames of a bench to a recording: as the probe's own, or everything that is wrong named by its line."""
+
+import csv
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from device.files.recording_file import read_recording
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.radial_profile import press_profiles
+from host_tools.__main__ import app
+from host_tools.calibration.bench_folder import NEEDED, PressOnBench, bench_recording
+from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
+from host_tools.scenes.probe_file import simulated_probe
+
+PRESS = PressOnBench("A1", "2026-11-02T09:30:00+01:00", 4000.0, 1.0)
+LEDS = ("led_x", "led_y", "led_minus_x", "led_minus_y")
+
+
+@pytest.fixture(scope="module")
+def recorded(tables):
+    from device.measurement.quantities import Inclusion
+
+    protocol = PhantomProtocol(tuple(np.linspace(0.1, 0.64, 8)), frames=1)
+    return phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=3, protocol=protocol)
+
+
+def written(folder, recorded, *, columns=(*NEEDED, *LEDS), shift=0):
+    """Write frames and table of a recording as a bench would have them."""
+    folder.mkdir(exist_ok=True)
+    with (folder / "frames.csv").open("w", newline="", encoding="utf-8-sig") as file:
+        table = csv.writer(file)
+        table.writerow(columns)
+        for number, frame in enumerate(recorded.frames):
+            counts = frame.counts if not shift else frame.counts.astype(np.uint16) << 2
+            cv2.imwrite(str(folder / f"f{number}.png"), counts)
+            row = (f"f{number}.png", frame.role, repr(frame.force_n), repr(frame.t_s), *map(repr, frame.led_ratio))
+            table.writerow(row[: len(columns)])
+    return folder / "frames.csv"
+
+
+def test_a_recording_of_a_bench_reads_as_the_probes_own(recorded, tmp_path):
+    table = written(tmp_path / "bench", recorded)
+    found = bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+    assert [frame.force_n for frame in found.frames] == [frame.force_n for frame in recorded.frames]
+    assert (found.serial, found.truth, found.simulated) == ("SIM-0001", None, False)
+    ours, theirs = (press_profiles(one)[0].as_row() for one in (found, recorded))
+    assert np.array_equal(ours, theirs)
+
+
+def test_ten_bits_that_lie_below_are_put_at_the_top(recorded, tmp_path):
+    """A camera of 10 bit, whose program writes counts of 0 to 1023 into 16."""
+    table = written(tmp_path / "bench", recorded, shift=2)
+    made_by = simulated_probe()
+    of_ten = replace(made_by, camera=replace(made_by.camera, bits=10))
+    found = bench_recording(tmp_path / "bench", table, PRESS, of_ten)
+    assert found.camera.bits == 16
+    for ours, theirs in zip(found.frames, recorded.frames, strict=True):
+        assert np.array_equal(ours.counts >> 8, theirs.counts)
+
+
+def test_everything_that_is_wrong_is_named_at_once_by_its_line(recorded, tmp_path):
+    table = written(tmp_path / "bench", recorded)
+    lines = table.read_text("utf-8-sig").splitlines()
+    cv2.imwrite(str(tmp_path / "bench" / "small.png"), np.zeros((20, 20), np.uint8))
+    cv2.imwrite(str(tmp_path / "bench" / "colour.png"), np.zeros((492, 768, 3), np.uint8))
+    wrong = {
+        1: ("f0.png,flat,0,0,1,1,1,1", "role is 'flat'"),
+        2: ("none.png,dark,0,0,1,1,1,1", "No such file"),
+        3: ("../f1.png,dark,0,0,1,1,1,1", "a path inside the folder"),
+        4: ("small.png,dark,0,0,1,1,1,1", "20 x 20 px"),
+        5: ("colour.png,dark,0,0,1,1,1,1", "3 colours"),
+        6: ("f1.png,press,nan,0,1,1,1,1", "force_n is nan"),
+        7: ("f1.png,press,0.5,0,2,1,1,1", "led_ratio is 2.0"),
+        8: ("f1.png,press,0.5", "too many or too few"),
+        9: ("f1.png,press,0;5,0,1,1,1,1", "'0;5'"),
+    }
+    for place, (line, _) in wrong.items():
+        lines[place] = line
+    table.write_text("\n".join(lines))
+    with pytest.raises(InvalidQuantity) as refused:
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+    said = str(refused.value).splitlines()
+    assert len(said) == len(wrong)
+    for place, (_, what) in wrong.items():
+        assert f"line {place + 1}:" in said[place - 1]
+        assert what in said[place - 1]
+
+
+@pytest.mark.parametrize(
+    ("columns", "what"),
+    [
+        (("file", "role", "force_n"), "column t_s"),
+        (("file", "role", "force_n", "t_s", "colour"), "column colour"),
+        ((*NEEDED, "led_x"), "columns of LEDs"),
+    ],
+)
+def test_columns_that_are_not_as_they_must_be_are_refused(recorded, tmp_path, columns, what):
+    table = written(tmp_path / "bench", recorded, columns=columns)
+    with pytest.raises(InvalidQuantity, match=what):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+
+
+def test_missing_roles_and_a_time_without_a_zone_are_refused(recorded, tmp_path):
+    pressed = replace(recorded, frames=tuple(recorded.with_role("press")))
+    table = written(tmp_path / "bench", pressed)
+    with pytest.raises(InvalidQuantity, match="dark frames is 0") as refused:
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+    assert "reference frames is 0" in str(refused.value)
+    with pytest.raises(InvalidQuantity, match="started_at"):
+        replace(PRESS, started_at="2026-11-02T09:30:00")
+
+
+def test_the_command_writes_a_recording_and_nothing_of_a_bad_table(recorded, tmp_path):
+    table, out = written(tmp_path / "bench", recorded), tmp_path / "ramps" / "A1.zip"
+    given = ["import", str(tmp_path / "bench"), "--exposure-us", "4000", "--started-at", PRESS.started_at]
+    given += ["--probe", "models/simulated_probe/probe.toml", "--out", str(out)]
+    assert CliRunner().invoke(app, given).exit_code == 0
+    assert read_recording(out).id == "A1"
+    assert CliRunner().invoke(app, given).exit_code == 1
+    out.unlink()
+    table.write_text("file,role\n")
+    assert CliRunner().invoke(app, given).exit_code == 1
+    assert not out.exists()
