@@ -66,6 +66,10 @@ EXAMPLES = """examples:
 """
 
 
+ALIASES = {"support": ("support-bundle",)}
+"""Other names of verbs."""
+
+
 def _parser(named: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
     """Return the parser; only the verbs `named` know their options."""
     parser = argparse.ArgumentParser(
@@ -81,7 +85,9 @@ def _parser(named: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
     parser.add_argument("--port", type=int, help="port of the screen and the API")
     commands = parser.add_subparsers(dest="command", metavar="VERB", title="verbs")
     for verb, told in VERBS.items():
-        its = commands.add_parser(verb, help=told, formatter_class=argparse.RawDescriptionHelpFormatter)
+        its = commands.add_parser(
+            verb, aliases=ALIASES.get(verb, ()), help=told, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
         if verb in named:
             module = import_module(_module_of(verb))
             module.add_options(its)
@@ -112,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for library in ONE_THREAD:
         os.environ.setdefault(library, "1")
     arguments = in_any_order(sys.argv[1:] if arguments is None else arguments)
-    parser = _parser([verb for verb in VERBS if verb in arguments])
+    parser = _parser([verb for verb in VERBS if {verb, *ALIASES.get(verb, ())} & set(arguments)])
     options = parser.parse_args(arguments)
     if options.scene and not options.simulate:
         parser.error("--scene says what the *simulated* probe is pressed on: add --simulate")
@@ -190,7 +196,7 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.restore import run_restore_command
 
             return run_restore_command(options, _stated(options))
-        case "support":
+        case "support" | "support-bundle":
             from device.commands.support import run_support_command
 
             return run_support_command(options)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from daemon_process import WAIT_S
 
 EVENTS = b"GET /api/v1/events HTTP/1.1\r\nhost: 127.0.0.1\r\n\r\n"
-BODY_BYTES, PIECE = 100_000_000, bytes(64 * 1024)
+BODY_BYTES, PIECE, PAUSE_S = 100_000_000, bytes(64 * 1024), 0.2
 
 
 @contextlib.contextmanager
@@ -31,7 +31,7 @@ def large_bodies(url: str) -> Iterator[list[int]]:
     answers, ending = list[int](), threading.Event()
 
     def sending() -> None:
-        while not ending.is_set():
+        while not ending.wait(PAUSE_S):
             for says_its_size in (True, False):
                 answers.append(_sent(url, says_its_size=says_its_size))
 

@@ -41,6 +41,7 @@ def served_probe(folder: Path, *, is_running: bool, scenario: Scenario | None = 
     app = create_app(procedure, procedure.store, updates=Updates(updates, "0.1.0+400"))
     settings = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, lifespan="off")
     server, listening = uvicorn.Server(settings), socket.create_server(("127.0.0.1", 0))
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # as the daemon's own port has it
     serving = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     serving.start()
     try:

@@ -67,7 +67,7 @@ def test_the_toolkit_of_a_wheel_finds_protocols_models_and_tables(installed, tmp
     assert (found.returncode, found.stderr) == (0, "")
     assert found.stdout.startswith(str(installed))
     assert run(installed, tmp_path, "-m", "host_tools", "--help").returncode == 0
-    scene = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80", "--force-n", "0.5"]
+    scene = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80", "--force-n", "0.5", "--strain", "small"]
     solved = run(installed, tmp_path, "-m", "host_tools", "simulate", *scene, "--frame", "frame.png")
     assert solved.returncode == 0, solved.stderr
     assert (tmp_path / "frame.png").is_file()

@@ -57,6 +57,16 @@ class RecordingHead:
     camera: CameraSettings
 
 
+@dataclass(frozen=True)
+class FrameForce:
+    """When a frame was taken (s from the recording's start), at which force (N), in which role, and of which ramp."""
+
+    role: str
+    ramp: int
+    t_s: float
+    force_n: float
+
+
 def png_of(frame: Frame) -> bytes:
     """Return a frame's counts as a PNG."""
     return cv2.imencode(".png", frame.counts)[1].tobytes()
@@ -142,6 +152,17 @@ def read_head(path: Path) -> RecordingHead:
             return _head(json.loads(read("recording.json")))
         except (*UNREADABLE, ValueError) as error:
             raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
+
+
+def read_forces(path: Path) -> tuple[FrameForce, ...]:
+    """Read the force of every frame of a recording, and no frame; raise `InvalidQuantity` naming what is wrong."""
+    with _files(path) as read:
+        try:
+            record = json.loads(read("recording.json"))
+        except (*UNREADABLE, ValueError) as error:
+            raise InvalidQuantity("recording", path, "a folder or .zip with recording.json", REPAIR) from error
+    entries = _field(record, "frames", list)
+    return tuple(_force(entry, f"frames[{i}].") for i, entry in enumerate(entries))
 
 
 def read_picture(path: Path) -> bytes | None:
@@ -245,6 +266,11 @@ def _head(record: dict[str, Any]) -> RecordingHead:
         simulated=_optional(record, "simulated", bool, False),
         camera=CameraSettings(**{n: _field(camera, n, NUMBER, "camera.") for n in names}),
     )
+
+
+def _force(entry: Any, where: str) -> FrameForce:
+    t_s, force_n = (float(_field(entry, name, NUMBER, where)) for name in ("t_s", "force_n"))
+    return FrameForce(_field(entry, "role", str, where), int(entry.get("ramp", 0)), t_s, force_n)
 
 
 def _require_room_for(frames: int, camera: CameraSettings) -> None:

@@ -17,7 +17,7 @@ from fastapi import FastAPI, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
 from device.config import Config
-from device.files.recording_file import read_picture, read_recording
+from device.files.recording_file import FrameForce, read_forces, read_picture, read_recording
 from device.instrument.press.picture import tactile_png
 from device.instrument.watch.recordings_watch import retention_rule
 from device.measurement.quantities import InvalidQuantity
@@ -52,6 +52,14 @@ class KeptFiles:
         if path.is_file():
             return FileResponse(path, media_type="application/zip", headers=tag)
         return StreamingResponse(packed(path), media_type="application/zip", headers=tag)
+
+    def forces(self, measurement_id: str) -> tuple[FrameForce, ...]:
+        """Return the force of every frame of a measurement."""
+        path = self._path(measurement_id)
+        try:
+            return read_forces(path)
+        except InvalidQuantity as error:  # of a recording of before there were hashes
+            raise damaged_recording(path.stem) from error
 
     def _path(self, measurement_id: str) -> Path:
         return self._store.recording_path(self._store.measurement(measurement_id)["recording_id"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Query, Response
@@ -11,7 +12,7 @@ from device.web.contract import PNG, ZIP, answers, media
 from device.web.exams import tagged
 from device.web.kept_files import KeptFiles
 from device.web.paging import MeasurementQuery, page_of
-from device.web.schema import MeasuredFeatures, Measurement, MeasurementList
+from device.web.schema import ForceCurve, MeasuredFeatures, Measurement, MeasurementList
 
 
 def add_measurements(app: FastAPI, api: str, store: Store) -> None:
@@ -39,6 +40,11 @@ def add_measurements(app: FastAPI, api: str, store: Store) -> None:
         return dict(store.measurement(measurement_id)["features"])
 
     kept = KeptFiles(store)
+
+    @app.get(f"{one}/forces", responses=answers(200, ForceCurve, "ETag"), tags=["measurements"])
+    def get_forces(measurement_id: str) -> dict[str, Any]:
+        """Return the force of every frame of one measurement."""
+        return {"frames": [asdict(frame) for frame in kept.forces(measurement_id)]}
 
     @app.get(
         f"{one}/image.png",

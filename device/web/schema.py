@@ -122,6 +122,21 @@ class MeasuredFeatures(RootModel[dict[str, float]]):
     """The features of the tactile image that the estimate was computed from, by their names."""
 
 
+class ForceOfFrame(_Body):
+    """The force (N) at which a frame was taken, when (s from the recording's start), its role and its ramp's number."""
+
+    role: str
+    ramp: int
+    t_s: float
+    force_n: float
+
+
+class ForceCurve(_Body):
+    """How a measurement was pressed, frame by frame as they were taken."""
+
+    frames: list[ForceOfFrame]
+
+
 class KnownTruth(_Body):
     """What a phantom, real or simulated, is known to hold."""
 

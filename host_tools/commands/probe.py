@@ -232,9 +232,11 @@ def _read(read: Callable[[Path], Record], file: Path, as_json: bool) -> Record:
 
 def with_probe(scene: Scene, probe: Path | None) -> Scene:
     """Return a scene pressed by the probe of a file; unchanged where none is given."""
+    if probe is None:
+        return scene
     from host_tools.scenes.probe_file import read_probe
 
-    return replace(scene, waveguide=read_probe(probe).waveguide) if probe else scene
+    return replace(scene, waveguide=read_probe(probe).waveguide)
 
 
 def probe_with_tables(probe: Path | None, table: Path) -> Probe | None:

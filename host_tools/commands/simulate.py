@@ -34,7 +34,7 @@ def simulate(
     offset_mm: Annotated[float | None, typer.Option(help="Inclusion's centre beside the probe's axis.")] = None,
     indentation_mm: Annotated[float | None, typer.Option(help="Prescribe the indentation (1 mm by default).")] = None,
     force_n: Annotated[float | None, typer.Option(help="Prescribe the force instead.")] = None,
-    strain: Annotated[SimulateStrain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "small",
+    strain: Annotated[SimulateStrain, typer.Option(help="Strain measure; auto asks the tolerance.")] = "auto",
     tolerance: Annotated[str, typer.Option(help="Relative error allowed on O1-O3, such as 0.5% or 0.005.")] = "0.5%",
     within_s: Annotated[float, typer.Option(help="Time to find a level that holds it, wall clock.")] = 120.0,
     best: Annotated[bool, typer.Option("--best", help="Print the best, also if it misses the tolerance.")] = False,
@@ -83,9 +83,11 @@ def _require_outputs(
 
 def _read(path: Path | None) -> Scene:
     """Return the file's scene, or the default one."""
+    if path is None:
+        return Scene()
     from host_tools.scenes.scene_file import read_scene
 
-    return read_scene(path) if path else Scene()
+    return read_scene(path)
 
 
 def _scene(

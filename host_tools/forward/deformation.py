@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import InterpolatedUnivariateSpline
 
 from device.measurement.arrays import Array
 
@@ -65,6 +64,8 @@ def area_above(r_mm: Array, field_mm: Array, threshold_mm: float) -> float:
 
 def _area_of_ray(r_mm: Array, excess_mm: Array) -> float:
     """Return the area (mm2) of the rings where the spline through a profile is positive."""
+    from scipy.interpolate import InterpolatedUnivariateSpline  # takes longer to load than a scene to solve
+
     spline = InterpolatedUnivariateSpline(r_mm, excess_mm)  # its roots are ten times faster than CubicSpline's
     edges = np.concatenate([r_mm[:1], spline.roots(), r_mm[-1:]])
     inside = spline((edges[:-1] + edges[1:]) / 2) > 0

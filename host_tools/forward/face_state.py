@@ -49,7 +49,8 @@ class FaceState:
     `w_mm` is the displacement of the face relative to the probe's own undeformed shape, `p_kpa` the axial force on the
     face per undeformed area (positive in compression), `total_mm3` the integral of w over the face, `force_n` the
     reaction of the back and `contact_force_n` the integral of the pressure, which must equal it.
-    `outward_mm` is how far a point of the face has moved away from the axis, where the model says it.
+    `outward_mm` is how far a point of the face has moved away from the axis, where the model says it: finite strain
+    does, and in small strain the deformed area is the undeformed one.
     """
 
     indentation_mm: float
@@ -59,6 +60,19 @@ class FaceState:
     force_n: float
     contact_force_n: float
     outward_mm: Array | None = None
+
+    def deformed_p_kpa(self, rays: Rays) -> Array:
+        """Return the force per *deformed* area [A, R] (kPa), the pressure that acts on the skin where it lies now.
+
+        A frictionless face is pushed along its normal, whose axial part acts on the area seen along the axis: a ring of
+        r dr has become (r + m) (dr + dm), with m outwards.
+        """
+        if self.outward_mm is None:
+            return self.p_kpa
+        r_mm = rays.r_mm
+        hoop = np.divide(self.outward_mm, r_mm, out=np.gradient(self.outward_mm, r_mm[0], axis=-1), where=r_mm > 0)
+        stretch = np.gradient(self.outward_mm, r_mm[0], axis=-1)
+        return np.asarray(self.p_kpa / ((1 + stretch) * (1 + hoop)))
 
     def scaled(self, factor: float) -> FaceState:
         """Return the state of a linear body at another load."""

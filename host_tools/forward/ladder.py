@@ -1,9 +1,10 @@
 """A scene and a tolerance to a solution that states no more than it: plan, solve, compare, and climb.
 
 Each kind of model has its rungs. In small strain they are orders on one mesh, which beats refining it and keeps
-features smooth in the scene; in finite strain, whose rims must stay blunt, meshes and orders. The first rung is what
-usually holds; the climb ends where the stated error is within the tolerance, or the rungs or the time are used up, and
-then what is missing is said. Sweeps do not climb: all their scenes share one level.
+features smooth in the scene; in finite strain, where the contact's rim must stay blunt, meshes and orders, whose errors
+the same meshes foretell in small strain. The first rung is what usually holds; the climb ends where the stated error is
+within the tolerance, or the rungs or the time are used up, and then what is missing is said. Sweeps do not climb: all
+their scenes share one level.
 """
 
 from __future__ import annotations
@@ -11,11 +12,14 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 from typing import Any, Literal
 
 from host_tools.forward.accuracy import Level, small_strain_departure
-from host_tools.forward.plan import GRADED, ModelPlan, model_plan
+from host_tools.forward.error_estimates.foretold_error import foretold_error
+from host_tools.forward.error_estimates.stated_error import numbers
+from host_tools.forward.plan import FINITE_IS_LIMITED, GRADED, ModelPlan, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
@@ -27,11 +31,26 @@ WITHIN_S = 120.0
 NEXT_RUNG = 2.0
 """A rung takes about so many times as long as the one below it."""
 FLAT_ORDERS, DOMED_ORDERS, SOLID_ORDERS = range(3, 10), range(3, 7), range(3, 7)
-FINITE_RUNGS = (Level("blunt", 2), Level("blunt", 3), Level("blunt_fine", 3), Level("blunt_fine", 4))
+FINITE_RUNGS = (
+    Level("sliding_coarse", 2),
+    Level("sliding_coarse", 3),
+    Level("sliding", 3),
+    Level("sliding", 4),
+    Level("sliding_fine", 4),
+    Level("sliding_fine", 5),
+)
+WIDEST_RIM = (Level("sliding_coarse", 3), Level("sliding_coarse", 4))
+"""What is tried where the tissue slips further along the rim than elements there are long."""
 FIRST_ORDERS = {0.05: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
 """By the tolerance from which on it is worth beginning there."""
-FIRST_BLUNT_AT = 0.1
-"""A tolerance from which on finite strain begins with the lowest rung."""
+FIRST_SOLID = {0.3: 3, 0.05: 4, 0.005: 5, 0.0: 6}
+"""The same in 3-D, whose lower orders state far more than they err: a rung that cannot hold costs half of the next."""
+FIRST_FINITE = {0.15: 0, 0.02: 1, 0.005: 2, 0.002: 3, 0.0: 4}
+"""The same for the rungs of finite strain."""
+CONVERGED = Level(GRADED, 5)
+"""Small strain, as good as true, by which it is told what a mesh of finite strain errs."""
+LIGHT_RATIO = 0.01
+"""Share of a press at which small strain foretells: its relative errors are of any press, and none folds at this."""
 SMALL_IS_ENOUGH = "ask for small strain (--strain small), which then states its own errors alone"
 TAKE_THE_BEST = "take the best as it is (--best)"
 CANCELLING = "total_deformation_mm3"
@@ -70,8 +89,7 @@ class Climb:
         if self.was_chosen and self.departure > self.tolerance:
             return (
                 f"tolerance is {asked}, but small strain departs from finite strain by about "
-                f"{100 * self.departure:.2g} % here, and finite strain is axisymmetric and flat-faced only: press less "
-                f"deep, or {SMALL_IS_ENOUGH}."
+                f"{100 * self.departure:.2g} % here, and {FINITE_IS_LIMITED}: press less deep, or {SMALL_IS_ENOUGH}."
             )
         if self.reached <= self.tolerance:
             return ""
@@ -105,9 +123,14 @@ def climb(
     pressed = scene.with_press(presses[-1])
     plan = model_plan(pressed, tolerance=tolerance, strain=strain)
     best, told = None, ""
+    rung = _Rung(scene, presses, plan, tolerance)
     for level in _rungs(plan, tolerance):
         took = time.perf_counter()
-        found = _rung(scene, presses, plan, level, tolerance, told)
+        try:
+            found = rung.solved(level, told)
+        except PressFailed as failed:
+            best = replace(rung.at_widest_rim(best, failed), ended=f"the next level gives way: {failed}")
+            break
         best = min((one for one in (best, found) if one), key=lambda one: one.reached)
         if found.reached <= tolerance:
             break
@@ -125,33 +148,88 @@ def climb(
 
 def _rungs(plan: ModelPlan, tolerance: float) -> Sequence[Level]:
     if plan.strain == "finite":
-        return FINITE_RUNGS if tolerance >= FIRST_BLUNT_AT else FINITE_RUNGS[1:]
-    first = next(order for at_least, order in FIRST_ORDERS.items() if tolerance >= at_least)
-    orders = SOLID_ORDERS if plan.symmetry != "axisymmetric" else FLAT_ORDERS
+        return FINITE_RUNGS[next(rung for at_least, rung in FIRST_FINITE.items() if tolerance >= at_least) :]
+    orders, firsts = FLAT_ORDERS, FIRST_ORDERS
     if plan.contact == "unilateral":
         orders = DOMED_ORDERS
+    elif plan.symmetry != "axisymmetric":
+        orders, firsts = SOLID_ORDERS, FIRST_SOLID
+    first = next(order for at_least, order in firsts.items() if tolerance >= at_least)
     return [Level(GRADED, order) for order in orders if order >= min(first, orders[-1])]
 
 
-def _rung(scene: Scene, presses: Sequence[Press], plan: ModelPlan, level: Level, tolerance: float, told: str) -> Climb:
-    """Return what one level reaches; `told` is what the one below stated."""
-    why = f"the lowest that may state {100 * tolerance:g} %" + (f"; {told}" if told else "")
-    reasons = plan.reasons | {"level": why}
-    if level.grading == GRADED:
-        reasons["mesh"] = "meshed for this scene, its rims in layers"
-    mesh = "remeshed" if level.grading == GRADED else plan.mesh
-    on_level = replace(
-        plan,
-        grading=level.grading,
-        order=level.order,
-        mesh=mesh,
-        reasons=reasons,
-        predicted_error={},
-        predicted_seconds=None,
-    )
-    solutions = solve_ramp(scene, presses, on_level, estimate_error=True)
-    feature, reached = max((worst_error(one) for one in solutions), key=lambda pair: pair[1])
-    return Climb(solutions, tolerance, reached, feature)
+class _Rung:
+    """Solves one scene and plan at one level after another."""
+
+    def __init__(self, scene: Scene, presses: Sequence[Press], plan: ModelPlan, tolerance: float) -> None:
+        self.scene, self.presses, self.plan, self.tolerance = scene, presses, plan, tolerance
+
+    def solved(self, level: Level, told: str) -> Climb:
+        """Return what one level reaches; `told` is what the one below stated."""
+        plan = self._plan(level, told)
+        if plan.strain == "finite":
+            solutions = self._foretold(plan)
+        else:
+            solutions = solve_ramp(self.scene, self.presses, plan, estimate_error=True)
+        feature, reached = max((worst_error(one) for one in solutions), key=lambda pair: pair[1])
+        return Climb(solutions, self.tolerance, reached, feature)
+
+    def at_widest_rim(self, best: Climb | None, failed: PressFailed) -> Climb:
+        """Return what is best where a rung gave way: its rim slips too far, and wider ones may still hold.
+
+        Raise the failure where nothing can be had.
+        """
+        for level in WIDEST_RIM if self.plan.strain == "finite" else ():
+            if best and (best.reached <= self.tolerance or best.solutions[0].plan.grading != level.grading):
+                break
+            try:
+                found = self.solved(level, f"finer rims give way: {failed}")
+            except PressFailed:
+                break
+            best = min((one for one in (best, found) if one), key=lambda one: one.reached)
+        if best is None:
+            raise failed
+        return best
+
+    def _plan(self, level: Level, told: str) -> ModelPlan:
+        why = f"the lowest that may state {100 * self.tolerance:g} %" + (f"; {told}" if told else "")
+        mesh = "its rims in layers" if level.grading == GRADED else "the contact's rim no finer than it slips"
+        reasons = self.plan.reasons | {"level": why, "mesh": f"meshed for this scene, {mesh}"}
+        return replace(
+            self.plan,
+            grading=level.grading,
+            order=level.order,
+            mesh="remeshed",
+            reasons=reasons,
+            predicted_error={},
+            predicted_seconds=None,
+        )
+
+    def _foretold(self, plan: ModelPlan) -> tuple[Solution, ...]:
+        """Return solutions in finite strain, with the errors that the same mesh has in small strain."""
+        solutions = solve_ramp(self.scene, self.presses, plan, estimate_error=True)
+        same_mesh = self._in_small_strain(Level(plan.grading, plan.order))
+        return tuple(
+            replace(one, stated_error=foretold_error(same_mesh, self._converged, one.stated_error)) for one in solutions
+        )
+
+    @cached_property
+    def _converged(self) -> dict[str, float]:
+        return self._in_small_strain(CONVERGED)
+
+    def _in_small_strain(self, level: Level) -> dict[str, float]:
+        """Return force, indentation and O1-O3 of a light press of the same kind."""
+        plan = replace(self._plan(level, ""), strain="small", contact="closed_sliding")
+        [light] = solve_ramp(self.scene, [lightened(self.presses[0])], plan)
+        return numbers(light.rays, light.pressed, light.baseline)
+
+
+def lightened(press: Press) -> Press:
+    """Return `LIGHT_RATIO` of a press, by what it is prescribed by."""
+    if press.indentation_mm is not None:
+        return Press(indentation_mm=LIGHT_RATIO * press.indentation_mm)
+    assert press.force_n is not None  # Press guarantees one of the two
+    return Press(force_n=LIGHT_RATIO * press.force_n)
 
 
 def worst_error(solution: Solution) -> tuple[str, float]:

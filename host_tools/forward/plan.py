@@ -27,8 +27,13 @@ STANDARD = Level("standard", 3)
 """The level of every data set: one level for all scenes, or features would jump where the plan changes its mind."""
 GRADED = "graded"
 """The element sizes of one scene that climbs from order to order: layers around the rims, large elements elsewhere."""
+SLIDING = ("sliding_coarse", "sliding", "sliding_fine")
+"""The element sizes of a climb in finite strain, by the rim of the contact; the bonded rim, which does not slip, is
+fine in all of them."""
 BLUNT = Level("blunt", 3)
-"""The level of finite strain: elements at the sharp rims no smaller than the slip, or they fold."""
+"""The level of data sets in finite strain: elements at the sharp rims no smaller than the slip, or they fold."""
+
+FINITE_IS_LIMITED = f"finite strain is axisymmetric, flat-faced and of Poisson ratios to {LOCKING_POISSON_RATIO} only"
 
 
 @dataclass(frozen=True)
@@ -109,8 +114,9 @@ def aligned(scene: Scene) -> tuple[Scene, float]:
 def _strain(scene: Scene, symmetry: FaceSector, asked: str, tolerance: float, reasons: dict[str, str]) -> StrainModel:
     departure = small_strain_departure(scene)
     known = f"small strain departs from finite strain by about {100 * departure:.2g} % here"
-    can_finite = symmetry == "axisymmetric" and scene.waveguide.dome_mm == 0
-    if asked == "finite" and not can_finite:
+    of_one_section = symmetry == "axisymmetric" and scene.waveguide.dome_mm == 0
+    can_finite = of_one_section and not _locks(scene)
+    if asked == "finite" and not of_one_section:
         raise InvalidQuantity(
             "strain", "finite", "small for a scene that is not axisymmetric or has a domed face", "ask for small strain"
         )
@@ -121,7 +127,7 @@ def _strain(scene: Scene, symmetry: FaceSector, asked: str, tolerance: float, re
         reasons["strain"] = f"asked for; {known}"
         return "finite"
     if asked == "auto" and departure > tolerance:
-        reasons["strain"] = f"{known}, more than the tolerance, but finite strain is axisymmetric and flat-faced only"
+        reasons["strain"] = f"{known}, more than the tolerance, but {FINITE_IS_LIMITED}"
     else:
         reasons["strain"] = ("asked for; " if asked == "small" else "") + known
     return "small"
@@ -139,7 +145,7 @@ def _contact(scene: Scene, strain: StrainModel, reasons: dict[str, str]) -> Cont
 
 
 def _formulation(scene: Scene, strain: StrainModel, reasons: dict[str, str]) -> Literal["displacement", "mixed"]:
-    locks = with_inclusion(scene).locks or baseline(scene).locks
+    locks = _locks(scene)
     if locks and strain == "finite":
         raise InvalidQuantity(
             "poisson_ratio",
@@ -152,6 +158,10 @@ def _formulation(scene: Scene, strain: StrainModel, reasons: dict[str, str]) -> 
         return "mixed"
     reasons["formulation"] = f"no Poisson ratio above {LOCKING_POISSON_RATIO}: displacements alone do not lock"
     return "displacement"
+
+
+def _locks(scene: Scene) -> bool:
+    return with_inclusion(scene).locks or baseline(scene).locks
 
 
 def _largest_poisson_ratio(scene: Scene) -> float:

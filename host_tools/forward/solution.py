@@ -76,8 +76,16 @@ class Solution:
 
     @property
     def p_kpa(self) -> Array:
-        """Contact pressure along +x; its last sample, at the rim, grows with the mesh and means nothing."""
+        """Contact pressure along +x, as force per undeformed area: what the probe's tables and models are made of.
+
+        Its last sample, at the rim, grows with the mesh and means nothing.
+        """
         return np.asarray(self.pressed.p_kpa[0])
+
+    @property
+    def deformed_p_kpa(self) -> Array:
+        """Contact pressure along +x, as force per deformed area; of small strain the same."""
+        return np.asarray(self.pressed.deformed_p_kpa(self.rays)[0])
 
     @property
     def p_baseline_kpa(self) -> Array:
@@ -121,6 +129,7 @@ class Solution:
             "w_mm": self.w_mm.tolist(),
             "w_baseline_mm": self.w_baseline_mm.tolist(),
             "p_kpa": self.p_kpa.tolist(),
+            "deformed_p_kpa": self.deformed_p_kpa.tolist(),
         }
         return record if len(self.rays.angle_rad) == 1 else record | self._fields()
 

@@ -28,8 +28,9 @@ MEANINGS = {
     "inclusion_deformation_mm": "what the inclusion adds to the deformation of the face",
     "deformation_mm": "deformation of the face, relative to its own undeformed shape",
     "baseline_deformation_mm": "deformation under the same press without the inclusion",
-    "contact_pressure_kpa": "contact pressure; at the very rim it is singular",
+    "contact_pressure_kpa": "contact pressure, force per undeformed area; at the very rim it is singular",
     "baseline_contact_pressure_kpa": "contact pressure of the same press without the inclusion",
+    "deformed_contact_pressure_kpa": "contact pressure, force per deformed area",
     "indentation_mm": "how far the back of the probe is pressed in",
     "force_n": "force on the probe",
     "contact_force_n": "integral of the contact pressure",
@@ -90,6 +91,7 @@ def _fields(solutions: Sequence[Solution]) -> dict[str, list[Array]]:
         "baseline_deformation_mm": [one.baseline.w_mm for one in solutions],
         "contact_pressure_kpa": [one.pressed.p_kpa for one in solutions],
         "baseline_contact_pressure_kpa": [one.baseline.p_kpa for one in solutions],
+        "deformed_contact_pressure_kpa": [one.pressed.deformed_p_kpa(one.rays) for one in solutions],
     }
 
 

@@ -103,7 +103,7 @@ def _without_inclusion(
 def _stated(plan: ModelPlan, rays: Rays, found: Loaded, without: Loaded, press: Press) -> dict[str, float]:
     if found.residual and without.residual:
         return dual_error(rays, found, without, by_force=press.force_n is not None)
-    return stated_error(plan, rays, found, without)
+    return stated_error(plan, rays, found, without, by_force=press.force_n is not None)
 
 
 def _but_for_modulus(scene: Scene, other: Scene) -> Scene:

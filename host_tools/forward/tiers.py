@@ -7,14 +7,12 @@ from typing import Any, NamedTuple
 from netgen.meshing import NgException
 
 from host_tools.forward.face_state import Rays
-from host_tools.forward.finite_strain.load_path import FiniteStrainModel
 from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
 from host_tools.forward.meshes.morph import morphed_mesh
 from host_tools.forward.meshes.solid_mesh import COARSE, FINE, LAYERED, SolidResolution, solid_mesh
 from host_tools.forward.plan import GRADED, ModelPlan
 from host_tools.forward.press_model import PressFailed, PressModel
 from host_tools.forward.sampling import FaceSampler
-from host_tools.forward.small_strain.domed_press import DomedModel
 from host_tools.forward.small_strain.linear_model import LinearModel
 from host_tools.forward.symmetry import AXISYMMETRIC, SOLID, Symmetry
 from host_tools.scenes.scene import Scene
@@ -27,10 +25,16 @@ AXISYMMETRIC_SIZES = {
         bulk_mm=1.5, face_mm=0.5, contact_rim_mm=0.005, back_rim_mm=0.005, per_inclusion=20.0, grading=0.3
     ),
     GRADED: Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=8.0, grading=0.5, rim_layers=5),
+    "sliding_coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.02, per_inclusion=10.0, grading=0.5),
+    "sliding": Resolution(bulk_mm=4.0, contact_rim_mm=0.2, back_rim_mm=0.02, per_inclusion=10.0, grading=0.5),
+    "sliding_fine": Resolution(
+        bulk_mm=3.0, face_mm=0.8, contact_rim_mm=0.1, back_rim_mm=0.01, per_inclusion=12.0, grading=0.5
+    ),
     "blunt": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.5, per_inclusion=10.0, grading=0.5),
     "blunt_fine": Resolution(bulk_mm=2.0, face_mm=0.5, contact_rim_mm=0.3, back_rim_mm=0.3, grading=0.4),
 }
-"""Element sizes by the name of the level; "blunt" keeps the rims coarser than the slip of finite strain."""
+"""Element sizes by the name of the level. Those of finite strain keep the contact's rim coarser than its slip: "blunt"
+ones, of data sets, both rims, "sliding" ones of a climb only that, since the bonded rim does not slip."""
 
 SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE, GRADED: LAYERED}
 SOLID_ANGLES = 48
@@ -63,8 +67,12 @@ def build(scene: Scene, plan: ModelPlan) -> Meshed:
     mixed = plan.formulation == "mixed"
     model: PressModel
     if plan.strain == "finite":
+        from host_tools.forward.finite_strain.load_path import FiniteStrainModel
+
         model = FiniteStrainModel(mesh, plan.order, rays)
     elif plan.contact == "unilateral":
+        from host_tools.forward.small_strain.domed_press import DomedModel
+
         model = DomedModel(
             mesh,
             symmetry,

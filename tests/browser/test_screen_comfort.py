@@ -11,10 +11,20 @@ from playwright.sync_api import Browser, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe, served_probe
 
+from device.errors import DeviceError
 from device.instrument.press.states import Guidance
 from device.instrument.status import PressJob
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
+
+FOCUSED = """() => {
+  const node = document.activeElement;
+  const box = node.getBoundingClientRect();
+  const isInside = box.left >= 0 && box.top >= 0 && box.right <= innerWidth && box.bottom <= innerHeight;
+  const marked = [node, node.nextElementSibling].filter(Boolean).map(one => getComputedStyle(one).outlineStyle);
+  const isSeen = node === document.body || (isInside && marked.includes("solid"));
+  return {id: node.id || node.value || node.tagName, isSeen};
+}"""
 
 
 @pytest.mark.parametrize("size", SIZES[:2], ids=named)
@@ -43,6 +53,20 @@ def test_the_probes_own_touch_screen_has_keys_for_every_field(browser: Browser, 
     page.context.close()
 
 
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_the_map_is_whole_without_scrolling(browser: Browser, probe: ServedProbe, size, language: str):
+    page = opened(browser, probe, size, locale=language)
+    page.locator("#exam-button").click()
+    page.locator("#patient-ref").fill("B-22")
+    page.locator("#operator").fill("Ada")
+    page.locator("#to-place").click()
+    targets = page.locator('[data-page="where"] :is(.hour, .button)').filter(visible=True)
+    for index in range(targets.count()):
+        expect(targets.nth(index)).to_be_in_viewport(ratio=0.99)
+    page.context.close()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", SIZES, ids=named)
 def test_every_page_can_be_read_in_both_schemes(browser: Browser, probe: ServedProbe, size, scheme: str):
@@ -62,6 +86,57 @@ def test_every_page_can_be_read_in_both_schemes(browser: Browser, probe: ServedP
         assert wrong_in(page) == [], name
         if name in opens:
             page.locator(f"#{name}-close").click()
+    page.context.close()
+
+
+@pytest.mark.parametrize("size", [(640, 400), (960, 540)], ids=named)
+def test_at_double_zoom_nothing_is_cut_off_and_every_focus_is_seen(browser: Browser, probe: ServedProbe, size):
+    """As a browser zooms 1280 x 800 and 1920 x 1080: half the pixels of CSS, twice as many of the screen for each."""
+    page = opened(browser, probe, size, device_scale_factor=2)
+    stops = set()
+    for _ in range(30):
+        page.keyboard.press("Tab")
+        stop = page.evaluate(FOCUSED)
+        if stop["id"] in stops:
+            break
+        stops.add(stop["id"])
+        assert stop["isSeen"], stop
+    assert {"exam-button", "press-button", "menu-open"} <= stops
+    opens = {"menu": "#menu-open", "history": "#menu-history", "chooser": "#exam-button"}
+    for name in ("ready", "lesion", "fault", *opens):
+        press = PressJob("p", "standard", "capturing") if name == "lesion" else None
+        step = name if name in ("lesion", "fault") else "ready"
+        fault = DeviceError.by_code["E304"]("It gave no reading.", "Plug it in.") if name == "fault" else None
+        probe.procedure.board.update(step=step, guidance=Guidance.PRESS_SLOWLY, press=press, fault=fault)
+        expect(page.locator("#panel")).to_have_attribute("data-step", step)
+        if name == "history":
+            page.locator("#menu-open").click()
+        if name in opens:
+            page.locator(opens[name]).click()
+            expect(page.locator(f"#{name}")).to_be_visible()
+        shoot(page, f"comfort/zoom-{name}-{size[0]}")
+        assert wrong_in(page) == [], name
+        if name in opens:
+            page.locator(f"#{name}-close").click()
+    page.context.close()
+
+
+def test_the_focus_is_never_lost(browser: Browser, probe: ServedProbe):
+    page = opened(browser, probe)
+    page.locator("#history-open").focus()
+    press = PressJob("p", "standard", "capturing")
+    probe.procedure.board.update(step="lesion", guidance=Guidance.PRESS_SLOWLY, press=press)
+    expect(page.locator("#press-button")).to_be_focused()  # another screen has begun a press
+    probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, press=None)
+    expect(page.locator("#header")).to_have_js_property("inert", value=False)
+    page.locator("#exam-button").focus()
+    page.keyboard.press("Enter")
+    page.locator("#free-press").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#chooser-heading")).to_be_focused()  # the button that had it is on another page
+    page.locator("#free-yes").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#exam-button")).to_be_focused()
     page.context.close()
 
 

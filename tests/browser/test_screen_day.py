@@ -134,6 +134,7 @@ def test_a_day(page: Page, tmp_path: Path):
     nurse.press()
     nurse.press()
     nurse.tap("act-details")
+    expect(page.locator("#details-forces .force-press")).to_have_count(2)  # its image, and what the sign means
     nurse.look("details")
     nurse.tap("details-close")
     nurse.tap("history-open")

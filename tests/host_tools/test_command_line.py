@@ -18,10 +18,11 @@ from device.simulation.scenario import Scenario
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
+PRESS = [*SCENE, "--force-n", "0.5", "--strain", "small"]
 
 
 def test_simulate_prints_the_contracts_fields_as_json():
-    done = run_toolkit("simulate", *SCENE, "--indentation-mm", 1, "--json")
+    done = run_toolkit("simulate", *SCENE, "--indentation-mm", 1, "--strain", "small", "--json")
     assert done.returncode == 0, done.stderr
     record = json.loads(done.stdout)
     assert record["force_n"] == pytest.approx(0.2051, rel=5e-3)
@@ -33,9 +34,7 @@ def test_simulate_prints_the_contracts_fields_as_json():
 
 
 def test_simulate_writes_a_figure_and_a_frame(tmp_path):
-    done = run_toolkit(
-        "simulate", *SCENE, "--force-n", 0.5, "--plot", tmp_path / "w.png", "--frame", tmp_path / "frame.png"
-    )
+    done = run_toolkit("simulate", *PRESS, "--plot", tmp_path / "w.png", "--frame", tmp_path / "frame.png")
     assert done.returncode == 0, done.stderr
     frame = cv2.imread(str(tmp_path / "frame.png"), cv2.IMREAD_UNCHANGED)
     assert frame.shape == (492, 768)
@@ -46,7 +45,7 @@ def test_simulate_writes_a_figure_and_a_frame(tmp_path):
 
 
 def test_a_long_exposure_saturates_the_frame(tmp_path):
-    run_toolkit("simulate", *SCENE, "--force-n", 0.5, "--frame", tmp_path / "frame.png", "--exposure-us", 40_000)
+    run_toolkit("simulate", *PRESS, "--frame", tmp_path / "frame.png", "--exposure-us", 40_000)
     assert cv2.imread(str(tmp_path / "frame.png"), cv2.IMREAD_UNCHANGED)[246, 384] == 255
 
 
@@ -163,6 +162,15 @@ def test_phantom_records_over_nothing(tmp_path):
     assert done.returncode == 1
     assert "phantom3, but must be a new folder" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["phantom3"]
+
+
+def test_the_first_solve_waits_for_nothing_that_it_does_not_need():
+    """What is loaded until a scene is meshed: NumPy and NGSolve, and none of what takes as long as they do."""
+    code = (
+        "import sys, host_tools.__main__, host_tools.forward.ladder; "
+        "print([m for m in ('scipy', 'cv2', 'pydantic', 'xarray', 'matplotlib', 'pandas') if m in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def _interrupted(arguments, loaded):

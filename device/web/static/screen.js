@@ -3,6 +3,7 @@
 
 import { sound, stayAwake, useComfort } from "./base/comfort.js";
 import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./base/dom.js";
+import { followFocus, keepFocus } from "./base/focus.js";
 import { showIdentity } from "./base/menu.js";
 import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, startPress, takeTare } from "./base/probe.js";
 import { figure, say, sayPage } from "./base/words.js";
@@ -183,6 +184,7 @@ function show() {
   showGauge(seen);
   showLive(pressUnderWay() && status.press.state !== "computing");
   showSelfTest(status);
+  keepFocus(pressButton);
 }
 
 /** Ask the probe for what the page needs, one thing at a time; what failed is asked for again. */
@@ -358,6 +360,7 @@ onExam(() => {
 sayPage();
 useComfort();
 useKeyboard();
+followFocus(pressButton);
 followScanner(scanned);
 useBeside(openOlder);
 followStatus(receive, () => showConnection(true), showBeside);

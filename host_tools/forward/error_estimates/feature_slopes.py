@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import InterpolatedUnivariateSpline
 
 from device.measurement.arrays import Array
 from host_tools.forward.deformation import CENTRAL_RATIO, HALF_MAXIMUM
@@ -49,6 +48,8 @@ def _edge_weights(r_mm: Array, field_mm: Array, peak: Array) -> Array:
     weights = np.zeros_like(peak)
     if field_mm.max() <= 0:
         return weights
+    from scipy.interpolate import InterpolatedUnivariateSpline
+
     spline = InterpolatedUnivariateSpline(r_mm, field_mm - HALF_MAXIMUM * field_mm.max())
     for edge_mm in spline.roots():
         per_excess = 2 * np.pi * edge_mm / abs(float(spline.derivative()(edge_mm)))

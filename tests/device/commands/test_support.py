@@ -14,10 +14,13 @@ from device.care.support_sections import SECTIONS
 from device.commands.support import main as support_main
 
 
-def test_every_section_is_named_with_what_became_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("verb", ["support", "support-bundle"])
+def test_every_section_is_named_with_what_became_of_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
     write_card(tmp_path / "card")
     file = tmp_path / "a.zip"
-    assert main(["--root", str(tmp_path / "card"), "support", str(file)]) == 0
+    assert main(["--root", str(tmp_path / "card"), verb, str(file)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines[:-1]] == list(SECTIONS)
     assert "Look into it before you send it" in lines[-1]

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from device.files.durable import synced_file
-from device.files.recording_file import png_of, read_picture, read_recording, write_recording
+from device.files.recording_file import png_of, read_forces, read_picture, read_recording, write_recording
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import GEOMETRY, CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -436,3 +436,18 @@ def test_a_recording_of_a_hundred_thousand_frames_is_refused_before_any_is_read(
     most = (1 << 30) // (640 * 480)
     with pytest.raises(InvalidQuantity, match=f"^frames of the recording is 100000, .* at most {most} frames"):
         read_recording(folder)
+
+
+@pytest.mark.parametrize("name", ["press", "press.zip"])
+def test_the_forces_are_read_without_a_frame(tmp_path, monkeypatch, name):
+    written = small_recording()
+    write_recording(written, tmp_path / name)
+    monkeypatch.setattr(cv2, "imdecode", None)
+    told = [(one.role, one.ramp, one.t_s, one.force_n) for one in read_forces(tmp_path / name)]
+    assert told == [(one.role, one.ramp, one.t_s, one.force_n) for one in written.frames]
+
+
+def test_forces_that_are_none_are_refused_by_their_name(tmp_path):
+    (tmp_path / "recording.json").write_text('{"frames": [{"role": "press", "t_s": 0.1, "force_n": "0.5"}]}')
+    with pytest.raises(InvalidQuantity, match=r"frames\[0\]\.force_n"):
+        read_forces(tmp_path)

@@ -35,8 +35,8 @@ def get(store):
 
 
 PATHS = [
-    "measurements", "measurements?limit=1", "measurements/m-1", "measurements/m-1/features", "presses", "exams",
-    "audit",
+    "measurements", "measurements?limit=1", "measurements/m-1", "measurements/m-1/features",
+    "measurements/m-1/forces", "presses", "exams", "audit",
     "measurements/m-1/image.png", "measurements/m-1/recording.zip",
 ]  # fmt: skip
 

@@ -55,7 +55,7 @@ class Witness:
 
 @pytest.fixture
 def witness(tmp_path, monkeypatch):
-    (tmp_path / "recording.json").write_text("{}")
+    (tmp_path / "recording.json").write_text('{"frames": []}')
     witness = Witness(tmp_path)
     monkeypatch.setattr(kept_files, "read_recording", lambda folder: witness.note("reading", None))
     monkeypatch.setattr(kept_files, "tactile_png", lambda recording: witness.note("picture", b"png"))
@@ -68,6 +68,7 @@ HEAVY = {
     "measurements/m-1": "measurement",
     "measurements/m-1/features": "measurement",
     "measurements/m-1/image.png": "picture",
+    "measurements/m-1/forces": "recording",
     "measurements/m-1/recording.zip": "recording",
     "presses/p-1": "press",
     "health/ready": "ready",

@@ -37,7 +37,7 @@ def other(tmp_path):
 
 
 def solved(*options):
-    done = run_toolkit("simulate", *SCENE, "--json", *options)
+    done = run_toolkit("simulate", *SCENE, "--strain", "small", "--json", *options)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 

@@ -14,7 +14,7 @@ INCLUSION = ("--size-mm", 10, "--depth-mm", 6, "--modulus-kpa", 80)
 
 
 def test_explain_prints_each_choice_with_its_reason_and_the_error_of_each_number():
-    done = run_toolkit("simulate", *INCLUSION, "--tolerance", "1%", "--explain")
+    done = run_toolkit("simulate", *INCLUSION, "--strain", "small", "--tolerance", "1%", "--explain")
     assert done.returncode == 0, done.stderr
     for words in (
         "symmetry     axisymmetric",
@@ -29,23 +29,22 @@ def test_explain_prints_each_choice_with_its_reason_and_the_error_of_each_number
 
 def test_a_scene_file_is_solved_and_options_change_it(tmp_path):
     write_scene(Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2)), tmp_path / "scene.toml")
-    whole = json.loads(run_toolkit("simulate", "--scene", str(tmp_path / "scene.toml"), "--json").stdout)
-    softer = json.loads(
-        run_toolkit("simulate", "--scene", str(tmp_path / "scene.toml"), "--tissue-modulus-kpa", "2.5", "--json").stdout
-    )
+    asked = ("simulate", "--scene", str(tmp_path / "scene.toml"), "--strain", "small", "--json")
+    whole = json.loads(run_toolkit(*asked).stdout)
+    softer = json.loads(run_toolkit(*asked, "--tissue-modulus-kpa", "2.5").stdout)
     assert whole["force_n"] == softer["force_n"] == pytest.approx(0.2)
     assert softer["indentation_mm"] > 1.8 * whole["indentation_mm"]
 
 
 def test_the_scene_that_was_asked_for_is_saved_with_every_key_and_solved_again_from_its_file(tmp_path):
     path = tmp_path / "scene.toml"
-    options = ("--tissue-modulus-kpa", 2.5, "--force-n", 0.2, "--json")
+    options = ("--tissue-modulus-kpa", 2.5, "--force-n", 0.2, "--strain", "small", "--json")
     asked = json.loads(run_toolkit("simulate", *INCLUSION, *options, "--save-scene", path).stdout)
     assert read_scene(path) == Scene(
         Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2), tissue=Tissue(youngs_modulus_kpa=2.5)
     )
     assert "thickness_mm = 30.0" in path.read_text()
-    again = json.loads(run_toolkit("simulate", "--scene", path, "--json").stdout)
+    again = json.loads(run_toolkit("simulate", "--scene", path, "--strain", "small", "--json").stdout)
     assert again["max_deformation_mm"] == pytest.approx(asked["max_deformation_mm"], rel=1e-9)
 
 
@@ -56,8 +55,28 @@ def test_a_scene_is_saved_as_toml_alone(tmp_path):
 
 
 def test_the_poisson_ratio_of_everything_can_be_given():
-    options = ("simulate", *INCLUSION, "--poisson", "0.4995", "--json")
+    options = ("simulate", *INCLUSION, "--poisson", "0.4995", "--strain", "small", "--json")
     assert json.loads(run_toolkit(*options).stdout)["plan"]["formulation"] == "mixed"
+
+
+def test_strain_is_chosen_by_the_tolerance_unless_it_is_told():
+    """At 1 mm small strain departs by 5.7 %: enough for 20 %, and not for 5 %."""
+    by_tolerance = {
+        asked: json.loads(run_toolkit("simulate", *INCLUSION, "--tolerance", asked, "--json").stdout)
+        for asked in ("20%", "5%")
+    }
+    assert [record["plan"]["strain"] for record in by_tolerance.values()] == ["small", "finite"]
+    for record in by_tolerance.values():
+        assert record["tolerance"]["held"]
+    assert "more than the tolerance of 5 %" in by_tolerance["5%"]["plan"]["reasons"]["strain"]
+
+
+def test_a_scene_that_finite_strain_does_not_serve_is_refused_unless_small_strain_is_told():
+    """A Poisson ratio that locks: errors of the mesh alone would be within 1 %, those of the model are not."""
+    refused = run_toolkit("simulate", *INCLUSION, "--poisson", "0.4995", "--tolerance", "1%")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "small strain departs from finite strain by about" in refused.stderr
+    assert "--strain small" in refused.stderr
 
 
 def test_finite_strain_on_request_is_true_sliding_with_its_plan_in_the_json():
@@ -100,7 +119,8 @@ def test_what_is_stated_is_within_the_tolerance_and_the_record_says_so():
             "strain is finite",
         ),
         (("--scene", "nowhere.toml"), "nowhere.toml"),
-        ((*INCLUSION, "--force-n", "100"), "force_n is 100 N, but must be below 3.0"),
+        ((*INCLUSION, "--force-n", "100", "--strain", "small"), "force_n is 100 N, but must be below 3.0"),
+        ((*INCLUSION, "--force-n", "100"), "force_n is 100, but the press could be followed only to"),
     ],
 )
 def test_what_cannot_be_solved_is_refused_in_one_sentence(options, words):

@@ -23,6 +23,13 @@ def test_pressure_that_rings_inside_an_element_is_no_tension():
     assert _under(1 + 2 * np.sin(2 * np.pi * RAYS.r_mm / 0.5)).pressure_is_positive
 
 
+def test_a_face_that_has_grown_by_a_tenth_carries_its_force_on_more_area():
+    p_kpa = 2 - RAYS.r_mm / 11
+    face = FaceState(1.0, np.zeros_like(p_kpa), p_kpa, 0.0, 1.0, 1.0, outward_mm=0.1 * RAYS.r_mm)
+    np.testing.assert_allclose(face.deformed_p_kpa(RAYS), p_kpa / 1.21, rtol=1e-12)
+    np.testing.assert_array_equal(replace(face, outward_mm=None).deformed_p_kpa(RAYS), p_kpa)  # small strain
+
+
 @pytest.mark.parametrize("middle_mm", [0.0, 4.0, 9.0])
 def test_a_ring_that_is_pulled_is_found(middle_mm):
     pulled = np.where(np.abs(RAYS.r_mm - middle_mm) < 1.5, -0.1, 1.0)

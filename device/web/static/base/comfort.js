@@ -61,5 +61,5 @@ export function useComfort() {
   for (const one of ["on", "off"]) byId(`sound-${one}`).addEventListener("click", () => useSound(one === "on"));
   for (const one of Object.keys(LANGUAGES)) byId(`language-${one}`).addEventListener("click", () => chooseLanguage(one));
   // A browser lets a page sound only after somebody has touched it.
-  addEventListener("pointerdown", () => { sounds.context ??= new AudioContext(); }, { once: true });
+  for (const touch of ["pointerdown", "keydown"]) addEventListener(touch, () => { sounds.context ??= new AudioContext(); }, { once: true });
 }

@@ -99,6 +99,7 @@ export const imageUrl = (id) => `${API}/measurements/${of(id)}/image.png`;
 export const recordingUrl = (id) => `${API}/measurements/${of(id)}/recording.zip`;
 export const reportUrl = (examId) => `${API}/exams/${of(examId)}/report.pdf`;
 export const tableUrl = (examId) => `${API}/exports/measurements.csv${examId ? `?exam_id=${of(examId)}` : ""}`;
+export const fetchForces = async (id) => (await get(`/measurements/${of(id)}/forces`)).frames;
 export const fetchMeasurement = (id) => get(`/measurements/${of(id)}`);
 
 /** Measurements, newest first, of an exam or of all, older than one of them. */

@@ -42,6 +42,9 @@ export function figure(number, decimals) {
   return /[1-9]/.test(text) ? text : text.replace(/^[-\u2212]/, "");
 }
 
+/** A number as it was computed, with four digits at least, as the language writes it. */
+export const exact = (number) => number.toLocaleString(locale, Number.isInteger(number) ? { useGrouping: false } : { maximumSignificantDigits: 4, useGrouping: false });
+
 const DAY = { year: "numeric", month: "2-digit", day: "2-digit" };
 const MINUTE = { hour: "2-digit", minute: "2-digit" };
 

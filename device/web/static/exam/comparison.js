@@ -42,4 +42,5 @@ export function showComparison(measurements) {
     line("", [...pair.map(picture), ""]),
     ...rows,
   );
+  box.scrollIntoView({ block: "start" }); // the marks may be far below
 }

@@ -107,6 +107,7 @@ async function show(beforeSeq = null) {
 
 function choose(next) {
   scope = next;
+  list.parentElement.scrollTop = 0;
   marked = [];
   showComparison(marked);
   showExports();

@@ -1,14 +1,13 @@
 // Everything behind a measurement, in a researcher's words and the daemon's own: features, frames, force, model.
 
 import { byId, element } from "../base/dom.js";
-import { recordingUrl } from "../base/probe.js";
-import { figure, moment, say } from "../base/words.js";
+import { fetchForces, recordingUrl } from "../base/probe.js";
+import { exact, figure, moment, say } from "../base/words.js";
 import { modeName } from "../press/modes.js";
+import { forceCurve } from "./force_curve.js";
 
 const dialog = byId("details");
 byId("details-close").addEventListener("click", () => dialog.close());
-
-const number = (value) => (Number.isInteger(value) ? String(value) : value.toPrecision(4));
 
 function warningWords({ code, title, cause, remedy }) {
   return `${code} ${title}: ${cause} ${remedy}`;
@@ -22,12 +21,20 @@ function lines({ taken_at: at, mode, frames, force_n: force, estimate, features,
     ["status", estimate.status],
     ["reason", estimate.reason],
     ["warnings", warnings.map(warningWords).join("\n")],
-    ["features", Object.entries(features).map(([name, value]) => `${name} ${number(value)}`).join("\n")],
+    ["features", Object.entries(features).map(([name, value]) => `${name} ${exact(value)}`).join("\n")],
     ["model", `${estimate.model} ${estimate.model_sha256}`],
     ["certificate", estimate.calibration_id],
     ["exam", exam ?? ""],
     ["recording", recording],
   ];
+}
+
+/** Draw how it was pressed, once the probe has said it; a recording that was deleted has no curve. */
+async function showForces({ id }) {
+  const place = byId("details-forces");
+  place.replaceChildren();
+  const curve = forceCurve(await fetchForces(id).catch(() => []));
+  if (curve) place.replaceChildren(element("figcaption", "", say("details.forces")), curve);
 }
 
 /** Open the details of a measurement. */
@@ -39,5 +46,6 @@ export function openDetails(measurement) {
   ]));
   const link = byId("details-recording");
   Object.assign(link, { href: recordingUrl(measurement.id), download: `measurement-${measurement.seq}.zip` });
+  showForces(measurement);
   dialog.showModal();
 }

@@ -58,6 +58,19 @@ def test_the_work_of_the_back_is_the_stored_energy(ramp, edge_force):
     assert ramp[-1].energy_uj == pytest.approx(work_uj, rel=closes)
 
 
+def test_the_pressure_of_the_deformed_area_carries_the_same_force_on_a_wider_face(ramp):
+    """Ring by ring the same force; over the middle 1.3-1.9 % less pressure for each mm, since the face has widened."""
+    for loaded in ramp:
+        p_kpa, now_kpa = loaded.face.p_kpa[0], loaded.face.deformed_p_kpa(RAYS)[0]
+        r_mm = RAYS.r_mm[0]
+        now_mm = r_mm + loaded.face.outward_mm[0]
+        inside = r_mm <= 0.9 * r_mm[-1]
+        before_mn = simpson((p_kpa * r_mm)[inside], x=r_mm[inside])
+        assert simpson((now_kpa * now_mm)[inside], x=now_mm[inside]) == pytest.approx(before_mn, rel=5e-4)
+        less = 1 - (now_kpa / p_kpa)[r_mm < 5].mean()
+        assert 0.013 < less / loaded.face.indentation_mm < 0.019
+
+
 def test_every_load_is_kept_with_profiles_along_every_ray(ramp):
     assert [loaded.face.indentation_mm for loaded in ramp] == list(LOADS_MM)
     for loaded in ramp:

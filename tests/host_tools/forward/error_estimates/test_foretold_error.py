@@ -1,0 +1,44 @@
+"""What small strain foretells of a mesh holds what finite strain errs on it."""
+
+from dataclasses import replace
+
+import pytest
+
+from device.measurement.quantities import Inclusion
+from host_tools.forward.error_estimates.foretold_error import foretold_error
+from host_tools.forward.error_estimates.stated_error import numbers
+from host_tools.forward.ladder import climb
+from host_tools.forward.solve import solve
+from host_tools.scenes.scene import Press, Scene, Tissue
+
+TRUE = {"force_n": 0.2, "indentation_mm": 1.0, "max_deformation_mm": 0.02, "central_deformation_mm3": 3.0}
+STEPS = {"force_n": 0.001, "indentation_mm": 0.0, "max_deformation_mm": 0.02, "central_deformation_mm3": 0.0}
+
+
+def test_each_feature_states_three_times_its_own_error_or_its_step_and_half_of_the_largest_at_least():
+    same_mesh = TRUE | {"force_n": 0.202, "max_deformation_mm": 0.0201, "central_deformation_mm3": 3.0001}
+    stated = foretold_error(same_mesh, TRUE, STEPS)
+    assert stated["force_n"] == pytest.approx(0.03)
+    assert stated["max_deformation_mm"] == pytest.approx(0.02)
+    assert stated["central_deformation_mm3"] == pytest.approx(0.015)
+    assert stated["indentation_mm"] == 0.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "scene",
+    [
+        Scene(Inclusion(10.0, 6.0, 80.0), Press(indentation_mm=1.0)),
+        Scene(Inclusion(12.0, 4.0, 40.0), Press(force_n=0.2), tissue=Tissue(thickness_mm=40.0)),
+    ],
+)
+@pytest.mark.parametrize("tolerance", [0.2, 0.02])
+def test_the_true_error_in_finite_strain_is_within_the_stated_one(scene, tolerance):
+    climbed = climb(scene, [scene.press], tolerance=tolerance, strain="finite")
+    [found] = climbed.solutions
+    assert climbed.missed == ""
+    finer = solve(scene, replace(found.plan, grading="sliding_fine", order=4))
+    true = numbers(finer.rays, finer.pressed, finer.baseline)
+    for name, value in numbers(found.rays, found.pressed, found.baseline).items():
+        if name not in ("total_deformation_mm3", "force_n" if scene.press.force_n else "indentation_mm"):
+            assert abs(value / true[name] - 1) <= found.stated_error[name] <= tolerance
