@@ -18,13 +18,20 @@ from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.press_models.mode_outcome import Guess
 from host_tools.press_models.recorded_presses import in_parallel
 
+OF_INTERVAL = 1.645
+"""Standard deviations to each end of an interval of 90 %."""
+
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A phantom answered as unknown: truth, estimate and interval [3] in the unknowns' own units, and its misfit."""
+    """A phantom answered as unknown: truth, estimate and interval [3] in the unknowns' own units, and its misfit.
+
+    `tolerance` [3]: one standard deviation of the truth, as it is stated.
+    """
 
     name: str
     truth: Array
+    tolerance: Array
     value: Array
     low: Array
     high: Array
@@ -33,8 +40,10 @@ class LeftOut:
 
     @property
     def is_covered(self) -> NDArray[np.bool_]:
-        """Whether each interval [3] holds the truth."""
-        return np.asarray((self.low <= self.truth) & (self.truth <= self.high))
+        """Whether each interval [3] holds the truth, as far as that is known: both are wrong on their own."""
+        away, known = self.truth - self.value, OF_INTERVAL * self.tolerance
+        half = np.where(away > 0, self.high - self.value, self.value - self.low)
+        return np.asarray(np.abs(away) <= np.hypot(half, known))
 
 
 def answers_of(design: Design, fit: ProbeFit) -> OwnAnswers:
@@ -65,7 +74,8 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
     answer = _answer(answers, guess, ramp.seen)
     low, high = (denormalise_unknowns(ends) for ends in answer.intervals[:2])
     truth, value = denormalise_unknowns(ramp.stated[:COUNT]), denormalise_unknowns(answer.mean)
-    return LeftOut(ramp.name, truth, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
+    tolerance = denormalise_unknowns((ramp.stated + ramp.std)[:COUNT]) - truth
+    return LeftOut(ramp.name, truth, tolerance, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
 
 
 def answers_to_seen(

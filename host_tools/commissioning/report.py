@@ -25,17 +25,18 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
 
 def phantom_lines(phantoms: Sequence[LeftOut]) -> Iterator[str]:
     """Yield how each phantom left out was answered."""
-    yield f"{'phantom left out':18} {'misfit':>6}  " + "  ".join(f"{name:>28}" for name in UNKNOWNS)
+    yield f"{'phantom left out':18} {'misfit':>6}  " + "  ".join(f"{name:>32}" for name in UNKNOWNS)
     for one in phantoms:
         yield f"{one.name:18} {one.misfit_ratio:6.2f}  " + "  ".join(
-            f"{_told(one, place):>28}" for place in range(len(UNKNOWNS))
+            f"{_told(one, place):>32}" for place in range(len(UNKNOWNS))
         )
 
 
 def _told(one: LeftOut, place: int) -> str:
-    """Return truth and interval of an unknown, and whether the interval holds it."""
+    """Return stated truth and interval of an unknown, and whether they fit each other."""
     low, high, truth = one.low[place], one.high[place], one.truth[place]
+    stated = f"{truth:.3g} +- {one.tolerance[place]:.2g}"
     if not one.is_determined[place]:
-        return f"{truth:.3g}: not determined"
-    held = "in" if one.is_covered[place] else "NOT in"
-    return f"{truth:.3g} {held} {low:.3g}-{high:.3g}"
+        return f"{stated}: not determined"
+    held = "fits" if one.is_covered[place] else "NOT in"
+    return f"{stated} {held} {low:.3g}-{high:.3g}"

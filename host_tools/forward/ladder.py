@@ -41,8 +41,10 @@ FINITE_RUNGS = (
 )
 WIDEST_RIM = (Level("sliding_coarse", 3), Level("sliding_coarse", 4))
 """What is tried where the tissue slips further along the rim than elements there are long."""
-FIRST_ORDERS = {0.05: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
+FIRST_ORDERS = {0.1: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
 """By the tolerance from which on it is worth beginning there."""
+FIRST_SOLID = {0.3: 3, 0.05: 4, 0.005: 5, 0.0: 6}
+"""The same in 3-D, whose lower orders state far more than they err: a rung that cannot hold costs half of the next."""
 FIRST_FINITE = {0.15: 0, 0.02: 1, 0.005: 2, 0.002: 3, 0.0: 4}
 """The same for the rungs of finite strain."""
 CONVERGED = Level(GRADED, 5)
@@ -147,10 +149,12 @@ def climb(
 def _rungs(plan: ModelPlan, tolerance: float) -> Sequence[Level]:
     if plan.strain == "finite":
         return FINITE_RUNGS[next(rung for at_least, rung in FIRST_FINITE.items() if tolerance >= at_least) :]
-    first = next(order for at_least, order in FIRST_ORDERS.items() if tolerance >= at_least)
-    orders = SOLID_ORDERS if plan.symmetry != "axisymmetric" else FLAT_ORDERS
+    orders, firsts = FLAT_ORDERS, FIRST_ORDERS
     if plan.contact == "unilateral":
         orders = DOMED_ORDERS
+    elif plan.symmetry != "axisymmetric":
+        orders, firsts = SOLID_ORDERS, FIRST_SOLID
+    first = next(order for at_least, order in firsts.items() if tolerance >= at_least)
     return [Level(GRADED, order) for order in orders if order >= min(first, orders[-1])]
 
 

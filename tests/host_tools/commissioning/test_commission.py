@@ -23,7 +23,7 @@ from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning import commission as commission_module
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, commission, gates_of
 from host_tools.commissioning.joint_fit import FLAT_FIELD_RATIO, FLOOR, PROBE, Design, fit_probe
-from host_tools.commissioning.left_out import left_out
+from host_tools.commissioning.left_out import LeftOut, left_out
 from host_tools.commissioning.own_bundle import write_own_bundle
 from host_tools.commissioning.phantom_ramps import phantom_ramps
 from host_tools.commissioning.report import phantom_lines, probe_lines
@@ -181,3 +181,12 @@ def test_a_phantom_that_the_designs_model_does_not_hold_is_refused(tables, phant
     recording = recorded(tables, next(of_file(phantoms)))
     with pytest.raises(InvalidQuantity, match="depth_mm of"):
         phantom_ramps([recording], [known[0].name], others, simulated_probe())
+
+
+def test_an_interval_fits_a_truth_as_far_as_that_is_known():
+    """An interval of 10 +- 0.3 and a truth of 10.4: missed where that is exact, not where it is known to 0.2."""
+    known, wide = np.zeros(3), np.full(3, 0.2)
+    answer = LeftOut("A1", np.full(3, 10.4), known, np.full(3, 10.0), np.full(3, 9.7), np.full(3, 10.3), known > 1, 1.0)
+    assert not answer.is_covered.any()
+    assert replace(answer, tolerance=wide).is_covered.all()
+    assert not replace(answer, tolerance=wide, truth=np.full(3, 9.5)).is_covered.any()
