@@ -94,7 +94,7 @@ class Climb:
         if self.reached <= self.tolerance:
             return ""
         return (
-            f"tolerance is {asked}, but {self.feature} is only good to {100 * self.reached:.2g} % ({self.ended}): "
+            f"tolerance is {asked}, but {self.feature} is only good to {100 * self.reached:.3g} % ({self.ended}): "
             f"allow a larger tolerance or more time (--within-s), or {TAKE_THE_BEST}."
         )
 
