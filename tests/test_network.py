@@ -81,7 +81,7 @@ def test_a_browser_is_led_from_the_clear_address_to_pairing(probe):
     assert (clear.status_code, clear.headers["location"]) == (307, f"{probe.url}/")
     encrypted = probe.ask("GET", "/")
     assert (encrypted.status_code, encrypted.headers["location"]) == (303, "/pair")
-    assert "Pair with the probe" in probe.ask("GET", "/pair").text
+    assert "/static/pair.js" in probe.ask("GET", "/pair").text
 
 
 @contextlib.contextmanager
