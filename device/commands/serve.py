@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from device import __version__
 from device.access.known_hosts import ANYWHERE
@@ -197,11 +197,13 @@ def _hospital(procedure: Procedure) -> Hospital:
     from device.dicom.hospital import Hospital
     from device.instrument.press.picture import kept_or_drawn
 
-    def tell(fault: DeviceError | None) -> None:
-        if procedure.board.now.archive is not fault:
-            procedure.board.update(archive=fault)
-
-    return Hospital(procedure.config.dicom, procedure.store, kept_or_drawn, tell, lambda: _is_pressed(procedure))
+    return Hospital(
+        procedure.config.dicom,
+        procedure.store,
+        kept_or_drawn,
+        _telling("archive", procedure),
+        lambda: _is_pressed(procedure),
+    )
 
 
 def _notifier(procedure: Procedure) -> Notifier | None:
@@ -211,11 +213,18 @@ def _notifier(procedure: Procedure) -> Notifier | None:
         return None
     from device.webhook.notifier import Notifier
 
-    def tell(fault: DeviceError | None) -> None:
-        if procedure.board.now.webhook is not fault:
-            procedure.board.update(webhook=fault)
-
+    tell = _telling("webhook", procedure)
     return Notifier(settings, procedure.store, procedure.config.serial, tell, lambda: _is_pressed(procedure))
+
+
+def _telling(receiver: Literal["archive", "webhook"], procedure: Procedure) -> Callable[[DeviceError | None], None]:
+    """Return what the status hears of a receiver, whenever that changes."""
+
+    def tell(fault: DeviceError | None) -> None:
+        if getattr(procedure.board.now, receiver) is not fault:
+            procedure.board.update(**{receiver: fault})
+
+    return tell
 
 
 def _is_pressed(procedure: Procedure) -> bool:

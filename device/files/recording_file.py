@@ -237,7 +237,7 @@ def _from_json(record: dict[str, Any], read: Callable[[str], bytes]) -> Recordin
         bound = f"{SCHEMA} or {SCAN_SCHEMA}"
         raise InvalidQuantity("schema", record["schema"], bound, "convert the recording with matching software")
     head, truth, entries = _head(record), record.get("truth"), _field(record, "frames", list)
-    _require_room_for(len(entries), head.camera)
+    require_room_for(len(entries), head.camera)
     recording = Recording(
         id=_field(record, "id", str),
         serial=head.serial,
@@ -273,7 +273,7 @@ def _force(entry: Any, where: str) -> FrameForce:
     return FrameForce(_field(entry, "role", str, where), int(entry.get("ramp", 0)), t_s, force_n)
 
 
-def _require_room_for(frames: int, camera: CameraSettings) -> None:
+def require_room_for(frames: int, camera: CameraSettings) -> None:
     """Refuse more frames than `MOST_BYTES` of memory hold, before any of them is read."""
     of_one = camera.width_px * camera.height_px * (1 if camera.bits == 8 else 2)
     most = MOST_BYTES // max(int(of_one), 1)

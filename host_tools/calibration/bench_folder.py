@@ -12,11 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path, PurePosixPath
-from typing import cast, get_args
+from typing import Literal, cast, get_args
 
 import cv2
 import numpy as np
 
+from device.files.recording_file import require_room_for
 from device.files.toml_record import InvalidRecord
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.led_sides import LedRatio
@@ -58,9 +59,11 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
     """Return the recording that a table of frames (CSV) and the folder of their images make.
 
     Images are mono PNG or TIFF of the size and depth of the probe's file. Raises `InvalidQuantity`, with all
-    `problems`, for a column that is missing or unknown, for each line that is no frame, and for missing roles.
+    `problems`, for a column that is missing or unknown, for each line that is no frame, for missing roles, and for more
+    frames than memory holds.
     """
     rows = _rows(table)
+    require_room_for(len(rows), _camera(press, probe, 16))
     problems: list[InvalidQuantity] = []
     frames: list[Frame] = []
     for number, row in enumerate(rows, start=2):
@@ -78,18 +81,18 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         serial=probe.serial,
         software=press.software,
         started_at=press.started_at,
-        camera=_camera(press, probe, 8 * ordered[0].counts.itemsize),
+        camera=_camera(press, probe, 8 if ordered[0].counts.dtype == np.uint8 else 16),
         frames=tuple(ordered),
         cell=RecordedCell(probe.cell.counts_per_n),
     )
 
 
-def _camera(press: PressOnBench, probe: Probe, bits: int) -> CameraSettings:
+def _camera(press: PressOnBench, probe: Probe, bits: Literal[8, 16]) -> CameraSettings:
     camera = probe.camera
     return CameraSettings(
         camera.width_px,
         camera.height_px,
-        8 if bits == 8 else 16,
+        bits,
         camera.mm_per_px_x,
         camera.mm_per_px_y,
         press.exposure_us,

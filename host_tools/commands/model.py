@@ -1,4 +1,4 @@
-"""`host_tools table` and `phantom`: the simulated probe's tables and its recordings of phantoms."""
+"""`host_tools table`, `phantom` and `import`: the simulated probe's tables, its recordings of phantoms, a bench's."""
 
 from __future__ import annotations
 

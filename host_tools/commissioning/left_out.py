@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
+from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
 from device.measurement.ramp_modes.own_answers import OwnAnswers
 from device.measurement.ramp_modes.radial_profile import SeenPresses
 from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.press_models.mode_outcome import Guess
 from host_tools.press_models.recorded_presses import in_parallel
-
-OF_INTERVAL = 1.645
-"""Standard deviations to each end of an interval of 90 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +39,7 @@ class LeftOut:
     @property
     def is_covered(self) -> NDArray[np.bool_]:
         """Whether each interval [3] holds the truth, as far as that is known: both are wrong on their own."""
-        away, known = self.truth - self.value, OF_INTERVAL * self.tolerance
+        away, known = self.truth - self.value, np.sqrt(CHI_SQUARE_90) * self.tolerance
         half = np.where(away > 0, self.high - self.value, self.value - self.low)
         return np.asarray(np.abs(away) <= np.hypot(half, known))
 

@@ -39,7 +39,6 @@ PROBES, PRESSES, MOST_KNOWN = 20, 60, 300
 TOLERANT = 10
 """Presses of each probe that are also answered by its tolerances alone."""
 NEGLIGIBLE = 1e-6
-SOFT_KPA = 15.0
 HEADER = (
     "answered by", "refused", "size covered", "depth covered", "both covered", "size, depth determined", "E determined",
     "size RMSE (mm)", "depth RMSE (mm)", "median misfit",

@@ -12,16 +12,8 @@ from written_exam import begin, measure
 from device.config import DicomSection
 from device.dicom.hospital import Hospital
 from device.files.recording_file import read_picture
-from device.records.store import Store
 from device.web.app import create_app
 from device.web.dicom import HospitalStatus, SentExam
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture(params=["127.0.0.1"])

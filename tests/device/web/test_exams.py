@@ -8,20 +8,12 @@ import httpx
 import pytest
 from probe_card import add_measurement
 
-from device.records.store import Store
 from device.web import schema
 from device.web.app import create_app
 
 EXAM = {"kind": "patient", "patient_ref": "A-17", "side": "left", "clock_position": 10, "operator": "Ada"}
 ACT = {"by": "Ada", "reason": "Mixed up"}
 PAGE = {"before_seq": 2**62, "limit": 99}
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import types
 import httpx
 import pytest
 
-from device.records.store import Store
 from device.web.app import create_app
 
 PATIENT = '"kind": "patient", "patient_ref": "A-17", "operator": "Ada"'
@@ -41,13 +40,6 @@ BODIES = {
     "no text": b"\xff\xfe\x00",
 }
 IDS = ["00000000-0000-4000-8000-000000000000", "1", "..%2f..%2fetc%2fpasswd", "%00", "' OR '1'='1", "x" * 300]
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import types
 import httpx
 import pytest
 
-from device.records.store import Store
 from device.web import pairing
 from device.web.app import create_app
 from device.web.entrance.door import COOKIE, Door
@@ -15,13 +14,6 @@ from device.web.entrance.network import ServedNetwork
 from device.web.schema import AuditList
 
 FAR = "192.0.2.7"
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

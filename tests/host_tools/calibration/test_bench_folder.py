@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from device.files.recording_file import read_recording
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import press_profiles
 from host_tools.__main__ import app
 from host_tools.calibration.bench_folder import NEEDED, PressOnBench, bench_recording
@@ -22,8 +22,6 @@ LEDS = ("led_x", "led_y", "led_minus_x", "led_minus_y")
 
 @pytest.fixture(scope="module")
 def recorded(tables):
-    from device.measurement.quantities import Inclusion
-
     protocol = PhantomProtocol(tuple(np.linspace(0.1, 0.64, 8)), frames=1)
     return phantom_recording(Inclusion(12.0, 6.0, 60.0), tables, seed=3, protocol=protocol)
 
@@ -112,6 +110,13 @@ def test_missing_roles_and_a_time_without_a_zone_are_refused(recorded, tmp_path)
     assert "reference frames is 0" in str(refused.value)
     with pytest.raises(InvalidQuantity, match="started_at"):
         replace(PRESS, started_at="2026-11-02T09:30:00")
+
+
+def test_more_frames_than_memory_holds_are_refused_before_any_is_read(tmp_path):
+    line = "none.png,press,0.5,0\n"
+    (tmp_path / "frames.csv").write_text("file,role,force_n,t_s\n" + 100_000 * line)
+    with pytest.raises(InvalidQuantity, match="frames of the recording is 100000"):
+        bench_recording(tmp_path, tmp_path / "frames.csv", PRESS, simulated_probe())
 
 
 def test_the_command_writes_a_recording_and_nothing_of_a_bad_table(recorded, tmp_path):

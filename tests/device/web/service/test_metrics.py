@@ -12,7 +12,6 @@ from device.errors import DimLightError, LightBusError, StorageError
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.readiness import PartHealth
 from device.records.exams import ExamContent
-from device.records.store import Store
 from device.web.app import create_app
 
 
@@ -30,13 +29,6 @@ class Probe:
 
     def parts(self):
         return self.health
-
-
-@pytest.fixture
-def store(tmp_path):
-    opened = Store(tmp_path / "var")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture
