@@ -10,7 +10,6 @@ import ssl
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import pynetdicom.association
 from pydicom.dataset import Dataset
@@ -18,6 +17,7 @@ from pydicom.uid import UID
 from pynetdicom import AE, evt
 from pynetdicom.association import Association
 from pynetdicom.dul import DULServiceProvider
+from pynetdicom.pdu import A_ASSOCIATE_RJ
 
 from device.config import DicomSection
 from device.dicom.subject import IMPLEMENTATION_UID
@@ -91,16 +91,16 @@ def associated(remote: RemoteProgram, settings: DicomSection, sop_classes: Seque
     own = application(settings)
     for sop_class in sop_classes:
         own.add_requested_context(sop_class)
-    connections: list[object] = []
+    heard = _Heard()
     association = own.associate(
         remote.host,
         remote.port,
         ae_title=remote.title,
         tls_args=_tls(settings, remote),
-        evt_handlers=[(evt.EVT_CONN_OPEN, connections.append)],
+        evt_handlers=[(evt.EVT_CONN_OPEN, heard.connection), (evt.EVT_PDU_RECV, heard.pdu)],
     )
     if not association.is_established:
-        raise unreachable(remote, _refusal(association, settings) if connections else "cannot be reached")
+        raise unreachable(remote, heard.why_not(settings.own_title))
     try:
         yield association
     finally:
@@ -127,11 +127,29 @@ def echo(remote: RemoteProgram, settings: DicomSection) -> None:
         raise unreachable(remote, "gives no answer" if status is None else f"answers with status {status:#06x}")
 
 
-def _refusal(association: Association, settings: DicomSection) -> str:
-    if association.is_rejected:
-        answer: Any = association.acceptor.primitive
-        return f"rejects {settings.own_title}: {answer.reason_str}"
-    return "takes none of what this probe offers, or broke the connection off"
+class _Heard:
+    """What came of asking for an association, as pynetdicom's thread of the connection hears it.
+
+    `Association.is_rejected` would say it, too, but not when the remote program closes right behind its refusal:
+    pynetdicom's other thread then finds the connection gone and takes the refusal for none (one time in nine).
+    """
+
+    def __init__(self) -> None:
+        self._is_connected, self._refusal = False, ""
+
+    def connection(self, _event: evt.Event) -> None:
+        self._is_connected = True
+
+    def pdu(self, event: evt.Event) -> None:
+        if isinstance(event.pdu, A_ASSOCIATE_RJ):
+            self._refusal = event.pdu.reason_str
+
+    def why_not(self, own_title: str) -> str:
+        if self._refusal:
+            return f"rejects {own_title}: {self._refusal}"
+        if self._is_connected:
+            return "takes none of what this probe offers, or broke the connection off"
+        return "cannot be reached"
 
 
 def _tls(settings: DicomSection, remote: RemoteProgram) -> tuple[ssl.SSLContext, str] | None:

@@ -30,20 +30,12 @@ def test_each_program_is_asked_and_told_by_itself(tmp_path, stated, capsys):
         assert capsys.readouterr().out == f"archive {TITLE} at 127.0.0.1:{archive.port}: answers\n"
         assert main(stated(f'{there}worklist_host = "127.0.0.1"\nworklist_port = {free_port()}\n')) == 1
         assert "worklist WORKLIST" in capsys.readouterr().out
-        causes = (
-            _cause_of_no_answer([*stated(f'{there}own_title = "STRANGER"\n'), "--json"], capsys) for _ in range(20)
-        )
-        # Orthanc closes right behind its refusal: what is on its way may be lost with the connection.
-        assert next(cause for cause in causes if "broke the connection off" not in cause).count("rejects STRANGER") == 1
+        assert main([*stated(f'{there}own_title = "STRANGER"\n'), "--json"]) == 1
+        told = json.loads(capsys.readouterr().out)["archive"]
+        assert (told["answers"], told["fault"]["code"]) == (False, "E030")
+        assert "rejects STRANGER" in told["fault"]["cause"]
     finally:
         archive.close()
-
-
-def _cause_of_no_answer(command, capsys):
-    assert main(command) == 1
-    told = json.loads(capsys.readouterr().out)["archive"]
-    assert (told["answers"], told["fault"]["code"]) == (False, "E030")
-    return told["fault"]["cause"]
 
 
 def test_without_any_program_it_says_which_setting_is_missing(stated, capsys):

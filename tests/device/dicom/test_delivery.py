@@ -119,8 +119,9 @@ def test_an_archive_that_is_not_there_costs_nothing_but_time(store, outgoing, de
     outgoing.queue(exam["id"], version=1, by="Ada")
     with pytest.raises(ArchiveUnreachable, match=r"archive HOSPACS at 127\.0\.0\.1:\d+ cannot be reached"):
         deliver(archive_port=free_port())
-    with pytest.raises(ArchiveUnreachable, match="rejects STRANGER"):
-        deliver(own_title="STRANGER")
+    for _ in range(40):  # Orthanc closes right behind its refusal: one in nine was told as a broken connection
+        with pytest.raises(ArchiveUnreachable, match="rejects STRANGER"):
+            deliver(own_title="STRANGER")
     assert states(store) == ["queued"] * 4
     deliver()
     assert states(store) == ["confirmed"] * 4

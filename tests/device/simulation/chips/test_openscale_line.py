@@ -46,9 +46,13 @@ def readings(data: bytes) -> list[bytes]:
     return data.split(b"Readings:\r\n")[1].split(b"\r\n")
 
 
-def read_for_ever(cell: OpenScale) -> None:
-    while True:
+def fault_in(cell: OpenScale) -> LoadCellError | None:
+    """Return what a read fails with. On a busy machine any line may come too late and be a silence."""
+    try:
         cell.read(timeout_s=0.1)
+    except LoadCellError as error:
+        return error
+    return None
 
 
 def reached(condition: Callable[[], bool]) -> bool:
@@ -145,9 +149,7 @@ def test_a_fault_shows_in_the_bytes_and_is_over_when_it_is_over(kind, error):
     cell = open_load_cell(scale.device_path)
     assert cell.read(timeout_s=30.0).counts == 42.0
     fault.is_on = True
-    with pytest.raises(error) as caught:
-        read_for_ever(cell)
-    assert type(caught.value) is error
+    assert reached(lambda: type(fault_in(cell)) is error)
     fault.is_on = False
     assert first_reading(cell) == 42.0
     cell.close()
@@ -197,7 +199,6 @@ def test_closing_is_unplugging_for_the_reader_and_ends_the_thread():
     cell = open_load_cell(scale.device_path)
     scale.close()
     scale.close()
-    with pytest.raises(LoadCellError, match="is gone"):
-        read_for_ever(cell)
+    assert reached(lambda: "is gone" in str(fault_in(cell)))
     cell.close()
     assert "load cell stream" not in {thread.name for thread in threading.enumerate()}
