@@ -18,7 +18,7 @@ from device.measurement.quantities import Inclusion
 from host_tools.forward.accuracy import Level, prescribed
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.ladder import lightened, solved_at
-from host_tools.forward.plan import BLUNT, GRADED, STANDARD, model_plan
+from host_tools.forward.plan import BLUNT, GRADED, STANDARD, StrainModel, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
@@ -37,7 +37,7 @@ UNRESOLVED = 1e-5
 FINEST_SLIDING = (Level("sliding_fine", 5), Level("sliding_fine", 4), Level("sliding", 5), Level("sliding", 4))
 """Truths of finite strain, the first that can be had: corrected by what the same mesh errs in small strain."""
 
-Draw = Callable[[np.random.Generator], Scene]
+DrawScene = Callable[[np.random.Generator], Scene]
 
 
 class ErrorStatement(NamedTuple):
@@ -64,7 +64,7 @@ class ModelKind(NamedTuple):
     """A sort of model: how its scenes are drawn and how many, its levels, and the level of its truth."""
 
     name: str
-    draw: Draw
+    draw: DrawScene
     scenes: int
     levels: tuple[Level, ...]
     truths: tuple[Level, ...]
@@ -212,7 +212,7 @@ def scored(kind: ModelKind, scene: Scene) -> list[ErrorStatement]:
 
 
 def _at_level(kind: ModelKind, scene: Scene, level: Level) -> Solution:
-    strain = "finite" if kind.is_finite else "small"
+    strain: StrainModel = "finite" if kind.is_finite else "small"
     if level in (STANDARD, BLUNT):
         return solve(scene, model_plan(scene, strain=strain), estimate_error=True)
     return solved_at(scene, level, strain=strain)

@@ -7,8 +7,8 @@ from host_tools.forward.accuracy import Level
 from host_tools.forward.ladder import FINITE_RUNGS
 from host_tools.verification.effectivity import (
     KINDS,
-    ModelKind,
     ErrorStatement,
+    ModelKind,
     box_scene,
     chapter_of,
     measure_effectivity,
