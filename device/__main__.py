@@ -42,6 +42,7 @@ VERBS = {
     "update": "install a signed release, go back",
     "backup": "save measurements, settings, certificates and own models to a file",
     "restore": "bring a backup to a card that holds no measurements yet",
+    "erase": "overwrite measurements and keys of a probe that is given away",
     "status": "say what the daemon does, and what the last press was",
     "exams": "list the exams that are kept",
     "export": "write measurements to a table, arrays or an archive of recordings",
@@ -196,6 +197,11 @@ def _run(options: argparse.Namespace) -> int:
             from device.commands.restore import run_restore_command
 
             return run_restore_command(options, _stated(options))
+        case "erase":
+            from device.commands.erase import run_erase_command
+
+            config = _start_settings(options, _scenario(options)).config
+            return run_erase_command(options, config, _stated(options))
         case "support" | "support-bundle":
             from device.commands.support import run_support_command
 

@@ -76,7 +76,7 @@ def restore_backup(
         wanted = {entry.name: entry for entry in archive.entries.values() if targets.wants(entry.name)}
         for name in wanted:
             targets.of(name)  # refuses what has no place here before anything is written
-        with _daemon_kept_out(targets.data):
+        with daemon_kept_out(targets.data):
             _require_nothing_lost(targets.data, wanted)
             _require_room(targets, wanted.values())
             try:
@@ -158,7 +158,7 @@ def _require_place(name: str, place: Path, own: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def _daemon_kept_out(data: Path) -> Iterator[None]:
+def daemon_kept_out(data: Path) -> Iterator[None]:
     """Hold the data folder's lock; raise `BusyError` while a daemon has it."""
     data.mkdir(parents=True, exist_ok=True)
     # Root must not follow a link that lies in the daemon's own folder.

@@ -1,7 +1,8 @@
 """The verbs of `python -m device`, one file each: options in, exit code out.
 
 Modules in reading order: `serve`, `analyse`, `record`, `calibration`, `self_test`, `config`, `faults`, `audit`,
-`pair`, `tokens`, `openapi`, `update`, `backup`, `restore`, `support`, `dicom`, `led_off`.
+`pair`, `tokens`, `openapi`, `update`, `backup`, `restore`, `erase`, `support`, `dicom`,
+`led_off`.
 
 Those that only look are in `look`. What a verb does stands in the room that does it; here are its options and what it
 prints. `led_off` imports no NumPy.

@@ -75,6 +75,23 @@ def show(
     print(json.dumps(checked_manifest(file, signers.read_text(encoding="utf-8")), indent=1))
 
 
+@release.command(epilog="Example: host_tools release advisories dist/tsis-0.1.0-aarch64.release --database all.zip")
+def advisories(
+    file: Annotated[Path, typer.Argument(help="Release file, or its sbom.json.", exists=True, dir_okay=False)],
+    database: Annotated[Path, typer.Option(help="Folder or zip of advisories (OSV), as osv.dev's.", exists=True)],
+) -> None:
+    """Print the known vulnerabilities of a release's wheels, offline: exit code 1 when there is one."""
+    from host_tools.release.advisories import compared, parts_of
+
+    comparison = compared(parts_of(file), database)
+    for one in comparison.found:
+        mended = " or ".join(one.mended_in) or "no version yet"
+        print(f"{one.part.name} {one.part.version}: {' '.join(one.names)}, mended in {mended}: {one.summary}")
+    print(f"{comparison.parts} parts, {comparison.advisories} advisories as of {comparison.newest}: ", end="")
+    print(f"{len(comparison.found)} known vulnerabilities" if comparison.found else "no known vulnerability")
+    raise typer.Exit(1 if comparison.found else 0)
+
+
 @release.command(epilog="Example: host_tools release key ~/.config/tsis/release_key")
 def key(
     file: Annotated[Path, typer.Argument(help="File of the private key; the public one gets .pub.")] = KEY,

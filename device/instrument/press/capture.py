@@ -108,15 +108,18 @@ class Capture:
         flow.
         """
         guidance = self.board.now.guidance
-        while True:
-            self._wait_until_untouched()
+        try:
+            while True:
+                self._wait_until_untouched()
+                began_s = time.monotonic()
+                frames = self._untouched_frames()
+                # A flat field under load would be wrong in every pixel, and nothing else would tell.
+                if self.stopping.is_set() or self.bench.peak_n(began_s, frames[-1].t_s) < self.press.contact_n:
+                    return frames
+                self.board.update(guidance=Guidance.LIFT)
+        finally:
+            # Not before the frames are there: whoever is told to press as soon as he lifts never gets beyond them.
             self.board.update(guidance=guidance)
-            began_s = time.monotonic()
-            frames = self._untouched_frames()
-            # A flat field under load would be wrong in every pixel, and nothing else would tell.
-            if self.stopping.is_set() or self.bench.peak_n(began_s, frames[-1].t_s) < self.press.contact_n:
-                return frames
-            self.board.update(guidance=Guidance.LIFT)
 
     def _wait_until_untouched(self) -> None:
         self.bench.light(DARK)

@@ -65,10 +65,11 @@ class PressPosterior:
         self._whitening = np.linalg.inv(np.linalg.cholesky(noise.scan_covariance(presses)))
 
     def residuals(self, at: Array) -> Array:
-        """Return whitened residuals [..., S] at coordinates [..., 8 + N]."""
+        """Return whitened residuals [..., S] at coordinates [..., 8 + N], in their precision."""
         points = at.reshape(-1, self.dimensions)
         rows = self._surrogate.rows(self._of_presses(points), self._directions(len(points)))
-        residuals = (self._joined(self._apart(rows)) - self._row) @ self._whitening.T
+        away = self._joined(self._apart(rows)) - self._row.astype(at.dtype)
+        residuals = away @ self._whitening.T.astype(at.dtype)
         return np.asarray(residuals.reshape(*at.shape[:-1], len(self._row)))
 
     def whitened(self, change: Array) -> Array:
@@ -94,13 +95,13 @@ class PressPosterior:
         """
         log = np.full(len(at), -np.inf)
         inside = np.all(np.abs(at) <= 1, axis=1)
-        residuals = self.residuals(at[inside])
+        residuals = self.residuals(at[inside].astype(np.float32))  # single precision: see `PressRows`
         log[inside] = np.log1p(at[inside, OFFSET:]).sum(axis=1) - 0.5 * np.sum(residuals**2, axis=1)
         return log
 
     def _of_presses(self, at: Array) -> Array:
         """Return the coordinates [n N, 9] of `normalise` of every press, for coordinates [n, 8 + N]."""
-        each = np.empty((len(at), self.presses, len(PARAMETERS)))
+        each = np.empty((len(at), self.presses, len(PARAMETERS)), at.dtype)
         each[:, :, :OFFSET] = at[:, None, :OFFSET]
         each[:, :, OFFSET] = self._units * (at[:, OFFSET:] + 1) - 1
         return each.reshape(-1, len(PARAMETERS))
@@ -132,7 +133,9 @@ def best_fit(posterior: Explained, start: Array) -> Array:
     return np.asarray(best)
 
 
-def best_fits(posterior: Explained, start: Array, free: NDArray[np.bool_], *, tolerance: float) -> Array:
+def best_fits(
+    posterior: Explained, start: Array, free: NDArray[np.bool_], *, tolerance: float, steps: int = STEPS
+) -> Array:
     """Return the best fits [n, 8 + N] begun at n points, in those of the coordinates that are `free`; others stay."""
     held = np.broadcast_to(np.eye(free.sum()) / EVEN_STD, (len(start), free.sum(), free.sum()))
 
@@ -144,5 +147,5 @@ def best_fits(posterior: Explained, start: Array, free: NDArray[np.bool_], *, to
         return together, np.concatenate([jacobian[:, :, free], held[: len(at)]], axis=1)
 
     best = np.array(start)
-    best[:, free] = least_squares(residuals, start[:, free], low=-1.0, high=1.0, tolerance=tolerance, steps=STEPS)
+    best[:, free] = least_squares(residuals, start[:, free], low=-1.0, high=1.0, tolerance=tolerance, steps=steps)
     return best

@@ -41,9 +41,10 @@ class LegendreSum:
     coefficients: Array
 
     def values(self, at: Array) -> Array:
-        """Return the outputs [n, Q] at points [n, V] of the cube from -1 to 1."""
+        """Return the outputs [n, Q] at points [n, V] of the cube from -1 to 1, in the precision of the points."""
         parts = np.split(at, range(POINTS_AT_ONCE, len(at), POINTS_AT_ONCE))
-        return np.concatenate([self._ordered.T @ self._terms.tree_values(part) for part in parts], axis=1).T
+        outputs_of_terms = (self._ordered_single if at.dtype == np.float32 else self._ordered).T
+        return np.concatenate([outputs_of_terms @ self._terms.tree_values(part) for part in parts], axis=1).T
 
     def values_and_gradient(self, at: Array) -> tuple[Array, Array]:
         """Return the outputs [n, Q] and their derivatives [V, n, Q] by each variable."""
@@ -62,6 +63,10 @@ class LegendreSum:
         ordered = np.zeros((self._terms.size, self.coefficients.shape[1]))
         np.add.at(ordered, self._terms.places, self.coefficients)
         return ordered
+
+    @cached_property
+    def _ordered_single(self) -> NDArray[np.float32]:
+        return self._ordered.astype(np.float32)
 
 
 class LegendreTerms:
@@ -87,7 +92,7 @@ class LegendreTerms:
     def tree_values(self, at: Array) -> Array:
         """Return the tree's terms [T, n] at points [n, V]."""
         polynomials = _polynomials(at, self._highest)
-        terms = np.ones((self.size, len(at)))
+        terms = np.ones((self.size, len(at)), at.dtype)
         for level in self._levels:
             np.multiply(terms[level.parent], polynomials[level.degree, level.variable], out=terms[level.rows])
         return terms
@@ -143,7 +148,7 @@ def _last_variable(term: Degrees) -> int:
 def _polynomials(at: Array, highest: int) -> Array:
     """Return the polynomials [highest + 1, V, n] of every variable, degree by degree."""
     x = at.T
-    values = np.ones((highest + 1, *x.shape))
+    values = np.ones((highest + 1, *x.shape), x.dtype)
     values[1:2] = x
     for k in range(2, highest + 1):
         values[k] = ((2 * k - 1) * x * values[k - 1] - (k - 1) * values[k - 2]) / k

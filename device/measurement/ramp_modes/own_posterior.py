@@ -82,11 +82,11 @@ class OwnPosterior:
         return np.asarray(self._whitening @ _joined(seen.transpose(1, 0, 2)).T)
 
     def residuals(self, at: Array) -> Array:
-        """Return whitened residuals [..., S] at coordinates [..., 8 + 2 N]."""
+        """Return whitened residuals [..., S] at coordinates [..., 8 + 2 N], in their precision."""
         points = at.reshape(-1, self.dimensions)
         place = self._place(points)
         seen = _turned(self._rows(place), place.angle_rad).reshape(len(points), self.presses, SEEN_COLUMNS)
-        residuals = (_joined(seen) - self._seen) @ self._whitening.T
+        residuals = (_joined(seen) - self._seen.astype(at.dtype)) @ self._whitening.T.astype(at.dtype)
         return np.asarray(residuals.reshape(*at.shape[:-1], len(self._seen)))
 
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
@@ -117,7 +117,8 @@ class OwnPosterior:
         log = np.full(len(at), -np.inf)
         from_axis = self._from_axis(at).reshape(len(at), self.presses)
         inside = np.all(np.abs(at[:, :OFFSET]) <= 1, axis=1) & np.all(from_axis <= 1, axis=1)
-        log[inside] = -0.5 * np.sum(self.residuals(at[inside]) ** 2, axis=1)
+        residuals = self.residuals(at[inside].astype(np.float32))  # single precision: see `PressRows`
+        log[inside] = -0.5 * np.sum(residuals**2, axis=1)
         return log
 
     def _rows(self, place: Place) -> Array:
@@ -130,7 +131,7 @@ class OwnPosterior:
 
     def _place(self, at: Array) -> Place:
         """Return where the inclusions of n N presses lie."""
-        each = np.empty((len(at), self.presses, len(PARAMETERS)))
+        each = np.empty((len(at), self.presses, len(PARAMETERS)), at.dtype)
         each[:, :, :OFFSET] = at[:, None, :OFFSET]
         each[:, :, OFFSET] = 2 * self._units * self._from_axis(at).reshape(len(at), self.presses) - 1
         xy = at[:, OFFSET:].reshape(-1, AXES)

@@ -163,7 +163,7 @@ class OwnProbe:
 
 def turned_columns(rows: Array, angle_rad: float | Array) -> Array:
     """Return rows [..., P] in the inclusion's direction as seen [..., S], at an angle [..., 1] from the bright side."""
-    seen = np.concatenate([rows, np.zeros((*rows.shape[:-1], SEEN_COLUMNS - COLUMNS))], axis=-1)
+    seen = np.concatenate([rows, np.zeros((*rows.shape[:-1], SEEN_COLUMNS - COLUMNS), rows.dtype)], axis=-1)
     for order, along, across in ((1, FIRST, FIRST_ACROSS), (2, SECOND, SECOND_ACROSS)):
         seen[..., along] = rows[..., along] * np.cos(order * angle_rad)
         seen[..., across] = rows[..., along] * np.sin(order * angle_rad)

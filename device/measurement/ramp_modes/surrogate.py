@@ -70,11 +70,12 @@ class PressSurrogate:
     def rows(self, normalised: Array, direction_rad: Array | None = None) -> Array:
         """Return profile rows [n, P] at coordinates [n, 9] of `parameters.normalise`; directions as in `PressRows`."""
         parameters = denormalise(normalised)
-        at = self.coordinates(normalised, parameters)
+        at = self.coordinates(normalised, parameters).astype(normalised.dtype)
         inclusion = self.inclusion_field.values(at)
         if direction_rad is not None:
             inclusion += turned(self.turned_field.values(at), direction_rad)
-        return assemble(inclusion_factor(parameters) * inclusion, self.baseline.values(at))
+        inclusion *= inclusion_factor(parameters)
+        return assemble(inclusion, self.baseline.values(at))
 
     def rows_and_jacobian(self, normalised: Array, direction_rad: Array | None = None) -> tuple[Array, Array]:
         """Return the rows [n, P] at coordinates [n, 9] and their derivatives [n, P, 9] by them."""
@@ -119,6 +120,8 @@ class PressSurrogate:
 class PressRows(Protocol):
     """A forward model of a press at any offset up to `to_mm`, in coordinates of `parameters.normalise`.
 
+    Rows have the precision of their coordinates. Single is twice as fast and good to a millionth of the light, far
+    below noise: a posterior's samples need no more.
     Directions [n] are those in which the inclusion lies in the image; without them rows are the mean over all of them.
     """
 
@@ -151,7 +154,7 @@ class ScanSurrogate:
     def rows(self, normalised: Array, direction_rad: Array | None = None) -> Array:
         """Return profile rows [n, P] at coordinates [n, 9], each of the surrogate that holds its offset."""
         is_beside = self._is_beside(normalised)
-        rows = np.empty((len(normalised), COLUMNS))
+        rows = np.empty((len(normalised), COLUMNS), normalised.dtype)
         for surrogate, chosen in ((self.near, ~is_beside), (self.beside, is_beside)):
             if chosen.any():
                 rows[chosen] = surrogate.rows(normalised[chosen], _of(direction_rad, chosen))

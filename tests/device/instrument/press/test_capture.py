@@ -298,14 +298,17 @@ def test_whoever_holds_the_probe_since_the_start_is_told_to_lift_it(capture_of):
 
 
 def test_unloaded_frames_that_were_touched_meanwhile_are_taken_again_and_the_operator_is_told_to_lift(capture_of):
-    """A tap between two looks at the force: a flat field under load would be wrong in every pixel."""
+    """A tap between two looks at the force: a flat field under load would be wrong in every pixel.
+
+    And it is told until they are taken: a hand that presses whenever it is told to would touch each time before.
+    """
     capture, peaks_n, told = capture_of(0.0, 0.0, 0.0), [0.3, 0.0], []
     capture.bench.peak_n = lambda since_s, t_s: peaks_n.pop(0)
-    capture.board.on_guidance(told.append)
+    capture.board.on_guidance(lambda guidance: told.append((guidance, capture.bench.taken)))
     frames = capture.unloaded()
     assert capture.bench.taken == 4 * UNLOADED_FRAMES
     assert [frame.t_s for frame in frames] == list(range(2 * UNLOADED_FRAMES + 1, 4 * UNLOADED_FRAMES + 1))
-    assert told == [Guidance.LIFT, Guidance.WAIT]
+    assert told == [(Guidance.LIFT, 2 * UNLOADED_FRAMES), (Guidance.WAIT, 4 * UNLOADED_FRAMES)]
     assert capture.bench.lights[-1] == DARK
 
 

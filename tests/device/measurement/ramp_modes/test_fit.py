@@ -88,4 +88,16 @@ def test_the_density_of_many_points_is_that_of_each_alone():
     posterior = PressPosterior(row, surrogate, NOISE, direction_rad=direction_rad)
     points = TRUTH + np.random.default_rng(3).uniform(-0.1, 0.1, (5, len(TRUTH)))
     each = [posterior.log_density(point[None])[0] for point in points]
-    np.testing.assert_allclose(posterior.log_density(points), each, rtol=1e-9)
+    np.testing.assert_allclose(posterior.log_density(points), each, rtol=1e-5)
+
+
+def test_single_precision_moves_a_density_by_far_less_than_a_press_tells(ramp_model):
+    surrogate, direction_rad = ramp_model.answers.surrogate, np.array([0.7])
+    row = surrogate.rows(TRUTH[None], direction_rad)[0]
+    posterior = PressPosterior(row, surrogate, ramp_model.answers.noise, direction_rad=direction_rad)
+    points = TRUTH + np.random.default_rng(3).uniform(-0.05, 0.05, (400, len(TRUTH)))
+    exactly = np.log1p(points[:, -1]) - 0.5 * np.sum(posterior.residuals(points) ** 2, axis=1)
+    likely = exactly > exactly.max() - 20
+    assert posterior.residuals(points.astype(np.float32)).dtype == np.float32
+    assert likely.sum() > 50
+    np.testing.assert_allclose(posterior.log_density(points)[likely], exactly[likely], atol=0.02)
