@@ -1,6 +1,7 @@
 # Bare `make` lists the verbs. `run` and `test` set themselves up: they need python3 (3.11 or newer) and a package index.
 PORT ?= 8000
 SCENE ?=
+PROBE ?=
 FILE ?=
 MACHINE ?= aarch64
 KEY ?= $(HOME)/.config/tsis/release_key
@@ -44,8 +45,10 @@ help: ## list the verbs
 
 setup: .venv/all.stamp ## make the virtual environment .venv with everything
 
-run: .venv/device.stamp ## start the simulated probe: make run [PORT=8000] [SCENE=FILE]
-	@exec $(PY) -m device --simulate --port $(PORT) $(if $(SCENE),--scene $(SCENE))
+# A probe's file is read by the toolkit, which needs everything.
+run: $(if $(PROBE),.venv/all.stamp,.venv/device.stamp) ## start the simulated probe: make run [PORT=8000] [SCENE=FILE, or PROBE=probe.toml]
+	@$(if $(PROBE),mkdir -p build && $(HOST_TOOLS) probe scene "$(PROBE)" --out build/probe_scene.toml)
+	@exec $(PY) -m device --simulate --port $(PORT) $(if $(PROBE),--scene build/probe_scene.toml,$(if $(SCENE),--scene $(SCENE)))
 
 test: .venv/all.stamp ## run the tests, but for the long ones (four minutes)
 	$(PY) -m pytest -n auto --maxprocesses 4 -m "not long"

@@ -358,9 +358,23 @@ class PressSection(Section):
 
 @dataclass(frozen=True, config=STRICT)
 class StoreSection(Section):
-    """The disk: how much must be left before a press is taken."""
+    """The disk: how much must be left before a press is taken, and below how much it is warned."""
 
     min_free_mb: Annotated[float, Bound(1.0, 1e6, "MB"), Doc("Space that must be left before a press is taken.")] = 50.0
+    warn_free_mb: Annotated[
+        float | None,
+        Bound(1.0, 1e6, "MB"),
+        Doc(
+            "While less is left it is warned; unless given, ten times min_free_mb, "
+            "and at most half way from min_free_mb to retention.free_mb."
+        ),
+    ] = None
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a warning that would come after the refusal."""
+        if self.warn_free_mb is not None:
+            above = Bound(self.min_free_mb, 1e6, "MB, below which no press is taken")
+            yield from conflict("store.warn_free_mb", self.warn_free_mb, above, "store.min_free_mb")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -580,6 +594,15 @@ class Config(Section):
     dicom: DicomSection = field(default_factory=DicomSection)
     webhook: WebhookSection = field(default_factory=WebhookSection)
     maker: MakerSection = field(default_factory=MakerSection)
+
+    @property
+    def warn_free_mb(self) -> float:
+        """Space (1e6 bytes) below which it is warned: where a rule makes space by itself, once it has come too late."""
+        store, rule_mb = self.store, self.retention.free_mb
+        if store.warn_free_mb is not None:
+            return store.warn_free_mb
+        warn_mb = 10 * store.min_free_mb
+        return warn_mb if rule_mb is None else min(warn_mb, (store.min_free_mb + rule_mb) / 2)
 
     def conflicts(self) -> Iterator[Conflict]:
         """Yield exposure and frame rate that the light does not allow, and a chip at the bus and address of another."""

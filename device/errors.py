@@ -497,6 +497,15 @@ class OrphanedRecordings(StorageError):  # noqa: N818 - the name is what the ope
     is_lasting = True
 
 
+class StorageLowError(StorageError):
+    """Little space is left; the probe measures on until there is none, and then refuses."""
+
+    code = "E606"
+    title = "Storage low"
+    severity = "warning"
+    is_lasting = True
+
+
 class NewerDataError(StorageError):
     """The data folder was written by a newer release than this one, which cannot read it."""
 

@@ -7,6 +7,7 @@ not wait for what reads recordings.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 STANDARD_PROTOCOL = PROTOCOLS / "standard.toml"
 TOLERANCE = 0.01
+"""What is aimed at where no tolerance is asked for."""
 WITHIN_S = 120.0
 StrainChoice = Literal["small", "finite", "auto"]
 
@@ -39,7 +41,7 @@ StrainChoice = Literal["small", "finite", "auto"]
 def solve(
     scene: Scene,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     strain: StrainChoice = "auto",
     within_s: float = WITHIN_S,
     best: bool = False,
@@ -47,10 +49,11 @@ def solve(
     """Solve a scene by the cheapest model that holds a tolerance: the face, the force, O1-O3, and errors.
 
     `tolerance` is the relative error allowed on force and O1-O3: 0.01 is 1 %. What is stated is compared with it, and
-    higher levels are taken until it holds, for `within_s` seconds. `strain` "auto" takes finite strain where small
+    higher levels are taken until it holds, for `within_s` seconds. Without one 1 % is aimed at, and a `UserWarning`
+    says where it is missed. `strain` "auto" takes finite strain where small
     strain departs by more than that; "small" is the paper's model, whose departure is then not counted. Raise
     `InvalidQuantity` for a scene that no model serves, `PressFailed` for a press that cannot be reached, and
-    `ToleranceMissed` where no level holds; `best` returns the best instead.
+    `ToleranceMissed` where no level holds what was asked for; `best` returns the best instead.
     """
     return solve_ramp(scene, [scene.press], tolerance=tolerance, strain=strain, within_s=within_s, best=best)[0]
 
@@ -59,7 +62,7 @@ def solve_ramp(
     scene: Scene,
     presses: Sequence[Press],
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     strain: StrainChoice = "auto",
     within_s: float = WITHIN_S,
     best: bool = False,
@@ -72,8 +75,12 @@ def solve_ramp(
 
     if not presses:
         raise InvalidQuantity("presses", "none", "at least one", "give the loads")
-    allowed = require("tolerance", tolerance, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
-    return held(climb(scene, presses, tolerance=allowed, strain=strain, within_s=within_s), best=best).solutions
+    aim = TOLERANCE if tolerance is None else tolerance
+    allowed = require("tolerance", aim, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
+    climbed = climb(scene, presses, tolerance=allowed, strain=strain, within_s=within_s)
+    if tolerance is None and not best and climbed.missed:
+        warnings.warn(climbed.missed, stacklevel=3)
+    return held(climbed, best=best or tolerance is None).solutions
 
 
 def sweep(

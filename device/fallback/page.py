@@ -1,16 +1,19 @@
-"""The situation as a page of the probe's screen, and as a problem document of the REST API. Nothing is decided here."""
+"""The situation as a page of the probe's screen in a language, and as a problem document of the REST API.
+
+Nothing is decided here.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from html import escape
 from typing import Any
 
 from device.errors import DeviceError
 from device.fallback.address import ServedAddress
 from device.fallback.situation import Situation
+from device.fallback.words import PageWords
 
 STATUS = 503
 REMEDY = "Ask again in a few seconds; the probe's screen says more."
@@ -40,63 +43,84 @@ def revision(situation: Situation) -> str:
     return hashlib.sha256(json.dumps(vars(situation)).encode()).hexdigest()[:16]
 
 
-def page(situation: Situation, address: ServedAddress, *, is_local: bool, has_support: bool) -> str:
+def page(situation: Situation, address: ServedAddress, words: PageWords, *, is_local: bool, has_support: bool) -> str:
     """Return the whole page; what changes something, and the log, stand on it only for the screen at the probe."""
+
+    def said(text: str, **values: str) -> str:
+        return escape(words.say(text, **values))
+
     return PAGE.format(
+        language=words.language,
         revision=revision(situation),
         serial=escape(address.serial),
-        headline=escape(situation.headline),
-        hint=escape(situation.hint),
+        serial_number=said("Serial number"),
+        headline=said(situation.headline),
+        hint=said(situation.hint),
         tone="bad" if situation.faults else "calm",
         icon="fault" if situation.faults else "wait",
-        faults="".join(map(_fault, situation.faults)),
-        log=_log(situation.log) if is_local else "",
-        facts="".join(_fact(*fact) for fact in _facts(situation, address)),
-        buttons="".join(_buttons(situation, has_support)) if is_local else "",
-        release=escape(situation.release or "not installed as a release"),
+        faults_name=said("Faults"),
+        faults="".join(_fault(fault, words) for fault in situation.faults),
+        service=_service(situation, words, is_local=is_local),
+        facts="".join(_fact(*fact) for fact in _facts(situation, address, words)),
+        buttons="".join(_buttons(situation, words, has_support)) if is_local else "",
+        moment=said("One moment."),
+        refused=said("It did not work."),
+        no_diagnosis=said("Documents size, depth and modulus. Not a diagnosis."),
+        software=said("Software {version}", version=situation.release or words.say("not installed as a release")),
     )
 
 
-def _fault(fault: dict[str, str]) -> str:
-    code, title, cause, remedy = (escape(fault[field]) for field in ("code", "title", "cause", "remedy"))
+def _fault(fault: dict[str, str], words: PageWords) -> str:
+    code, title, remedy = escape(fault["code"]), escape(words.meaning(fault)), escape(words.remedy(fault))
     return (
-        f'<div class="fault" data-severity="{escape(fault["severity"])}"><p class="fault-name">'
-        f'<span class="fault-code">{code}</span><span class="fault-title">{title}</span></p>'
-        f'<p class="fault-words"><strong class="fault-cause">{cause}</strong> '
+        f'<div class="fault" data-severity="{escape(fault["severity"])}"><span class="fault-code">{code}</span>'
+        f'<p class="fault-words"><strong class="fault-title">{title}</strong> '
         f'<span class="fault-remedy">{remedy}</span></p></div>'
     )
 
 
-def _log(lines: Sequence[str]) -> str:
-    if not lines:
+def _service(situation: Situation, words: PageWords, *, is_local: bool) -> str:
+    """Return what service needs, one tap away: the faults' own words and the log, which are in English."""
+    told = "".join(
+        f'<p class="fault-cause">{escape(fault["code"])} {escape(fault["cause"])} {escape(fault["remedy"])}</p>'
+        for fault in situation.faults
+    )
+    if is_local and situation.log:
+        name, lines = escape(words.say("Last lines of the log")), escape("\n".join(situation.log))
+        told += f'<pre class="log" aria-label="{name}">{lines}</pre>'
+    if not told:
         return ""
-    return f'<pre class="log" aria-label="Last lines of the log">{escape(chr(10).join(lines))}</pre>'
+    details = escape(words.say("Details"))
+    return f'<details class="service"><summary class="button button-quiet">{details}</summary>{told}</details>'
 
 
-def _facts(situation: Situation, address: ServedAddress) -> list[tuple[str, str]]:
-    good = situation.last_good or "none other on this probe"
-    return [("Last good release", good), ("Reached at", "  ".join(address.ways))]
+def _facts(situation: Situation, address: ServedAddress, words: PageWords) -> list[tuple[str, str]]:
+    good = situation.last_good or words.say("none other on this probe")
+    return [(words.say("Last good release"), good), (words.say("Reached at"), "  ".join(address.ways))]
 
 
 def _fact(name: str, value: str) -> str:
     return f"<p><small>{escape(name)}</small> {escape(value)}</p>"
 
 
-def _buttons(situation: Situation, has_support: bool) -> list[str]:
+def _buttons(situation: Situation, words: PageWords, has_support: bool) -> list[str]:
     found = []
     if situation.may_roll_back:
-        found.append(_button("roll-back", f"Go back to {situation.last_good}"))
+        done = words.say("The probe goes back to its last good release.")
+        found.append(_button("roll-back", words.say("Go back to {release}", release=situation.last_good), done))
     if has_support:
-        found.append(_button("support", "Save support file"))
+        done = words.say("The support file is with this browser's downloads.")
+        found.append(_button("support", words.say("Save support file"), done))
     return found
 
 
-def _button(name: str, words: str) -> str:
-    return f'<button id="{name}" class="button" type="button">{escape(words)}</button>'
+def _button(name: str, words: str, done: str) -> str:
+    """Return a button that says in its data what is said once it has been done."""
+    return f'<button id="{name}" class="button" type="button" data-done="{escape(done)}">{escape(words)}</button>'
 
 
 PAGE = """<!doctype html>
-<html lang="en">
+<html lang="{language}">
 <head>
   <meta charset="utf-8">
   <meta name="viewport" content="width=device-width, initial-scale=1">
@@ -106,7 +130,7 @@ PAGE = """<!doctype html>
   <link rel="stylesheet" href="/static/fallback.css">
   <script type="module" src="/static/fallback.js"></script>
 </head>
-<body data-revision="{revision}">
+<body data-revision="{revision}" data-moment="{moment}" data-refused="{refused}">
   <svg class="visually-hidden" aria-hidden="true">
     <symbol id="icon-wait" viewBox="0 0 48 48"><circle cx="24" cy="24" r="18"/><path d="M24 14v10l7 5"/></symbol>
     <symbol id="icon-fault" viewBox="0 0 48 48"><path d="M24 6L44 41H4zM24 19v11M24 35.5v.5"/></symbol>
@@ -114,7 +138,7 @@ PAGE = """<!doctype html>
   <div id="panel" class="panel" data-tone="{tone}">
     <header class="header">
       <h1 class="product"><abbr title="Tactile Sensation Imaging System">TSIS</abbr></h1>
-      <p class="serial" aria-label="Serial number">{serial}</p>
+      <p class="serial" aria-label="{serial_number}">{serial}</p>
     </header>
     <main class="fallback">
       <section class="instruction">
@@ -122,11 +146,13 @@ PAGE = """<!doctype html>
         <p id="instruction">{headline}</p>
       </section>
       <p class="hint">{hint}</p>
-      <section class="reasons" role="alert" aria-label="Faults" tabindex="0">{faults}{log}</section>
-      <section class="facts">{facts}</section>
+      <div class="known" role="region" aria-label="{faults_name}" tabindex="0">
+        <section class="reasons" role="alert">{faults}{service}</section>
+        <section class="facts">{facts}</section>
+      </div>
       <section class="ways-out">{buttons}<p id="told" aria-live="polite"></p></section>
     </main>
-    <footer class="footer"><p>Documents size, depth and modulus. Not a diagnosis.</p><p>Software {release}</p></footer>
+    <footer class="footer"><p>{no_diagnosis}</p><p>{software}</p></footer>
   </div>
 </body>
 </html>

@@ -24,6 +24,7 @@ from device.fallback.actions import has_support, roll_back, support_file
 from device.fallback.address import ServedAddress, read_address
 from device.fallback.page import STATUS, page, problem, revision
 from device.fallback.situation import Situation, read_situation
+from device.fallback.words import PageWords, wished_language
 from device.files.plain_settings import HOST
 
 log = logging.getLogger(__name__)
@@ -139,7 +140,9 @@ class FallbackRequest(BaseHTTPRequestHandler):
             self._send(static.read_bytes(), KINDS[static.suffix])
         elif asked.path == "/":
             options = {"is_local": asked.is_own_screen, "has_support": has_support()}
-            self._send(page(situation, self.server.address, **options).encode(), "text/html; charset=utf-8", STATUS)
+            words = PageWords(wished_language(self.headers.get("accept-language", "")))
+            text = page(situation, self.server.address, words, **options)
+            self._send(text.encode(), "text/html; charset=utf-8", STATUS)
         else:
             raise _unknown(asked)
 

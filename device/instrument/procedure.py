@@ -39,6 +39,7 @@ from device.instrument.watch.computer_watch import ComputerWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
 from device.instrument.watch.recordings_watch import RecordingsWatch, retention_rule
+from device.instrument.watch.space_watch import SpaceWatch
 from device.measurement.mode import FRAMES, Mode, ModeWorth
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
@@ -97,6 +98,7 @@ class Procedure:
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._computer, self._recordings = computer, RecordingsWatch(store, retention_rule(config))
+        self._space = SpaceWatch(store, config)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
@@ -414,6 +416,9 @@ class Procedure:
 
     def _look_at_disk(self) -> None:
         with self.progress.inside("storage"):
+            warnings = self._space.warned(self.board.now.warnings)
+            if warnings != self.board.now.warnings:
+                self.board.update(warnings=warnings)
             self.store.require_space(self.config.store.min_free_mb)
 
     def _prove_store(self) -> None:

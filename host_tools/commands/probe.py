@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.commands.output import note, own_models, print_rows, problem_record
 
 if TYPE_CHECKING:
@@ -92,6 +92,32 @@ def _consequences(found: Probe) -> Iterator[tuple[str, float, str]]:
     yield "frame_height", height_mm, "mm"
     yield "frame_height_over_face", height_mm / (2 * found.face.radius_mm), ""
     yield "force_of_one_count", 1 / found.cell.counts_per_n, "N"
+
+
+@probe.command(epilog="Example: host_tools probe scene probe.toml --out scene.toml, then make run SCENE=scene.toml")
+def scene(
+    file: ProbeFile,
+    out: Annotated[Path, typer.Option(help="Scene file to write.")],
+    number: Annotated[
+        int | None, typer.Option(help="Which of the probes that are built within the tolerances; as stated without it.")
+    ] = None,
+) -> None:
+    """Write a scene file in which the simulator is this probe, against which its models are another: press it, record
+    phantoms with it, commission it. Moduli of the layers, LEDs, camera and load cell may be its own.
+    """
+    import tomli_w
+
+    from device.files.durable import write_durably
+    from host_tools.scenes.probe_file import read_probe, simulated_probe
+    from host_tools.scenes.probe_scene import as_scene_table, scene_of_probe
+
+    if number is not None:
+        require("number", number, Bound(1, 10**6, ""), "give a whole number from 1")
+    found = _read(read_probe, file, False)
+    of_probe = as_scene_table(scene_of_probe(found, simulated_probe(), number))
+    which = "as stated" if number is None else f"number {number} within its tolerances"
+    write_durably(out, (f"# Probe {found.serial}, {which}.\n" + tomli_w.dumps(of_probe)).encode())
+    note.print(f"{out} written: make run SCENE={out} runs probe {found.serial}, {which}.", soft_wrap=True)
 
 
 @probe.command(epilog="Example: host_tools probe phantoms phantoms.toml")

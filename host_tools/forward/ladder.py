@@ -41,7 +41,7 @@ FINITE_RUNGS = (
 )
 WIDEST_RIM = (Level("sliding_coarse", 3), Level("sliding_coarse", 4))
 """What is tried where the tissue slips further along the rim than elements there are long."""
-FIRST_ORDERS = {0.1: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
+FIRST_ORDERS = {0.005: 3, 5e-4: 4, 1e-4: 5, 0.0: 6}
 """By the tolerance from which on it is worth beginning there."""
 FIRST_SOLID = {0.3: 3, 0.05: 4, 0.005: 5, 0.0: 6}
 """The same in 3-D, whose lower orders state far more than they err: a rung that cannot hold costs half of the next."""
@@ -144,6 +144,12 @@ def climb(
     assert best is not None  # every plan has rungs
     departure = small_strain_departure(pressed) if plan.strain == "small" else 0.0
     return replace(best, departure=departure, was_chosen=strain == "auto")
+
+
+def solved_at(scene: Scene, level: Level, *, strain: Literal["small", "finite"]) -> Solution:
+    """Solve a scene at one rung of a climb, with the errors that the climb would compare; raise as `climb` does."""
+    plan = model_plan(scene, strain=strain)
+    return _Rung(scene, [scene.press], plan, 1.0).solved(level, "").solutions[0]
 
 
 def _rungs(plan: ModelPlan, tolerance: float) -> Sequence[Level]:

@@ -102,7 +102,7 @@ def _without_inclusion(
 
 def _stated(plan: ModelPlan, rays: Rays, found: Loaded, without: Loaded, press: Press) -> dict[str, float]:
     if found.residual and without.residual:
-        return dual_error(rays, found, without, by_force=press.force_n is not None)
+        return dual_error(rays, found, without, order=plan.order, by_force=press.force_n is not None)
     return stated_error(plan, rays, found, without, by_force=press.force_n is not None)
 
 

@@ -7,42 +7,16 @@ depends on its seed and number alone, whatever the version of any library.
 from __future__ import annotations
 
 from pathlib import Path
-from random import Random
-from statistics import NormalDist
 
 import tomli_w
 
 from device.files.durable import write_durably
 from device.files.toml_record import as_table
-from device.measurement.recording.led_sides import LedRatio
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.lens import TrueCamera
 from device.simulation.physics.skin import ContactLaw, SkinTexture
 from device.simulation.physics.world import OverLesion, PressTilts, Relaxation, TrueLight, World
-
-CUT = 2.0
-"""Standard deviations beyond which nothing is drawn: a builder throws such a part away."""
-DIGITS = 4
-
-
-class _Draw:
-    """Numbers of one world, rounded as they are written."""
-
-    def __init__(self, seed: int, number: int) -> None:
-        self._random, self._normal = Random(f"world {number} of seed {seed}"), NormalDist()
-
-    def about(self, middle: float, tolerance: float) -> float:
-        ends = self._normal.cdf(-CUT), self._normal.cdf(CUT)
-        return round(middle + tolerance * self._normal.inv_cdf(self._random.uniform(*ends)), DIGITS)
-
-    def within(self, low: float, high: float) -> float:
-        return round(self._random.uniform(low, high), DIGITS)
-
-    def whole(self) -> int:
-        return self._random.randrange(2**31)
-
-    def sides(self, tolerance: float) -> LedRatio:
-        return self.about(1, tolerance), self.about(1, tolerance), self.about(1, tolerance), self.about(1, tolerance)
+from host_tools.scenes.probe_scene import ToleranceDraw
 
 
 def foreign_world(seed: int, number: int) -> World:
@@ -53,7 +27,7 @@ def foreign_world(seed: int, number: int) -> World:
     over the lesion wetting 3 %, albedo 2 %, tissue 5 %; relaxation of 2-5 % in 2-10 s, ramps of 0.1-0.2 N/s, texture of
     0.3 % over 2 mm, both to a third.
     """
-    draw = _Draw(seed, number)
+    draw = ToleranceDraw(f"world {number} of seed {seed}")
     return World(
         contact=ContactLaw(exponent=draw.about(1, 0.1), largest_ratio=draw.within(0.95, 1.0)),
         camera=TrueCamera(

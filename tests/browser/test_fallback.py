@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from daemon_process import wait_for
 from fallback_process import Fallback, ProbeRoot, failed_start, good_daemon
-from opened_screen import shoot
+from opened_screen import SIZES, named, shoot
 from playwright.sync_api import Page, expect
+from screen_layout import wrong_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 BAD = '[press]\ntarget_n = 99\n[camera]\nexposure_ms = 4\nwidth_px = "wide"\n'
@@ -37,7 +38,10 @@ def test_bad_settings_are_a_page_that_says_what_is_wrong_and_the_mended_probe_is
         assert setting in said
         expect(page.locator(".fault-cause")).to_contain_text(setting)
     expect(page.locator(".facts")).to_contain_text("0.1.0+398")
+    expect(page.locator(".fault-remedy")).to_have_text("Call service.")
     shoot(page, "fallback")
+    page.locator(".service summary").click()
+    shoot(page, "fallback-details")
     size = page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
     assert size == [800, 480]
     root.settings("")
@@ -69,8 +73,40 @@ def test_a_release_that_ends_before_it_can_say_why_shows_its_last_words(page, fa
     )
     root.command("journalctl", "#!/bin/sh\necho \"ModuleNotFoundError: No module named 'numpy' <b>\"\n")
     page.goto(root.url)
+    page.locator(".service summary").click()
     expect(page.locator(".fault-cause")).to_contain_text(
         "Release 0.2.0+412 ended before it could say why (exit-code, 1)"
     )
     expect(page.locator(".log")).to_contain_text("No module named 'numpy' <b>")
     shoot(page, "fallback-broken-release")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=named)
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_the_page_is_whole_in_the_language_of_the_browser(page, fallback, language, size):
+    fallback.root.settings(BAD)
+    failed_start(fallback.root)
+    options = {"locale": language, "viewport": {"width": size[0], "height": size[1]}}
+    page = page.context.browser.new_context(**options).new_page()
+    page.goto(fallback.root.url)
+    said = {"en-GB": "The probe does not start", "de-DE": "Die Sonde startet nicht"}[language]
+    expect(page.locator("#instruction")).to_have_text(said)
+    shoot(page, f"fallback-{language[:2]}-{size[0]}")
+    wrong = wrong_in(page)
+    page.context.close()
+    assert wrong == []
+
+
+def test_the_language_and_colours_that_were_chosen_on_the_screen_hold_here_too(page, fallback):
+    page.goto(fallback.root.url)
+    page.evaluate("localStorage['tsis.language'] = 'de'; localStorage['tsis.colours'] = 'dark'")
+    page.reload()
+    expect(page.locator("#instruction")).to_have_text("Die Sonde startet")
+    assert page.evaluate("document.documentElement.lang") == "de"
+    assert page.evaluate("getComputedStyle(document.getElementById('panel')).backgroundColor") == "rgb(12, 16, 19)"
+    page.locator("#roll-back").click()
+    expect(page.locator("#told")).to_have_text("Die Sonde geht zur letzten guten Version zurück.")
+    page.evaluate("document.getElementById('roll-back').disabled = false")
+    page.locator("#roll-back").click()
+    expect(page.locator("#told")).to_contain_text("Das ging nicht. The probe was asked to go back already.")
+    page.evaluate("localStorage.clear()")

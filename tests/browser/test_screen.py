@@ -467,7 +467,10 @@ def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page,
     expect(line).to_have_text(re.compile(r"^2 of \d+ checks failed\.$"))
     failed = page.locator('.check[data-verdict="failed"]')
     expect(failed).to_have_count(2)
-    expect(failed.nth(0)).to_contain_text("It lights -x: put the plugs of +x and -x where they belong.")
+    expect(failed.nth(0)).to_contain_text("The LED lights side -x. Have service swap the plugs of +x and -x.")
+    failed.nth(0).get_by_role("button", name="Details").click()
+    expect(page.locator("#fault-list")).to_contain_text("It lights -x: put the plugs of +x and -x where they belong.")
+    page.locator("#fault-close").click()
     assert page.locator(".check").first.get_attribute("data-verdict") == "failed"
     shoot(page, "self-test")
     _require_fits(page)
@@ -483,6 +486,18 @@ def test_the_operator_runs_the_self_test_and_reads_which_part_failed(page: Page,
     expect(line).to_contain_text("Take another weight: between 0.1 and 5 N")
     page.locator("#self-test-close").click()
     expect(page.locator("#instruction")).to_have_text(BEGINNING)
+    page.locator("#menu-open").click()
+    page.locator("#language-de").click()
+    page.locator("#menu-open").click()
+    page.locator("#self-test-open").click()
+    expect(line).to_have_text(re.compile(r"^2 von \d+ Prüfungen nicht bestanden\.$"))
+    expect(failed.nth(0)).to_contain_text("Die LED beleuchtet Seite -x. Den Service die Stecker von +x und -x tauschen")
+    said = page.locator("#self-test-results").inner_text()
+    assert re.search(r"freier Platz\s+Speicher\s+bestanden\s+\d+ MB, nötig: mindestens 50 MB", said), said
+    assert not re.search(r"check\.|remedy\.|unit\.|bound\.|at least|at most", said), said
+    shoot(page, "self-test-de")
+    _require_fits(page)
+    page.evaluate("localStorage.clear()")
     daemon.stop()
 
 

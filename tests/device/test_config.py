@@ -63,6 +63,7 @@ BOUNDS = [
     ("press.max_offset_mm", 0.5, 30.0),
     ("press.timeout_s", 1.0, 3600.0),
     ("store.min_free_mb", 1.0, 1e6),
+    ("store.warn_free_mb", 50.0, 1e6),  # what a press needs
     ("clock.max_jump_s", 0.1, 3600.0),
     ("server.port", 0, 65_535),
 ]

@@ -82,6 +82,11 @@ def test_a_tolerance_that_is_not_held_is_refused_unless_the_best_is_asked_for():
     assert tsis.solve(SCENE, **asked, best=True).stated_error["max_deformation_mm"] > 1e-9
 
 
+def test_without_a_tolerance_the_best_is_returned_with_a_warning():
+    with pytest.warns(UserWarning, match="tolerance is 1 %, but .* only good to"):
+        assert tsis.solve(SCENE, within_s=0.1).stated_error["central_deformation_mm3"] > 0.01
+
+
 @pytest.mark.long
 def test_strain_follows_the_tolerance_unless_it_is_asked_for(solution):
     assert solution.plan.strain == "small"

@@ -1,40 +1,55 @@
 // The page of a probe whose software does not run: loaded anew when what is known changes, and when the probe is back.
+// What a person chose on the probe's screen, language and colours, holds here, too.
 
 const LOOK_MS = 1000;
-const told = document.getElementById("told");
+const PREFIX = "tsis."; // of what the screen remembers (device/web/static/base/memory.js)
+
+function remembered(name) {
+  try {
+    return localStorage.getItem(PREFIX + name);
+  } catch {
+    return null;
+  }
+}
+
+/** Show the page in another language than the browser asked for. */
+async function speak(language) {
+  const response = await fetch("/", { headers: { "Accept-Language": language }, cache: "no-store" });
+  const asked = new DOMParser().parseFromString(await response.text(), "text/html");
+  if (asked.documentElement.lang !== language || !asked.body.dataset.revision) return;
+  document.documentElement.lang = language;
+  Object.assign(document.body.dataset, asked.body.dataset);
+  document.getElementById("panel").replaceWith(asked.getElementById("panel"));
+}
 
 async function ask(path) {
   const headers = { "Content-Type": "application/json" };
   const response = await fetch(path, { method: "POST", headers });
   if (!response.ok) {
-    const { detail = "It did not work.", remedy = "" } = await response.json().catch(() => ({}));
+    const { detail = "", remedy = "" } = await response.json().catch(() => ({}));
     throw new Error(`${detail} ${remedy}`);
   }
   return response;
 }
 
-function offer(id, words, act) {
+function offer(id, act) {
   const button = document.getElementById(id);
+  const told = document.getElementById("told");
   button?.addEventListener("click", async () => {
     button.disabled = true;
-    told.textContent = "One moment.";
+    told.textContent = document.body.dataset.moment;
     try {
       await act();
-      told.textContent = words;
+      told.textContent = button.dataset.done;
     } catch (error) {
-      told.textContent = error.message;
+      const service = document.createElement("small");
+      service.lang = "en";
+      service.textContent = error.message;
+      told.replaceChildren(document.body.dataset.refused, " ", service);
       button.disabled = false;
     }
   });
 }
-
-offer("roll-back", "The probe goes back to its last good release.", () => ask("/api/v1/updates/roll-back"));
-offer("support", "The support file is with this browser's downloads.", async () => {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(await (await ask("/fallback/support")).blob());
-  link.download = "tsis-support.zip";
-  link.click();
-});
 
 async function look() {
   const response = await fetch("/fallback/state", { cache: "no-store" }).catch(() => null);
@@ -43,4 +58,14 @@ async function look() {
   if (response?.status === 404 || (state && state.revision !== document.body.dataset.revision)) location.reload();
 }
 
+if (remembered("colours")) document.documentElement.dataset.colours = remembered("colours");
+const chosen = remembered("language");
+if (chosen && chosen !== document.documentElement.lang) await speak(chosen).catch(() => {});
+offer("roll-back", () => ask("/api/v1/updates/roll-back"));
+offer("support", async () => {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(await (await ask("/fallback/support")).blob());
+  link.download = "tsis-support.zip";
+  link.click();
+});
 setInterval(look, LOOK_MS);

@@ -1,4 +1,4 @@
-"""Storage that goes wrong: a disk that is full, read-only or silent, and a model bundle with one byte changed.
+"""Storage that goes wrong: a disk that is low, full, read-only or silent, and a model bundle with one byte changed.
 
 Only what goes through the store's `Disk` is refused or held up, with the kernel's own "no space left" from /dev/full;
 the database beside it is on the real disk. Linux only. Source: full(4); errno(3), EROFS, which Linux answers once it
@@ -18,10 +18,12 @@ from device.files.durable import synced_file
 from device.simulation.faults import FaultTimeline
 
 FULL = Path("/dev/full")
+LOW_BYTES = 200_000_000
+"""What a disk has left that is low: above `store.min_free_mb` of the settings, below ten times that."""
 
 
 class EmulatedDisk:
-    """The disk of a scenario: full, read-only or frozen while it says so, else the real one.
+    """The disk of a scenario: low, full, read-only or frozen while it says so, else the real one.
 
     Implements the store's `Disk`; while it is frozen no call returns.
     """
@@ -32,7 +34,10 @@ class EmulatedDisk:
     def free_bytes(self, folder: Path) -> int:
         """Return the space that is left for a folder."""
         self._faults.hold_up("disk_frozen")
-        return 0 if self._faults.is_active("disk_full") else shutil.disk_usage(folder).free
+        if self._faults.is_active("disk_full"):
+            return 0
+        free_bytes = shutil.disk_usage(folder).free
+        return min(free_bytes, LOW_BYTES) if self._faults.is_active("disk_low") else free_bytes
 
     def file(self, path: Path) -> AbstractContextManager[BinaryIO]:
         """Open a file to be written anew and synchronised.

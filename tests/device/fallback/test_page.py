@@ -8,6 +8,7 @@ from device.errors import CameraError, ConfigError
 from device.fallback.address import ServedAddress
 from device.fallback.page import page, problem, revision
 from device.fallback.situation import Situation
+from device.fallback.words import PageWords
 from device.web.schema import Problem
 
 FAULTS = tuple(
@@ -18,14 +19,14 @@ STARTING = Situation("The probe is starting", "Soon.")
 ADDRESS = ServedAddress(serial="TSIS-<7>")
 
 
-def shown(situation, *, is_local=True, has_support=True):
-    return page(situation, ADDRESS, is_local=is_local, has_support=has_support)
+def shown(situation, language="en", *, is_local=True, has_support=True):
+    return page(situation, ADDRESS, PageWords(language), is_local=is_local, has_support=has_support)
 
 
 def test_every_fault_stands_there_as_text():
     text = shown(REFUSED)
     assert re.findall(r'"fault-code">(\w+)<', text) == ["E001", "E101"]
-    for words in ("a &lt; 3 &amp; b.", "Correct &lt;it&gt;.", "Settings refused", "TSIS-&lt;7&gt;", "&lt;script&gt;"):
+    for words in ("a &lt; 3 &amp; b.", "Correct &lt;it&gt;.", "A setting is wrong", "TSIS-&lt;7&gt;", "&lt;script&gt;"):
         assert words in text
 
 
@@ -36,6 +37,14 @@ def test_the_screen_at_the_probe_has_the_ways_out_and_the_log_another_machine_ha
     assert "<button" not in elsewhere
     assert "&lt;script&gt;" not in elsewhere
     assert "E101" in elsewhere
+
+
+def test_what_service_needs_is_one_tap_away_and_what_to_do_is_not():
+    before, details = shown(REFUSED).split("<details")
+    assert "Call service." in before
+    assert "a &lt; 3" not in before
+    assert "a &lt; 3 &amp; b. Correct &lt;it&gt;." in details
+    assert "<details" not in shown(STARTING)
 
 
 @pytest.mark.parametrize("has_support", [True, False])

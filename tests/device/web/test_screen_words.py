@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,12 +18,14 @@ from device.instrument.press.machine import FrameSeen, PressRules, PressUnderWay
 from device.instrument.press.states import Guidance, PressState, off_centre, too_hard
 from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OUT, SHADE, UNKNOWN_IMAGE
 from device.measurement.mode import MODES
+from device.measurement.quantities import Bound
 from device.measurement.ramp_modes.estimate import REASONS
 from device.web.screen_words import LANGUAGES, page, words_of
 
 STATIC = ROOT / "device" / "web" / "static"
 ENGLISH = words_of("en")
-SENTENCES = words_of("sentences")
+REMEDIES = {key: text for key, text in words_of("sentences").items() if key.startswith("remedy.")}
+SENTENCES = {key: text for key, text in words_of("sentences").items() if key not in REMEDIES}
 ELSEWHERE = {
     "daemon_stopped",
     "daemon_restarted",
@@ -132,6 +136,74 @@ def test_every_sentence_of_the_daemon_has_its_words_and_is_said() -> None:
     made = daemon_sentences()
     unheard = {key for key, text in SENTENCES.items() if not any(re.match(pattern_of(text), one) for one in made)}
     assert unheard <= ELSEWHERE
+
+
+SELF_TEST = ROOT / "device" / "instrument" / "self_test"
+NAMED_BY = {"compared": 1, "not_tested": 1, "CheckResult": 1, "broken": 0}
+"""The calls that name a check, and which of their arguments does."""
+
+
+def modules_of_the_self_test() -> list[ast.Module]:
+    return [ast.parse((SELF_TEST / name).read_text(encoding="utf-8")) for name in ("checks.py", "run.py")]
+
+
+def literals(tree: ast.AST) -> Iterator[str]:
+    """Every text of a module but its docstrings; of an f-string what is between its values, which are "1"."""
+    parts = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    alone = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(part.value if isinstance(part, ast.Constant) else "1" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in parts | alone:
+            yield node.value
+
+
+def names_of_checks() -> set[str]:
+    """Every check's name, as it is written: those of a call, of the table of all checks, and of a variable `check`."""
+    found = set()
+    for tree in modules_of_the_self_test():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in NAMED_BY:
+                named: list[ast.expr | None] = [node.args[NAMED_BY[node.func.id]]]
+            elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "check":
+                named = [node.value]
+            elif isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Dict):
+                named = node.value.keys
+            else:
+                continue
+            found |= {one.value for one in named if isinstance(one, ast.Constant)}
+            found |= {ast.unparse(one) for one in named if isinstance(one, ast.JoinedStr)}
+    return found
+
+
+MADE_OF = {"f'model {name}'": "check.model", "f'LED {side}'": "check.LED", "f'LED {SIDES[number]}'": "check.LED"}
+MADE_OF["f'date after {NOT_BEFORE:%Y-%m-%d}'"] = "check.date"
+
+
+def test_every_check_of_the_self_test_has_a_name_in_each_language() -> None:
+    names = names_of_checks()
+    assert {"noise", "enable line", "LED sides", "write and read", "f'model {name}'"} <= names
+    assert {MADE_OF.get(name, f"check.{name}") for name in names} <= ENGLISH.keys()
+
+
+def test_every_remedy_of_the_self_test_is_said_in_the_operators_words() -> None:
+    sentences = {text for tree in modules_of_the_self_test() for text in literals(tree) if text.endswith(".")}
+    assert "Repeat it with a known weight." in sentences
+    said = {one: [key for key, text in REMEDIES.items() if re.fullmatch(pattern_of(text), one)] for one in sentences}
+    assert {one for one, keys in said.items() if not keys} == set()
+    assert {key for keys in said.values() for key in keys} == REMEDIES.keys()
+    assert REMEDIES.keys() <= ENGLISH.keys()
+
+
+def test_every_unit_and_bound_of_the_self_test_has_words() -> None:
+    calls = [node for tree in modules_of_the_self_test() for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    units = {ast.literal_eval(one.args[2]) for one in calls if ast.unparse(one.func) == "Bound"}
+    assert {"counts", "days", "bytes wrong"} <= units
+    assert {f"unit.{one}" for one in units - {"N", "s", "MB"}} <= ENGLISH.keys()
+    bounds = [Bound(1, 2, ""), Bound(1, 2, "", low_included=False, high_included=False)]
+    words = {word for one in bounds for word in re.findall(r"at least|above|at most|below", str(one))}
+    assert {f"bound.{word}" for word in words} <= ENGLISH.keys()
+    assert len(words) == 4
 
 
 def test_the_page_of_all_sentences_is_the_files() -> None:

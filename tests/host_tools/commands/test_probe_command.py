@@ -7,6 +7,7 @@ import pytest
 from toolkit_process import run_toolkit
 
 from device.files.shipped import SIMULATED_PROBE
+from device.simulation.scenario import read_scenario
 from host_tools.scenes.probe_file import NAME, simulated_probe
 
 OWN = SIMULATED_PROBE / NAME
@@ -137,3 +138,21 @@ def test_nothing_is_written_of_phantoms_that_contradict_themselves(tmp_path):
     assert told.returncode == 1
     assert "phantoms[2].name" in told.stderr
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_probes_file_becomes_a_scene_that_the_simulator_reads(tmp_path):
+    text = OWN.read_text().replace("youngs_modulus_kpa = 60.0", "youngs_modulus_kpa = 66.0")
+    (tmp_path / "own.toml").write_text(text)
+    out = tmp_path / "scene.toml"
+    told = run_toolkit("probe", "scene", tmp_path / "own.toml", "--out", out)
+    assert told.returncode == 0, told.stderr
+    assert read_scenario(out).world.layers.face_modulus_ratio == pytest.approx(1.1)
+    assert run_toolkit("probe", "scene", OWN, "--out", out, "--number", 4).returncode == 0
+    assert out.read_text().startswith("# Probe SIM-0001, number 4 within its tolerances.\n")
+    drawn = read_scenario(out)
+    told = run_toolkit("probe", "scene", OWN, "--out", out, "--number", 0)
+    assert (told.returncode, read_scenario(out)) == (1, drawn)
+    (tmp_path / "own.toml").write_text(text.replace("radius_mm = 11.0", "radius_mm = 10.5"))
+    told = run_toolkit("probe", "scene", tmp_path / "own.toml", "--out", out)
+    assert (told.returncode, read_scenario(out)) == (1, drawn)
+    assert "radius_mm is 10.5, but must be 11.0, as the simulator's tables have it" in told.stderr

@@ -19,7 +19,7 @@ def test_explain_prints_each_choice_with_its_reason_and_the_error_of_each_number
     for words in (
         "symmetry     axisymmetric",
         "contact      closed_sliding",
-        "graded, order 4",
+        "graded, order 3",
         "the lowest that may state 1 %",
         "small_strain_departure",
     ):
@@ -77,6 +77,15 @@ def test_a_scene_that_finite_strain_does_not_serve_is_refused_unless_small_strai
     assert (refused.returncode, refused.stdout) == (1, "")
     assert "small strain departs from finite strain by about" in refused.stderr
     assert "--strain small" in refused.stderr
+
+
+def test_without_a_tolerance_the_best_is_printed_with_the_sentence():
+    """What nobody asked for fails nobody: a default of 0.5 % is aimed at, and its miss is told."""
+    for scene in (("--poisson", "0.4995"), ("--force-n", "0.5", "--within-s", "0.1")):
+        done = run_toolkit("simulate", *INCLUSION, *scene, "--json")
+        record = json.loads(done.stdout)["tolerance"]
+        assert (done.returncode, record["asked"], record["held"]) == (0, 0.005, False)
+        assert "tolerance is 0.5 %, but" in done.stderr
 
 
 def test_finite_strain_on_request_is_true_sliding_with_its_plan_in_the_json():

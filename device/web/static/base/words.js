@@ -68,27 +68,44 @@ export function dicomTime(text) {
 }
 
 const asPattern = (text) => text.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+?)");
-const patterns = Object.entries(sentences).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
+const isRemedy = ([key]) => key.startsWith("remedy.");
+const known = Object.entries(sentences);
+const patterns = known.filter((one) => !isRemedy(one)).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
+const remedies = known.filter(isRemedy).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}$`)]);
+
+/** A number that the daemon wrote, as the language writes it; what is none stays as it is. */
+export function spokenNumber(value) {
+  const number = /^(-?\d+(?:\.(\d+))?)( ?%?)$/.exec(value);
+  return number ? figure(Number(number[1]), number[2]?.length ?? 0) + (number[3] ? "\u00a0%" : "") : value;
+}
 
 function spokenValue(value) {
-  const number = /^(-?\d+(?:\.(\d+))?)( ?%?)$/.exec(value);
-  if (number) return figure(Number(number[1]), number[2]?.length ?? 0) + (number[3] ? "\u00a0%" : "");
+  if (spokenNumber(value) !== value) return spokenNumber(value);
   return value.split(" and ").map((part) => words[`value.${part}`] ?? part).join(` ${words.and} `);
 }
+
+const firstOf = (kinds, text) => kinds.map(([key, pattern]) => [key, pattern.exec(text)]).find(([, hit]) => hit) ?? [];
+const valuesOf = (hit, spoken) => Object.fromEntries(Object.entries(hit.groups ?? {}).map(([name, value]) => [name, spoken(value)]));
 
 /** What the daemon's sentences say: {do, why}, each a sentence or "", or null when one of them is not known. */
 export function understand(text) {
   const said = { do: "", why: [] };
   let rest = text.trim();
   while (rest) {
-    const [key, hit] = patterns.map(([one, pattern]) => [one, pattern.exec(rest)]).find(([, found]) => found) ?? [];
+    const [key, hit] = firstOf(patterns, rest);
     if (!hit) return null;
-    const values = Object.fromEntries(Object.entries(hit.groups ?? {}).map(([name, value]) => [name, spokenValue(value)]));
+    const values = valuesOf(hit, spokenValue);
     said.do = say(`reason.${key}.do`, values) || said.do;
     said.why.push(say(`reason.${key}.why`, values));
     rest = rest.slice(hit[0].length).trim();
   }
   return { do: said.do, why: said.why.join(" ") };
+}
+
+/** What to do about a check that was not passed, or null when the daemon's sentence is not known. */
+export function understandRemedy(text) {
+  const [key, hit] = firstOf(remedies, text);
+  return hit ? say(key, valuesOf(hit, spokenNumber)) : null;
 }
 
 const REMEDIES = { E211: /^Wait (?<s>\d+) s:/ };

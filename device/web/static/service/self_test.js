@@ -2,7 +2,9 @@
 
 import { button, byId, element, setEnabled, isEnabled, setText } from "../base/dom.js";
 import { fetchSelfTest, startSelfTest } from "../base/probe.js";
-import { figure, isSaid, say } from "../base/words.js";
+import { isSaid, say } from "../base/words.js";
+import { openService } from "../press/faults.js";
+import { checkName, checkRemedy, measuredWords } from "./check_words.js";
 
 const WORST_FIRST = ["failed", "not_tested", "passed"];
 const ERASE = "⌫";
@@ -14,22 +16,19 @@ let problem = "";
 
 const partName = (part) => (isSaid(`part.${part}`) ? say(`part.${part}`) : part);
 
-function measuredWords({ value, unit, bound }) {
-  if (value === null) return "";
-  const size = Math.abs(value);
-  const said = size !== 0 && (size < 0.001 || size >= 1e5) ? value.toExponential(1) : figure(value, size < 10 ? 3 : 0);
-  return say("self_test.measured", { value: said, unit, bound });
-}
-
 function checkItem(result) {
-  const { part, check, verdict, code, cause, remedy } = result;
+  const { part, verdict, code, cause, remedy } = result;
   const item = element("li", "check");
   item.dataset.verdict = verdict;
   const name = element("p", "check-name");
   const said = element("span", "check-verdict", say(`verdict.${verdict}`));
-  name.append(element("strong", "", check), element("span", "check-part", partName(part)), said);
+  name.append(element("strong", "", checkName(result)), element("span", "check-part", partName(part)), said);
   item.append(name, element("p", "check-measured", measuredWords(result)));
-  if (remedy) item.append(element("p", "check-remedy", [code, cause, remedy].filter(Boolean).join(" ")));
+  if (remedy) item.append(element("p", "check-remedy", checkRemedy(result)));
+  if (verdict === "failed") {
+    const words = [code, cause, remedy].filter(Boolean).join(" ");
+    item.append(button("button button-quiet check-details", say("details"), () => openService(words)));
+  }
   return item;
 }
 
@@ -45,7 +44,7 @@ function verdictWords() {
   if (failed) return say("self_test.failed", { failed, n: results.length });
   if (!passed) return say("self_test.not_tested");
   if (!untested) return say("self_test.passed_all", { n: passed });
-  const left = results.filter(({ verdict }) => verdict === "not_tested").map(({ check }) => check);
+  const left = results.filter(({ verdict }) => verdict === "not_tested").map(checkName);
   return say("self_test.passed_part", { passed, n: results.length, parts: left.join(", ") });
 }
 

@@ -5,7 +5,7 @@ import errno
 import pytest
 
 from device.simulation import faults
-from device.simulation.chips.emulated_storage import EmulatedDisk
+from device.simulation.chips.emulated_storage import LOW_BYTES, EmulatedDisk
 from device.simulation.faults import FaultTimeline, ScriptedFault
 
 
@@ -26,6 +26,15 @@ def test_a_full_disk_takes_nothing_and_has_nothing_left_until_there_is_space_aga
     write(disk, tmp_path / "frame")
     assert (tmp_path / "frame").read_bytes() == b"counts"
     assert disk.free_bytes(tmp_path) > 0
+
+
+def test_a_low_disk_takes_what_comes_and_says_how_little_is_left(tmp_path):
+    now_s = [0.0]
+    disk = EmulatedDisk(FaultTimeline([ScriptedFault("disk_low", until_s=1.0)], clock=lambda: now_s[0]))
+    assert disk.free_bytes(tmp_path) == LOW_BYTES
+    write(disk, tmp_path / "frame")
+    now_s[0] = 1.0
+    assert disk.free_bytes(tmp_path) > LOW_BYTES
 
 
 def test_a_read_only_disk_takes_nothing_and_still_has_space(tmp_path):

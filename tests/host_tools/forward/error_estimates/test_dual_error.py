@@ -1,4 +1,4 @@
-"""The dual-weighted residual against what it must be: its sum the step between two orders, twice its size the error."""
+"""The dual-weighted residual against what it must be: its sum the step between two orders, its size the error."""
 
 from dataclasses import replace
 
@@ -57,9 +57,10 @@ def test_the_parts_of_the_force_are_of_one_sign_and_add_up_to_how_much_too_stiff
         Scene(Inclusion(20.0, 12.0, 2.0), Press(force_n=0.3), tissue=Tissue(thickness_mm=60.0)),
     ],
 )
-def test_the_true_error_is_within_the_stated_one_and_not_far_below(scene):
-    true = numbers_of(solve(scene, _graded(scene, ORDER + 3)))
-    solution = solve(scene, _graded(scene, ORDER), estimate_error=True)
+@pytest.mark.parametrize("order", [3, 4, 5])
+def test_the_true_error_is_within_the_stated_one_and_not_far_below(scene, order):
+    true = numbers_of(solve(scene, _graded(scene, order + 3)))
+    solution = solve(scene, _graded(scene, order), estimate_error=True)
     found = numbers_of(solution)
     ratios = []
     for name, stated in solution.stated_error.items():
@@ -67,7 +68,7 @@ def test_the_true_error_is_within_the_stated_one_and_not_far_below(scene):
         assert error <= max(stated, UNRESOLVED), name
         if stated and error > UNRESOLVED:
             ratios.append(stated / error)
-    assert np.median(ratios) < 60
+    assert np.median(ratios) < 25
 
 
 def numbers_of(solution):

@@ -8,7 +8,7 @@ import pytest
 from device.measurement.quantities import Inclusion
 from host_tools.forward.error_estimates.stated_error import stated_error
 from host_tools.forward.face_state import FaceState, Rays
-from host_tools.forward.plan import model_plan
+from host_tools.forward.plan import GRADED, model_plan
 from host_tools.forward.press_model import Loaded
 from host_tools.scenes.scene import Scene, Waveguide
 
@@ -25,11 +25,11 @@ PRESSED = Loaded(face(0.200, 0.0200), other=face(0.202, 0.0201))  # 1 % in force
 BASELINE = Loaded(face(0.19, 0.0), other=face(0.19, 0.0))
 
 
-def test_in_small_strain_each_feature_states_twice_its_own_step():
-    """What is left to gain is about as much as the last step gained, and as much again for safety: 2 %, and 1 %."""
+def test_in_small_strain_each_feature_states_three_times_its_own_step():
+    """What is left to gain is about as much as the last step gained, and twice as much for safety: 3 %, and 1.5 %."""
     stated = stated_error(PLAN, RAYS, PRESSED, BASELINE)
-    assert stated["force_n"] == pytest.approx(0.02)
-    assert stated["max_deformation_mm"] == pytest.approx(0.01)
+    assert stated["force_n"] == pytest.approx(0.03)
+    assert stated["max_deformation_mm"] == pytest.approx(0.015)
     assert stated["deformation_area_mm2"] == 0.0  # the same shape: rounding is no error
 
 
@@ -41,6 +41,17 @@ def test_elsewhere_every_feature_states_the_largest_step(plan, factor):
     """1 %, that of the force: twice it where the other order is higher, 0.4 of it in 3-D, where it is lower."""
     stated = stated_error(plan, RAYS, PRESSED, BASELINE)
     assert stated["force_n"] == stated["max_deformation_mm"] == pytest.approx(factor * 0.01)
+
+
+def test_a_dome_that_lifts_off_states_what_no_order_sees_at_its_edge():
+    """Orders 4 and 5 once agreed to 7e-5 where both were 1.7e-3 off."""
+    domed = replace(PLAN, contact="unilateral", grading=GRADED, order=5)
+    closed = replace(PRESSED.state, p_kpa=np.ones_like(BUMP_MM))
+    near = Loaded(closed, other=face(0.200, 0.020001))
+    assert stated_error(domed, RAYS, near, BASELINE)["max_deformation_mm"] == pytest.approx(4 * 5e-5)
+    touching = BUMP_MM * (RAYS.r_mm < 8.0)
+    lifted = near._replace(state=replace(closed, p_kpa=touching))
+    assert stated_error(domed, RAYS, lifted, BASELINE)["max_deformation_mm"] == 2e-3
 
 
 def test_what_was_prescribed_has_no_error():

@@ -1,0 +1,45 @@
+"""What counts as a statement that holds, and what a chapter says of many; the kinds run in `verify --effectivity`."""
+
+import numpy as np
+import pytest
+
+from host_tools.forward.accuracy import Level
+from host_tools.forward.ladder import FINITE_RUNGS
+from host_tools.verification.effectivity import (
+    KINDS,
+    ErrorStatement,
+    ModelKind,
+    box_scene,
+    chapter_of,
+    measure_effectivity,
+)
+
+GOOD = ErrorStatement("kind", "graded 4", "max_deformation_mm", 0.02, 0.01)
+WRONG = ErrorStatement("kind", "graded 3", "max_deformation_mm", 0.01, 0.02)
+UNRESOLVED = ErrorStatement("kind", "graded 4", "force_n", 1e-9, 1e-6)
+
+
+def test_a_statement_holds_where_the_true_error_is_within_or_not_resolved():
+    assert (GOOD.is_held, WRONG.is_held, UNRESOLVED.is_held) == (True, False, True)
+    assert GOOD.ratio == pytest.approx(2.0)
+
+
+def test_a_chapter_judges_what_held_level_by_level_and_names_what_is_overstated():
+    found = chapter_of([*[GOOD] * 99, UNRESOLVED, WRONG, GOOD._replace(level="graded 5", stated=0.06)])
+    assert [one.passed for one in found.benchmarks] == [True, False, True]
+    assert found.tables[0].rows[0][1:6] == ("graded 4", "100", "1.000", "2.0", "2")
+    assert found.facts == {"statements": 102, "held": 101, "overstated": ["kind: graded 5, 6.0"]}
+
+
+def test_every_level_that_a_climb_begins_with_is_measured():
+    levels = {level for kind in KINDS for level in kind.levels}
+    assert {*FINITE_RUNGS[:4]} < levels
+    assert {Level("graded", order) for order in (3, 4, 5, 6)} < levels
+
+
+def test_statements_of_a_scene_in_the_box_hold():
+    kind = ModelKind("box", box_scene, 1, (Level("graded", 3), Level("graded", 4)), (Level("graded", 7),))
+    found = measure_effectivity([kind], seed=4)
+    assert {one.level for one in found} == {"graded 3", "graded 4"}
+    assert all(one.is_held for one in found)
+    assert np.median([one.ratio for one in found]) < 50
