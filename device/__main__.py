@@ -54,6 +54,9 @@ VERBS = {
 OF_EVERY_VERB = {"--simulate": False, "--config": True, "--root": True, "--scene": True, "--port": True}
 """Options that stand before the verb or behind it, and whether a value follows."""
 LOOKING = ("status", "exams", "export", "retention")
+"""Verbs that only read what is kept, or ask the daemon: in a room of their own."""
+WITHOUT_SETTINGS = ("analyse", "config", "faults", "openapi", "support")
+"""Verbs whose `run` takes the options alone; that of the others takes the settings, too."""
 ONE_THREAD = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS")
 """A frame is small work: more threads of a library would wait for each other. The camera's process inherits this."""
 
@@ -69,6 +72,7 @@ EXAMPLES = """examples:
 
 ALIASES = {"support": ("support-bundle",)}
 """Other names of verbs."""
+ALIASED = {other: verb for verb, others in ALIASES.items() for other in others}
 
 
 def _parser(named: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
@@ -148,51 +152,18 @@ def _refusals() -> tuple[type[Exception], ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    match options.command:
-        case "analyse":
-            from device.commands.analyse import run_analyse_command
-
-            return run_analyse_command(options)
+    command: str | None = options.command
+    match ALIASED.get(command or "", command):
+        case None:
+            return _serve(options)
         case "record":
             return _record(options)
-        case "config":
-            from device.commands.config import run_config_command
-
-            return run_config_command(options)
-        case "calibration":
-            from device.commands.calibration import run_calibration_command
-
-            return run_calibration_command(options, _start_settings(options, _scenario(options)).config)
-        case "faults":
-            from device.commands.faults import run_faults_command
-
-            return run_faults_command(options)
-        case "pair":
-            from device.commands.pair import run_pair_command
-
-            return run_pair_command(options, _start_settings(options, _scenario(options)).config)
-        case "tokens":
-            from device.commands.tokens import run_tokens_command
-
-            return run_tokens_command(options, _start_settings(options, _scenario(options)).config)
-        case "audit":
-            from device.commands.audit import run_audit_command
-
-            return run_audit_command(options, _start_settings(options, _scenario(options)).config)
-        case "openapi":
-            from device.commands.openapi import run_openapi_command
-
-            return run_openapi_command(options)
         case "self-test":
             return _self_test(options)
         case "update":
             from device.update.__main__ import run_update
 
             return run_update(options)
-        case "backup":
-            from device.commands.backup import run_backup_command
-
-            return run_backup_command(options, _start_settings(options, _scenario(options)).config)
         case "restore":
             from device.commands.restore import run_restore_command
 
@@ -200,31 +171,20 @@ def _run(options: argparse.Namespace) -> int:
         case "erase":
             from device.commands.erase import run_erase_command
 
-            config = _start_settings(options, _scenario(options)).config
-            return run_erase_command(options, config, _stated(options))
-        case "support" | "support-bundle":
-            from device.commands.support import run_support_command
-
-            return run_support_command(options)
-        case "dicom":
-            from device.commands.dicom import run_dicom_command
-
-            return run_dicom_command(options, _start_settings(options, _scenario(options)).config)
-        case verb if verb in LOOKING:
-            return _look(verb, options)
+            return run_erase_command(options, _started(options), _stated(options))
         case "led-off":
             from device.commands.led_off import led_off
 
             led_off(_start_settings(options, None).config.light)
             return 0
-    return _serve(options)
+        case verb:
+            run: Callable[..., int] = import_module(_module_of(verb)).run
+            return run(options) if verb in WITHOUT_SETTINGS else run(options, _started(options))
 
 
-def _look(verb: str, options: argparse.Namespace) -> int:
-    """Run a verb that only reads what is kept, or asks the daemon."""
-    config = _start_settings(options, _scenario(options)).config
-    run: Callable[[argparse.Namespace, Config], int] = import_module(_module_of(verb)).run
-    return run(options, config)
+def _started(options: argparse.Namespace) -> Config:
+    """Return the settings that a daemon would start with."""
+    return _start_settings(options, _scenario(options)).config
 
 
 def _serve(options: argparse.Namespace) -> int:

@@ -23,6 +23,8 @@ from bench_table import Figure
 from daemon_process import QUICK_HAND, Daemon
 from rig import Rig, build_shim
 
+from device.errors import LightRestError
+
 CHAPTER = "daemon of a probe"
 MODES = ("quick", "standard", "precise")
 STARTS = 3
@@ -31,7 +33,7 @@ READY_BOUND = 15.0
 REST_S, SETTLE_S = 20.0, 15.0
 QUICK_PRESSES = 30
 """A hand in real time takes three seconds for each: chapter `endurance` has a thousand."""
-MOST_GROWN_MB = 10.0
+MOST_GROWN_MB, RESTING_S = 10.0, 5.0
 ALL, OWN = "Pss", "Pss_Anon"
 """Of /proc/PID/smaps_rollup."""
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
@@ -102,7 +104,8 @@ def _grown(daemon: Daemon, family: list[int], modes: Sequence[str]) -> tuple[flo
 
 def _press(daemon: Daemon, modes: Iterable[str]) -> None:
     for mode in modes:
-        job = daemon.press(mode)
+        while (job := daemon.press(mode))["code"] == LightRestError.code:
+            time.sleep(RESTING_S)  # no person presses so often that the LEDs must rest
         assert job["state"] == "done", job
 
 

@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING")
 
 
-def run_analyse_command(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Estimate recordings by the settings of a file, or those of the simulated probe that made them.
 
     The certificate has to have held when they were recorded.

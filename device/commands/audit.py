@@ -50,7 +50,7 @@ def _moment(text: str) -> str:
     return recorded(moment)
 
 
-def run_audit_command(options: argparse.Namespace, config: Config) -> int:
+def run(options: argparse.Namespace, config: Config) -> int:
     """Say how far the chain goes, or which row was changed; return 0, or 1 when one was. Or list what was done."""
     if options.action == "list":
         return _list(options, config)

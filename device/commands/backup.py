@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="as one JSON object")
 
 
-def run_backup_command(options: argparse.Namespace, config: Config) -> int:
+def run(options: argparse.Namespace, config: Config) -> int:
     """Write the backup and say what is in it; return the exit code, or raise what kept it from being written."""
     report = write_backup(config, options.file, options.root)
     if options.json:

@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     activate.add_argument("id", metavar="ID")
 
 
-def run_calibration_command(options: argparse.Namespace, config: Config) -> int:
+def run(options: argparse.Namespace, config: Config) -> int:
     """Run a verb; return the exit code, or raise the `DeviceError` of a certificate that cannot be used."""
     calibrations = Calibrations(config.calibration)
     if options.verb == "activate":

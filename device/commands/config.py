@@ -38,7 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     form.add_argument("--markdown", action="store_true", help="what there is to set: the page docs/settings.md")
 
 
-def run_config_command(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run `config check` or `config show`; return the exit code, or raise `ConfigError` for what cannot be shown."""
     if options.verb == "show" and options.markdown:
         print(markdown(), end="")

@@ -30,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action.add_argument("--json", action="store_true", help="as JSON")
 
 
-def run_dicom_command(options: argparse.Namespace, config: Config) -> int:
+def run(options: argparse.Namespace, config: Config) -> int:
     """Ask what the settings name; return the exit code, or raise `ArchiveUnreachable` when the worklist is silent."""
     return _worklist(options, config) if options.action == "worklist" else _echo(options, config)
 

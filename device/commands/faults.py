@@ -54,7 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     form.add_argument("--markdown", action="store_true", help="the page docs/faults.md")
 
 
-def run_faults_command(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Print the table of faults; return the exit code."""
     if options.markdown:
         print(markdown(), end="")

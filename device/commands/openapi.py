@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--check", type=Path, metavar="FILE", help="say whether a file is this document")
 
 
-def run_openapi_command(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Print the document, or compare a file with it; return the exit code."""
     if options.check is None:
         print(document(), end="")

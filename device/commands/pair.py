@@ -30,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print a JSON object")
 
 
-def run_pair_command(options: argparse.Namespace, config: Config) -> int:
+def run(options: argparse.Namespace, config: Config) -> int:
     """Make a pairing code and say what to do with it."""
     asked = {"name": options.name, "scope": options.scope, "days": options.days}
     code = ask(config, "POST", PAIRING, asked)

@@ -34,7 +34,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the sections as one JSON object")
 
 
-def run_support_command(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Write the support file and say which sections are in it; return the exit code."""
     context = SupportContext(options.root, options.config, options.simulate)
     try:
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, metavar="FILE", help="the daemon's settings (TOML)")
     parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="folder that stands for /")
     parser.set_defaults(simulate=False)
-    return run_support_command(parser.parse_args(arguments))
+    return run(parser.parse_args(arguments))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print a JSON object")
 
 
-def run_tokens_command(options: argparse.Namespace, config: Config) -> int:
+def run(options: argparse.Namespace, config: Config) -> int:
     """List the tokens, or revoke one."""
     if options.revoke:
         revoked = ask(config, "DELETE", f"{TOKENS}/{options.revoke}")

@@ -50,6 +50,7 @@ from device.web.schema import (
 )
 from device.web.service.manual import add_manual
 from device.web.service.metrics import add_metrics
+from device.web.service.security_contact import add_security_contact
 from device.web.service.webhook import add_webhook
 from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.streams.live_view import add_live_view
@@ -110,6 +111,7 @@ def create_app(
     _add_tare(app, procedure)
     add_metrics(app, procedure, store)
     add_manual(app)
+    add_security_contact(app, lambda: procedure.config.maker)
     add_live_view(app, API, procedure)
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)

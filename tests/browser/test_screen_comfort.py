@@ -7,13 +7,15 @@ from pathlib import Path
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from opened_screen import SIZES, named, opened, shoot
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe, served_probe
 
 from device.errors import DeviceError
 from device.instrument.press.states import Guidance
 from device.instrument.status import PressJob
+from device.simulation.hand import HandSettings
+from device.simulation.scenario import Scenario
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 
@@ -189,6 +191,56 @@ def test_a_reload_in_a_press_shows_what_the_probe_says(browser: Browser, probe: 
     expect(page.locator("#press-button")).to_have_text("Cancel")
     expect(page.locator("#footer")).to_have_js_property("inert", value=True)
     page.context.close()
+
+
+ASKED = """() => {
+  window.locks = [];
+  const ask = navigator.wakeLock.request.bind(navigator.wakeLock);
+  navigator.wakeLock.request = async (kind) => {
+    const lock = await ask(kind);
+    window.locks.push(lock);
+    return lock;
+  };
+}"""
+"""Notes each lock that the browser itself gives to the page."""
+HELD = "() => window.locks.map((lock) => !lock.released)"
+
+
+@pytest.mark.long
+def test_while_the_probe_is_pressed_the_screen_stays_awake_and_a_stray_touch_does_nothing(
+    browser: Browser, tmp_path: Path
+):
+    hand = HandSettings(reaction_s=3.0)  # it begins late enough for all that is tried meanwhile
+    with served_probe(tmp_path, is_running=True, scenario=Scenario(hand=hand)) as served:
+        context = browser.new_context(locale="en-GB", viewport={"width": 800, "height": 480}, has_touch=True)
+        context.add_init_script(f"({ASKED})()")
+        page = context.new_page()
+        page.goto(served.url)
+        for button in ("#exam-button", "#free-press", "#free-yes"):
+            page.locator(button).tap()
+        exam, history = (centre(page, name) for name in ("#exam-button", "#history-open"))
+        expect(page.locator("#press-button")).to_have_text("Press the simulated probe")
+        assert page.evaluate(HELD) == []
+        page.locator("#press-button").dblclick()  # a finger that bounces
+        expect(page.locator("#press-button")).to_have_text("Cancel")
+        page.wait_for_function(f"() => ({HELD})().includes(true)")
+        for x, y in (exam, history):
+            page.touchscreen.tap(x, y)
+        expect(page.locator("dialog[open]")).to_have_count(0)
+        assert served.procedure.board.now.press.state in ("waiting", "capturing")
+        page.locator("#press-button").tap()
+        expect(page.locator("#instruction")).to_have_text("Cancelled")
+        page.wait_for_function(f"() => !({HELD})().includes(true)")
+        page.touchscreen.tap(*exam)
+        expect(page.locator("#chooser")).to_be_visible()
+        page.context.close()
+
+
+def centre(page: Page, name: str) -> tuple[float, float]:
+    """Return where a finger touches an element."""
+    box = page.locator(name).bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
 def test_nothing_can_be_pressed_under_the_curtain(browser: Browser, tmp_path: Path):

@@ -1,0 +1,97 @@
+"""The smallest panel, 480 x 320: every button below a result is in reach, and no word of a comparison is broken."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from kept_measurements import keep
+from opened_screen import SIZES, opened, shoot
+from playwright.sync_api import Browser, Page, expect
+from screen_layout import wrong_in
+from served_probe import ServedProbe
+
+from device.instrument.press.states import Guidance
+from device.instrument.status import PressJob
+
+pytestmark = [pytest.mark.browser, pytest.mark.real_time]
+SMALLEST = SIZES[1]
+EXAM = {"kind": "patient", "patient_ref": "A-17", "side": "left", "clock_position": 10, "operator": "Ada"}
+PICTURE = cv2.imencode(".png", np.full((358, 480), 90, np.uint8))[1].tobytes()
+CUT_OFF = """(box) => [...box.querySelectorAll(".button")].filter((one) => one.offsetParent).flatMap((one) => {
+  const [outer, inner] = [box.getBoundingClientRect(), one.getBoundingClientRect()];
+  const isCut = inner.left < outer.left - 0.5 || inner.right > outer.right + 0.5 || inner.bottom > innerHeight;
+  return isCut || one.scrollWidth > one.clientWidth || one.scrollHeight > one.clientHeight ? [one.textContent] : [];
+})"""
+BROKEN_WORDS = """(box) => {
+  const found = [];
+  const walk = document.createTreeWalker(box, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    for (const word of walk.currentNode.textContent.matchAll(/[^\\s-]+/g)) {
+      const range = document.createRange();
+      range.setStart(walk.currentNode, word.index);
+      range.setEnd(walk.currentNode, word.index + word[0].length);
+      if (new Set([...range.getClientRects()].map((rect) => Math.round(rect.top))).size > 1) found.push(word[0]);
+    }
+  }
+  return found;
+}"""
+
+
+def open_exam(page: Page, probe: ServedProbe) -> str:
+    """Begin an exam and open it; return its id."""
+    exam = page.request.post(f"{probe.url}/api/v1/exams", data=EXAM).json()
+    page.locator("#exam-button").click()
+    page.locator(".recent").first.click()
+    expect(page.locator("#exam-who")).to_have_text("A-17")
+    return str(exam["id"])
+
+
+def show(page: Page, probe: ServedProbe, measurement_id: str, exam_id: str | None) -> None:
+    """Let a press end with a measurement that is kept."""
+    press = PressJob("p", "standard", "done", measurement_id=measurement_id, exam_id=exam_id)
+    told = {"step": "result", "guidance": Guidance.DONE, "press": press, "measurement_id": measurement_id}
+    probe.procedure.board.update(**told)
+    expect(page.locator("#panel")).to_have_attribute("data-view", "result")
+    expect(page.locator("#act-details")).to_be_visible()
+
+
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_every_button_below_a_result_is_in_reach(browser: Browser, probe: ServedProbe, language: str, number: int):
+    """The second one belongs to no exam and has one more: to add it to this one."""
+    number += 10 * (language == "de-DE")
+    probe.procedure.board.update(measurement_id=None)
+    page = opened(browser, probe, SMALLEST, locale=language)
+    exam_id = open_exam(page, probe)
+    of_exam = exam_id if number % 10 == 1 else None
+    keep(probe.procedure.store, number, exam_id=of_exam)
+    show(page, probe, f"m-{number}", of_exam)
+    assert page.locator(".acts .button:visible").count() == (5 if of_exam else 6)
+    shoot(page, f"small/acts-{language[:2]}-{number % 10}")
+    assert page.locator(".acts").evaluate(CUT_OFF) == []
+    assert page.locator(".acts").evaluate(BROKEN_WORDS) == []
+    assert wrong_in(page) == []
+    page.context.close()
+
+
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_no_word_of_a_comparison_is_broken(browser: Browser, probe: ServedProbe, language: str):
+    probe.procedure.board.update(measurement_id=None)
+    page = opened(browser, probe, SMALLEST, locale=language)
+    exam_id = open_exam(page, probe)
+    first = 30 if language == "de-DE" else 20
+    for number in (first, first + 1):
+        keep(probe.procedure.store, number, exam_id=exam_id, picture=PICTURE)
+    page.locator("#menu-open").click()
+    page.locator("#menu-history").click()
+    for index in range(2):
+        page.locator(".marker").nth(index).click()
+    expect(page.locator("#comparison tr")).to_have_count(5)
+    page.wait_for_function("() => [...document.images].every(one => !one.src || one.complete)")
+    shoot(page, f"small/comparison-{language[:2]}")
+    assert page.locator("#comparison").evaluate(BROKEN_WORDS) == []
+    sideways = "box => box.parentElement.scrollWidth - box.parentElement.clientWidth"
+    assert page.locator("#comparison").evaluate(sideways) == 0
+    assert wrong_in(page) == []
+    page.context.close()
