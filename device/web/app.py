@@ -48,6 +48,7 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.screen.joined_files import add_screen
 from device.web.service.manual import add_manual
 from device.web.service.metrics import add_metrics
 from device.web.service.security_contact import add_security_contact
@@ -120,15 +121,12 @@ def create_app(
     add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
+    add_screen(app)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get(PAIRING_PAGE, include_in_schema=False)
     def pairing_page() -> FileResponse:
         return FileResponse(STATIC / "pair.html")
-
-    @app.get("/", include_in_schema=False)
-    def screen() -> FileResponse:
-        return FileResponse(STATIC / "index.html")
 
     return app
 
