@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import field
+from datetime import date
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Literal
@@ -46,6 +47,8 @@ AeTitle = Annotated[str, Field(pattern=r"^[!-\[\]-~]([ -\[\]-~]{0,14}[!-\[\]-~])
 
 WebhookUrl = Annotated[str, Field(pattern=r'^https?://[!"$->A-\[\]-~]+$')]
 """An address without a user, a password or a query: the signature says who sends."""
+ContactUrl = Annotated[str, Field(pattern=r"^(mailto:|tel:|https://)[!-~]+$")]
+Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
 THIS_MACHINE = ("127.0.0.1", "::1", "localhost")
 
 
@@ -523,6 +526,33 @@ class WebhookSection(Section):
             )
 
 
+@dataclass(frozen=True, config=STRICT)
+class MakerSection(Section):
+    """Who made this probe and mends it; the probe tells it to whoever finds a vulnerability."""
+
+    security_contact: Annotated[
+        ContactUrl | None, Doc("Where a vulnerability is reported: mailto:, tel: or https: and the rest.")
+    ] = None
+    updates_until: Annotated[Day | None, Doc("Until when there are updates for it, as 2031-12-31.")] = None
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yield a contact without a day, a day without a contact, and a day that no calendar has."""
+        given = {"maker.security_contact": self.security_contact, "maker.updates_until": self.updates_until}
+        for (name, value), other in zip(given.items(), reversed(given), strict=True):
+            if value is None and given[other] is not None:
+                yield Conflict(name, "not set", "set", (other,))
+        if self.updates_until is not None and not _is_day(self.updates_until):
+            yield Conflict("maker.updates_until", self.updates_until, "a day of the calendar", (), "correct it")
+
+
+def _is_day(text: str) -> bool:
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _is_guarded(url: str) -> bool:
     """Return whether nobody on the way reads what is sent to an address, and it names a host and a port that is one."""
     try:
@@ -563,6 +593,7 @@ class Config(Section):
     server: ServerSection = field(default_factory=ServerSection)
     dicom: DicomSection = field(default_factory=DicomSection)
     webhook: WebhookSection = field(default_factory=WebhookSection)
+    maker: MakerSection = field(default_factory=MakerSection)
 
     @property
     def warn_free_mb(self) -> float:

@@ -35,6 +35,7 @@ from served_probe import served_probe
 from written_exam import begin, measure
 
 from device.assembly.cell import commissioned
+from device.commands.serve import SWITCH_S
 from device.config import simulated_config
 from device.instrument.press.capture import Capture
 from device.instrument.status import StatusBoard
@@ -51,6 +52,7 @@ MOST_MS, MOST_MB, STOP_S = 150.0, 30.0, 3.0
 
 def figures() -> Iterator[Figure]:
     """Yield the frames beside requests, what harm does, and how long stops take."""
+    sys.setswitchinterval(SWITCH_S)  # as the daemon's
     with TemporaryDirectory(prefix="tsis-") as folder:
         yield from _frames_beside_requests(_made(Path(folder) / "frames"))
         yield from _harmed(_made(Path(folder) / "harmed"))

@@ -15,9 +15,10 @@ SCOPES: tuple[Scope, ...] = ("read", "measure", "admin")
 
 API = "/api/v1"
 PAIRING, CLAIM, TOKENS = f"{API}/pairing", f"{API}/pairing/claim", f"{API}/tokens"
-PAIRING_PAGE = "/pair"
-OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM), ("GET", PAIRING_PAGE)})
-"""Whoever has no token yet may see that it runs, and bring the code from the probe's screen by the page for that."""
+PAIRING_PAGE, SECURITY_CONTACT = "/pair", "/.well-known/security.txt"
+OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM), ("GET", PAIRING_PAGE), ("GET", SECURITY_CONTACT)})
+"""Whoever has no token yet may see that it runs, bring the code from the probe's screen by the page for that, and read
+whom to tell of a vulnerability."""
 OPEN_FOLDER = "/static/"
 """The screen's own files: they are in every copy of the software."""
 WORKLIST = f"{API}/worklist"

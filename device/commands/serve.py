@@ -11,6 +11,7 @@ import json
 import logging
 import os
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -39,6 +40,9 @@ log = logging.getLogger(__name__)
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
 LOOPBACK_ADDRESS = "127.0.0.1"
 START_AGAIN = "Then start the daemon again."
+SWITCH_S = 0.0005
+"""A thread of the web that answers gives Python's lock up so soon to one that takes frames; Python's own 5 ms, waited
+for at each step of a frame's work, are a frame's time."""
 
 
 def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Callable[[], None] = lambda: None) -> int:
@@ -47,6 +51,7 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
     `ready` is called once every part has opened. Raises `DeviceError` when the port is taken, and whatever `opened`
     raises when a part does not open.
     """
+    sys.setswitchinterval(SWITCH_S)
     config = settings.config
     with DaemonPort(config) as port, ExitStack() as listening:
         sockets, network = _beside(config, listening)

@@ -48,8 +48,10 @@ from device.web.schema import (
     Status,
     Tare,
 )
+from device.web.screen.joined_files import add_screen
 from device.web.service.manual import add_manual
 from device.web.service.metrics import add_metrics
+from device.web.service.security_contact import add_security_contact
 from device.web.service.webhook import add_webhook
 from device.web.streams.changes import ChangeFeed, LastEventId
 from device.web.streams.live_view import add_live_view
@@ -110,6 +112,7 @@ def create_app(
     _add_tare(app, procedure)
     add_metrics(app, procedure, store)
     add_manual(app)
+    add_security_contact(app, lambda: procedure.config.maker)
     add_live_view(app, API, procedure)
     add_exams(app, API, store)
     add_exports(app, API, store, lambda: procedure.config.serial, kept_or_drawn)
@@ -118,15 +121,12 @@ def create_app(
     add_retention(app, API, lambda: procedure.config, store)
     add_updates(app, API, procedure, updates or Updates())
     add_pairing(app, door, network)
+    add_screen(app)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
 
     @app.get(PAIRING_PAGE, include_in_schema=False)
     def pairing_page() -> FileResponse:
         return FileResponse(STATIC / "pair.html")
-
-    @app.get("/", include_in_schema=False)
-    def screen() -> FileResponse:
-        return FileResponse(STATIC / "index.html")
 
     return app
 

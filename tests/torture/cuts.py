@@ -8,7 +8,6 @@ is compared. The control: the same without synchronising has to find losses, or 
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import random
 import signal
@@ -19,8 +18,9 @@ import time
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(TESTS), str(TESTS.parent)]
-from cut_disk import CutDisk, can_cut  # noqa: E402
+sys.path[:0] = [str(TESTS), str(TESTS.parent), str(TESTS / "torture")]
+from cut_disk import CutDisk  # noqa: E402
+from cut_options import cut_options  # noqa: E402
 
 from device.errors import DeviceError  # noqa: E402
 from device.records.store import Store  # noqa: E402
@@ -114,14 +114,7 @@ def cut_often(cuts: int, seed: int, *, synchronises: bool) -> Cuts:
 
 def main() -> int:
     """Cut as often as asked; return 0 when nothing is lost and the control loses something."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cuts", type=int, default=100)
-    parser.add_argument("--control", type=int, default=20, help="at most so many cuts without synchronising")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    if not can_cut():
-        print("The power cannot be cut here: root, loop devices and mkfs.ext4 are needed.", file=sys.stderr)
-        return 2
+    options = cut_options(__doc__)
     story = cut_often(options.cuts, options.seed, synchronises=True)
     control = cut_often(options.control, options.seed, synchronises=False)
     print("\n".join(story.problems))

@@ -8,14 +8,14 @@ something, or this test could not tell.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS.parent), str(TESTS / "torture")]
-from cut_disk import CutDisk, can_cut  # noqa: E402
+from cut_disk import CutDisk  # noqa: E402
+from cut_options import cut_options  # noqa: E402
 from kills import Kills  # noqa: E402
 
 from device.errors import DeviceError  # noqa: E402
@@ -82,14 +82,7 @@ def _is_lost(story: DaemonCuts) -> bool:
 
 def main() -> int:
     """Cut as often as asked; return 0 when nothing is lost and the control loses something."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cuts", type=int, default=100)
-    parser.add_argument("--control", type=int, default=20, help="at most so many cuts without synchronising")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    if not can_cut():
-        print("The power cannot be cut here: root, loop devices and mkfs.ext4 are needed.", file=sys.stderr)
-        return 2
+    options = cut_options(__doc__)
     told = cut(options.cuts, options.seed, synchronises=True).told
     control = cut(options.control, options.seed, synchronises=False).told
     print("\n".join(told.problems))

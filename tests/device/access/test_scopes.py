@@ -32,8 +32,9 @@ def test_every_operation_of_the_api_needs_what_the_table_says(method, path):
     assert need_of(method, path) == expected(method, path)
 
 
-def test_nothing_but_whether_it_runs_and_the_code_is_open():
-    assert {("GET", "/api/v1/health/live"), ("POST", "/api/v1/pairing/claim"), ("GET", "/pair")} == OPEN
+def test_nothing_but_whether_it_runs_the_code_and_whom_to_tell_is_open():
+    pages = {("GET", "/pair"), ("GET", "/.well-known/security.txt")}
+    assert {("GET", "/api/v1/health/live"), ("POST", "/api/v1/pairing/claim"), *pages} == OPEN
     assert need_of("GET", "/static/screen.js") == "nothing"
     assert need_of("POST", "/static/screen.js") == "admin"
 

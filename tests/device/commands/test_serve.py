@@ -1,18 +1,20 @@
 """The daemon's port, and what it leaves behind when it does not start. Its change of hands: test_server.py."""
 
 import socket
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from device.assembly.opened_parts import StartFailed
-from device.commands.serve import DaemonPort, refusal_noted
+from device.commands.serve import SWITCH_S, DaemonPort, refusal_noted, serve
 from device.config import Config, ServerSection
 from device.errors import CameraError, ConfigError, LightError
 from device.fallback.start_note import NOTE, read_note
 from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
+from device.settings.last_good import StartSettings
 
 
 def test_an_answer_of_two_parts_does_not_wait_for_the_clients_acknowledgement():
@@ -50,3 +52,17 @@ def test_what_ends_as_it_should_notes_nothing(tmp_path):
     with refusal_noted(tmp_path):
         pass
     assert read_note(tmp_path) is None
+
+
+def test_no_thread_of_the_web_keeps_the_frames_waiting_for_pythons_lock():
+    before_s = sys.getswitchinterval()
+
+    def opened():
+        raise CameraError("There is no camera.", "Plug it in.")
+
+    try:
+        with pytest.raises(CameraError):
+            serve(StartSettings(Config(server=ServerSection(port=0))), opened)
+        assert sys.getswitchinterval() == pytest.approx(SWITCH_S)
+    finally:
+        sys.setswitchinterval(before_s)

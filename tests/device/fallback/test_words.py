@@ -15,8 +15,8 @@ from device.fallback.address import ServedAddress
 from device.fallback.page import page
 from device.fallback.situation import UPDATING, Situation
 from device.fallback.words import LANGUAGES, PageWords, wished_language
-from device.web.screen_words import LANGUAGES as OF_THE_SCREEN
-from device.web.screen_words import words_of
+from device.web.screen.screen_words import LANGUAGES as OF_THE_SCREEN
+from device.web.screen.screen_words import words_of
 
 ENGLISH = words_of("en")
 GERMAN = PageWords("de")

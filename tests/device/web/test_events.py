@@ -2,6 +2,7 @@
 
 import asyncio
 import types
+from contextlib import ExitStack
 from dataclasses import replace
 
 import pytest
@@ -12,7 +13,15 @@ from device.errors import ClockJumpError, LightBusError, StalledError, Unplugged
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.status import PressJob, ProcedureStatus, ScanProgress, StatusBoard
 from device.web import events, schema
-from device.web.events import ALIVE_S, EVENT_INTERVAL_S, STILL_N, StatusFeed, snapshot, status_events
+from device.web.events import (
+    ALIVE_S,
+    EVENT_INTERVAL_S,
+    LONGEST_INTERVAL_S,
+    STILL_N,
+    StatusFeed,
+    snapshot,
+    status_events,
+)
 
 
 class Force:
@@ -228,3 +237,30 @@ def test_all_clients_get_the_event_that_was_built_once_and_only_once(procedure, 
     asyncio.run(all_follow())
     assert procedure.built == 3
     assert all(one == told[0] for one in told)
+
+
+def test_many_streams_share_the_time_of_one_loop_and_none_is_told_too_seldom():
+    feed = StatusFeed(types.SimpleNamespace())
+    with ExitStack() as opened:
+        intervals_s = []
+        for _ in range(200):
+            opened.enter_context(feed.stream())
+            intervals_s.append(feed.interval_s)
+        assert intervals_s[:12] == [EVENT_INTERVAL_S] * 12
+        assert intervals_s[49] == pytest.approx(0.25)
+        assert max(intervals_s) == LONGEST_INTERVAL_S < ALIVE_S
+    assert feed.interval_s == EVENT_INTERVAL_S
+
+
+def test_a_stream_counts_until_its_client_goes(procedure):
+    async def open_and_close():
+        streams = [status_events(procedure.feed, Unchanged()) for _ in range(50)]
+        for stream in streams:
+            await anext(stream)
+        beside_fifty_s = procedure.feed.interval_s
+        for stream in streams:
+            await stream.aclose()
+        return beside_fifty_s
+
+    assert asyncio.run(open_and_close()) == pytest.approx(0.25)
+    assert procedure.feed.interval_s == EVENT_INTERVAL_S

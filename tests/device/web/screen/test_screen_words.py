@@ -20,7 +20,7 @@ from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OU
 from device.measurement.mode import MODES
 from device.measurement.quantities import Bound
 from device.measurement.ramp_modes.estimate import REASONS
-from device.web.screen_words import LANGUAGES, page, words_of
+from device.web.screen.screen_words import LANGUAGES, page, words_of
 
 STATIC = ROOT / "device" / "web" / "static"
 ENGLISH = words_of("en")
@@ -208,4 +208,4 @@ def test_every_unit_and_bound_of_the_self_test_has_words() -> None:
 
 def test_the_page_of_all_sentences_is_the_files() -> None:
     shown = (ROOT / "docs" / "screen_words.md").read_text(encoding="utf-8")
-    assert shown == page(), "python -m device.web.screen_words > docs/screen_words.md"
+    assert shown == page(), "python -m device.web.screen.screen_words > docs/screen_words.md"

@@ -1,6 +1,6 @@
 """Every sentence that an operator can meet on the screen, as docs/screen_words.md shows them.
 
-`python -m device.web.screen_words > docs/screen_words.md` writes that page from device/web/static/words.
+`python -m device.web.screen.screen_words > docs/screen_words.md` writes that page from device/web/static/words.
 """
 
 from __future__ import annotations
@@ -8,12 +8,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-WORDS = Path(__file__).parent / "static" / "words"
+WORDS = Path(__file__).parents[1] / "static" / "words"
 LANGUAGES = {"en": "English", "de": "German"}
 HEAD = """# What the screen says
 
 This page answers which sentences an operator can meet, in each language.
-Written by `python -m device.web.screen_words > docs/screen_words.md` from the files in `device/web/static/words/`.
+Written by `python -m device.web.screen.screen_words > docs/screen_words.md` from `device/web/static/words/`.
 A word in braces stands for a figure or a name.
 """
 
