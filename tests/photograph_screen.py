@@ -11,6 +11,7 @@ import sys
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -18,7 +19,10 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from chromium import chromium_page
-from daemon_process import ROOT, wait_for
+from daemon_process import QUICK_HAND, ROOT, Daemon, wait_for
+from fallback_process import Fallback, ProbeRoot, failed_start
+from ordered_step import ordered
+from orthanc import OWN_TITLE, TITLE, Orthanc
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
@@ -50,13 +54,13 @@ Written by `python tests/photograph_screen.py` from a simulated probe, with the 
 class Album:
     """Two pages of one probe, one a size, to which the same is done; each state is photographed on both."""
 
-    def __init__(self, browser: Browser, url: str, rows: list[str], *, has_touch: bool = False) -> None:
+    def __init__(self, browser: Browser, url: str, rows: list[str], *, has_touch: bool = False, **more: Any) -> None:
         self._rows, self.wrong = rows, list[str]()
         self.pages: list[Page] = []
         for width, height in SIZES:
             size = {"width": width, "height": height}
-            context = browser.new_context(locale="en-GB", viewport=size, has_touch=has_touch, is_mobile=has_touch)  # type: ignore[arg-type]
-            self.pages.append(context.new_page())
+            options = {"locale": "en-GB", "viewport": size, "has_touch": has_touch, "is_mobile": has_touch, **more}
+            self.pages.append(browser.new_context(**options).new_page())
             self.pages[-1].goto(url)
 
     def each(self, act: Callable[[Page], object]) -> None:
@@ -71,8 +75,8 @@ class Album:
     def sees(self, name: str, words: str) -> None:
         self.each(lambda page: expect(page.locator(name)).to_contain_text(words))
 
-    def shoot(self, name: str, words: str) -> None:
-        """Photograph a state, with words that say which it is."""
+    def shoot(self, name: str, words: str, *, scrolls: bool = False) -> None:
+        """Photograph a state, with words that say which it is; a page that scrolls as a whole is not measured."""
         cells = [f"| {words} "]
         for page, (width, _) in zip(self.pages, SIZES, strict=True):
             page.wait_for_function("() => [...document.images].every(one => !one.src || one.complete)")
@@ -82,7 +86,7 @@ class Album:
                 image.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
                     path, optimize=True
                 )
-            self.wrong += [f"{name} {width}: {one}" for one in wrong_in(page)]
+            self.wrong += [f"{name} {width}: {one}" for one in wrong_in(page) if not scrolls]
             cells.append(f"| ![{words}](screens/{path.name}) ")
         self._rows.append("".join(cells) + "|")
 
@@ -155,12 +159,7 @@ def of_what_was_measured(album: Album) -> None:
     album.tap("#details-close", "#act-void")
     album.shoot("void", "Why a measurement does not count")
     album.tap("#void-close")
-    for page in album.pages:
-        if not page.locator("#history-open").is_visible():
-            page.locator("#menu-open").click()
-            page.locator("#menu-history").click()
-        else:
-            page.locator("#history-open").click()
+    open_history(album)
     album.each(lambda page: expect(page.locator(".kept")).to_have_count(3))
     album.shoot("history", "What was measured")
     album.each(lambda page: [page.locator(".marker").nth(one).click() for one in (1, 2)])
@@ -169,6 +168,16 @@ def of_what_was_measured(album: Album) -> None:
     album.each(lambda page: expect(page.locator(".trend")).to_have_count(2))
     album.shoot("trend", "A patient's trend")
     album.tap("#history-close")
+
+
+def open_history(album: Album) -> None:
+    """Open what was measured; a small page has it in its menu."""
+    for page in album.pages:
+        if not page.locator("#history-open").is_visible():
+            page.locator("#menu-open").click()
+            page.locator("#menu-history").click()
+        else:
+            page.locator("#history-open").click()
 
 
 def of_service(album: Album) -> None:
@@ -181,6 +190,111 @@ def of_service(album: Album) -> None:
     album.shoot("software", "Software")
     album.tap("#releases-close", "#act-finish")
     album.sees("#exam-who", "Choose patient")
+
+
+def of_a_voided_one(browser: Browser, probe: ServedProbe, rows: list[str]) -> list[str]:
+    """A measurement that does not count, and one in German and in other colours."""
+    wrong = list[str]()
+    for name, words, options in (
+        ("german", "A result in German", {"locale": "de-DE"}),
+        ("dark", "A result in dark colours", {"color_scheme": "dark"}),
+        ("forced", "A result in the colours of the system", {"forced_colors": "active"}),
+    ):
+        album = Album(browser, probe.url, rows, **options)
+        album.each(lambda page: expect(page.locator("#modes")).to_be_visible())
+        album.tap("#exam-button", ".recent")
+        open_history(album)
+        album.each(lambda page: page.locator(".kept-open").last.click())
+        album.each(lambda page: expect(page.locator("#act-now")).to_be_visible())
+        album.shoot(name, words)
+        if name == "german":
+            first = album.pages[0]
+            first.locator("#act-void").click()
+            first.locator("#void-by").fill("Ada")
+            first.locator("#void .reasons-grid .button").first.click()
+            expect(first.locator("#void")).to_be_hidden()
+            open_history(album)
+            album.each(lambda page: expect(page.locator('.kept[data-voided="true"]')).to_have_count(1))
+            album.each(lambda page: page.locator('.kept[data-voided="true"]').scroll_into_view_if_needed())
+            album.shoot("voided", "A measurement that does not count, in German")
+        album.close()
+        wrong += album.wrong
+    return wrong
+
+
+def of_an_update(album: Album, probe: ServedProbe) -> None:
+    """How far an update is, little storage, and the page that pairs another machine."""
+    low = DeviceError.by_code["E606"]("The disk has some 200 MB left, below 500 MB.", "Export the exams.")
+    told = {"step": "ready", "guidance": Guidance.TOUCH_BESIDE, "press": None, "fault": None}
+    probe.procedure.board.update(**told, warnings=(low,))
+    album.sees(".fault-code", "E606")
+    album.shoot("storage-low", "Little storage is left")
+    probe.procedure.board.update(warnings=())
+    probe.updates.mkdir(exist_ok=True)
+    progress = {"state": "unpacking", "release": "0.2.0+412", "progress": 0.42, "step": "unpacking numpy"}
+    (probe.updates / "progress.json").write_text(json.dumps(progress), encoding="utf-8")
+    album.sees("#status-line", "0.2.0 is being installed")
+    album.tap("#menu-open", "#releases-open")
+    album.each(lambda page: expect(page.locator("#release-progress")).to_be_visible())
+    album.shoot("updating", "How far an update is")
+    album.each(lambda page: page.goto(f"{probe.url}/pair"))
+    album.each(lambda page: expect(page.locator("#offer")).to_be_visible())
+    album.shoot("pairing", "The page that pairs another machine", scrolls=True)
+
+
+def of_no_start(browser: Browser, rows: list[str], folder: Path) -> list[str]:
+    """The page of a probe whose software does not start, in both languages."""
+    root, wrong = ProbeRoot(folder), list[str]()
+    root.releases("0.2.0+412", committed="0.2.0+412", previous="0.1.0+398")
+    root.settings("[press]\ntarget_n = 99\n")
+    failed_start(root)
+    fallback = Fallback(root)
+    for name, words, language in (
+        ("fallback", "The probe does not start", "en-GB"),
+        ("fallback-german", "The same in German", "de-DE"),
+    ):
+        album = Album(browser, root.url, rows, locale=language)
+        album.sees(".fault-code", "E001")
+        album.shoot(name, words)
+        album.close()
+        wrong += album.wrong
+    fallback.stop()
+    return wrong
+
+
+def of_the_hospital(browser: Browser, rows: list[str], folder: Path) -> list[str]:
+    """What the hospital has ordered, and how far an exam is on its way to the archive, by a real one."""
+    archive = Orthanc(folder)
+    ordered(archive.worklists, "ana", day=f"{date.today():%Y%m%d}")
+    scene = (
+        f'[settings.dicom]\narchive_host = "127.0.0.1"\narchive_port = {archive.port}\narchive_title = "{TITLE}"\n'
+        f'worklist_host = "127.0.0.1"\nworklist_port = {archive.port}\nworklist_title = "{TITLE}"\n'
+        f'own_title = "{OWN_TITLE}"\n'
+    )
+    archive.start()
+    daemon = Daemon(folder, scene + QUICK_HAND)
+    daemon.ask("/api/v1/exams", "POST", {**EXAM, "operator": "Ada"})
+    album = Album(browser, daemon.url, rows)
+    album.each(lambda page: expect(page.locator("#modes")).to_be_visible())
+    album.tap("#exam-button")
+    album.each(lambda page: expect(page.locator("#ordered .recent")).to_have_count(1))
+    album.shoot("worklist", "What the hospital has ordered")
+    album.tap("#recent .recent")
+    album.each(lambda page: page.locator("#modes label").filter(has_text="Quick").click())
+    album.pages[0].locator("#press-button").click()
+    album.sees("#image-title", "Measurement 1, Quick")
+    open_history(album)
+    album.each(lambda page: expect(page.locator("#archive-send")).to_be_visible())
+    album.pages[0].locator("#archive-send").click()
+    expect(album.pages[0].locator(".archive-state")).to_contain_text("confirmed")
+    album.tap("#history-close")
+    open_history(album)
+    album.sees(".archive-state", "confirmed")
+    album.shoot("archive", "An exam that the hospital's archive has")
+    album.close()
+    daemon.stop()
+    archive.close()
+    return album.wrong
 
 
 def of_trouble(album: Album, probe: ServedProbe) -> None:
@@ -238,6 +352,7 @@ def photographed(browser: Browser, rows: list[str]) -> list[str]:
             chapter(album)
         album.close()
         wrong += album.wrong
+        wrong += of_a_voided_one(browser, probe, rows)
     with probe_of(is_running=False) as probe:
         probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE)
         album = Album(browser, probe.url, rows, has_touch=True)
@@ -247,11 +362,21 @@ def photographed(browser: Browser, rows: list[str]) -> list[str]:
         album.close()
         wrong += album.wrong
         album = Album(browser, probe.url, rows)
+        album.each(lambda page: expect(page.locator("#modes")).to_be_visible())
+        of_an_update(album, probe)
+        album.close()
+        wrong += album.wrong
+        (probe.updates / "progress.json").unlink()
+        album = Album(browser, probe.url, rows)
         of_trouble(album, probe)
     album.each(lambda page: expect(page.locator("#connection-lost")).to_be_visible())
     album.shoot("lost", "No connection")
     album.close()
-    return wrong + album.wrong
+    wrong += album.wrong
+    for chapter in (of_no_start, of_the_hospital):
+        with TemporaryDirectory(prefix="tsis-") as folder:
+            wrong += chapter(browser, rows, Path(folder))
+    return wrong
 
 
 def main() -> int:

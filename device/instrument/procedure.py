@@ -433,8 +433,6 @@ class Procedure:
             self._written_s = time.monotonic()
 
     def _at_fault(self, error: DeviceError) -> None:
-        if self.board.now.fault is None:
-            log.error("%s %s", error.code, error)
         self._capture.end(str(error), "failed")
         # The fault first: whoever is told that the press has ended finds out why.
         self.board.update(step="fault", guidance=Guidance.FAULT, fault=error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -15,8 +16,11 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.scan_advice import ScanAdvice
 from device.measurement.wanted_accuracy import WantedAccuracy
 
+log = logging.getLogger(__name__)
 Step = Literal["starting", "ready", "reference", "lesion", "computing", "result", "rejected", "self_test", "fault"]
 JobState = Literal["waiting", "capturing", "computing", "done", "rejected", "cancelled", "failed"]
+FAULTS = frozenset({"fault", "warnings"})
+"""The fields whose changes are a line; the watchdog, and who sends to the hospital, write their own."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,7 @@ class ProcedureStatus:
 
 
 class StatusBoard:
-    """Holds the present status; tells listeners when the guidance changes."""
+    """Holds the present status; tells listeners when the guidance changes, and the log of each fault once."""
 
     def __init__(self) -> None:
         self._status, self._lock = ProcedureStatus(), threading.Lock()
@@ -148,7 +152,26 @@ class StatusBoard:
         with self._lock:
             before, self._status = self._status, replace(self._status, **changes)
             after = self._status
+        if changes.keys() & FAULTS:
+            _log_faults(before, after)
         if after.guidance is not before.guidance:
             for listener in self._listeners:
                 listener(after.guidance)
         return after
+
+
+def _log_faults(before: ProcedureStatus, after: ProcedureStatus) -> None:
+    """Write a line for each fault that came or went, by its code, with the press that was under way."""
+    known, now = _wrong(before), _wrong(after)
+    press = after.press.id if after.press and after.press.state in ("waiting", "capturing", "computing") else "none"
+    for code, error in now.items():
+        if code not in known:
+            level = logging.ERROR if error.severity == "fault" else logging.WARNING
+            log.log(level, "fault code=%s severity=%s press=%s cause=%r", code, error.severity, press, error.cause)
+    for code in known.keys() - now.keys():
+        log.info("fault over code=%s press=%s", code, press)
+
+
+def _wrong(status: ProcedureStatus) -> dict[str, DeviceError]:
+    told = (status.fault, *status.warnings)
+    return {error.code: error for error in told if error is not None}

@@ -42,7 +42,14 @@ def tradeoff(
     from device.simulation.physics.light_table import load_light_table
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.pages.page import Results, write_page
-    from host_tools.tradeoff import forward_models, light_models, press_frames, press_modes, press_networks
+    from host_tools.tradeoff import (
+        forward_models,
+        light_models,
+        press_frames,
+        press_modes,
+        press_networks,
+        tolerance_times,
+    )
 
     if out:
         require_writable(out, (".md",))
@@ -52,6 +59,7 @@ def tradeoff(
     calibration = read_calibration(table / "calibration.json")
     chapters = {
         "forward": lambda: forward_models.forward_chapter(forward_models.SHORT if short else None),
+        "tolerances": lambda: tolerance_times.tolerances_chapter(tolerance_times.SHORT if short else None),
         "light": lambda: light_models.light_chapter(
             load_light_table(table), tables.centred, light_models.SHORT if short else None
         ),

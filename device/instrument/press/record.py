@@ -55,7 +55,6 @@ class PressBook:
     def warn(self, warning: DeviceError | None) -> None:
         """Show what does not end a press; the next `note` keeps it with the press."""
         if warning:
-            log.warning("%s %s", warning.code, warning)
             others = tuple(one for one in self._board.now.warnings if one.code != warning.code)
             self._board.update(warnings=(*others, warning))
 

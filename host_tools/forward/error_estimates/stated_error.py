@@ -18,12 +18,17 @@ from host_tools.forward.press_model import Loaded
 
 STEP_UP_FACTOR = 3.0
 """Stated error over a feature's own step to the next higher order."""
-BLUNT_FACTOR = 2.0
+BLUNT_FACTOR = 3.0
 """Stated error over the largest step to the next higher order, in finite strain."""
+INTEGRAL, INTEGRAL_FACTOR = "central_deformation_mm3", 2.5
+"""In finite strain under a force O2, what the face's lifted middle and lowered border leave of each other, states so
+much more: the blunt rim moves both."""
 STEP_DOWN_FACTOR = 0.4
 """Stated error over the largest step, of any feature, from the next lower order."""
 CLIMBED_FACTOR = 2.0
 """Stated error over the largest step from the next lower order, on a mesh whose rims are in layers."""
+LOW_ORDERS, LOW_FACTOR = (3, 4), 0.5
+"""The same at low orders, where the next step is a tenth of the last."""
 CORRECTED_FACTOR = 4.0
 """Stated error over a feature's own step by one Newton correction, where small strain foretells what it cannot see."""
 CONTACT_FACTOR = 4.0
@@ -48,7 +53,7 @@ def stated_error(
     if pressed.other is None or baseline.other is None:
         return {}
     others = pressed.other, baseline.other
-    if by_force and plan.grading in SLIDING:
+    if by_force and plan.strain == "finite":
         others = at_force(pressed.other, pressed.state.force_n), at_force(baseline.other, baseline.state.force_n)
     found, other = numbers(rays, pressed.state, baseline.state), numbers(rays, *others)
     steps = {name: _step(value, other[name]) for name, value in found.items()}
@@ -59,7 +64,8 @@ def stated_error(
     largest = max(step for name, step in steps.items() if name not in CANCELLING)
     least = EDGE_ERROR if plan.contact == "unilateral" and _lifts_off(pressed.state) else 0.0
     stated = max(_factor(plan) * largest, least)
-    return {name: stated if step else 0.0 for name, step in steps.items()}
+    shares = {INTEGRAL: INTEGRAL_FACTOR} if by_force and plan.strain == "finite" else {}
+    return {name: shares.get(name, 1.0) * stated if step else 0.0 for name, step in steps.items()}
 
 
 def at_force(corrected: FaceState, force_n: float) -> FaceState:
@@ -72,8 +78,10 @@ def at_force(corrected: FaceState, force_n: float) -> FaceState:
 
 def _factor(plan: ModelPlan) -> float:
     """Return stated error over the largest step."""
+    if plan.grading == GRADED and plan.contact == "unilateral":
+        return CONTACT_FACTOR
     if plan.grading == GRADED:
-        return CONTACT_FACTOR if plan.contact == "unilateral" else CLIMBED_FACTOR
+        return LOW_FACTOR if plan.order in LOW_ORDERS else CLIMBED_FACTOR
     return BLUNT_FACTOR if plan.symmetry == "axisymmetric" else STEP_DOWN_FACTOR
 
 

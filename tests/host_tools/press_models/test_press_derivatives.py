@@ -8,10 +8,10 @@ from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.parameters import HIGH, LOW, denormalise, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.noise import light_ratio
-from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
 from device.measurement.ramp_modes.row_derivatives import COUNT, DIRECTIONS, NAMES, RowDerivatives
 from device.measurement.ramp_modes.surrogate import OFFSET
-from device.simulation.physics.world import AS_BELIEVED
+from device.simulation.physics.world import AS_BELIEVED, World
 from host_tools.press_models.press_derivatives import (
     changes_of_presses,
     fit_region,
@@ -19,7 +19,7 @@ from host_tools.press_models.press_derivatives import (
     world_changed,
     write_derivatives,
 )
-from host_tools.press_models.press_samples import draw_parameters
+from host_tools.press_models.press_samples import PressedScene, draw_parameters
 from host_tools.scenes.probe_file import simulated_probe
 
 ENDS_MM = float(LOW[OFFSET]), float(HIGH[OFFSET])
@@ -40,6 +40,18 @@ def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
     for name, columns in (("contact_exponent", RESPONSE), ("tilt_lesion_deg", FIRST), ("face_motion_ratio", RESPONSE)):
         one, found = changes[:, NAMES.index(name), columns], kept[:, NAMES.index(name), columns]
         assert np.sqrt(np.mean((found - one) ** 2)) < 0.2 * np.sqrt(np.mean(one**2)), name
+
+
+def test_the_face_drawn_where_it_moved_to_changes_the_contrast_by_hundredths_of_its_peak(tables):
+    """docs/forward_model.md says so where it says why models are made without it."""
+    parameters = draw_parameters(6, np.random.default_rng(24))
+    rows, moved = (
+        np.array([PressedScene(tables, world=world).press(one, 0.0).as_row(0.0) for one in parameters])[:, CONTRAST]
+        for world in (AS_BELIEVED, World(face_motion_ratio=1.0))
+    )
+    shares = np.abs(moved - rows).max(axis=1) / np.abs(rows).max(axis=1)
+    assert 0.01 < np.median(shares) < 0.04
+    assert shares.max() < 0.1
 
 
 def test_rows_and_changes_have_the_inclusion_where_the_forward_model_has_it(tables):

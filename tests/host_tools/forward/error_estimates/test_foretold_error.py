@@ -24,6 +24,14 @@ def test_each_feature_states_three_times_its_own_error_or_its_step_and_half_of_t
     assert stated["indentation_mm"] == 0.0
 
 
+def test_under_a_force_the_integral_states_a_quarter_more():
+    same_mesh = TRUE | {"indentation_mm": 1.01, "max_deformation_mm": 0.0201, "central_deformation_mm3": 3.09}
+    stated = foretold_error(same_mesh, TRUE, STEPS | {"force_n": 0.0})
+    assert stated["force_n"] == 0.0
+    assert stated["indentation_mm"] == pytest.approx(0.045)
+    assert stated["central_deformation_mm3"] == pytest.approx(1.25 * 3 * 0.03)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "scene",

@@ -35,12 +35,27 @@ def test_in_small_strain_each_feature_states_three_times_its_own_step():
 
 @pytest.mark.parametrize(
     ("plan", "factor"),
-    [(replace(PLAN, strain="finite"), 2.0), (replace(PLAN, symmetry="half"), 0.4)],
+    [
+        (replace(PLAN, strain="finite"), 3.0),
+        (replace(PLAN, symmetry="half"), 0.4),
+        (replace(PLAN, symmetry="half", grading=GRADED, order=4), 0.5),
+        (replace(PLAN, symmetry="half", grading=GRADED, order=5), 2.0),
+    ],
 )
 def test_elsewhere_every_feature_states_the_largest_step(plan, factor):
-    """1 %, that of the force: twice it where the other order is higher, 0.4 of it in 3-D, where it is lower."""
+    """1 %, that of the force: three times it where the other order is higher, less at most orders in 3-D."""
     stated = stated_error(plan, RAYS, PRESSED, BASELINE)
     assert stated["force_n"] == stated["max_deformation_mm"] == pytest.approx(factor * 0.01)
+
+
+def test_in_finite_strain_under_a_force_orders_are_compared_at_that_force():
+    """At a fixed indentation the indentation had no error at all."""
+    finite = replace(PLAN, strain="finite")
+    at_equal_mm = stated_error(finite, RAYS, PRESSED, BASELINE)
+    under_force = stated_error(finite, RAYS, PRESSED, BASELINE, by_force=True)
+    assert (at_equal_mm["indentation_mm"], under_force["force_n"]) == (0.0, 0.0)
+    assert under_force["indentation_mm"] == pytest.approx(3 * 0.002 / 0.202)
+    assert under_force["central_deformation_mm3"] == 2.5 * under_force["max_deformation_mm"]
 
 
 def test_a_dome_that_lifts_off_states_what_no_order_sees_at_its_edge():
