@@ -104,9 +104,18 @@ def _grown(daemon: Daemon, family: list[int], modes: Sequence[str]) -> tuple[flo
 
 def _press(daemon: Daemon, modes: Iterable[str]) -> None:
     for mode in modes:
-        while (job := daemon.press(mode))["code"] == LightRestError.code:
+        while (ended := _pressed(daemon, mode)) == LightRestError.code:
             time.sleep(RESTING_S)  # no person presses so often that the LEDs must rest
-        assert job["state"] == "done", job
+        assert ended == "done", ended
+
+
+def _pressed(daemon: Daemon, mode: str) -> str:
+    """Return how a press has ended, or the code of what it was refused or rejected for."""
+    answer = daemon.ask("/api/v1/presses", "POST", {"mode": mode})
+    if answer.status != 202:
+        return str(answer.json["code"])
+    job = daemon.ended(answer.headers["location"])
+    return str(job["code"] or job["state"])
 
 
 def _family(pid: int) -> list[int]:
