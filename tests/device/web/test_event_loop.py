@@ -89,15 +89,18 @@ def test_what_reads_the_disk_or_makes_a_picture_is_not_done_on_the_event_loop(wi
 
 
 def test_only_what_waits_runs_on_the_event_loop(witness):
-    """The event stream, a picture that waits for its turn to be made, and the parts of an upload."""
+    """Streams, a picture that waits for its turn to be made, an upload's parts, and the screen, joined at the start."""
     routes = [route for route in create_app(witness, witness).routes if isinstance(route, APIRoute)]
     waits = (inspect.iscoroutinefunction, inspect.isasyncgenfunction)
     on_the_loop = [route.path for route in routes if any(is_it(route.endpoint) for is_it in waits)]
     assert sorted(on_the_loop) == [
+        "/",
         "/api/v1/events",
         "/api/v1/live.mjpeg",
         "/api/v1/measurements/{measurement_id}/image.png",
         "/api/v1/updates",
+        "/static/joined/screen.css",
+        "/static/joined/screen.js",
     ]
 
 

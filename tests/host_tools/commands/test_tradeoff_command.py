@@ -19,9 +19,10 @@ def measured(out: Path) -> dict[str, dict]:
     return json.loads((out.parent / "results" / f"{out.stem}.json").read_text())["chapters"]
 
 
-@pytest.mark.parametrize(
-    "chapter", ["networks", *(pytest.param(name, marks=pytest.mark.long) for name in ("forward", "modes"))]
-)
+LONG_CHAPTERS = (pytest.param(name, marks=pytest.mark.long) for name in ("forward", "tolerances", "modes"))
+
+
+@pytest.mark.parametrize("chapter", ["networks", *LONG_CHAPTERS])
 def test_a_chapter_becomes_a_page_with_its_figure(tmp_path: Path, chapter: str) -> None:
     out = tmp_path / "tradeoff.md"
     done = tradeoff("--only", chapter, "--out", str(out))
@@ -39,10 +40,10 @@ def test_all_chapters_are_one_page(tmp_path: Path) -> None:
     out = tmp_path / "tradeoff.md"
     done = tradeoff("--out", str(out))
     assert done.exit_code == 0, done.output
-    assert list(measured(out)) == ["forward", "light", "frames", "networks", "modes"]
+    assert list(measured(out)) == ["forward", "tolerances", "light", "frames", "networks", "modes"]
 
 
 def test_a_chapter_that_is_not_one_is_refused() -> None:
     done = tradeoff("--only", "colour")
     assert done.exit_code == 1
-    assert "one of forward, light, frames, networks, modes" in str(done.exception)
+    assert "one of forward, tolerances, light, frames, networks, modes" in str(done.exception)
