@@ -4,7 +4,8 @@ The daemon runs as on a probe, without `--simulate`; the world on the other side
 (tests/rig), so what it costs is not counted. Memory is what the kernel holds for the daemon and its camera's process:
 pages that both have count once (PSS). What it grows is told of pages of its own alone: how much of a library's page
 counts as the daemon's changes with every other program that begins or ends. Ready is when the daemon says READY=1 and
-answers that it can press; its yardstick is an interpreter that imports NumPy.
+answers that it can press; its yardstick is an interpreter that imports NumPy. From the last frame to the answer is what
+the probe tells of its own presses: the wall's time until the answer is kept on the disk.
 """
 
 from __future__ import annotations
@@ -19,17 +20,21 @@ from tempfile import TemporaryDirectory
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "rig"))
 
-from bench_table import Figure
+from bench_table import Figure, median_seconds
 from daemon_process import QUICK_HAND, Daemon
 from rig import Rig, build_shim
 
 from device.errors import LightRestError
+from host_tools.tradeoff.yardstick import YARDSTICK_CALLS, exp_and_sum
 
 CHAPTER = "daemon of a probe"
 MODES = ("quick", "standard", "precise")
 STARTS = 3
 READY_BOUND = 15.0
 """1.5 s where NumPy takes 0.1."""
+ANSWERED_PRESSES = 5
+ANSWER_BOUNDS = {"quick": 200.0, "standard": 850.0, "precise": 5500.0}
+"""0.05, 0.2 and 1.3 s where the yardstick takes a quarter of a millisecond; the hand's scan is one of five presses."""
 REST_S, SETTLE_S = 20.0, 15.0
 QUICK_PRESSES = 30
 """A hand in real time takes three seconds for each: chapter `endurance` has a thousand."""
@@ -88,10 +93,21 @@ def _at_rest_and_after_presses(rig: Rig) -> Iterator[Figure]:
     rig.world.wish(url=daemon.url)
     _press(daemon, MODES)
     yield Figure(CHAPTER, "memory after a press of each mode", _memory_mb(family), "MB")
+    _press(daemon, MODES * (ANSWERED_PRESSES - 1))
+    yield from _answers(daemon)
     more = (*MODES * 2, *("quick",) * QUICK_PRESSES)
     grown_mb, press_s = _grown(daemon, family, more)
     here = f"{press_s:.1f} s a press"
     yield Figure(CHAPTER, f"what it grew in {len(more)} presses more", grown_mb, "MB", bound=MOST_GROWN_MB, here=here)
+
+
+def _answers(daemon: Daemon) -> Iterator[Figure]:
+    """Yield how long the probe's own answers took, medians of its presses."""
+    yardstick_s = median_seconds(exp_and_sum, YARDSTICK_CALLS)
+    for of_mode in daemon.ask("/api/v1/device").json["modes"]:
+        if bound := ANSWER_BOUNDS.get(of_mode["mode"]):
+            seconds, name = of_mode["answer_s"], f"{of_mode['mode']}: last frame to answer"
+            yield Figure(CHAPTER, name, seconds / yardstick_s, bound=bound, here=f"{1e3 * seconds:.3g} ms here")
 
 
 def _grown(daemon: Daemon, family: list[int], modes: Sequence[str]) -> tuple[float, float]:
