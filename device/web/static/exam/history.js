@@ -84,6 +84,12 @@ async function examsInScope() {
   return fetchExams({ patientRef: exam.patient_ref, limit: 100 });
 }
 
+/** Whether a measurement is of the place of the open exam: two lesions of one patient have a trend each. */
+function isOfThisPlace({ exam_id: id }) {
+  const [one, other] = [exams.get(id), openExam()];
+  return one?.side === other?.side && one?.clock_position === other?.clock_position;
+}
+
 async function page(beforeSeq = null) {
   const inScope = await examsInScope();
   if (!inScope) return fetchMeasurements({ beforeSeq, limit: PAGE });
@@ -101,7 +107,7 @@ async function show(beforeSeq = null) {
   const more = byId("history-more");
   more.hidden = scope !== "all" || measurements.length < PAGE;
   more.dataset.before = measurements.at(-1)?.seq ?? "";
-  showTrend(scope === "patient" ? measurements : []);
+  showTrend(scope === "patient" ? measurements.filter(isOfThisPlace) : [], openExam());
   showArchive(scope === "exam", measurements);
 }
 
