@@ -20,11 +20,11 @@ def exam_of(page: Page, probe: ServedProbe, **changes: object) -> str:
     return str(answer.json()["id"])
 
 
-def open_history(page: Page, place: str) -> None:
-    """Go on with the exam of a place, and open what was measured."""
+def open_history(page: Page, words: str) -> None:
+    """Go on with an exam, and open what was measured."""
     page.locator("#exam-button").click()
-    page.locator(".recent").filter(has_text=place).first.click()
-    expect(page.locator("#exam-where")).to_have_text(place)
+    page.locator(".recent").filter(has_text=words).first.click()
+    expect(page.locator("#exam-button")).to_contain_text(words)
     page.locator("#history-open").click()
 
 
@@ -42,4 +42,23 @@ def test_two_lesions_of_one_patient_have_a_trend_each(browser: Browser, probe: S
     expect(page.locator(".trend").first.locator(".trend-value")).to_have_count(2)
     shoot(page, "history-trend")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+def test_the_reason_of_a_void_one_is_said_in_the_language_of_who_reads_it(browser: Browser, probe: ServedProbe):
+    page = opened(browser, probe, locale="de-DE")
+    exam_id = exam_of(page, probe, patient_ref="B-22")
+    keep(probe.procedure.store, 51, exam_id=exam_id)
+    open_history(page, "B-22")
+    page.locator(".kept-open").click()
+    page.locator("#act-void").click()
+    page.get_by_role("button", name="Sonde abgerutscht").click()
+    expect(page.locator("#status-reason")).to_contain_text("Sonde abgerutscht")
+    voided = probe.procedure.store.measurement("m-51")["voided"]
+    assert (voided["by"], voided["reason"]) == ("Ada", "The probe slipped")
+    page.context.close()
+    page = opened(browser, probe)
+    open_history(page, "B-22")
+    page.locator(".kept-open").click()
+    expect(page.locator("#status-reason")).to_contain_text("The probe slipped")
     page.context.close()

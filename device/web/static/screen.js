@@ -6,7 +6,7 @@ import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./b
 import { followFocus, keepFocus } from "./base/focus.js";
 import { showIdentity } from "./base/menu.js";
 import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, startPress, takeTare } from "./base/probe.js";
-import { figure, say, sayPage } from "./base/words.js";
+import { figure, reasonToKeep, say, sayPage } from "./base/words.js";
 import { loadHospital } from "./exam/archive.js";
 import { showBeside, useBeside } from "./exam/beside.js";
 import { chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
@@ -309,7 +309,7 @@ async function tare() {
 
 async function file() {
   const exam = openExam();
-  await replace(await moveMeasurement(shown(), { by: exam.operator, reason: say("result.file"), exam_id: exam.id }));
+  await replace(await moveMeasurement(shown(), { by: exam.operator, reason: reasonToKeep("filed"), exam_id: exam.id }));
   tell({ word: "", reason: say("exam.filed", { patient: whoWords(exam) }), tone: "good" });
 }
 
