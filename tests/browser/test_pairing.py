@@ -77,15 +77,16 @@ def test_the_page_is_in_both_languages_and_schemes_whole_at_every_size(probe, pa
         other.goto(url)
         expect(other.locator(f"#{name}")).to_be_visible()
         if name == "offer":
+            if other.locator("#ask-again").is_visible():  # the code of before is still valid
+                other.locator("#ask-again").click()
             other.locator("#name").fill("Ward PC")
             other.locator("#ask button").click()
             expect(other.locator("#shown-valid")).not_to_have_text("")
         words = "Mit der Sonde koppeln" if language == "de-DE" else "Pair with the probe"
         expect(other.locator("h1")).to_have_text(words)
         shoot(other, f"pair/{name}-{language[:2]}-{scheme}-{size[0]}")
-        found = [one for one in wrong_in(other) if not one.startswith(("page ", "outside "))]  # the page scrolls
-        assert found == []
-        assert other.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        may_scroll = ("page ", "outside ") if size[0] < 480 else ()  # a phone
+        assert [one for one in wrong_in(other) if not one.startswith(may_scroll)] == []
         assert Axe().run(other).response["violations"] == []
         other.context.close()
 
@@ -94,6 +95,7 @@ def test_the_probes_own_panel_has_keys_for_the_name(probe, page):
     options = {"viewport": {"width": 480, "height": 320}, "has_touch": True, "is_mobile": True}
     panel = page.context.browser.new_context(**options).new_page()
     panel.goto(f"{probe.daemon.url}/pair")
+    panel.locator("#ask-again").tap()  # the code of before is still valid
     panel.locator("#name").tap()
     panel.locator("#keys").get_by_role("button", name="w", exact=True).tap()
     expect(panel.locator("#name")).to_have_value("w")

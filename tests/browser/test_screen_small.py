@@ -1,4 +1,4 @@
-"""The smallest panel, 480 x 320: every button below a result is in reach, and no word of a comparison is broken."""
+"""The smallest panel, 480 x 320: all that a press and its result need is in reach, and no word is broken."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from kept_measurements import keep
-from opened_screen import SIZES, opened, shoot
+from opened_screen import SIZES, named, opened, shoot
 from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe
@@ -71,6 +71,52 @@ def test_every_button_below_a_result_is_in_reach(browser: Browser, probe: Served
     shoot(page, f"small/acts-{language[:2]}-{number % 10}")
     assert page.locator(".acts").evaluate(CUT_OFF) == []
     assert page.locator(".acts").evaluate(BROKEN_WORDS) == []
+    assert wrong_in(page) == []
+    if of_exam:
+        expect(page.locator("#repeats")).to_be_in_viewport(ratio=0.99)  # how far measurements agree
+    page.locator("#act-details").click()
+    expect(page.locator("#details-picture .image-frame")).to_be_in_viewport(ratio=0.99)
+    page.wait_for_function("() => document.querySelector('#details-picture img').complete")
+    shoot(page, f"small/details-{language[:2]}-{number % 10}")
+    assert wrong_in(page) == []
+    page.context.close()
+
+
+@pytest.mark.parametrize("size", SIZES[:2], ids=named)
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_each_mode_says_its_worth_and_leaves_the_figures_whole(
+    browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]
+):
+    probe.procedure.board.update(measurement_id=None)
+    page, wrong = opened(browser, probe, size, locale=language), {}
+    for who in ("nobody", "A-17"):
+        for index, error in enumerate(["±5 %", "±3 %", "±2 %", ""]):
+            page.locator("#modes label").nth(index).click()
+            worth = page.locator("#mode-trade" if size == SMALLEST else "#modes input:checked + .mode-words")
+            expect(worth).to_contain_text(error.replace(" ", "\u00a0"))
+            expect(worth).to_be_in_viewport(ratio=0.99)
+            wrong[who, index] = wrong_in(page)
+            shoot(page, f"small/mode-{who}-{index}-{language[:2]}-{size[0]}")
+        open_exam(page, probe)
+    page.context.close()
+    assert {state: found for state, found in wrong.items() if found} == {}
+
+
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_who_is_examined_and_the_menu_need_no_scrolling(browser: Browser, probe: ServedProbe, language: str):
+    probe.procedure.board.update(measurement_id=None)
+    page = opened(browser, probe, SMALLEST, locale=language)
+    page.locator("#exam-button").click()
+    for name in ("patient-ref", "operator", "order-number", "to-place", "begin-phantom", "free-press"):
+        expect(page.locator(f"#{name}")).to_be_in_viewport(ratio=0.99)
+    assert wrong_in(page) == []
+    page.locator("#chooser-close").click()
+    page.locator("#menu-open").click()
+    for name in ("self-test-open", "pair", "language-de", "colours-dark", "sound-off"):
+        expect(page.locator(f"#{name}")).to_be_in_viewport(ratio=0.99)
+    assert wrong_in(page) == []
+    page.locator("#self-test-open").click()
+    expect(page.locator("#self-test-close")).to_be_in_viewport(ratio=0.99)
     assert wrong_in(page) == []
     page.context.close()
 

@@ -26,12 +26,18 @@ function showCode(said) {
   setText(byId("shown-code"), said.code);
   setText(byId("shown-url"), said.network?.url ?? say("pair.no_network"));
   setText(byId("shown-sha256"), said.network?.certificate_sha256 ?? "–");
-  byId("shown").hidden = false;
+  showShown(true);
+}
+
+/** Show the code, or that another one may be asked for. */
+function showShown(isShown) {
+  byId("shown").hidden = !isShown;
+  byId("ask-again").hidden = !isShown;
 }
 
 function showLeft() {
   const left = Math.max(0, ends - performance.now()) / 1000;
-  if (ends > 0 && left === 0) byId("shown").hidden = true;
+  if (ends > 0 && left === 0) showShown(false);
   setText(byId("shown-valid"), say("pair.left", { s: figure(Math.ceil(left), 0) }));
 }
 
@@ -69,6 +75,8 @@ byId("ask").addEventListener("submit", async (event) => {
   showCode(answer.said);
   byId("shown").scrollIntoView({ block: "nearest" });
 });
+
+byId("ask-again").addEventListener("click", () => { showShown(false); byId("name").focus(); });
 
 byId("bring").addEventListener("submit", async (event) => {
   event.preventDefault();

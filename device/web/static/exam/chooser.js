@@ -22,6 +22,9 @@ function page(name) {
   setText(byId("chooser-problem"), "");
 }
 
+/** A number whose hyphens break no line. */
+const whole = (text) => text.replaceAll("-", "\u2011");
+
 const typed = (name) => fields[name].value.trim();
 
 function problem(key) {
@@ -87,7 +90,7 @@ export function chooseAnotherPlace() {
 
 function showMap() {
   page("where");
-  setText(byId("where-of"), say("exam.where_of", { patient: step ? nameWords(step) : typed("patient_ref") }));
+  setText(byId("where-of"), say("exam.where_of", { patient: whole(step ? nameWords(step) : typed("patient_ref")) }));
   beginMap();
 }
 

@@ -1,7 +1,7 @@
 // Speed or accuracy, chosen before a press: what the probe offers, what each choice costs and how well it measures. A
 // probe with one mode asks nothing.
 
-import { byId, element, setAttribute } from "../base/dom.js";
+import { byId, element, setAttribute, setText } from "../base/dom.js";
 import { figure, say } from "../base/words.js";
 import { isScan, offerAccuracy } from "./scan.js";
 
@@ -43,6 +43,9 @@ export const modeName = (mode) => say(`mode.${mode}`);
 /** What a mode is worth, in a phrase. */
 export const trade = (offer) => [errorWords(offer), modulusWords(offer)].filter(Boolean).join(", ");
 
+/** All that a low screen has no room for in each choice: of the one that is chosen. */
+const worthWords = (offer) => [errorWords(offer), answeredWords(offer), modulusWords(offer)].filter(Boolean).join(", ");
+
 function choice(offer, isChosen) {
   const label = element("label", "mode");
   const input = element("input", "");
@@ -63,13 +66,14 @@ export function offerModes({ modes, default_mode: byDefault }) {
   const chosen = modes.some(({ mode }) => mode === chosenMode()) ? chosenMode() : byDefault;
   offers = modes;
   box.querySelectorAll("label").forEach((one) => one.remove());
-  box.append(...modes.map((offer) => choice(offer, offer.mode === chosen)));
+  byId("mode-trade").before(...modes.map((offer) => choice(offer, offer.mode === chosen)));
   offerAccuracy(modes);
 }
 
 /** Show the choice while there is one. */
 export function showModes(mayChoose) {
   box.hidden = !mayChoose || offers.length < 2;
+  setText(byId("mode-trade"), offerOf(chosenMode()) ? worthWords(offerOf(chosenMode())) : "");
 }
 
 /** The mode that is chosen, or undefined before the probe has said what it offers. */

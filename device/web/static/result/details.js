@@ -29,6 +29,13 @@ function lines({ taken_at: at, mode, frames, force_n: force, estimate, features,
   ];
 }
 
+/** The picture again, for a panel that has no room for it beside the figures (styles/sizes.css). */
+function showPictureAgain() {
+  const again = byId("image").closest("figure").cloneNode(true);
+  for (const one of again.querySelectorAll("[id]")) one.removeAttribute("id");
+  byId("details-picture").replaceChildren(...again.childNodes);
+}
+
 /** Draw how it was pressed, once the probe has said it; a recording that was deleted has no curve. */
 async function showForces({ id }) {
   const place = byId("details-forces");
@@ -46,6 +53,7 @@ export function openDetails(measurement) {
   ]));
   const link = byId("details-recording");
   Object.assign(link, { href: recordingUrl(measurement.id), download: `measurement-${measurement.seq}.zip` });
+  showPictureAgain();
   showForces(measurement);
   dialog.showModal();
 }
