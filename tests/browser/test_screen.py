@@ -536,8 +536,11 @@ def test_the_operator_reads_which_software_runs_and_gives_the_probe_a_release_fr
     expect(page.locator("#status-line")).not_to_contain_text("being installed")
     page.locator("#menu-open").click()
     page.locator("#releases-open").click()
-    words = "Version 0.2.0 did not work. This probe went back to 0.1.0. (camera gave no image)"
+    words = "Version 0.2.0 did not work. This probe went back to 0.1.0."
     expect(page.locator("#releases-line")).to_have_text(words)
+    page.locator("#release-why").click()
+    expect(page.locator("#fault-list")).to_contain_text("camera gave no image")
+    page.locator("#fault-close").click()
     page.locator("#release-back").click()
     wait_for((probe.updates / "incoming" / "roll_back").exists, bool)
 

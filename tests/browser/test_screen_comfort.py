@@ -249,6 +249,9 @@ def test_nothing_can_be_pressed_under_the_curtain(browser: Browser, tmp_path: Pa
     expect(page.locator("#connection-lost")).to_be_visible()
     for id in ("main", "header", "footer"):
         expect(page.locator(f"#{id}")).to_have_js_property("inert", value=True)
+    page.keyboard.type("A-17", delay=5)  # a scanner
+    page.keyboard.press("Enter")
+    expect(page.locator("dialog[open]")).to_have_count(0)
     shoot(page, "comfort/lost")
     assert wrong_in(page) == []
     page.context.close()

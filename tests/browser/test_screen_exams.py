@@ -124,3 +124,23 @@ def test_enter_twice_starts_and_cancels_and_the_focus_stays(page: Page, daemon: 
     expect(page.locator("#instruction")).to_have_text("Cancelled")
     expect(button).to_be_focused()
     assert daemon.ask("/api/v1/status").json["press"]["state"] == "cancelled"
+
+
+def test_by_the_keyboard_alone_an_exam_is_begun_and_enter_goes_on(page: Page, daemon: Daemon):
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").focus()
+    page.keyboard.press("Enter")
+    page.locator("#patient-ref").press_sequentially("K-9", delay=100)  # as a hand types
+    page.keyboard.press("Enter")
+    expect(page.locator("#chooser-problem")).to_have_text("Say who examines.")
+    page.keyboard.press("Tab")
+    expect(page.locator("#operator")).to_be_focused()
+    page.keyboard.type("Ada", delay=100)
+    page.keyboard.press("Enter")
+    expect(page.locator("#where-of")).to_be_visible()
+    page.locator('.hour[data-side="right"][data-hour="4"]').focus()
+    page.keyboard.press("Space")
+    page.locator("#begin-exam").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#exam-where")).to_have_text("Right 4 o'clock")

@@ -37,7 +37,7 @@ class JoinedScreen:
 
 @cache
 def joined_screen(static: Path = STATIC) -> JoinedScreen:
-    """Return the screen of a folder; raises `ValueError` for a module that imports or exports in another way."""
+    """Return the screen of a folder; raises `ValueError` for a module that cannot be joined, or a circle of them."""
     page = (static / "index.html").read_text(encoding="utf-8")
     sheets = [(static / name).read_text(encoding="utf-8") for name in SHEET.findall(page)]
     modules = _in_order(static / FIRST_MODULE, {})
@@ -48,12 +48,15 @@ def joined_screen(static: Path = STATIC) -> JoinedScreen:
     return JoinedScreen(page.replace("</head>", f"{asks}</head>", 1), "\n".join(sheets), "\n".join(blocks))
 
 
-def _in_order(path: Path, known: dict[Path, None]) -> list[Path]:
-    """Return a module behind all that it imports."""
+def _in_order(path: Path, known: dict[Path, None], above: tuple[Path, ...] = ()) -> list[Path]:
+    """Return a module behind all that it imports; `above` are those that have led to it."""
     path = path.resolve()
+    if path in above:
+        circle = " -> ".join(one.name for one in (*above[above.index(path) :], path))
+        raise ValueError(f"{circle}: modules that import each other in a circle cannot be joined: move what both need.")
     if path not in known:
         for _, other in IMPORT.findall(path.read_text(encoding="utf-8")):
-            _in_order(path.parent / other, known)
+            _in_order(path.parent / other, known, (*above, path))
         known[path] = None
     return list(known)
 

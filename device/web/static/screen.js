@@ -330,6 +330,7 @@ function finishExam() {
 /** A patient is scanned: into the field that waits for one, else the page opens that asks whose exam it is. */
 function scanned(code, field) {
   if (field && field.id !== "patient-ref") return;
+  if (!byId("connection-lost").hidden) return; // under the curtain nothing is begun
   if (pressUnderWay()) tell({ word: "", reason: say("exam.scan_busy"), tone: "caution" });
   else chooseExam(code);
 }

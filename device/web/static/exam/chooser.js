@@ -132,7 +132,6 @@ function beginPhantom() {
 
 fields.patient_ref.addEventListener("input", typedByHand);
 fields.order_number.addEventListener("input", typedByHand);
-byId("to-place").addEventListener("click", toMap);
 byId("begin-exam").addEventListener("click", beginPatient);
 byId("begin-phantom").addEventListener("click", beginPhantom);
 byId("free-press").addEventListener("click", () => page("free"));

@@ -93,10 +93,10 @@ export function asChosen(status) {
 
 /** What would tell more than a measurement did: the mode that determines the modulus most often, or a press beside. */
 export function surerWords({ mode, estimate }) {
-  if (["size_mm", "depth_mm", "youngs_modulus_kpa"].every((key) => estimate[key].identifiable)) return "";
+  const isWhole = ["size_mm", "depth_mm", "youngs_modulus_kpa"].every((key) => estimate[key].identifiable);
   const often = (offer) => offer?.determined_ratio?.youngs_modulus_kpa ?? 0;
   const best = offers.reduce((one, other) => (often(other) > often(one) ? other : one), offerOf(mode));
-  if (!best || best.mode === mode) return say("result.surer_beside");
+  if (!best || best.mode === mode) return isWhole ? "" : say("result.surer_beside");
   return say("result.surer", { mode: modeName(best.mode), trade: trade(best) });
 }
 

@@ -97,7 +97,7 @@ export function describeMeasurement(measurement) {
   const key = headline(estimate);
   const understood = estimate.reason ? understand(estimate.reason) : { do: "", why: say("result.all") };
   const [todo, why] = [understood?.do, understood?.why ?? say("reason.other")];
-  const surer = key === "result.partly_identifiable" ? surerWords(measurement) : "";
+  const surer = ["result.ok", "result.partly_identifiable"].includes(key) ? surerWords(measurement) : "";
   const reason = [why, todo && `${todo}.`, ...scanWords(measurement), surer].filter(Boolean).join(" ");
   const isGood = ["result.ok", "result.partly_identifiable"].includes(key) && reached !== false;
   return { word: say(key), reason, tone: isGood ? "good" : "caution" };

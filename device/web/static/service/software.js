@@ -4,6 +4,7 @@
 import { byId, setText } from "../base/dom.js";
 import { fetchUpdates, goBack, sendRelease } from "../base/probe.js";
 import { say } from "../base/words.js";
+import { openService } from "../press/faults.js";
 
 const UNDER_WAY = new Set(["waiting", "verifying", "unpacking", "switching", "checking"]);
 const ENDS = new Set(["rolled_back", "refused", "committed"]);
@@ -42,12 +43,14 @@ export function absenceWords() {
   return isUnderWay() ? [say("lost.updating"), say("lost.updating.words")] : null;
 }
 
-/** How the last update ended, and the updater's own reason. */
+/** How the last update ended. */
 function outcomeWords() {
-  if (!updates?.outcome || !ENDS.has(updates.state)) return updates?.outcome ?? "";
-  const told = { release: version(updates.release), version: version(updates.running) };
-  return [say(`software.${updates.state}`, told), updates.reason && `(${updates.reason})`].filter(Boolean).join(" ");
+  if (!updates || !ENDS.has(updates.state)) return "";
+  return say(`software.${updates.state}`, { release: version(updates.release), version: version(updates.running) });
 }
+
+/** The updater's own words of how that came, for service. */
+const ownWords = () => (updates?.outcome && ["rolled_back", "refused"].includes(updates.state) ? updates.reason || updates.outcome : "");
 
 function lineWords() {
   if (problem) return problem;
@@ -65,6 +68,7 @@ function showReleases() {
   byId("release-progress").hidden = !(isUnderWay() || sending);
   if (isUnderWay() && updates.progress !== null) byId("release-progress").value = updates.progress;
   else byId("release-progress").removeAttribute("value");
+  byId("release-why").hidden = !ownWords();
   const mayChange = installed && LOCAL.has(location.hostname);
   byId("release-form").hidden = !mayChange;
   byId("release-file").disabled = sending || isUnderWay();
@@ -118,6 +122,7 @@ byId("releases-open").addEventListener("click", () => {
   lookedAt = -Infinity;
   look();
 });
+byId("release-why").addEventListener("click", () => openService(ownWords()));
 byId("releases-close").addEventListener("click", () => dialog.close());
 byId("release-file").addEventListener("change", ({ target }) => {
   const [file] = target.files;

@@ -82,6 +82,13 @@ def test_a_module_that_cannot_be_joined_is_told_by_its_name(text: str, tmp_path:
         joined_screen(folder_with(tmp_path, screen=text, other="export const a = 1;\n"))
 
 
+def test_modules_that_import_each_other_are_told_by_their_names(tmp_path: Path) -> None:
+    circle = {"screen": 'import { a } from "./other.js";\n', "other": 'import { b } from "./third.js";\n'}
+    circle["third"] = 'import { a } from "./other.js";\nexport const b = a;\n'
+    with pytest.raises(ValueError, match=r"other\.js -> third\.js -> other\.js: modules that import each other"):
+        joined_screen(folder_with(tmp_path, **circle))
+
+
 @pytest.mark.parametrize(("path", "kind"), [(SHEETS_AT, "text/css"), (MODULES_AT, "text/javascript")])
 def test_what_a_browser_has_is_not_sent_again(path: str, kind: str) -> None:
     first = ask(path)
