@@ -11,7 +11,7 @@ from orthanc import Orthanc, free_port, needs_orthanc
 from written_exam import measure, needs_dciodvfy, verdict
 
 from device.dicom.hospital import Hospital
-from device.errors import ArchiveUnreachable, InvalidRequest, UnknownResource
+from device.errors import ArchiveUnreachable, InvalidRequest, ReusedKey, UnknownResource
 from device.files.recording_file import read_picture
 from device.records.asked_once import AskedOnce
 from device.records.store import Store
@@ -118,6 +118,16 @@ def test_a_step_is_one_exam_however_often_it_is_asked_for(store, hospital):
     assert hospital.begin_exam(step["id"], SAID, once) == hospital.begin_exam(step["id"], SAID, once)
     with pytest.raises(UnknownResource, match="Ask for the worklist again"):
         hospital.begin_exam("2.25.1", SAID)
+
+
+def test_a_step_is_one_exam_also_when_it_is_asked_for_again_after_a_restart(archive, store, hospital):
+    [step] = hospital.scheduled(None, "A-17", None)
+    once = AskedOnce("k-2", "POST")
+    made = hospital.begin_exam(step["id"], SAID, once)
+    restarted = Hospital(archive.settings(), store, read_picture)  # which has shown no step yet
+    assert restarted.begin_exam(step["id"], SAID, once) == made
+    with pytest.raises(ReusedKey):
+        restarted.begin_exam(step["id"], SAID, AskedOnce("k-2", "POST other"))
 
 
 def test_names_are_erased_from_the_disk_once_the_archive_has_the_exam(tmp_path, store, hospital):
