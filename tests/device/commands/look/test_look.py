@@ -59,7 +59,7 @@ def test_the_exams_are_listed_with_how_many_measurements_they_have(probe: Path) 
 def test_measurements_go_to_a_table_to_arrays_and_to_an_archive_that_are_never_written_over(probe: Path) -> None:
     table = device(probe, "export", "--simulate")
     assert len(table.stdout.splitlines()) == 3
-    for name in ("all.csv", "all.npz", "all.zip"):
+    for name in ("all.csv", "all.npz", "all.nc", "all.zip"):
         assert device(probe, "export", "--out", name, "--simulate").returncode == 0
     assert (probe / "all.csv").read_text() == table.stdout.replace("\r\n", "\n")
     with np.load(probe / "all.npz", allow_pickle=False) as arrays:
