@@ -143,6 +143,10 @@ def test_names_are_erased_from_the_disk_once_the_archive_has_the_exam(tmp_path, 
     assert store.outbox.erase_patients(sent_before=long_ago, made_before=long_ago) == 0
     assert "Müller".encode() in on_disk() or b"M\\u00fcller" in on_disk()
     assert store.outbox.erase_patients(sent_before=far, made_before=long_ago) == 1
+    assert store.outbox.erase_patients(sent_before=far, made_before=far) == 0
+    entries = store.audit.entries(subject=exam["id"], before_seq=2**62, limit=9)
+    assert [one["what"] for one in entries] == ["patient_erased", "exam_sent", "exam_made"]
+    assert "ller" not in str(entries)
     assert "Müller".encode() not in on_disk()
     assert b"M\\u00fcller" not in on_disk()
     assert b"19700102" not in on_disk()
