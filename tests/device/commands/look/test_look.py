@@ -133,6 +133,11 @@ def test_a_reader_that_has_seen_enough_ends_a_verb_without_a_traceback(tmp_path:
         (["audit", "verify", "--config", "a.toml"], ["--config", "a.toml", "audit", "verify"]),
         (["analyse", "--", "--config", "x"], ["analyse", "--", "--config", "x"]),
         (["status", "--port"], ["--port", "status"]),
+        (["--json", "status", "--port", "7"], ["--port", "7", "status", "--json"]),
+        (["--exam", "ID", "export", "--long"], ["export", "--exam", "ID", "--long"]),
+        (["--json", "support-bundle", "a.zip"], ["support-bundle", "--json", "a.zip"]),
+        (["--help", "status"], ["--help", "status"]),
+        (["--json", "--", "status"], ["--json", "--", "status"]),
     ],
 )
 def test_options_of_every_verb_may_stand_anywhere(given: list[str], read: list[str]) -> None:
