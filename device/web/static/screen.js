@@ -6,12 +6,12 @@ import { byId, element, isEnabled, setAttribute, setEnabled, setText } from "./b
 import { followFocus, keepFocus } from "./base/focus.js";
 import { showIdentity } from "./base/menu.js";
 import { cancelPress, fetchDevice, finishScan, followStatus, moveMeasurement, startPress, takeTare } from "./base/probe.js";
-import { figure, say, sayPage } from "./base/words.js";
+import { figure, reasonToKeep, say, sayPage } from "./base/words.js";
 import { loadHospital } from "./exam/archive.js";
 import { showBeside, useBeside } from "./exam/beside.js";
 import { chooseAnotherPlace, chooseExam } from "./exam/chooser.js";
 import { finish, isChosen, isFreeChosen, onExam, openExam, placeWords, refresh, whoWords } from "./exam/current.js";
-import { openHistory } from "./exam/history.js";
+import { openHistory, refreshHistory } from "./exam/history.js";
 import { useKeyboard } from "./exam/keyboard.js";
 import { followScanner } from "./exam/scanner.js";
 import { askVoid } from "./exam/void.js";
@@ -23,7 +23,7 @@ import { asChosen, chosenMode, modeName, offerModes, onChoice, showModes } from 
 import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./press/scan.js";
 import { openDetails } from "./result/details.js";
 import { describeMeasurement } from "./result/result.js";
-import { dismiss, followAnswer, isMissing, isOlder, loadNewest, replace, showNow, showOlder, shownResult } from "./result/shown.js";
+import { dismiss, followAnswer, isMissing, isOlder, loadNewest, refreshShown, replace, showNow, showOlder, shownResult } from "./result/shown.js";
 import { showSelfTest } from "./service/self_test.js";
 import { absenceWords, updateLine } from "./service/software.js";
 
@@ -272,6 +272,13 @@ function receive(next) {
   if (isFirst) performance.mark("first status shown"); // for `make bench screen`
 }
 
+/** Show anew what this or another screen has changed of exams and measurements. */
+function takeOverChanges() {
+  showBeside();
+  refreshHistory();
+  refreshShown().then(show, () => {}); // who does not answer is asked again by the next change
+}
+
 /** Send one command at a time; a refusal takes the place of what was said of the one before. */
 async function send(command) {
   if (sending) return;
@@ -309,7 +316,7 @@ async function tare() {
 
 async function file() {
   const exam = openExam();
-  await replace(await moveMeasurement(shown(), { by: exam.operator, reason: say("result.file"), exam_id: exam.id }));
+  await replace(await moveMeasurement(shown(), { by: exam.operator, reason: reasonToKeep("filed"), exam_id: exam.id }));
   tell({ word: "", reason: say("exam.filed", { patient: whoWords(exam) }), tone: "good" });
 }
 
@@ -363,4 +370,4 @@ useKeyboard();
 followFocus(pressButton);
 followScanner(scanned);
 useBeside(openOlder);
-followStatus(receive, () => showConnection(true), showBeside);
+followStatus(receive, () => showConnection(true), takeOverChanges);

@@ -69,8 +69,9 @@ export function dicomTime(text) {
 
 const asPattern = (text) => text.replace(/[.*+?^$()|[\]\\]/g, "\\$&").replace(/\{(\w+)\}/g, "(?<$1>.+?)");
 const isRemedy = ([key]) => key.startsWith("remedy.");
+const isKept = ([key]) => key.startsWith("kept.");
 const known = Object.entries(sentences);
-const patterns = known.filter((one) => !isRemedy(one)).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
+const patterns = known.filter((one) => !isRemedy(one) && !isKept(one)).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}(?=\\s|$)`)]);
 const remedies = known.filter(isRemedy).map(([key, text]) => [key, new RegExp(`^${asPattern(text)}$`)]);
 
 /** A number that the daemon wrote, as the language writes it; what is none stays as it is. */
@@ -106,6 +107,15 @@ export function understand(text) {
 export function understandRemedy(text) {
   const [key, hit] = firstOf(remedies, text);
   return hit ? say(key, valuesOf(hit, spokenNumber)) : null;
+}
+
+/** A reason as it is kept, in English whoever gives it, so that each language can say it again. */
+export const reasonToKeep = (name) => sentences[`kept.${name}`];
+
+/** A reason that was kept; what somebody has written freely stays as it is. */
+export function keptReason(text) {
+  const [key] = known.filter(isKept).find(([, kept]) => kept === text) ?? [];
+  return key ? say(key.replace("kept.", "void.")) : text;
 }
 
 const REMEDIES = { E211: /^Wait (?<s>\d+) s:/ };

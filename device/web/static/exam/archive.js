@@ -8,6 +8,7 @@ import { clock, say } from "../base/words.js";
 import { openExam, refresh } from "./current.js";
 
 const LOOK_MS = 2000;
+const GLANCE_MS = 5000; // while nothing is on its way: another screen may send it
 const ON_ITS_WAY = new Set(["queued", "sent"]);
 const box = byId("archive");
 const state = element("p", "archive-state");
@@ -52,7 +53,7 @@ function show(objects) {
   setText(sendButton, say(objects.length ? "archive.again" : "archive.send"));
   setEnabled(sendButton, !objects.some(({ state: is }) => is === "queued"));
   clearTimeout(looking);
-  if (objects.some(({ state: is }) => ON_ITS_WAY.has(is))) looking = setTimeout(look, LOOK_MS);
+  looking = setTimeout(look, objects.some(({ state: is }) => ON_ITS_WAY.has(is)) ? LOOK_MS : GLANCE_MS);
 }
 
 /** Ask how far the exam is, and again while something is on its way and somebody looks. */
@@ -85,11 +86,13 @@ async function send() {
 export function showArchive(isOfExam, measurements) {
   const exam = openExam();
   const counts = measurements.some(({ voided }) => !voided);
+  const before = shown?.id;
   clearTimeout(looking);
   shown = hospital?.archive && isOfExam && exam?.kind === "patient" && counts ? exam : null;
   box.hidden = !shown;
   if (!shown) return;
+  if (shown.id === before) return look();
   setText(sendButton, say("archive.send"));
   tell(say("archive.asking"));
-  look();
+  return look();
 }

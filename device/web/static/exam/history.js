@@ -13,12 +13,14 @@ import { thumbnail } from "./row.js";
 import { showTrend } from "./trend.js";
 
 const PAGE = 30;
+const MOST = 200; // of one answer
 const dialog = byId("history");
 const list = byId("history-list");
 let scope = "all";
 let onOpen = () => {};
 let marked = [];
 let exams = new Map();
+let asked = 0;
 
 async function examOf({ exam_id: id }) {
   if (!id) return null;
@@ -50,6 +52,7 @@ function row(measurement, exam) {
   const { seq, taken_at: at, mode, estimate, voided, truth } = measurement;
   const item = element("li", "kept");
   item.dataset.voided = Boolean(voided);
+  item.dataset.id = measurement.id;
   const show = button("kept-open", "", () => { dialog.close(); onOpen(measurement.id); });
   const words = element("span", "kept-words");
   const signs = [voided && say("history.void"), estimate.simulated && say("simulated"), truth && !estimate.simulated && say("phantom")];
@@ -84,24 +87,32 @@ async function examsInScope() {
   return fetchExams({ patientRef: exam.patient_ref, limit: 100 });
 }
 
-async function page(beforeSeq = null) {
+/** Whether a measurement is of the place of the open exam: two lesions of one patient have a trend each. */
+function isOfThisPlace({ exam_id: id }) {
+  const [one, other] = [exams.get(id), openExam()];
+  return one?.side === other?.side && one?.clock_position === other?.clock_position;
+}
+
+async function page(beforeSeq, limit) {
   const inScope = await examsInScope();
-  if (!inScope) return fetchMeasurements({ beforeSeq, limit: PAGE });
+  if (!inScope) return fetchMeasurements({ beforeSeq, limit });
   const found = await Promise.all(inScope.map((exam) => fetchMeasurements({ examId: exam.id, limit: 100 })));
   exams = new Map([...exams, ...inScope.map((exam) => [exam.id, exam])]);
   return found.flat().sort((a, b) => b.seq - a.seq);
 }
 
-async function show(beforeSeq = null) {
-  const measurements = await page(beforeSeq);
+async function show(beforeSeq = null, limit = PAGE) {
+  const mine = (asked += 1);
+  const measurements = await page(beforeSeq, limit);
   const rows = await Promise.all(measurements.map(async (one) => row(one, await examOf(one))));
+  if (mine !== asked) return; // something else is asked for meanwhile
   if (beforeSeq) list.append(...rows);
   else list.replaceChildren(...rows);
   byId("history-none").hidden = list.childElementCount > 0;
   const more = byId("history-more");
-  more.hidden = scope !== "all" || measurements.length < PAGE;
+  more.hidden = scope !== "all" || measurements.length < limit;
   more.dataset.before = measurements.at(-1)?.seq ?? "";
-  showTrend(scope === "patient" ? measurements : []);
+  showTrend(scope === "patient" ? measurements.filter(isOfThisPlace) : [], openExam());
   showArchive(scope === "exam", measurements);
 }
 
@@ -116,8 +127,19 @@ function choose(next) {
 }
 
 for (const one of ["exam", "patient", "all"]) byId(`history-${one}`).addEventListener("click", () => choose(one));
-byId("history-more").addEventListener("click", ({ currentTarget }) => show(Number(currentTarget.dataset.before)));
+byId("history-more").addEventListener("click", ({ currentTarget }) => show(Number(currentTarget.dataset.before)).catch(() => {}));
 byId("history-close").addEventListener("click", () => dialog.close());
+
+/** Show it anew while it is open, for another screen has measured or changed something; marks and focus stay. */
+export async function refreshHistory() {
+  if (!dialog.open) return;
+  const focused = document.activeElement?.closest(".kept");
+  const nth = focused && [...focused.querySelectorAll("button, input")].indexOf(document.activeElement);
+  exams = new Map();
+  await show(null, Math.min(Math.max(PAGE, list.childElementCount), MOST)).catch(() => {}); // the next change asks again
+  for (const box of list.querySelectorAll("input")) box.checked = marked.some(({ id }) => id === box.value);
+  if (focused && !focused.isConnected) list.querySelector(`[data-id="${CSS.escape(focused.dataset.id)}"]`)?.querySelectorAll("button, input")[nth].focus();
+}
 
 /** Open the history of the exam that is open, else of all; what is chosen in it is handed to `act` by its id. */
 export function openHistory(act) {

@@ -1,8 +1,10 @@
-// Size and depth of a patient's lesion over her exams: a point and its 90 % interval for each measurement that counts.
+// Size and depth of one lesion over a patient's exams of its place: a point and its 90 % interval for each measurement
+// that counts.
 
 import { byId, drawn, element } from "../base/dom.js";
 import { day, figure, say } from "../base/words.js";
 import { UNKNOWNS, isDetermined } from "../result/quantities.js";
+import { placeWords, whoWords } from "./current.js";
 
 const [WIDTH, HEIGHT, LEFT, BELOW] = [360, 130, 36, 24];
 
@@ -17,10 +19,10 @@ function axis(svg, most, first, last) {
   if (day(last) !== day(first)) svg.append(drawn("text", { x: WIDTH - 8, y: HEIGHT - 6, class: "trend-end" }, day(last)));
 }
 
-function chart({ name, key, unit }, measurements) {
+function chart({ name, key, unit }, measurements, place) {
   const told = measurements.filter(({ estimate }) => isDetermined(estimate, key));
   if (told.length < 2) return null;
-  const title = say("history.trend", { name: say(name), unit });
+  const title = say("history.trend", { name: say(name), unit, place });
   const svg = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
   const most = Math.max(...told.map(({ estimate }) => estimate[key].high));
   const bottom = HEIGHT - BELOW;
@@ -36,10 +38,11 @@ function chart({ name, key, unit }, measurements) {
   return figureNode;
 }
 
-/** Show the trend of measurements, newest first; void ones do not count. */
-export function showTrend(measurements) {
+/** Show the trend of an exam's place, from its measurements, newest first; void ones do not count. */
+export function showTrend(measurements, exam) {
   const counted = measurements.filter(({ voided }) => !voided).reverse();
-  const charts = UNKNOWNS.slice(0, 2).map((unknown) => chart(unknown, counted)).filter(Boolean);
+  const place = counted.length ? placeWords({ ...exam, nipple_distance_mm: null }) || whoWords(exam) : "";
+  const charts = UNKNOWNS.slice(0, 2).map((unknown) => chart(unknown, counted, place)).filter(Boolean);
   byId("trends").replaceChildren(...charts);
   byId("trends").hidden = charts.length === 0;
 }

@@ -3,7 +3,7 @@
 import { button, byId, setText } from "../base/dom.js";
 import { remember, remembered } from "../base/memory.js";
 import { voidMeasurement } from "../base/probe.js";
-import { say } from "../base/words.js";
+import { reasonToKeep, say } from "../base/words.js";
 import { openExam } from "./current.js";
 
 const REASONS = ["slipped", "place", "patient", "other"];
@@ -21,7 +21,7 @@ async function act(reason) {
   }
   remember("operator", who);
   try {
-    const after = await voidMeasurement(measurement, { by: who, reason: say(`void.${reason}`) });
+    const after = await voidMeasurement(measurement, { by: who, reason: reasonToKeep(reason) });
     dialog.close();
     done(after);
   } catch (error) {

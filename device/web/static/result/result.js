@@ -2,7 +2,7 @@
 // gets no headline: the tile says so and shows only the interval.
 
 import { byId, element, setQuantity, setText } from "../base/dom.js";
-import { figure, moment, say, understand } from "../base/words.js";
+import { figure, keptReason, moment, say, understand } from "../base/words.js";
 import { modeName, surerWords } from "../press/modes.js";
 import { showPicture } from "./picture.js";
 import { UNKNOWNS, intervalWords, isBounded, isDetermined, valueFigure } from "./quantities.js";
@@ -91,7 +91,7 @@ function scanWords({ ramps, reached }) {
 export function describeMeasurement(measurement) {
   const { estimate, voided, reached } = measurement;
   if (voided) {
-    const why = { by: voided.by, at: moment(voided.at), reason: voided.reason };
+    const why = { by: voided.by, at: moment(voided.at), reason: keptReason(voided.reason) };
     return { word: say("result.void"), reason: say("result.void_why", why), tone: "caution" };
   }
   const key = headline(estimate);

@@ -41,6 +41,17 @@ export async function loadNewest(id) {
   await loadRepeats();
 }
 
+/** Take over what another screen has changed of what is shown, and of how far the measurements of its exam agree. */
+export async function refreshShown() {
+  const [newest, shown] = await Promise.all([measurement, older].map((one) => one && fetchMeasurement(one.id)));
+  if (newest?.id === measurement?.id) measurement = newest;
+  if (shown?.id === older?.id) older = shown;
+  const seen = older ?? measurement;
+  if (!seen) return;
+  showMeasurement(seen);
+  if (!older) await loadRepeats();
+}
+
 /** Show a measurement from the history. */
 export async function showOlder(id) {
   older = await fetchMeasurement(id);

@@ -25,7 +25,8 @@ from device.web.screen.screen_words import LANGUAGES, page, words_of
 STATIC = ROOT / "device" / "web" / "static"
 ENGLISH = words_of("en")
 REMEDIES = {key: text for key, text in words_of("sentences").items() if key.startswith("remedy.")}
-SENTENCES = {key: text for key, text in words_of("sentences").items() if key not in REMEDIES}
+KEPT = {key: text for key, text in words_of("sentences").items() if key.startswith("kept.")}
+SENTENCES = {key: text for key, text in words_of("sentences").items() if key not in REMEDIES | KEPT}
 ELSEWHERE = {
     "daemon_stopped",
     "daemon_restarted",
@@ -136,6 +137,12 @@ def test_every_sentence_of_the_daemon_has_its_words_and_is_said() -> None:
     made = daemon_sentences()
     unheard = {key for key, text in SENTENCES.items() if not any(re.match(pattern_of(text), one) for one in made)}
     assert unheard <= ELSEWHERE
+
+
+def test_a_reason_that_is_kept_has_its_words_in_each_language() -> None:
+    said = {key.replace("kept.", "void.") for key in KEPT} - {"void.filed"}  # that one is read in the audit alone
+    assert said == {key for key in ENGLISH if key in said}
+    assert {ENGLISH[key] for key in said} <= set(KEPT.values())
 
 
 SELF_TEST = ROOT / "device" / "instrument" / "self_test"
