@@ -27,10 +27,10 @@ TRUTH_LENGTH = 0.15
 """Presses this far apart in truth are as unlike as those one standard deviation of the log spread apart."""
 FEWEST, MOST, NEIGHBOUR_RATIO = 60, 400, 0.12
 """Presses of which a bound is the quantile, and their share of an octile: 400 leave an error of 1.5 % of coverage."""
-TAIL = 0.15
+TAIL = 1.5 * (1 - COVERAGE)
 """Share of an octile's presses beyond either bound: most octiles have fewer, since the belt holds the bounds of all."""
-LEAST_COVERAGE = 0.86
-"""Of every octile of the modulus: 0.85 is promised (docs/modes.md), the rest is for chance."""
+LEAST_COVERAGE = 1 - 1.4 * (1 - COVERAGE)
+"""Of every octile of the modulus: 0.86 where 0.85 is promised (docs/modes.md), for chance."""
 FOLDS = 4
 """Parts of the presses, each of which is covered by the belts of the others."""
 RAREST_RATIO = 0.05
