@@ -53,7 +53,7 @@ run: $(if $(PROBE),.venv/all.stamp,.venv/device.stamp) ## start the simulated pr
 test: .venv/all.stamp ## run the tests, but for the long ones (four minutes)
 	$(PY) -m pytest -n auto --maxprocesses 4 -m "not long"
 
-test-all: .venv/all.stamp ## run all tests, as continuous integration does (a quarter of an hour)
+test-all: .venv/all.stamp ## run all tests, as continuous integration does (half an hour)
 	$(PY) -m pytest -n auto --maxprocesses 4
 
 loop: .venv/all.stamp ## run the tests of one module's room, in seconds: make loop FILE=device/web/app.py

@@ -104,18 +104,30 @@ def _module_of(verb: str) -> str:
 
 
 def in_any_order(arguments: Sequence[str]) -> list[str]:
-    """Return a command line with the options of every verb before it, wherever they stood; what is after -- stays."""
+    """Return a command line with the options of every verb before it, and its own behind it, wherever they stood.
+
+    What is after -- stays.
+    """
     ahead, rest, words = list[str](), list[str](), iter(arguments)
     for word in words:
         name, given, _ = word.partition("=")
         if word == "--":
-            return [*ahead, *rest, word, *words]
+            return [*ahead, *_verb_first(rest), word, *words]
         takes_value = OF_EVERY_VERB.get(name)
         where = rest if takes_value is None else ahead
         where.append(word)
         if takes_value and not given and (value := next(words, None)) is not None:
             where.append(value)
-    return [*ahead, *rest]
+    return [*ahead, *_verb_first(rest)]
+
+
+def _verb_first(words: list[str]) -> list[str]:
+    """Return a verb before its own options where one of those stands first."""
+    verb = next((word for word in words if word in VERBS or word in ALIASED), None)
+    if verb is None or words[0] in ("-h", "--help") or not words[0].startswith("-"):
+        return words
+    at = words.index(verb)
+    return [verb, *words[:at], *words[at + 1 :]]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import hypothesis
 import pytest
 from daemon_process import QUICK_HAND, ROOT, Daemon
+from long_tests import is_listed, listed
 from schedule import OneHand
 from xdist.remote import Producer
 
@@ -32,6 +33,15 @@ hypothesis.settings.load_profile("any machine")
 def pytest_xdist_auto_num_workers() -> int:
     """Return the workers of `-n auto`: one of them mostly waits for a hand (tests/schedule.py)."""
     return (os.cpu_count() or 1) + 1
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest leaves out what `-m` says
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that were measured to be long."""
+    names = listed()
+    for item in items:
+        if is_listed(item.nodeid, names):
+            item.add_marker("long")
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OneHand:

@@ -14,7 +14,10 @@ from types import ModuleType
 from daemon_process import ROOT
 
 PACKAGE = "tsis_client"
-BINARY = ("image/png", "application/zip", "application/pdf", "application/x-npz", "multipart/x-mixed-replace")
+BINARY = (
+    "image/png", "application/zip", "application/pdf", "application/x-npz", "application/x-netcdf",
+    "multipart/x-mixed-replace",
+)  # fmt: skip
 CONFIGURATION = {"post_hooks": [], "content_type_overrides": dict.fromkeys(BINARY, "application/octet-stream")}
 """What docs/contracts.md tells an integrator: bytes stay bytes."""
 

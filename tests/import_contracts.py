@@ -58,16 +58,16 @@ class OnlyContract(_Directly):
 
 
 class ReservedContract(_Directly):
-    """`libraries` are imported by modules of `room` alone."""
+    """`libraries` are imported by modules of `rooms` alone."""
 
     type_name = "reserved"
-    room = fields.StringField()
+    rooms = fields.SetField(subfield=fields.StringField())
     libraries = fields.SetField(subfield=fields.StringField())
 
     def broken(self, graph: ImportGraph) -> Iterator[Import]:
         for library in self.libraries & graph.modules:
             for importer in graph.find_modules_that_directly_import(library):
-                if not is_within(importer, [self.room]):
+                if not is_within(importer, self.rooms):
                     yield importer, library
 
 

@@ -21,8 +21,9 @@ OPEN = frozenset({("GET", f"{API}/health/live"), ("POST", CLAIM), ("GET", PAIRIN
 whom to tell of a vulnerability."""
 OPEN_FOLDER = "/static/"
 """The screen's own files: they are in every copy of the software."""
-WORKLIST = f"{API}/worklist"
-"""Shows patients' names, which nothing else does: to whoever may begin exams."""
+WORKLIST, EXAMS, DICOM_FILES = f"{API}/worklist", f"{API}/exams/", "/dicom.zip"
+"""Show patients' names, which nothing else does, to whoever may begin exams: files of an exam have those of its
+order."""
 MEASURING = ("presses", "exams", "measurements", "self-test", "tare", "worklist")
 """What a token that may measure may change, by the first part of its path."""
 
@@ -36,7 +37,7 @@ def need_of(method: str, path: str) -> Need:
         return "own screen"
     if path == TOKENS or path.startswith(f"{TOKENS}/"):
         return "admin"
-    if path == WORKLIST:
+    if path == WORKLIST or (path.startswith(EXAMS) and path.endswith(DICOM_FILES)):
         return "measure"
     if asked in ("GET", "OPTIONS"):
         return "read"

@@ -31,7 +31,7 @@ def image_of(subject: DicomSubject, picture: bytes) -> Dataset:
     data = begun(subject, "image", SecondaryCaptureImageStorage, "OT", taken_at)
     set_body_part(data, subject)
     set_acquisition(data, subject)
-    set_time(data, "Acquisition", local_time(taken_at))
+    set_time(data, "Acquisition", local_time(subject, taken_at))
     data.ConversionType = "WSD"
     data.SecondaryCaptureDeviceManufacturer = MANUFACTURER
     data.ImageType = ["DERIVED", "SECONDARY", "OTHER"]

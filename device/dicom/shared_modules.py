@@ -35,9 +35,14 @@ def reference(sop_class: str, sop_uid: str) -> Dataset:
     return item
 
 
-def local_time(text: str) -> datetime:
-    """Return a time of RFC 3339 in this machine's zone, which the object names: many viewers show it as it stands."""
-    return datetime.fromisoformat(text).astimezone()
+def local_time(subject: DicomSubject, text: str) -> datetime:
+    """Return a time of RFC 3339 in this machine's zone as of the exam: many viewers show it as it stands.
+
+    An object names one offset from UTC for all of its times, and every object of a study the same time of the study,
+    so what is written after the clocks were put back still has the exam's offset.
+    """
+    begun_at = datetime.fromisoformat(subject.exam["made_at"]).astimezone()
+    return datetime.fromisoformat(text).astimezone(begun_at.tzinfo)
 
 
 def set_time(data: Dataset, what: str, moment: datetime) -> None:
@@ -58,7 +63,7 @@ def line(text: str, longest: int) -> str:
 
 def begun(subject: DicomSubject, kind: ObjectKind, sop_class: str, modality: str, made_at: str) -> Dataset:
     """Return a new object of a measurement with all modules that objects of any kind share."""
-    made = local_time(made_at)
+    made = local_time(subject, made_at)
     data = Dataset()
     data.file_meta = FileMetaDataset()
     data.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
@@ -97,7 +102,7 @@ def _set_patient(data: Dataset, subject: DicomSubject) -> None:
 
 def _set_study(data: Dataset, subject: DicomSubject) -> None:
     data.StudyInstanceUID, data.StudyID = subject.study_uid, str(subject.exam["seq"])
-    set_time(data, "Study", local_time(subject.exam["made_at"]))
+    set_time(data, "Study", local_time(subject, subject.exam["made_at"]))
     data.AccessionNumber = subject.exam["order_number"] or ""
     data.ReferringPhysicianName = ""
     data.StudyDescription = "Tactile imaging" if subject.is_of_patient else "Tactile imaging, no patient"

@@ -99,7 +99,9 @@ def _head(exam: StoredRecord, serial: str) -> list[Flowable]:
         ("Probe", f"{serial}, software {__version__}"),
     ]
     cells = [[paragraph(name, SMALL), paragraph(str(value), TEXT)] for name, value in rows if value]
-    table = Table(cells, colWidths=[34 * mm, None], style=[*TIGHT, ("LINEABOVE", (0, 0), (-1, 0), 0.8, INK)])
+    table = Table(
+        cells, colWidths=[34 * mm, None], style=[*TIGHT, ("LINEABOVE", (0, 0), (-1, 0), 0.8, INK)], splitInRow=1
+    )
     return [paragraph("Tactile imaging: report of an exam", TITLE), Spacer(0, 3 * mm), table]
 
 
@@ -160,7 +162,7 @@ def _measurement(store: Store, one: Exported, picture_of: _PictureOf) -> list[Fl
     right.append(paragraph(f"{measurement['id']}, model {estimate['model']} {estimate['model_sha256'][:12]}", SMALL))
     left = _picture(store, measurement, picture_of)
     style = [*TIGHT, ("LINEABOVE", (0, 0), (-1, 0), 0.4, RULE), ("TOPPADDING", (0, 0), (-1, -1), 2.5 * mm)]
-    return [Spacer(0, 3 * mm), Table([[left, right]], colWidths=[PICTURE + 8 * mm, None], style=style)]
+    return [Spacer(0, 3 * mm), Table([[left, right]], colWidths=[PICTURE + 8 * mm, None], style=style, splitInRow=1)]
 
 
 def told(measurement: StoredRecord) -> Sequence[dict[str, str]]:

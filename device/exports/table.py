@@ -14,8 +14,8 @@ from typing import Any
 from device.exports.selection import Exported
 from device.measurement.quantities import UNKNOWNS, unit_of
 
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
-"""What a cell of a formula begins with (OWASP, CSV injection)."""
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
+"""What a cell of a formula begins with, also in full width (OWASP, CSV injection)."""
 OF_EXAM = ("kind", "patient_ref", "order_number", "side", "clock_position", "nipple_distance_mm", "operator", "note")
 PARTS_OF_UNKNOWN = ("value", "low", "high", "std", "identifiable", "low_is_open", "high_is_open")
 WITH_UNIT = ("low", "high", "std", "mean", "spread")

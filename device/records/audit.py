@@ -17,13 +17,19 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal
 
 from device.errors import AuditChanged
 
 log = logging.getLogger(__name__)
 
 _Record = dict[str, Any]
+AuditedAct = Literal[
+    "exam_made", "exam_changed", "measurement_moved", "measurement_voided", "press_begun", "press_ended", "token_made",
+    "token_revoked", "settings_changed", "exam_sent", "object_withdrawn", "object_recalled", "recording_deleted",
+    "patient_erased",
+]  # fmt: skip
+"""All that is ever written into it."""
 AUDIT_TABLE = """
 CREATE TABLE IF NOT EXISTS audit
   (seq INTEGER PRIMARY KEY AUTOINCREMENT, subject TEXT NOT NULL, record TEXT NOT NULL, hash TEXT);
@@ -89,7 +95,7 @@ def chained(before: str, entry: _Record) -> str:
 
 def append(
     db: sqlite3.Connection,
-    what: str,
+    what: AuditedAct,
     subject: str,
     *,
     by: str = "",
@@ -163,7 +169,7 @@ class Audit:
         """Take how a transaction of the store is begun."""
         self._transaction = transaction
 
-    def append(self, what: str, subject: str, **said: Any) -> None:
+    def append(self, what: AuditedAct, subject: str, **said: Any) -> None:
         """Write an entry of what is no record of the store; its fields as in `append` above."""
         with self._transaction() as db:
             append(db, what, subject, **said)

@@ -54,6 +54,8 @@ def _lines(text: str) -> str:
 
 Identifier = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_one_line)]
 """An identifier or a person, as somebody typed or scanned it."""
+DistanceMm = Annotated[float, Field(ge=0.0, le=250.0, allow_inf_nan=False), AfterValidator(abs)]
+"""A distance; -0 is 0, or it would be printed with its sign."""
 Reason = Annotated[str, Field(min_length=1, max_length=500), AfterValidator(_one_line)]
 ExamId = Annotated[str, Field(pattern="^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}$")]
 
@@ -72,7 +74,7 @@ class LesionFields(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
     side: Literal["left", "right"] | None = None
     clock_position: Annotated[int, Field(ge=1, le=12)] | None = None
-    nipple_distance_mm: Annotated[float, Field(ge=0.0, le=250.0, allow_inf_nan=False)] | None = None
+    nipple_distance_mm: DistanceMm | None = None
     operator: Identifier | None = None
     note: Annotated[str, Field(max_length=2000), AfterValidator(_lines)] = ""
 

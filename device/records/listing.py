@@ -149,7 +149,8 @@ class Listing:
 
     def changes(self, *, after: int, limit: int) -> list[Change]:
         """Return what was made or changed after an entry of the audit, oldest first."""
-        query = f"SELECT seq, hash, subject, record FROM audit WHERE seq > ? AND {_TOLD} ORDER BY seq LIMIT ?"
+        where = f"seq > ? AND {_TOLD} AND {_IS_THERE}"
+        query = f"SELECT seq, hash, subject, record FROM audit WHERE {where} ORDER BY seq LIMIT ?"
         with self._transaction() as db:
             rows = db.execute(query, (after, limit)).fetchall()
             return [_change(db, seq, own, subject, json.loads(record)) for seq, own, subject, record in rows]
@@ -187,6 +188,12 @@ _TOLD = (
     " OR json_extract(record, '$.after.measurement_id') IS NOT NULL)"
 )
 """The audit's entries of exams and measurements: the end of a press names the measurement that it made."""
+
+_IS_THERE = (
+    "(subject IN (SELECT id FROM exam) OR"
+    " coalesce(json_extract(record, '$.after.measurement_id'), subject) IN (SELECT id FROM measurement))"
+)
+"""What a damaged database has lost can be told to nobody."""
 
 
 def _counter(whom: str) -> str:

@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from device.records.audit import append, utc_now
+from device.records.audit import AuditedAct, append, utc_now
 from device.records.exams import exam_of, filed
 
 _Record = dict[str, Any]
@@ -33,6 +33,7 @@ CREATE INDEX IF NOT EXISTS outbox_by_state ON outbox (state);
 CREATE INDEX IF NOT EXISTS outbox_by_exam ON outbox (exam_id);
 CREATE TABLE IF NOT EXISTS ordered_study (exam_id TEXT PRIMARY KEY, record TEXT NOT NULL, patient TEXT);
 """
+NOT_NEEDED = "no longer needed for the archive"
 _ROWS = "SELECT record, state FROM outbox"
 
 
@@ -150,7 +151,8 @@ class Outbox:
                        (state, why, uid))  # fmt: skip
             if state == "recalled":
                 self._insert(db, recall)
-            append(db, f"object_{state}", recall.exam_id, reason=why, after={"objects": [uid]})
+            act: AuditedAct = "object_recalled" if state == "recalled" else "object_withdrawn"
+            append(db, act, recall.exam_id, reason=why, after={"objects": [uid]})
 
     def order(self, db: sqlite3.Connection, exam_id: str, record: _Record, patient: _Record) -> None:
         """Keep what the worklist says of an exam that is being made, in the transaction that makes it."""
@@ -170,17 +172,20 @@ class Outbox:
         one, unless any of it waits to be sent.
         """
         query = """
-            UPDATE ordered_study SET patient = NULL WHERE patient IS NOT NULL
+            SELECT exam_id FROM ordered_study WHERE patient IS NOT NULL
             AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent'))
             AND (exam_id IN (SELECT id FROM exam WHERE json_extract(record, '$.made_at') < :made)
               OR exam_id IN (SELECT exam_id FROM outbox WHERE state = 'confirmed')
               AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE json_extract(record, '$.confirmed_at') >= :sent))"""
         with self._transaction() as db:
-            erased = db.execute(query, {"made": made_before, "sent": sent_before}).rowcount
+            erased = db.execute(query, {"made": made_before, "sent": sent_before}).fetchall()
+            for (exam_id,) in erased:
+                db.execute("UPDATE ordered_study SET patient = NULL WHERE exam_id = ?", (exam_id,))
+                append(db, "patient_erased", exam_id, reason=NOT_NEEDED, after={"patient": None})
         if erased:
             with self._transaction() as db:
                 db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        return erased
+        return len(erased)
 
     def _select(self, where: str, *values: object) -> list[_Record]:
         with self._transaction() as db:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -80,9 +80,10 @@ class Retention:
         """Return what the rule deletes now; changes nothing. Raises `StorageError` when nobody can say."""
         with self._transaction() as db:
             kept, saved = _kept_recordings(db), self._saved(db)
-        due = _due(kept, rule, utc_now(), self._free_mb() if rule.free_mb is not None else 0.0)
-        may_go = [one for seq, one in due if not rule.saved_first or _is_saved(seq, one, saved)]
-        return RetentionPlan(rule, saved.made_at if saved else None, tuple(may_go), len(due) - len(may_go))
+        free_mb = self._free_mb() if rule.free_mb is not None else 0.0
+        may = [(one, not rule.saved_first or _is_saved(seq, one, saved)) for seq, one in kept]
+        removals, held_back = _due(may, rule, utc_now(), free_mb)
+        return RetentionPlan(rule, saved.made_at if saved else None, tuple(removals), held_back)
 
     def carry_out(self, rule: RetentionRule) -> RetentionPlan:
         """Delete what the rule deletes now, oldest first; return what that was."""
@@ -119,21 +120,27 @@ def _kept_recordings(db: sqlite3.Connection) -> list[tuple[int, Removal]]:
 
 
 def _due(
-    kept: Sequence[tuple[int, Removal]], rule: RetentionRule, now: str, free_mb: float
-) -> list[tuple[int, Removal]]:
-    """Return what a rule deletes, with the reason: what is too old, and then the oldest until there is space."""
+    kept: Sequence[tuple[Removal, bool]], rule: RetentionRule, now: str, free_mb: float
+) -> tuple[list[Removal], int]:
+    """Return what a rule deletes, with the reason: what is too old, and then the oldest until there is space.
+
+    Each comes with whether it may go; of the others it is told how many the rule would delete, and none makes space.
+    """
     before = _days_before(now, rule.keep_days) if rule.keep_days is not None else ""
-    due, wanted_bytes = [], ((rule.free_mb or 0.0) - free_mb) * 1e6
-    for seq, one in kept:
+    due, held_back, wanted_bytes = list[Removal](), 0, ((rule.free_mb or 0.0) - free_mb) * 1e6
+    for one, may_go in kept:
         if one.taken_at and one.taken_at < before:
             why = f"older than {rule.keep_days:g} days"
         elif wanted_bytes > 0.0:
             why = f"less than {rule.free_mb:g} MB left"
         else:
             continue
-        wanted_bytes -= one.size_bytes
-        due.append((seq, Removal(one.recording_id, one.measurement_id, one.taken_at, one.size_bytes, why)))
-    return due
+        if may_go:
+            wanted_bytes -= one.size_bytes
+            due.append(replace(one, why=why))
+        else:
+            held_back += 1
+    return due, held_back
 
 
 def _days_before(now: str, days: float) -> str:

@@ -27,7 +27,7 @@ from device.records.database import open_database, open_to_read
 from device.records.disk import Disk, LocalDisk, read_uncached
 from device.records.exams import UNFILED, AskedExam, Exams, exam_of, filed
 from device.records.listing import Listing
-from device.records.manifest import fingerprint_of, note_kept
+from device.records.manifest import Fingerprint, fingerprint_of, note_kept
 from device.records.outbox import Outbox
 from device.records.recordings import RECORDINGS, KeptRecordings, StartFindings
 from device.records.retention import Retention
@@ -235,7 +235,7 @@ class Store:
         path = self.recordings.place_of(recording.id)
         self.write_out(recording, path, encode=encode, picture=picture)
         try:
-            written = fingerprint_of(path)
+            written = _fingerprint(path)
             with self._transaction() as db:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
                 whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
@@ -298,6 +298,13 @@ class Store:
         """Close the database and let go of the folder."""
         with self._lock:
             self._opened.close()
+
+
+def _fingerprint(path: Path) -> Fingerprint:
+    try:
+        return fingerprint_of(path)
+    except OSError as error:
+        raise StorageError(f"The recording cannot be read back: {error}.", "Check the disk.") from error
 
 
 def _unknown(what: str, identifier: str) -> UnknownResource:

@@ -17,7 +17,7 @@ Responses = dict[int | str, dict[str, Any]]
 
 PNG, ZIP, EVENTS = "image/png", "application/zip", "text/event-stream"
 LIVE = "multipart/x-mixed-replace"
-CSV, NPZ, PDF = "text/csv", "application/x-npz", "application/pdf"
+CSV, NPZ, NETCDF, PDF = "text/csv", "application/x-npz", "application/x-netcdf", "application/pdf"
 BYTES = {"type": "string", "format": "binary"}
 """How the schema of a body says that it is no text: generated clients then hand out bytes."""
 TAGS = [
@@ -28,7 +28,7 @@ TAGS = [
     {"name": "exams", "description": "Whose measurement it is, and the audit of what was changed."},
     {"name": "measurements", "description": "What was measured, with picture and recording."},
     {"name": "hospital", "description": "Exams as DICOM, to download or to send to the hospital's archive."},
-    {"name": "exports", "description": "Take measurements away: tables, arrays, recordings."},
+    {"name": "exports", "description": "Take measurements away: tables, arrays, data sets, recordings."},
     {"name": "self-test", "description": "Test every part."},
     {"name": "access", "description": "Pair other machines, and revoke their tokens."},
     {"name": "updates", "description": "Releases, and what became of updates."},

@@ -14,12 +14,13 @@ from pydantic import BaseModel, Field
 from device.exports.archive import archive_of
 from device.exports.arrays import npz_of
 from device.exports.lesions import lesion_table, lesions_of
+from device.exports.netcdf import netcdf_of
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.measurement.repeats import repeats_by_unknown
 from device.records.listing import Wanted
 from device.records.store import Store
-from device.web.contract import CSV, NPZ, PDF, ZIP, answers, media
+from device.web.contract import CSV, NETCDF, NPZ, PDF, ZIP, answers, media
 from device.web.paging import MeasurementFilter
 
 
@@ -93,6 +94,16 @@ def add_exports(
     def export_arrays(asked: Annotated[ExportQuery, Query()]) -> Response:
         """Return measurements with their exams and features as arrays."""
         return _file([npz_of(asked.selection(store))], NPZ, "measurements.npz")
+
+    @app.get(
+        f"{api}/exports/measurements.nc",
+        response_class=Response,
+        responses=media(NETCDF, "A netCDF-4 data set `tsis.measurements/1` with units."),
+        tags=["exports"],
+    )
+    def export_dataset(asked: Annotated[ExportQuery, Query()]) -> Response:
+        """Return measurements with their exams and features as a netCDF data set."""
+        return _file([netcdf_of(asked.selection(store), f"probe {serial()}")], NETCDF, "measurements.nc")
 
     @app.get(
         f"{api}/exports/recordings.zip",

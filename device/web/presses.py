@@ -8,6 +8,7 @@ from fastapi import FastAPI, Query
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
+from device.errors import InvalidRequest
 from device.instrument.procedure import Procedure
 from device.measurement.mode import Mode
 from device.measurement.wanted_accuracy import UNTIL_BOUNDS, WITHIN_BOUND, WantedAccuracy
@@ -53,6 +54,8 @@ def add_presses(app: FastAPI, api: str, procedure: Procedure, store: Store) -> N
         If-Match it is refused when the exam was changed since the client has shown it.
         """
         request = request or PressRequest()
+        if if_match and request.exam_id is None:
+            raise InvalidRequest("If-Match is an exam's version, but there is no exam_id.", "Send both, or neither.")
         exam = AskedExam(request.exam_id, version_of(if_match) if if_match else None) if request.exam_id else None
         if idempotency_key is None:
             job = procedure.request(request.mode, request.wanted, exam=exam).as_record()

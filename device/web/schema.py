@@ -17,6 +17,7 @@ from device.instrument.status import JobState, Step
 from device.instrument.watch.readiness import HealthPart
 from device.measurement.estimate import EstimateStatus
 from device.measurement.mode import Mode
+from device.records.audit import AuditedAct
 from device.records.exams import ExamKind
 
 PressStateCode = StrEnum("PressStateCode", [(state.name, state.code) for state in PressState])  # type: ignore[misc]
@@ -190,20 +191,7 @@ class AuditEntry(_Body):
     at: str
     by: str
     client: str = ""
-    what: Literal[
-        "exam_made",
-        "exam_changed",
-        "measurement_moved",
-        "measurement_voided",
-        "press_begun",
-        "press_ended",
-        "token_made",
-        "token_revoked",
-        "settings_changed",
-        "exam_sent",
-        "object_withdrawn",
-        "object_recalled",
-    ]
+    what: AuditedAct
     subject: str
     reason: str
     before: dict[str, Any] | None

@@ -1,6 +1,6 @@
 """Measurements that a probe has exported as arrays (.npz) to a netCDF data set with units.
 
-The probe itself writes none: HDF5 would be its largest library beside OpenCV.
+A probe of this release exports that itself (`GET exports/measurements.nc`); this is for arrays that were kept.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from device.measurement.quick_mode.profile import QUICK_FORCES_N, QuickPress, qu
 from device.measurement.ramp_modes.estimate import VISIBLE_DEVIATIONS
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, smooth_ring_errors
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, PressRows
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, PressRows
 from device.measurement.recording.reference_light import EXPONENT
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
@@ -139,7 +139,7 @@ def _outcome(ensemble: DenseEnsemble, simulated: SpreadAnswers, recorded: Record
     half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
     seen, evaluated = simulated.part(slice(half)), _evaluated(ensemble, recorded.rows, normalise(recorded.parameters))
     first = evaluated.part(usual)
-    belts = confidence_belts(seen.truth, seen.mean, seen.spread)
+    belts = confidence_belts(seen.truth, seen.mean, seen.spread, seen.truth[:, MODULUS])
     belts = widened(belts, first.truth, first.mean, first.spread)
     return QuickOutcome(
         belts,

@@ -16,6 +16,7 @@ from device.errors import StorageError
 from device.exports.archive import archive_of
 from device.exports.arrays import npz_of
 from device.exports.lesions import lesion_table
+from device.exports.netcdf import netcdf_of
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.files.durable import synced_file
@@ -29,9 +30,10 @@ EXAMPLES = """examples:
   python -m device export --lesions                a row a lesion: mean, spread, repeatability
   python -m device export --out exam.zip --exam ID recordings with a table of them
   python -m device export --out all.npz            arrays for NumPy
+  python -m device export --out all.nc             a netCDF data set with units
 """
 SCREEN = Path("-")
-KINDS = (".csv", ".npz", ".zip")
+KINDS = (".csv", ".npz", ".nc", ".zip")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +58,8 @@ def run(options: argparse.Namespace, config: Config) -> int:
         raise InvalidQuantity("--out", out, f"a new file that ends with {' or '.join(KINDS)}", "choose another name")
     with closing(Store(config.data, to_read=True)) as store:
         wanted = Wanted(exam_id=options.exam, mode=options.mode)
-        pieces = _pieces(Selection.of_now(store, wanted, with_void=options.with_void), store, out, options)
+        selection = Selection.of_now(store, wanted, with_void=options.with_void)
+        pieces = _pieces(selection, store, config.serial, out, options)
         if out == SCREEN:
             for piece in pieces:
                 sys.stdout.buffer.write(piece)
@@ -66,10 +69,12 @@ def run(options: argparse.Namespace, config: Config) -> int:
     return 0
 
 
-def _pieces(selection: Selection, store: Store, out: Path, options: argparse.Namespace) -> Iterable[bytes]:
+def _pieces(selection: Selection, store: Store, serial: str, out: Path, options: argparse.Namespace) -> Iterable[bytes]:
     match out.suffix:
         case ".npz":
             return [npz_of(selection)]
+        case ".nc":
+            return [netcdf_of(selection, f"probe {serial}")]
         case ".zip":
             return archive_of(store, selection)
     table = long_table if options.long else lesion_table if options.lesions else wide_table

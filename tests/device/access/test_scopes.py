@@ -20,7 +20,7 @@ def expected(method, path):
         return "own screen"
     if path.startswith("/api/v1/tokens"):
         return "admin"
-    if path == "/api/v1/worklist":  # patients' names
+    if path in ("/api/v1/worklist", "/api/v1/exams/{exam_id}/dicom.zip"):  # patients' names
         return "measure"
     if method == "GET":
         return "read"
@@ -55,6 +55,9 @@ def test_nothing_but_whether_it_runs_the_code_and_whom_to_tell_is_open():
         ("GET", "/api/v1/pairing/", "read"),
         ("POST", "/api/v1/pairing/", "admin"),
         ("GET", "/staticky", "read"),
+        ("GET", "/api/v1/exams/x/dicom.zip", "measure"),
+        ("HEAD", "/api/v1/exams/x/dicom.zip", "measure"),
+        ("GET", "/api/v1/exams/x/dicom", "read"),
     ],
 )
 def test_what_is_not_listed_needs_more_rather_than_less(method, path, need):

@@ -4,6 +4,7 @@ import io
 import re
 import subprocess
 import sys
+import time
 import zipfile
 
 import numpy as np
@@ -17,6 +18,7 @@ from device.dicom.hospital import Hospital
 from device.dicom.subject import OrderedStudy, study_uid
 from device.errors import InvalidRequest, UnknownResource
 from device.files.recording_file import read_picture
+from device.records import exams
 from device.records.store import Store
 
 WITHOUT_ANYTHING = {**dict.fromkeys(("order_number", "side", "clock_position", "nipple_distance_mm")), "note": ""}
@@ -124,6 +126,25 @@ def test_both_objects_say_whose_they_are_and_who_took_them(store, files_of):
     assert where["Laterality"].CodeMeaning == "Left"
     assert where["Topographical modifier"].CodeValue == "129781005"
     assert where["Finding"].CodeMeaning == "Lesion"
+
+
+def test_all_times_of_an_object_have_the_one_offset_that_it_names(store, files_of, monkeypatch):
+    monkeypatch.setattr(exams, "utc_now", lambda: "2026-07-01T22:30:00.000Z")
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    try:
+        exam = begin(store)
+        measure(store, exam, taken_at="2026-11-23T10:00:00.000Z")  # after the clocks were put back
+        for path in files_of(exam).values():
+            data = pydicom.dcmread(path)
+            assert data.TimezoneOffsetFromUTC == "+0200"
+            assert (data.StudyDate, data.StudyTime[:6]) == ("20260702", "003000")
+            for what in ("InstanceCreation", "Content", "Acquisition"):
+                if f"{what}Date" in data and data.Modality == "OT":
+                    assert (data[f"{what}Date"].value, data[f"{what}Time"].value[:6]) == ("20261123", "120000")
+    finally:
+        monkeypatch.undo()
+        time.tzset()
 
 
 def test_the_image_is_the_kept_picture_with_its_scale_and_rows_below(store, files_of):

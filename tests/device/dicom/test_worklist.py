@@ -11,7 +11,7 @@ from orthanc import Orthanc, free_port, needs_orthanc
 from written_exam import measure, needs_dciodvfy, verdict
 
 from device.dicom.hospital import Hospital
-from device.errors import ArchiveUnreachable, InvalidRequest, UnknownResource
+from device.errors import ArchiveUnreachable, InvalidRequest, ReusedKey, UnknownResource
 from device.files.recording_file import read_picture
 from device.records.asked_once import AskedOnce
 from device.records.store import Store
@@ -120,6 +120,16 @@ def test_a_step_is_one_exam_however_often_it_is_asked_for(store, hospital):
         hospital.begin_exam("2.25.1", SAID)
 
 
+def test_a_step_is_one_exam_also_when_it_is_asked_for_again_after_a_restart(archive, store, hospital):
+    [step] = hospital.scheduled(None, "A-17", None)
+    once = AskedOnce("k-2", "POST")
+    made = hospital.begin_exam(step["id"], SAID, once)
+    restarted = Hospital(archive.settings(), store, read_picture)  # which has shown no step yet
+    assert restarted.begin_exam(step["id"], SAID, once) == made
+    with pytest.raises(ReusedKey):
+        restarted.begin_exam(step["id"], SAID, AskedOnce("k-2", "POST other"))
+
+
 def test_names_are_erased_from_the_disk_once_the_archive_has_the_exam(tmp_path, store, hospital):
     [step] = hospital.scheduled(None, "A-17", None)
     exam = hospital.begin_exam(step["id"], SAID)
@@ -133,6 +143,10 @@ def test_names_are_erased_from_the_disk_once_the_archive_has_the_exam(tmp_path, 
     assert store.outbox.erase_patients(sent_before=long_ago, made_before=long_ago) == 0
     assert "Müller".encode() in on_disk() or b"M\\u00fcller" in on_disk()
     assert store.outbox.erase_patients(sent_before=far, made_before=long_ago) == 1
+    assert store.outbox.erase_patients(sent_before=far, made_before=far) == 0
+    entries = store.audit.entries(subject=exam["id"], before_seq=2**62, limit=9)
+    assert [one["what"] for one in entries] == ["patient_erased", "exam_sent", "exam_made"]
+    assert "ller" not in str(entries)
     assert "Müller".encode() not in on_disk()
     assert b"M\\u00fcller" not in on_disk()
     assert b"19700102" not in on_disk()

@@ -116,6 +116,20 @@ def test_every_measurement_that_counts_is_on_a_page_and_void_ones_are_counted_on
         assert text.count(foot) == pages
 
 
+@pytest.mark.parametrize(
+    "note", ["\n".join(f"line {n:03}" for n in range(222)), "\u738b" * 2000], ids=["lines", "script"]
+)
+def test_a_note_and_warnings_of_any_length_go_on_on_the_next_page(store, recording, printed, note):
+    made = exam(store, note=note)
+    warnings = [{"code": f"E{n:03}", "title": "Title", "cause": "cause " * 30} for n in range(60)]
+    keep(store, 1, exam_id=made["id"], recording=recording, warnings=warnings)
+    text = printed(made)
+    wanted = note.split("\n") if "\n" in note else []
+    assert [one for one in [*wanted, *(each["code"] for each in warnings)] if one not in text] == []
+    for sign in "<>":  # a code may begin on one page and end on the next
+        assert text.count(sign) == note.count("\u738b")
+
+
 def test_a_picture_that_is_gone_leaves_the_numbers(store, printed):
     made = exam(store)
     keep(store, 1, exam_id=made["id"])

@@ -68,7 +68,7 @@ def test_a_quantity_is_a_row_with_its_unit(store):
 @pytest.mark.parametrize(
     "text",
     ["=1+1", "+1", "-1", "@SUM(A1)", "=HYPERLINK(\"http://evil.example\";\"x\")", "-2+3+cmd|' /C calc'!A0", "=",
-     "=1\n=2"],
+     "=1\n=2", "\uff1d1+1", "\uff0b1", "\uff0d1", "\uff20SUM(A1)"],
 )  # fmt: skip
 def test_no_cell_is_a_formula(store, text):
     """Not even one whose exam was kept with such a text."""
@@ -77,6 +77,12 @@ def test_no_cell_is_a_formula(store, text):
     [row] = rows(wide_table(Selection(store)))
     assert (row["operator"], row["note"]) == ("'" + text.split("\n")[0], f"'{text}")
     assert not [cell for cell in row.values() if cell.startswith(("=", "+", "-", "@"))]
+
+
+def test_a_note_that_begins_with_an_empty_line_is_no_formula_either(store):
+    made = exam(store, note="\n=1+1")
+    keep(store, 1, exam_id=made["id"])
+    assert rows(wide_table(Selection(store)))[0]["note"] == "'\n=1+1"
 
 
 def test_a_negative_number_stays_one(store):

@@ -86,6 +86,11 @@ def test_a_change_is_the_next_version_and_its_entry_has_before_and_after(store, 
     assert (made["by"], made["before"], made["after"]) == ("Ada Byron", None, OF_A_PATIENT)
 
 
+def test_a_distance_of_minus_nought_is_nought(store):
+    made = store.exams.make(ExamContent(kind="patient", patient_ref="A", operator="Ada", nipple_distance_mm=-0.0))
+    assert str(store.exams.exam(made["id"])["nipple_distance_mm"]) == "0.0"
+
+
 def test_what_changes_nothing_is_no_version(store, exam):
     assert store.exams.change(exam["id"], {"side": "left"}, version=1, **ACT) == exam
     assert len(store.audit.entries(**PAGE)) == 1

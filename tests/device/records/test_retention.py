@@ -111,6 +111,16 @@ def test_for_space_the_oldest_go_until_there_is_enough(store):
     assert names(store.retention.plan(RetentionRule(free_mb=store.free_mb))) == []
 
 
+def test_what_is_held_back_makes_no_space_so_that_the_next_ones_go(store):
+    """The oldest is in no backup, as one that was damaged when it was made: the rule must not wait for it for ever."""
+    save(store, left_out=["r-1"])
+    size_mb = store.recordings.place_of("r-1").stat().st_size / 1e6
+    left_bytes = store._disk.free_bytes(store.folder)
+    store._disk.free_bytes = lambda folder: left_bytes
+    plan = store.retention.plan(RetentionRule(free_mb=store.free_mb + 0.5 * size_mb))
+    assert (names(plan), plan.held_back) == (["r-2"], 1)
+
+
 def test_what_was_deleted_says_when_and_why_and_is_in_the_audit(store):
     save(store)
     store.retention.carry_out(RetentionRule(keep_days=200))

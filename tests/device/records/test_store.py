@@ -284,6 +284,20 @@ def test_a_recording_that_cannot_be_written_leaves_no_row_and_no_file(tmp_path, 
     store.close()
 
 
+def test_a_recording_that_cannot_be_read_back_leaves_no_row_and_no_file(tmp_path, monkeypatch):
+    store = Store(tmp_path)
+
+    def failing(path):
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))
+
+    monkeypatch.setattr("device.records.store.fingerprint_of", failing)
+    with pytest.raises(StorageError, match="cannot be read back"):
+        add(store, 1)
+    assert store.measurements(before_seq=2**62, limit=9) == []
+    assert list((store.folder / "recordings").iterdir()) == []
+    store.close()
+
+
 def test_less_space_than_asked_for_is_a_full_disk_with_both_numbers(tmp_path):
     store = Store(tmp_path, BrokenDisk(errno.EIO))
     store.require_space(30.0)

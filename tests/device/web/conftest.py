@@ -20,7 +20,7 @@ def store(tmp_path):
 @pytest.fixture
 def get(store):
     """Ask the own screen's API, by a path below /api/v1."""
-    app = create_app(types.SimpleNamespace(), store)
+    app = create_app(types.SimpleNamespace(config=types.SimpleNamespace(serial="P-1")), store)
 
     def getting(path, **query):
         async def answer():

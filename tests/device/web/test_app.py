@@ -169,6 +169,13 @@ def test_a_press_of_what_is_no_exam_or_no_version_is_refused(ask, procedure, hea
     assert procedure.asked == []
 
 
+def test_a_version_of_no_exam_is_refused_and_no_press_of_nobody_is_begun(ask, procedure):
+    answer = ask("POST", "/api/v1/presses", headers={"If-Match": '"3"'}, json={"mode": "quick"})
+    assert (answer.status_code, answer.json()["code"]) == (422, "E803")
+    assert "there is no exam_id" in answer.json()["detail"]
+    assert procedure.asked == []
+
+
 @pytest.mark.parametrize("key", ["", "two words", "k" * 256, "caf\u00e9".encode(), b"\xff"])
 def test_a_key_that_is_no_name_is_refused_and_nothing_is_done(ask, procedure, key):
     answer = ask("POST", "/api/v1/presses", headers={"Idempotency-Key": key})

@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+import xarray
 from kept_measurements import keep
 
 from device.records.exams import ExamContent
@@ -56,6 +57,15 @@ def test_arrays_are_numpys(get):
         assert list(file["measurement_id"]) == ["m-3", "m-2", "m-1"]
 
 
+def test_a_data_set_is_netcdf_of_what_was_selected(get):
+    answer = get("exports/measurements.nc", mode="standard")
+    assert answer.headers["content-type"] == "application/x-netcdf"
+    assert answer.headers["content-disposition"] == 'attachment; filename="tsis-measurements.nc"'
+    with xarray.open_dataset(io.BytesIO(answer.content), engine="h5netcdf") as found:
+        assert list(found["measurement_id"].values) == ["m-3", "m-1"]
+        assert found.attrs["source"] == "probe P-1"
+
+
 def test_recordings_are_one_zip(get):
     with zipfile.ZipFile(io.BytesIO(get("exports/recordings.zip", mode="standard").content)) as archive:
         assert archive.namelist() == ["measurements.csv", "recordings/r-3.zip", "recordings/r-1.zip", "missing.csv"]
@@ -67,7 +77,7 @@ def test_what_was_voided_comes_only_when_it_is_asked_for(store, get):
     assert len(get("exports/measurements.csv", with_void="true").text.splitlines()) == 1 + 3
 
 
-@pytest.mark.parametrize("path", ["measurements.csv", "measurements.npz", "recordings.zip"])
+@pytest.mark.parametrize("path", ["measurements.csv", "measurements.npz", "measurements.nc", "recordings.zip"])
 @pytest.mark.parametrize("query", [{"exam": "x"}, {"mode": "fast"}, {"outcome": "done"}, {"from": "now"}, {"limit": 1}])
 def test_a_selection_that_is_none_is_refused(get, path, query):
     answer = get(f"exports/{path}", **query)

@@ -21,24 +21,53 @@ def shrunk_answers(count, seed, noise=0.15):
     return truth, mean, np.sqrt(np.maximum(weight @ grid**2 - mean**2, 1e-6))
 
 
+def belt_of(truth, mean, spread, modulus=None, seed=7):
+    """The belt of one unknown; with a modulus that has nothing to do with it, unless one is given."""
+    drawn = np.random.default_rng(seed).uniform(-1, 1, len(truth)) if modulus is None else modulus
+    return confidence_belts(*(column[:, None] for column in (truth, mean, spread)), drawn)[0]
+
+
+def is_inside(belt, truth, mean, spread):
+    intervals = [belt.interval(m, s) for m, s in zip(mean, spread, strict=True)]
+    return np.array([one.low <= t <= one.high for one, t in zip(intervals, truth, strict=True)])
+
+
 def test_intervals_cover_nine_in_ten_in_every_octile_of_the_truth():
     """A Bayesian interval covers 0.9 on the average, but misses most truths at the ends of the range."""
-    belts = confidence_belts(*(column[:, None] for column in shrunk_answers(12_000, 1)))[0]
+    belt = belt_of(*shrunk_answers(12_000, 1))
     truth, mean, spread = shrunk_answers(6000, 2)
-    intervals = [belts.interval(m, s) for m, s in zip(mean, spread, strict=True)]
-    inside = np.array([one.low <= t <= one.high for one, t in zip(intervals, truth, strict=True)])
+    inside = is_inside(belt, truth, mean, spread)
     octile = np.minimum(((truth + 1) * 4).astype(int), 7)
     assert inside.mean() == pytest.approx(0.9, abs=0.02)
     assert min(inside[octile == k].mean() for k in range(8)) > 0.85
 
 
-def test_belts_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
-    """Quantiles twice too far out: the factor is a half, but for what chance does not let be told."""
-    columns = [column[:, None] for column in shrunk_answers(4000, 3)]
-    [right] = confidence_belts(*columns)
+def test_what_the_modulus_moves_is_covered_in_its_every_octile():
+    """Answers that read soft ones too small and hard ones too large, by up to 1.2 of their spread."""
+
+    def moved(count, seed):
+        truth, mean, spread = shrunk_answers(count, seed)
+        modulus = np.random.default_rng([seed, 1]).uniform(-1, 1, count)
+        return truth, mean + 1.2 * modulus * spread, spread, modulus
+
+    belt = belt_of(*moved(12_000, 4))
+    *answers, modulus = moved(8000, 5)
+    inside = is_inside(belt, *answers)
+    octile = np.minimum(((modulus + 1) * 4).astype(int), 7)
+    assert min(inside[octile == k].mean() for k in range(8)) > 0.84
+    assert 0.89 < inside.mean() < 0.94
+    plain = belt_of(*moved(12_000, 4)[:3])
+    unaware = is_inside(plain, *answers)
+    assert min(unaware[octile == k].mean() for k in range(8)) < 0.82
+
+
+def test_quantiles_that_lie_too_far_out_are_brought_back(monkeypatch):
+    """Quantiles twice too far out: the factor is half of what it was."""
+    columns = shrunk_answers(4000, 3)
+    right = belt_of(*columns)
     learned = module._learned
     monkeypatch.setattr(module, "_learned", lambda *presses: module._scaled(learned(*presses), 2.0))
-    [narrowed] = confidence_belts(*columns)
+    narrowed = belt_of(*columns)
     np.testing.assert_allclose(narrowed.high, right.high, rtol=0.05, atol=0.05)
     np.testing.assert_allclose(narrowed.low, right.low, rtol=0.05, atol=0.05)
 
@@ -46,7 +75,7 @@ def test_belts_that_cover_other_presses_too_often_are_narrowed(monkeypatch):
 def test_too_few_presses_that_determine_an_unknown_are_refused():
     truth = np.linspace(-1, 1, 100)[:, None]
     with pytest.raises(InvalidQuantity, match="presses that determine an unknown is 100, but must be at least 120"):
-        confidence_belts(truth, truth, np.full_like(truth, 0.2))
+        confidence_belts(truth, truth, np.full_like(truth, 0.2), truth[:, 0])
 
 
 @pytest.mark.parametrize(("share", "is_determined"), [(0.04, False), (0.5, True)])
@@ -54,9 +83,9 @@ def test_an_unknown_that_presses_rarely_determine_is_never_called_determined(sha
     """Answers that are exactly right cannot tell how wide the belts of the few are to be."""
     truth = np.linspace(-1, 1, 1000)
     spread = np.where(np.arange(1000) % 100 < 100 * share, 0.1, 0.5)
-    belts = confidence_belts(*(column[:, None] for column in (truth, truth, spread)))[0]
-    assert belts.interval(0.3, 0.1).is_identifiable == is_determined
-    assert (belts.interval(0.3, 0.1)[:2] == (-1.0, 1.0)) != is_determined
+    belt = belt_of(truth, truth, spread)
+    assert belt.interval(0.3, 0.1).is_identifiable == is_determined
+    assert (belt.interval(0.3, 0.1)[:2] == (-1.0, 1.0)) != is_determined
 
 
 def flat_belts(bound: float) -> tuple[Belt, ...]:

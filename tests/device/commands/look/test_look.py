@@ -59,7 +59,7 @@ def test_the_exams_are_listed_with_how_many_measurements_they_have(probe: Path) 
 def test_measurements_go_to_a_table_to_arrays_and_to_an_archive_that_are_never_written_over(probe: Path) -> None:
     table = device(probe, "export", "--simulate")
     assert len(table.stdout.splitlines()) == 3
-    for name in ("all.csv", "all.npz", "all.zip"):
+    for name in ("all.csv", "all.npz", "all.nc", "all.zip"):
         assert device(probe, "export", "--out", name, "--simulate").returncode == 0
     assert (probe / "all.csv").read_text() == table.stdout.replace("\r\n", "\n")
     with np.load(probe / "all.npz", allow_pickle=False) as arrays:
@@ -133,6 +133,11 @@ def test_a_reader_that_has_seen_enough_ends_a_verb_without_a_traceback(tmp_path:
         (["audit", "verify", "--config", "a.toml"], ["--config", "a.toml", "audit", "verify"]),
         (["analyse", "--", "--config", "x"], ["analyse", "--", "--config", "x"]),
         (["status", "--port"], ["--port", "status"]),
+        (["--json", "status", "--port", "7"], ["--port", "7", "status", "--json"]),
+        (["--exam", "ID", "export", "--long"], ["export", "--exam", "ID", "--long"]),
+        (["--json", "support-bundle", "a.zip"], ["support-bundle", "--json", "a.zip"]),
+        (["--help", "status"], ["--help", "status"]),
+        (["--json", "--", "status"], ["--json", "--", "status"]),
     ],
 )
 def test_options_of_every_verb_may_stand_anywhere(given: list[str], read: list[str]) -> None:

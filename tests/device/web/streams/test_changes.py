@@ -120,3 +120,15 @@ def test_a_store_that_cannot_be_read_is_asked_again_with_the_next_change(store, 
     monkeypatch.setattr(store.listing, "changes", read)
     keep(store, 2)
     assert [record["id"] for _, record in told(feed)[0]] == ["m-1", "m-2"]
+
+
+def test_what_a_damaged_database_has_lost_is_told_to_nobody_and_all_else_is(store):
+    made = make_exam(store)
+    keep(store, 1)
+    gone = make_exam(store)
+    with store._transaction() as db:
+        db.execute("DELETE FROM exam WHERE id = ?", (gone["id"],))
+    later = make_exam(store)
+    feed, _ = begun(store, after=0)
+    events, _ = told(feed)
+    assert [record["id"] for kind, record in events if kind == "exam"] == [made["id"], later["id"]]

@@ -1,0 +1,52 @@
+"""Measurements as one netCDF data set with units, `tsis.measurements/1`: the arrays of `arrays`, for xarray and others.
+
+h5netcdf writes it by HDF5, in memory; its libraries are loaded with the first such export. A text is of any length;
+what is not known is as in the arrays.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from device.exports.arrays import arrays_of
+from device.exports.selection import Exported
+from device.measurement.quantities import unit_of
+
+SCHEMA = "tsis.measurements/1"
+
+
+def netcdf_of(exported: Iterable[Exported], source: str) -> bytes:
+    """Return the file; `source` says whose measurements they are. Raises as `arrays_of`."""
+    import h5netcdf  # type: ignore[import-untyped]
+
+    arrays = arrays_of(exported)
+    names, features = arrays.pop("feature_names"), arrays.pop("features")
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        file.dimensions = {"measurement": features.shape[0], "feature": features.shape[1]}
+        file.attrs.update({"schema": SCHEMA, "source": source})
+        for name, values in arrays.items():
+            _add(file, name, ("measurement",), values, unit_of(name) if values.dtype.kind == "f" else None)
+        _add(file, "features", ("measurement", "feature"), features)
+        _add(file, "feature", ("feature",), names)
+        _add(file, "feature_unit", ("feature",), np.array([unit_of(str(name)) for name in names], dtype=np.str_))
+    return content.getvalue()
+
+
+def _add(file: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, unit: str | None = None) -> None:
+    """Add a variable: numbers as they are, texts as texts of any length."""
+    import h5py  # type: ignore[import-untyped]
+
+    if values.dtype.kind == "U":
+        added = file.create_variable(name, dimensions, h5py.string_dtype())
+        values = values.astype(object)
+    else:
+        added = file.create_variable(name, dimensions, values.dtype)
+    if values.size:
+        added[...] = values
+    if unit is not None:
+        added.attrs["units"] = unit

@@ -1,0 +1,74 @@
+"""The data set is the arrays of the same selection, with units, and what the toolkit makes of kept arrays."""
+
+import io
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from kept_measurements import keep
+
+from device.errors import InvalidRequest
+from device.exports import arrays
+from device.exports.arrays import npz_of
+from device.exports.netcdf import netcdf_of
+from device.exports.selection import Selection
+from device.records.exams import ExamContent
+from device.records.store import Store
+from host_tools.data.exported import write_netcdf
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    exam = opened.exams.make(ExamContent(kind="patient", patient_ref="Ä-17", operator="王"))
+    keep(opened, 1, exam_id=exam["id"], features={"force_n": 0.5, "contrast": 0.25})
+    keep(opened, 2, status="no_contact", features={"force_n": 0.25})
+    yield opened
+    opened.close()
+
+
+def dataset(content):
+    return xr.load_dataset(io.BytesIO(content), engine="h5netcdf")
+
+
+def test_every_array_is_a_variable_with_its_unit(store):
+    found = dataset(netcdf_of(Selection(store), "probe P-1"))
+    with np.load(io.BytesIO(npz_of(Selection(store))), allow_pickle=False) as kept:
+        assert set(found.variables) == {*kept.files, "feature", "feature_unit"} - {"feature_names"}
+        for name in set(kept.files) - {"features", "feature_names"}:
+            assert found[name].dims == ("measurement",)
+            np.testing.assert_array_equal(found[name].values.astype(kept[name].dtype), kept[name])
+        np.testing.assert_array_equal(found["features"], kept["features"])
+        assert list(found["feature"].values) == list(kept["feature_names"])
+    assert (found["size_mm"].units, found["youngs_modulus_kpa"].units, found["force_n"].units) == ("mm", "kPa", "N")
+    assert dict(zip(found["feature"].values, found["feature_unit"].values, strict=True))["force_n"] == "N"
+    assert list(found["patient_ref"].values) == ["", "Ä-17"]
+    assert found.attrs == {"schema": "tsis.measurements/1", "source": "probe P-1"}
+
+
+def test_the_toolkit_makes_the_same_of_arrays_that_were_kept(store, tmp_path):
+    npz = tmp_path / "measurements.npz"
+    npz.write_bytes(npz_of(Selection(store)))
+    write_netcdf(npz, tmp_path / "measurements.nc")
+    made = xr.load_dataset(tmp_path / "measurements.nc", engine="h5netcdf")
+    xr.testing.assert_equal(made, dataset(netcdf_of(Selection(store), "")))
+
+
+def test_a_data_set_of_nothing_can_be_read(tmp_path):
+    store = Store(tmp_path / "empty")
+    found = dataset(netcdf_of(Selection(store), ""))
+    assert (found["size_mm"].shape, found["features"].shape, found["patient_ref"].shape) == ((0,), (0, 0), (0,))
+    store.close()
+
+
+def test_too_many_are_refused(store, monkeypatch):
+    monkeypatch.setattr(arrays, "MOST", 1)
+    with pytest.raises(InvalidRequest, match="Choose fewer"):
+        netcdf_of(Selection(store), "")
+
+
+def test_its_libraries_are_loaded_with_the_first_export_alone():
+    said = "import sys, device.web.app; print({'h5py', 'h5netcdf'} & set(sys.modules))"
+    assert subprocess.check_output([sys.executable, "-c", said], text=True).strip() == "set()"
