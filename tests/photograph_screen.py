@@ -1,7 +1,7 @@
 """Photographs every state of the screen at both sizes of a panel into docs, of a simulated probe in a real Chromium.
 
 `python tests/photograph_screen.py` writes docs/screens and the page that shows them, docs/screen_states.md. It ends
-with 1 when the ruler of tests/screen_layout.py finds anything in a state.
+with 1 when the ruler of tests/screen_layout.py or axe finds anything in a state.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from axe_playwright_python.sync_playwright import Axe
 from chromium import chromium_page
 from daemon_process import QUICK_HAND, ROOT, Daemon, wait_for
 from fallback_process import Fallback, ProbeRoot, failed_start
@@ -37,6 +38,8 @@ from device.simulation.scenario import Scenario
 SHOTS = ROOT / "docs" / "screens"
 PAGE = ROOT / "docs" / "screen_states.md"
 SIZES = [(800, 480), (480, 320)]
+AXE = Axe()
+WCAG = {"runOnly": ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa"]}
 COLOURS = 256
 """Of a photograph's palette: half of the file, and nobody sees it."""
 EXAM = {"kind": "patient", "patient_ref": "A-17", "side": "left", "clock_position": 10, "nipple_distance_mm": 35.0}
@@ -75,8 +78,8 @@ class Album:
     def sees(self, name: str, words: str) -> None:
         self.each(lambda page: expect(page.locator(name)).to_contain_text(words))
 
-    def shoot(self, name: str, words: str, *, scrolls: bool = False) -> None:
-        """Photograph a state, with words that say which it is; a page that scrolls as a whole is not measured."""
+    def shoot(self, name: str, words: str) -> None:
+        """Photograph a state, with words that say which it is, and have the ruler and axe look at it."""
         cells = [f"| {words} "]
         for page, (width, _) in zip(self.pages, SIZES, strict=True):
             page.wait_for_function("() => [...document.images].every(one => !one.src || one.complete)")
@@ -86,7 +89,9 @@ class Album:
                 image.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
                     path, optimize=True
                 )
-            self.wrong += [f"{name} {width}: {one}" for one in wrong_in(page) if not scrolls]
+            self.wrong += [f"{name} {width}: {one}" for one in wrong_in(page)]
+            violations = AXE.run(page, options=WCAG).response["violations"]
+            self.wrong += [f"{name} {width}: axe {one['id']}" for one in violations]
             cells.append(f"| ![{words}](screens/{path.name}) ")
         self._rows.append("".join(cells) + "|")
 
@@ -239,7 +244,7 @@ def of_an_update(album: Album, probe: ServedProbe) -> None:
     album.shoot("updating", "How far an update is")
     album.each(lambda page: page.goto(f"{probe.url}/pair"))
     album.each(lambda page: expect(page.locator("#offer")).to_be_visible())
-    album.shoot("pairing", "The page that pairs another machine", scrolls=True)
+    album.shoot("pairing", "The page that pairs another machine")
 
 
 def of_no_start(browser: Browser, rows: list[str], folder: Path) -> list[str]:
@@ -310,6 +315,7 @@ def of_trouble(album: Album, probe: ServedProbe) -> None:
 
     reason = "The force rose to 1.20 N, above 1.00 N: lift and press more gently."
     tell("rejected", Guidance.REJECTED, press=PressJob("p", "quick", "rejected", reason=reason))
+    album.each(lambda page: expect(page.locator("#modes")).to_be_visible())
     album.sees("#instruction", "Press more gently")
     album.shoot("rejected", "A press that does not count, and why")
     tell("rejected", Guidance.REJECTED, press=PressJob("p", "quick", "cancelled"))

@@ -82,6 +82,29 @@ def test_every_button_below_a_result_is_in_reach(browser: Browser, probe: Served
     page.context.close()
 
 
+@pytest.mark.parametrize("size", [(360, 640)], ids=named)
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+def test_a_phone_shows_a_result_whole_and_starts_the_next_press(
+    browser: Browser, probe: ServedProbe, language: str, size: tuple[int, int]
+):
+    """It scrolls; the press button stays in reach."""
+    number = 40 + (language == "de-DE")
+    probe.procedure.board.update(measurement_id=None)
+    page = opened(browser, probe, size, locale=language)
+    exam_id = open_exam(page, probe)
+    assert wrong_in(page) == []
+    keep(probe.procedure.store, number, exam_id=exam_id, picture=PICTURE)
+    show(page, probe, f"m-{number}", exam_id)
+    expect(page.locator("#press-button")).to_be_in_viewport(ratio=0.99)
+    shoot(page, f"small/phone-{language[:2]}-{size[0]}")
+    for name in ("modulus-interval", "image-title", "repeats", "act-finish"):
+        page.locator(f"#{name}").scroll_into_view_if_needed()
+        expect(page.locator(f"#{name}")).to_be_in_viewport(ratio=0.99)
+    assert page.locator(".tile").evaluate_all("tiles => tiles.flatMap(tile => (" + BROKEN_WORDS + ")(tile))") == []
+    assert wrong_in(page) == []
+    page.context.close()
+
+
 @pytest.mark.parametrize("size", SIZES[:2], ids=named)
 @pytest.mark.parametrize("language", ["en-GB", "de-DE"])
 def test_each_mode_says_its_worth_and_leaves_the_figures_whole(
