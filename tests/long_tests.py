@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = Path(__file__).with_suffix(".txt")
-LONGEST_S = 1.5
+LONGEST_S = 1.0
 KEPT = (
     "tests/browser/test_foreign_page.py::",
     "tests/browser/test_screen.py::test_a_new_user_presses_the_simulated_probe_and_reads_the_result",
