@@ -56,7 +56,7 @@ FORBIDDEN = {
         "device.instrument.status",
     ),
     "Only the exports print pages": ("device.web.app", "reportlab"),
-    "Only the exports and the toolkit write netCDF": ("device.web.app", "h5netcdf"),
+    "Only the files and the toolkit write netCDF": ("device.web.app", "h5netcdf"),
     "Care saves and restores what lies on the disk, whether a daemon runs or not": (
         "device.care.support",
         "device.instrument.status",

@@ -1,4 +1,5 @@
-"""Measurements as NumPy arrays in one .npz without pickled objects: `numpy.load(file, allow_pickle=False)` reads it.
+"""Measurements as NumPy arrays: in one .npz without pickled objects (`numpy.load(file, allow_pickle=False)` reads it),
+or in one netCDF data set with units.
 
 What is not known is NaN among numbers, "" among texts, and -1 where else 0 is false and 1 true.
 """
@@ -14,6 +15,7 @@ import numpy as np
 from device.errors import InvalidRequest
 from device.exports.selection import Exported
 from device.exports.table import WIDE_COLUMNS
+from device.files.netcdf_file import netcdf_of_arrays
 
 MOST = 20_000
 """So many measurements are held in memory at a time, some 40 MB with the features of mode standard."""
@@ -48,6 +50,11 @@ def npz_of(exported: Iterable[Exported]) -> bytes:
     content = io.BytesIO()
     np.savez_compressed(content, allow_pickle=False, **arrays_of(exported))
     return content.getvalue()
+
+
+def netcdf_of(exported: Iterable[Exported], source: str) -> bytes:
+    """Return the netCDF file; `source` says whose measurements they are. Raises as `arrays_of`."""
+    return netcdf_of_arrays(arrays_of(exported), source)
 
 
 def _column(name: str, cells: list[Any]) -> np.ndarray:

@@ -12,9 +12,8 @@ from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 
 from device.exports.archive import archive_of
-from device.exports.arrays import npz_of
+from device.exports.arrays import netcdf_of, npz_of
 from device.exports.lesions import lesion_table, lesions_of
-from device.exports.netcdf import netcdf_of
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.measurement.repeats import repeats_by_unknown

@@ -9,17 +9,13 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
-from device.measurement.quantities import UNKNOWNS, InvalidQuantity, unit_of
+from device.files.netcdf_file import netcdf_of_arrays
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 
 
-def exported_dataset(npz: Path) -> xr.Dataset:
-    """Return measurements (`measurement`) and their features (`measurement`, `feature`) of a probe's .npz.
-
-    Raises `InvalidQuantity` when it is none. Texts, numbers and flags are as the probe wrote them: NaN, "" and -1 are
-    what is not known.
-    """
+def _arrays_in(npz: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of a probe's .npz; raises `InvalidQuantity` when it is none."""
     try:
         with np.load(npz, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
@@ -28,20 +24,7 @@ def exported_dataset(npz: Path) -> xr.Dataset:
     missing = {"measurement_id", "features", "feature_names", *UNKNOWNS} - arrays.keys()
     if missing:
         raise _refused(npz, f"without {', '.join(sorted(missing))}")
-    names, features = arrays.pop("feature_names"), arrays.pop("features")
-    dataset = xr.Dataset(
-        {name: ("measurement", values, _attributes(name, values)) for name, values in arrays.items()},
-        coords={"feature": names},
-        attrs={"schema": "tsis.measurements/1", "source": npz.name},
-    )
-    dataset["features"] = ("measurement", "feature"), features
-    dataset["feature_unit"] = "feature", np.array([unit_of(str(name)) for name in names], dtype=np.str_)
-    return dataset
-
-
-def _attributes(name: str, values: np.ndarray) -> dict[str, str]:
-    """Return the unit of what is measured; numbers of things, flags and texts have none."""
-    return {"units": unit_of(name)} if np.issubdtype(values.dtype, np.floating) else {}
+    return arrays
 
 
 def _refused(npz: Path, why: str) -> InvalidQuantity:
@@ -51,12 +34,13 @@ def _refused(npz: Path, why: str) -> InvalidQuantity:
 
 
 def write_netcdf(npz: Path, out: Path) -> int:
-    """Write a new netCDF file of a probe's .npz; return how many measurements it has. Raises as `exported_dataset`.
+    """Write a new netCDF file of a probe's .npz; return how many measurements it has.
 
-    Raises `FileExistsError` for a file that is there: nothing is replaced.
+    Texts, numbers and flags are as the probe wrote them: NaN, "" and -1 are what is not known. Raises
+    `InvalidQuantity` for what is no export, `FileExistsError` for a file that is there: nothing is replaced.
     """
-    dataset = exported_dataset(npz)
+    arrays = _arrays_in(npz)
     if out.exists():
         raise FileExistsError(f"{out} is there already: choose another name.")
-    dataset.to_netcdf(out, engine="h5netcdf")
-    return int(dataset.sizes["measurement"])
+    out.write_bytes(netcdf_of_arrays(arrays, npz.name))
+    return len(arrays["measurement_id"])

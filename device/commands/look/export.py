@@ -14,9 +14,8 @@ from pathlib import Path
 from device.config import Config
 from device.errors import StorageError
 from device.exports.archive import archive_of
-from device.exports.arrays import npz_of
+from device.exports.arrays import netcdf_of, npz_of
 from device.exports.lesions import lesion_table
-from device.exports.netcdf import netcdf_of
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.files.durable import synced_file

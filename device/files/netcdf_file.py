@@ -1,4 +1,4 @@
-"""Measurements as one netCDF data set with units, `tsis.measurements/1`: the arrays of `arrays`, for xarray and others.
+"""Measurements as one netCDF data set with units, `tsis.measurements/1`: the arrays of an export, for xarray.
 
 h5netcdf writes it by HDF5, in memory; its libraries are loaded with the first such export. A text is of any length;
 what is not known is as in the arrays.
@@ -7,29 +7,28 @@ what is not known is as in the arrays.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from device.exports.arrays import arrays_of
-from device.exports.selection import Exported
 from device.measurement.quantities import unit_of
 
 SCHEMA = "tsis.measurements/1"
 
 
-def netcdf_of(exported: Iterable[Exported], source: str) -> bytes:
-    """Return the file; `source` says whose measurements they are. Raises as `arrays_of`."""
+def netcdf_of_arrays(arrays: Mapping[str, np.ndarray], source: str) -> bytes:
+    """Return the file of the arrays of an export; `source` says whose measurements they are."""
     import h5netcdf  # type: ignore[import-untyped]
 
-    arrays = arrays_of(exported)
-    names, features = arrays.pop("feature_names"), arrays.pop("features")
+    names, features = arrays["feature_names"], arrays["features"]
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
         file.dimensions = {"measurement": features.shape[0], "feature": features.shape[1]}
         file.attrs.update({"schema": SCHEMA, "source": source})
         for name, values in arrays.items():
+            if name in ("feature_names", "features"):
+                continue
             _add(file, name, ("measurement",), values, unit_of(name) if values.dtype.kind == "f" else None)
         _add(file, "features", ("measurement", "feature"), features)
         _add(file, "feature", ("feature",), names)

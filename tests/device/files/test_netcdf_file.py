@@ -11,8 +11,7 @@ from kept_measurements import keep
 
 from device.errors import InvalidRequest
 from device.exports import arrays
-from device.exports.arrays import npz_of
-from device.exports.netcdf import netcdf_of
+from device.exports.arrays import netcdf_of, npz_of
 from device.exports.selection import Selection
 from device.records.exams import ExamContent
 from device.records.store import Store
