@@ -21,8 +21,8 @@ from device.measurement.paper_mode.estimate import PAPER_UNITS
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QUICK_UNITS, QuickModel
 from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.commissioned.own_probe import OWN_ARRAYS
 from device.measurement.ramp_modes.model import RAMP_UNITS, SURROGATE_ARRAYS, SURROGATE_FILE, RampModel, ramp_answers_of
-from device.measurement.ramp_modes.own_probe import OWN_ARRAYS
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE, RangeClassifier
 
 Arrays = Mapping[str, NDArray[Any]]

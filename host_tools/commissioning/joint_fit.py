@@ -2,8 +2,9 @@
 
 Each ramp has a skin, an offset and a truth known to its tolerances; all share the probe. Least squares over all of
 them at once, each ramp whitened by camera, drift, smooth errors and what nobody knows of a press; the posterior of the
-probe is what remains when the others are marginalised. How far the forward model is from this probe, which no direction
-carries, is a smooth error of each press whose level is the likeliest by the marginal likelihood of all ramps.
+probe is what remains when the others are marginalised. What no direction carries is an error that all ramps share,
+which depends on skin and tissue, and a smooth one of each press; their sizes are the likeliest by the marginal
+likelihood of all ramps.
 Sources: Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001), model discrepancy; Tierney & Kadane, JASA 81 (1986), Laplace's
 approximation of the marginal likelihood; docs/own_probe.md.
 """
@@ -21,13 +22,15 @@ from scipy.optimize import least_squares
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, HIGH
 from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
+from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe
+from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, STD, RowDerivatives, owned_by
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
-from device.measurement.ramp_modes.own_posterior import AXES, OwnPosterior
-from device.measurement.ramp_modes.own_probe import OwnProbe
 from device.measurement.ramp_modes.radial_profile import RESPONSE
-from device.measurement.ramp_modes.row_derivatives import MEAN, STD, RowDerivatives, owned_by
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 from host_tools.commissioning.phantom_ramps import PhantomRamp
+from host_tools.commissioning.prior_discrepancy import SharedLack, prior_discrepancy
 
 PROBE = owned_by("probe")
 MODEL_RATIOS = (0.002, 0.003, 0.004, 0.006, 0.009, 0.013)
@@ -41,6 +44,10 @@ ONE_CASTING = 1 / 3
 FLOOR = 0.3
 """The posterior is believed no narrower than this part of the tolerance: it also carries what linear terms lack."""
 WHITENED_AGAIN, MOST_STEPS = 3, 40
+DISCREPANCY_RATIOS = (0.0, 0.01, 0.03, 0.1, 0.2)
+"""Levels of what the forward model lacks that are weighed, of what an inclusion does to the light."""
+UNLIKE_CASTINGS = 2.0
+"""It is believed so many times as large as phantoms say: castings have two skins, patients each their own."""
 REACH_MM = float(HIGH[OFFSET])
 BEGUN_AT = 0.1
 FARTHEST = 1.5
@@ -65,14 +72,16 @@ class ProbeFit:
     log_evidence: float
     misfit_ratio: Array
     levels: ErrorLevels
+    discrepancy: Discrepancy
+    believed: BelievedErrors
 
     def own_probe(self, derivatives: RowDerivatives) -> OwnProbe:
         """Return what is believed of the probe and its presses from now on."""
         believed = tolerances_only(derivatives, self.levels)
         mean, covariance = np.array(believed.mean), np.array(believed.covariance)
         mean[PROBE] = self.mean
-        covariance[np.ix_(PROBE, PROBE)] = self.covariance + np.diag((FLOOR * STD[PROBE]) ** 2)
-        return replace(believed, mean=mean, covariance=covariance)
+        covariance[np.ix_(PROBE, PROBE)] = np.diag((FLOOR * STD[PROBE]) ** 2)
+        return replace(believed, mean=mean, covariance=covariance, discrepancy=self.discrepancy)
 
 
 class Design(NamedTuple):
@@ -82,26 +91,47 @@ class Design(NamedTuple):
     derivatives: RowDerivatives
 
 
-def fit_probe(
-    ramps: Sequence[PhantomRamp],
-    design: Design,
-    model_ratios: Sequence[float] = MODEL_RATIOS,
-    flat_field_ratios: Sequence[float] = FLAT_FIELD_RATIOS,
-) -> ProbeFit:
-    """Return the posterior of the probe under the likeliest levels of its smooth errors, both given from the least.
+class BelievedErrors(NamedTuple):
+    """How large what no direction carries is believed: lacking of the forward model, its smooth error, and the skin's.
 
-    First that of the model for an ordinary skin, then that of skin and flat field: they hardly trade with each other,
-    for one is alike at all forces and the other is not.
+    The first is of what an inclusion does to the light, the others of the light.
     """
-    noise = design.answers.noise
 
-    def solved(model_ratio: float, flat_field_ratio: float) -> ProbeFit:
-        levels = replace(noise.levels, flat_field_ratio=flat_field_ratio, model_ratio=model_ratio)
-        return _JointFit(ramps, design, levels).solved()
+    discrepancy_ratio: float
+    model_ratio: float
+    flat_field_ratio: float
 
-    found = _likeliest(solved(model_ratio, flat_field_ratios[0]) for model_ratio in model_ratios)
-    others = (solved(found.levels.model_ratio, ratio) for ratio in flat_field_ratios[1:])
-    return _likeliest(chain([found], others))
+
+def fit_probe(ramps: Sequence[PhantomRamp], design: Design, believed: BelievedErrors | None = None) -> ProbeFit:
+    """Return the posterior of the probe under errors that are believed, or else under the likeliest of those weighed.
+
+    A discrepancy of the likeliest size is then taken `UNLIKE_CASTINGS` times as large.
+    """
+    if believed:
+        return _JointFit(ramps, design, believed).solved()
+    found = _likeliest_fit(ramps, design)
+    if not found.believed.discrepancy_ratio:
+        return found
+    larger = found.believed._replace(discrepancy_ratio=UNLIKE_CASTINGS * found.believed.discrepancy_ratio)
+    return _JointFit(ramps, design, larger).solved()
+
+
+def _likeliest_fit(ramps: Sequence[PhantomRamp], design: Design) -> ProbeFit:
+    """Return the fit of the largest evidence, each level tried from the least.
+
+    First, for an ordinary skin, that of what the forward model lacks, each with the likeliest of its smooth error; then
+    that of skin and flat field, which hardly trades with them: it is alike at all forces.
+    """
+
+    def solved(*levels: float) -> ProbeFit:
+        return _JointFit(ramps, design, BelievedErrors(*levels)).solved()
+
+    found = _likeliest(
+        _likeliest(solved(lacking, model_ratio, FLAT_FIELD_RATIO) for model_ratio in MODEL_RATIOS)
+        for lacking in DISCREPANCY_RATIOS
+    )
+    chosen = found.believed[:2]
+    return _likeliest(chain([found], (solved(*chosen, ratio) for ratio in FLAT_FIELD_RATIOS[1:])))
 
 
 def _likeliest(fits: Iterable[ProbeFit]) -> ProbeFit:
@@ -123,6 +153,8 @@ class _Ramp(Protocol):
 
     def whitened_changes(self, at: Array) -> Array: ...
 
+    def whitened_lack(self, at: Array, discrepancy: Discrepancy) -> Array: ...
+
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]: ...
 
 
@@ -143,6 +175,10 @@ class _PlainBlock:
         changes = self._derivatives.changes(point, self._surrogate.rows(point))
         return np.asarray(self._whitening @ changes[0, :, RESPONSE].T)
 
+    def whitened_lack(self, at: Array, discrepancy: Discrepancy) -> Array:
+        point = self._point(at)
+        return np.asarray(self._whitening @ discrepancy.spread(point, self._surrogate.rows(point))[0, RESPONSE])
+
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
         rows, slopes = self._surrogate.rows_and_jacobian(self._point(at[0]))
         jacobian = np.zeros((1, len(self._row), at.shape[1]))
@@ -157,9 +193,12 @@ class _PlainBlock:
 class _JointFit:
     """Least squares over the probe's directions, then ten coordinates of each ramp."""
 
-    def __init__(self, ramps: Sequence[PhantomRamp], design: Design, levels: ErrorLevels) -> None:
+    def __init__(self, ramps: Sequence[PhantomRamp], design: Design, believed: BelievedErrors) -> None:
+        noise, self._believed = design.answers.noise, believed
+        levels = replace(noise.levels, flat_field_ratio=believed.flat_field_ratio, model_ratio=believed.model_ratio)
+        self._lacking = prior_discrepancy(believed.discrepancy_ratio)
         self._ramps, self._surrogate, self._levels = ramps, design.answers.surrogate, levels
-        self._noise, self._derivatives = replace(design.answers.noise, levels=levels), design.derivatives
+        self._noise, self._derivatives = replace(noise, levels=levels), design.derivatives
         self._stated = np.array([np.append(ramp.stated[:OFFSET], np.zeros(AXES)) for ramp in ramps])
         self._std = np.array([np.append(ramp.std[:OFFSET], np.full(AXES, EVEN_STD)) for ramp in ramps])
         self._prior = _of_presses(design.derivatives, levels)
@@ -170,22 +209,45 @@ class _JointFit:
         low, high = self._bounds()
         for _ in range(WHITENED_AGAIN):
             explained = self._explained(at)
+            lack = self._lack(at, explained)
+            shared = SharedLack(np.concatenate(lack))
             found = least_squares(
-                lambda x, of: self._residuals(x, of)[0],
+                lambda x, *of: self._residuals(x, *of)[0],
                 np.clip(at, low + 1e-6, high - 1e-6),
-                jac=lambda x, of: self._residuals(x, of)[1],
+                jac=lambda x, *of: self._residuals(x, *of)[1],
                 bounds=(low, high),
                 x_scale="jac",
-                args=(explained,),
+                args=(explained, shared),
                 max_nfev=MOST_STEPS,
             )
             at = found.x
-        residuals, jacobian = self._residuals(at, explained)
+        residuals, jacobian = self._residuals(at, explained, shared)
         precision = jacobian.T @ jacobian
-        covariance: Array = np.linalg.inv(precision).astype(np.float64)[: len(PROBE), : len(PROBE)]
-        log_volume = sum(one.log_volume for one in explained)
+        log_volume = sum(one.log_volume for one in explained) + shared.log_volume
         evidence = log_volume - 0.5 * float(residuals @ residuals) - 0.5 * float(np.linalg.slogdet(precision)[1])
-        return ProbeFit(at[: len(PROBE)], covariance, evidence, self._misfits(at, explained), self._levels)
+        left, slopes = self._of_ramps(at, explained)
+        covariance, discrepancy = self._posterior(left, slopes, shared)
+        misfit = _mean_squares(left + shared.lack @ shared.mean(left), [len(one) for one in lack])
+        return ProbeFit(at[: len(PROBE)], covariance, evidence, misfit, self._levels, discrepancy, self._believed)
+
+    def _lack(self, x: Array, explained: Sequence[_Ramp]) -> list[Array]:
+        """Return what a unit of each part of the discrepancy changes of each ramp [S, R], whitened."""
+        _, at = self._parts(x)
+        return [ramp.whitened_lack(point, self._lacking) for ramp, point in zip(explained, at, strict=True)]
+
+    def _posterior(self, left: Array, slopes: Array, shared: SharedLack) -> tuple[Array, Discrepancy]:
+        """Return the covariance [D, D] of the probe's directions, and the discrepancy with what goes with it of them.
+
+        Both are told by the same ramps, whose own coordinates are marginalised.
+        """
+        design = np.hstack([slopes, shared.lack])
+        tolerances = np.concatenate([STD[PROBE], self._std.ravel(), np.ones(shared.lack.shape[1])])
+        covariance = np.linalg.inv(design.T @ design + np.diag(tolerances**-2))
+        told = np.r_[: len(PROBE), slopes.shape[1] : design.shape[1]]
+        factor: Array = np.linalg.cholesky(covariance[np.ix_(told, told)]).astype(np.float64)
+        of_probe, of_lack = factor[: len(PROBE)], factor[len(PROBE) :]
+        mean = self._lacking.factor @ shared.mean(left)
+        return of_probe @ of_probe.T, Discrepancy(mean, self._lacking.factor @ of_lack, of_probe)
 
     def _start(self) -> Array:
         """Return coordinates [n, 10], each inclusion a little towards its bright side: in the middle nothing slopes."""
@@ -212,8 +274,18 @@ class _JointFit:
             for ramp, point in zip(self._ramps, at, strict=True)
         ]
 
-    def _residuals(self, x: Array, explained: Sequence[_Ramp]) -> tuple[Array, Array]:
+    def _residuals(self, x: Array, explained: Sequence[_Ramp], shared: SharedLack) -> tuple[Array, Array]:
         """Return whitened residuals of ramps, of their statements and of tolerances, and their derivatives."""
+        left, slopes = self._of_ramps(x, explained)
+        std = np.concatenate([STD[PROBE], self._std.ravel()])
+        middle = np.concatenate([MEAN[PROBE], self._stated.ravel()])
+        return (
+            np.concatenate([shared.whitened(left), (x - middle) / std]),
+            np.concatenate([shared.whitened(slopes), np.diag(1 / std)]),
+        )
+
+    def _of_ramps(self, x: Array, explained: Sequence[_Ramp]) -> tuple[Array, Array]:
+        """Return residuals of all ramps, each whitened by itself, and their derivatives."""
         probe, at = self._parts(x)
         residuals, jacobian = [], []
         for number, (ramp, point) in enumerate(zip(explained, at, strict=True)):
@@ -225,19 +297,12 @@ class _JointFit:
             whole[:, first : first + at.shape[1]] = slope
             residuals.append(left + changes @ probe)
             jacobian.append(whole)
-        std = np.concatenate([STD[PROBE], self._std.ravel()])
-        middle = np.concatenate([MEAN[PROBE], self._stated.ravel()])
-        residuals.append((x - middle) / std)
-        jacobian.append(np.diag(1 / std))
         return np.concatenate(residuals), np.concatenate(jacobian)
 
-    def _misfits(self, x: Array, explained: Sequence[_Ramp]) -> Array:
-        probe, at = self._parts(x)
-        left = [
-            ramp.residuals_and_jacobian(point[None])[0][0] + ramp.whitened_changes(point)[:, PROBE] @ probe
-            for ramp, point in zip(explained, at, strict=True)
-        ]
-        return np.array([np.mean(one**2) for one in left])
+
+def _mean_squares(left: Array, counts: Sequence[int]) -> Array:
+    """Return the mean square [n] of each ramp's residuals, so many of all in one row [S]."""
+    return np.array([np.mean(one**2) for one in np.split(left, np.cumsum(counts)[:-1])])
 
 
 def _of_presses(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:

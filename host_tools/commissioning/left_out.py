@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
+from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
-from device.measurement.ramp_modes.own_answers import OwnAnswers
 from device.measurement.ramp_modes.radial_profile import SeenPresses
 from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe
 from host_tools.commissioning.phantom_ramps import PhantomRamp
@@ -55,15 +55,14 @@ def left_out(
 ) -> list[LeftOut]:
     """Return how each phantom with an inclusion is answered by a probe commissioned on the others.
 
-    `guess` says of rows where a fit may begin. The level of the model's error stays that of all phantoms.
+    `guess` says of rows where a fit may begin. The sizes of all errors stay those of all phantoms.
     """
     chosen = [number for number, ramp in enumerate(ramps) if ramp.has_inclusion]
 
     def answered(place: int) -> LeftOut:
         ramp = ramps[chosen[place]]
         others = [one for one in ramps if one is not ramp]
-        alone = fit_probe(others, design, (fit.levels.model_ratio,), (fit.levels.flat_field_ratio,))
-        return _answered(ramp, answers_of(design, alone), guess)
+        return _answered(ramp, answers_of(design, fit_probe(others, design, fit.believed)), guess)
 
     return in_parallel(answered, len(chosen), jobs)
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from device.measurement.bundle import CARD_FILE
 from device.measurement.quantities import Bound, require
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE
-from device.measurement.ramp_modes.row_derivatives import NAMES, STD
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE
 from host_tools.paper_network.export import write_folder
@@ -75,8 +75,7 @@ def _record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) 
     return {
         "made_at": made_at.isoformat(timespec="seconds").replace("+00:00", "Z"),
         **origin,
-        "model_ratio": done.fit.levels.model_ratio,
-        "flat_field_ratio": done.fit.levels.flat_field_ratio,
+        **done.fit.believed._asdict(),
         "probe": {
             NAMES[number]: {"mean": round(float(mean), 5), "std": round(float(own), 5), "tolerance": float(STD[number])}
             for number, mean, own in zip(PROBE, done.fit.mean, std, strict=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.row_derivatives import NAMES, STD
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD
 from host_tools.commissioning.joint_fit import ProbeFit
 from host_tools.commissioning.left_out import LeftOut
 
@@ -19,6 +19,7 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
     std = np.sqrt(np.diag(fit.covariance))
     for number, mean, own in zip(directions, fit.mean, std, strict=True):
         yield f"{NAMES[number]:28} {mean:8.4f} {own:8.4f} {STD[number]:10.3g}"
+    yield f"{'lacking of an inclusion':28} {fit.believed.discrepancy_ratio:8.2%}"
     yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
     yield f"{'skin and flat field':28} {fit.levels.flat_field_ratio:8.2%}"
 

@@ -18,10 +18,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, normalise
 from device.measurement.quantities import Bound, require
-from device.measurement.ramp_modes.legendre import LegendreSum, LegendreTerms
-from device.measurement.ramp_modes.noise import light_ratio
-from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE
-from device.measurement.ramp_modes.row_derivatives import (
+from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
     DERIVATIVE_ARRAYS,
     DIRECTIONS,
@@ -30,6 +27,9 @@ from device.measurement.ramp_modes.row_derivatives import (
     derivative_coordinates,
     row_derivatives_of,
 )
+from device.measurement.ramp_modes.legendre import LegendreSum, LegendreTerms
+from device.measurement.ramp_modes.noise import light_ratio
+from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE
 from device.measurement.ramp_modes.surrogate import DEPTH, OFFSET, SIZE, far_field_strength
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw

@@ -15,8 +15,8 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import PARAMETERS, denormalise
+from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.radial_profile import SeenPresses
 from device.measurement.recording.led_sides import LedRatio
 from device.simulation.physics.lens import AS_CERTIFIED

@@ -18,11 +18,11 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import denormalise_unknowns, normalise
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe
+from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, STD, RowDerivatives
 from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
-from device.measurement.ramp_modes.own_answers import OwnAnswers
-from device.measurement.ramp_modes.own_probe import OwnProbe
-from device.measurement.ramp_modes.row_derivatives import MEAN, STD, RowDerivatives
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits

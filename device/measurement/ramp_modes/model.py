@@ -21,10 +21,10 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import HIGH, denormalise, normalise_unknowns
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
+from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
+from device.measurement.ramp_modes.commissioned.own_probe import OWN_ARRAYS, own_probe_of
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.own_answers import OwnAnswers
-from device.measurement.ramp_modes.own_probe import OWN_ARRAYS, own_probe_of
 from device.measurement.ramp_modes.radial_profile import COLUMNS, NETWORK_NAMES, SeenPresses, network_rows
 from device.measurement.ramp_modes.range_classifier import RangeClassifier
 from device.measurement.ramp_modes.surrogate import ARRAYS, OFFSET, ScanSurrogate, surrogate_of
@@ -59,9 +59,9 @@ SURROGATE_ARRAYS = (
 
 
 def ramp_answers_of(arrays: Mapping[str, NDArray[Any]]) -> RampAnswers:
-    """Return what the arrays in `SURROGATE_ARRAYS` say, and those in `OWN_ARRAYS` where they are there.
+    """Return what the arrays in `SURROGATE_ARRAYS` say, and those in `OWN_ARRAYS` where any is there.
 
-    Raises `InvalidQuantity` when one is of another shape.
+    Raises `InvalidQuantity` when one is of another shape, or when a commissioned probe's lack some of its own.
     """
     near, beside = ({name: arrays[f"{part}_{name}"] for name in ARRAYS} for part in ("near", "beside"))
     end_mm, action = float(HIGH[OFFSET]), "install the model again"
@@ -74,8 +74,13 @@ def ramp_answers_of(arrays: Mapping[str, NDArray[Any]]) -> RampAnswers:
     to_mm = float(arrays["to_mm"])
     require("largest offset", to_mm, Bound(end_mm, np.inf, "mm", low_included=False), action)
     surrogate = ScanSurrogate(surrogate_of(near), surrogate_of(beside, end_mm, to_mm))
-    if not all(name in arrays for name in OWN_ARRAYS):
+    missing = [name for name in OWN_ARRAYS if name not in arrays]
+    if len(missing) == len(OWN_ARRAYS):
         return RampAnswers(surrogate, PressNoise(camera, forward=forward))
+    if missing:
+        raise InvalidQuantity(
+            "arrays of a commissioned probe", f"no {', '.join(missing)}", "all", "commission it again"
+        )
     own = own_probe_of(arrays)
     return OwnAnswers(surrogate, PressNoise(camera, own.levels, forward), own)
 

@@ -7,9 +7,9 @@ from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.parameters import HIGH, LOW, denormalise, normalise
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.commissioned.row_derivatives import COUNT, DIRECTIONS, NAMES, RowDerivatives
 from device.measurement.ramp_modes.noise import light_ratio
 from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
-from device.measurement.ramp_modes.row_derivatives import COUNT, DIRECTIONS, NAMES, RowDerivatives
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.physics.world import AS_BELIEVED, World
 from host_tools.press_models.press_derivatives import (

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import HIGH, PARAMETERS
 from device.measurement.ramp_modes.answers import UnlikeDesign
-from device.measurement.ramp_modes.noise import FURTHER, LOADS, PressNoise, light_ratio, smooth_errors
-from device.measurement.ramp_modes.own_probe import (
+from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
+from device.measurement.ramp_modes.commissioned.own_probe import (
     FIRST_ACROSS,
     SECOND_ACROSS,
     SEEN_COLUMNS,
@@ -22,6 +22,7 @@ from device.measurement.ramp_modes.own_probe import (
     Place,
     turned_columns,
 )
+from device.measurement.ramp_modes.noise import FURTHER, LOADS, PressNoise, light_ratio, smooth_errors
 from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE, SECOND, SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 from device.measurement.recording.ring_means import RING_RADII_MM
@@ -80,6 +81,12 @@ class OwnPosterior:
         changes = self._own.derivatives.changes(place.normalised, self._rows(place))
         seen = turned_columns(changes, place.angle_rad[:, None, None])
         return np.asarray(self._whitening @ _joined(seen.transpose(1, 0, 2)).T)
+
+    def whitened_lack(self, at: Array, discrepancy: Discrepancy) -> Array:
+        """Return what a discrepancy's factor changes [S, R], at coordinates [8 + 2 N]."""
+        place = self._place(at[None])
+        spread = discrepancy.spread(place.normalised, self._rows(place)).transpose(2, 0, 1)
+        return np.asarray(self._whitening @ _joined(turned_columns(spread, place.angle_rad[:, None])).T)
 
     def residuals(self, at: Array) -> Array:
         """Return whitened residuals [..., S] at coordinates [..., 8 + 2 N], in their precision."""
@@ -206,7 +213,8 @@ def _places(presses: int) -> list[NDArray[np.intp]]:
 
 def _joined(seen: Array) -> Array:
     """Return what is seen of N presses [n, N, S] as one row of each [n, ...]."""
-    return np.concatenate([seen[:, 0], seen[:, 1:, OF_FURTHER].reshape(len(seen), -1)], axis=1)
+    further = seen[:, 1:, OF_FURTHER]
+    return np.concatenate([seen[:, 0], further.reshape(len(seen), further[0].size if len(seen) else 0)], axis=1)
 
 
 def _turned(rows: Array, angle_rad: Array) -> Array:

@@ -19,10 +19,10 @@ from device.measurement.ramp_modes.answers import (
     RampAnswers,
     answer_of,
 )
+from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place
 from device.measurement.ramp_modes.fit import best_fit, best_fits
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.own_posterior import AXES, OwnPosterior
-from device.measurement.ramp_modes.own_probe import OwnProbe, Place
 from device.measurement.ramp_modes.posterior import sample_press
 from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE, SeenPresses
 from device.measurement.ramp_modes.scan import bound_of, scan_starts

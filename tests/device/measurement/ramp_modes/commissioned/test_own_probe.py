@@ -8,19 +8,21 @@ import pytest
 from device.files.shipped import SIMULATED_PROBE
 from device.measurement.parameters import HIGH, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
-from device.measurement.ramp_modes.noise import ErrorLevels
-from device.measurement.ramp_modes.own_answers import OwnAnswers
-from device.measurement.ramp_modes.own_posterior import AXES, OwnPosterior, seen_of, seen_with_noise, to_bright_side
-from device.measurement.ramp_modes.own_probe import (
+from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
+from device.measurement.ramp_modes.commissioned.own_posterior import (
+    AXES,
+    OwnPosterior,
+    seen_of,
+    seen_with_noise,
+    to_bright_side,
+)
+from device.measurement.ramp_modes.commissioned.own_probe import (
     FIRST_ACROSS,
     OwnProbe,
     Place,
     turned_columns,
 )
-from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
-from device.measurement.ramp_modes.row_derivatives import (
+from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
     DERIVATIVE_ARRAYS,
     MEAN,
@@ -29,6 +31,10 @@ from device.measurement.ramp_modes.row_derivatives import (
     owned_by,
     row_derivatives_of,
 )
+from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
+from device.measurement.ramp_modes.noise import ErrorLevels
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.physics.table_file import load_table
 
@@ -215,6 +221,8 @@ def test_a_bundle_keeps_what_is_the_probes_own(derivatives, ramp_model):
     assert again.noise.levels == own.own.levels
     with pytest.raises(InvalidQuantity, match="error levels"):
         ramp_answers_of(arrays | {"own_levels": np.zeros(3)})
+    with pytest.raises(InvalidQuantity, match="no own_discrepancy_mean"):
+        ramp_answers_of({name: one for name, one in arrays.items() if name != "own_discrepancy_mean"})
 
 
 def test_the_file_of_a_design_has_nothing_of_its_own(ramp_model):

@@ -19,6 +19,16 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.commissioned.discrepancy import NOTHING, Discrepancy
+from device.measurement.ramp_modes.commissioned.row_derivatives import (
+    COUNT,
+    DERIVATIVE_ARRAYS,
+    NAMES,
+    PAIR,
+    RowDerivatives,
+    owned_by,
+    row_derivatives_of,
+)
 from device.measurement.ramp_modes.noise import LOADS, ErrorLevels
 from device.measurement.ramp_modes.radial_profile import (
     COLUMN_COUNTS,
@@ -28,18 +38,14 @@ from device.measurement.ramp_modes.radial_profile import (
     FIRST_RINGS,
     SECOND,
 )
-from device.measurement.ramp_modes.row_derivatives import (
-    COUNT,
-    DERIVATIVE_ARRAYS,
-    NAMES,
-    PAIR,
-    RowDerivatives,
-    owned_by,
-    row_derivatives_of,
-)
 from device.measurement.recording.ring_means import RING_RADII_MM
 
-OWN_ARRAYS = (*(f"derivatives_{name}" for name in DERIVATIVE_ARRAYS), "own_mean", "own_covariance", "own_levels")
+OF_DISCREPANCY = tuple(Discrepancy.__dataclass_fields__)
+OWN_ARRAYS = (
+    *(f"derivatives_{name}" for name in DERIVATIVE_ARRAYS),
+    *("own_mean", "own_covariance", "own_levels"),
+    *(f"own_discrepancy_{name}" for name in OF_DISCREPANCY),
+)
 """Arrays that the file of a commissioned probe's surrogate has beside the others."""
 ACTION = "commission the probe again"
 FIRST_ACROSS = slice(COLUMNS, COLUMNS + COLUMN_COUNTS[2])
@@ -72,6 +78,7 @@ class RowChanges(NamedTuple):
 class OwnProbe:
     """`mean` [COUNT] and `covariance` [COUNT, COUNT] of the directions of `DIRECTIONS`, and `levels` of smooth errors.
 
+    `discrepancy` is what no direction carries; the covariance is of what does not go with it.
     Raises `InvalidQuantity` for arrays of another shape, and for a covariance that is none.
     """
 
@@ -79,6 +86,7 @@ class OwnProbe:
     mean: Array
     covariance: Array
     levels: ErrorLevels
+    discrepancy: Discrepancy = NOTHING
 
     def __post_init__(self) -> None:
         for name, found, expected in (("mean", self.mean, (COUNT,)), ("covariance", self.covariance, (COUNT, COUNT))):
@@ -95,25 +103,31 @@ class OwnProbe:
         changes = self.derivatives.changes(place.normalised, rows)
         seen = turned_columns(changes, place.angle_rad[:, None, None])
         shared = np.concatenate([owned_by("probe"), owned_by("lesion")])
-        parts = [np.einsum("nds,dk->nsk", seen[:, shared], self._factor(shared))]
+        parts = [np.einsum("nds,dk->nsk", seen[:, shared], self._factor(shared)), self._lacking(seen, place, rows)]
         parts.append(self._std(BESIDE_TILT) * self._beside(changes, place))
         for number in range(presses):
             own = self._of_press(changes[number], place.angle_rad[number], place.bright_side_rad[number])
             columns = np.zeros((presses, *own.shape))
             columns[number] = own
             parts.append(columns)
-        return RowChanges(self._shift(seen, changes), np.concatenate(parts, axis=2))
+        return RowChanges(self._shift(seen, changes, place, rows), np.concatenate(parts, axis=2))
 
     def shift(self, place: Place, rows: Array) -> Array:
         """Return what is believed to shift what is seen of presses [N, S], as of `changes`."""
         changes = self.derivatives.changes(place.normalised, rows)
-        return self._shift(turned_columns(changes, place.angle_rad[:, None, None]), changes)
+        return self._shift(turned_columns(changes, place.angle_rad[:, None, None]), changes, place, rows)
 
-    def _shift(self, seen: Array, changes: Array) -> Array:
+    def _shift(self, seen: Array, changes: Array, place: Place, rows: Array) -> Array:
         scalar = np.array([number not in (LESION_TILT, BESIDE_TILT, ALONG, PAIR) for number in range(COUNT)])
         shift: Array = np.einsum("nds,d->ns", seen[:, scalar], self.mean[scalar])
         shift[:, CONTRAST] += self._squared_tilt(changes)
-        return shift
+        return shift + turned_columns(self.discrepancy.shift(place.normalised, rows), place.angle_rad[:, None])
+
+    def _lacking(self, seen: Array, place: Place, rows: Array) -> Array:
+        """Return what the forward model lacks and the probe's directions with it [N, S, R], in standard deviations."""
+        spread = self.discrepancy.spread(place.normalised, rows).transpose(2, 0, 1)
+        turned = turned_columns(spread, place.angle_rad[:, None]).transpose(1, 2, 0)
+        return np.asarray(turned + np.einsum("nds,dr->nsr", seen[:, owned_by("probe")], self.discrepancy.of_probe))
 
     def _beside(self, changes: Array, place: Place) -> Array:
         """Return what a unit of the reference's tilt along the image's rows and columns does [N, S, 2]."""
@@ -152,7 +166,9 @@ class OwnProbe:
         """Return what a file holds, by the names in `OWN_ARRAYS`."""
         derivatives = {f"derivatives_{name}": part for name, part in self.derivatives.arrays().items()}
         levels = np.array([getattr(self.levels, name) for name in ErrorLevels.__dataclass_fields__])
-        return derivatives | {"own_mean": self.mean, "own_covariance": self.covariance, "own_levels": levels}
+        lacking = {f"own_discrepancy_{name}": getattr(self.discrepancy, name) for name in OF_DISCREPANCY}
+        own = {"own_mean": self.mean, "own_covariance": self.covariance, "own_levels": levels}
+        return derivatives | own | {name: np.asarray(part, np.float32) for name, part in lacking.items()}
 
     def _factor(self, chosen: NDArray[np.intp]) -> Array:
         return np.asarray(np.linalg.cholesky(self.covariance[np.ix_(chosen, chosen)]), np.float64)
@@ -207,4 +223,5 @@ def own_probe_of(arrays: Mapping[str, NDArray[Any]]) -> OwnProbe:
     if levels.shape != expected:
         raise InvalidQuantity("shape of the probe's error levels", levels.shape, str(expected), ACTION)
     mean, covariance = (np.asarray(arrays[name], np.float64) for name in ("own_mean", "own_covariance"))
-    return OwnProbe(derivatives, mean, covariance, ErrorLevels(*map(float, levels)))
+    lacking = Discrepancy(*(np.asarray(arrays[f"own_discrepancy_{name}"], np.float64) for name in OF_DISCREPANCY))
+    return OwnProbe(derivatives, mean, covariance, ErrorLevels(*map(float, levels)), lacking)
