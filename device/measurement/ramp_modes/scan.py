@@ -43,9 +43,10 @@ def scan_starts(
     tried = 2 * OFFSETS_TRIED_MM / reach_mm - 1
     starts = np.zeros((len(estimates), OFFSET + len(rows)))
     starts[:, :COUNT] = estimates
-    for start in starts:
-        points = np.column_stack([np.tile(start[:OFFSET], (len(tried), 1)), tried])
-        start[OFFSET:] = [tried[np.argmin(np.sum(press.residuals(points) ** 2, axis=1))] for press in presses]
+    points = np.column_stack([np.repeat(starts[:, :OFFSET], len(tried), axis=0), np.tile(tried, len(starts))])
+    for number, press in enumerate(presses, start=OFFSET):
+        left = np.sum(press.residuals(points) ** 2, axis=1)
+        starts[:, number] = tried[np.argmin(left.reshape(-1, len(tried)), axis=1)]
     return starts
 
 
