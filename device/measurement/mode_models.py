@@ -59,8 +59,6 @@ class ModeModels(NamedTuple):
         """
         if mode == "quick" and self.quick:
             return estimate_quick(recording, self.quick, calibration)
-        if mode == "precise" and self.ramp:
-            return self.advise(recording, calibration).estimate
         if mode in RAMP_MODES and self.ramp:
             return estimate_ramp(recording, mode, self.ramp, calibration)
         if mode == "paper":

@@ -27,7 +27,7 @@ from device.measurement.estimate import (
     with_numbers,
     without_numbers,
 )
-from device.measurement.mode import Mode
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.ramp_modes.answers import RampAnswer
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
@@ -64,11 +64,12 @@ def estimate_ramp(recording: Recording, mode: Mode, model: RampModel, calibratio
 def advise_scan(recording: Recording, model: RampModel, calibration: Calibration) -> ScanAdvice:
     """Return the estimate of all ramps of a scan so far, and where the next one would tell most.
 
-    Raises as `estimate_ramp`. Where a further ramp would narrow nothing by `WORTH_A_RAMP`, none is asked for.
+    Raises as `estimate_ramp`. None is asked for where a further ramp would narrow nothing by `WORTH_A_RAMP`, or a scan
+    has no more of them.
     """
     estimate, answered = _answered(recording, "precise", model, calibration)
     now = half_widths(estimate)
-    if answered is None or not now:
+    if answered is None or not now or len(recording.ramps()) >= FRAMES["precise"].most_ramps:
         return ScanAdvice(estimate, now, None, now)
     seen, answer = answered
     parts = model.answers.worth(seen, answer, PLACES_MM)
