@@ -14,7 +14,8 @@ from typing import NamedTuple
 from device.config import Config
 from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
 from device.files.bundle_file import read_models
-from device.instrument.press.record import Adviser, Estimator
+from device.instrument.press.record import Adviser, Estimator, LookAhead, look_at_nothing
+from device.instrument.press.remembered_ramps import RememberedRamps
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
@@ -67,13 +68,14 @@ def _nothing_to_prove() -> None:
 
 class Answers(NamedTuple):
     """The modes in which this probe has a model, what answers in them, what advises on a scan, what proves that both
-    still do, and what each mode's answers are worth by its model card."""
+    still do, what each mode's answers are worth by its model card, and what reads a reference press before them."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
     adviser: Adviser
     prove: Callable[[], None] = _nothing_to_prove
     worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
+    look_ahead: LookAhead = look_at_nothing
 
     def require(self, mode: Mode) -> None:
         """Raise `ConfigError` when the settings ask for a mode that is not among them."""
@@ -99,7 +101,7 @@ class Answers(NamedTuple):
                 begin()
                 self.prove()
 
-        return Answers(self.modes, estimator, adviser, prove, self.worth)
+        return Answers(self.modes, estimator, adviser, prove, self.worth, self.look_ahead)
 
 
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
@@ -107,7 +109,9 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
 
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
+    ramps = RememberedRamps()
     models = read_models(bundle, config.quick_model, config.standard_model).for_probe(config.serial)
+    models = models._replace(read=ramps.profiles)
 
     def certificate() -> Calibration:
         if calibration is None:
@@ -121,7 +125,7 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
         return models.advise(recording, certificate())
 
     worth = {mode: models.worth(mode) for mode in models.modes}
-    return Answers(models.modes, estimate, advise, lambda: _prove(models), worth)
+    return Answers(models.modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside)
 
 
 def _prove(models: ModeModels) -> None:

@@ -313,6 +313,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         adviser=answers.adviser,
         modes=answers.modes,
         worth=answers.worth,
+        look_ahead=answers.look_ahead,
         calibration=watch,
         opened=parts.opened,
         clock=probe.clock,

@@ -15,7 +15,7 @@ from device.dicom.shared_modules import MANUFACTURER, begun, local_time, set_acq
 from device.dicom.subject import DicomSubject
 from device.dicom.wording import rows, spoken_quantity
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from device.measurement.ramp_modes.radial_profile import binned_scale
+from device.measurement.recording.frame_light import binned_scale
 from device.measurement.recording.recording import REPAIR, CameraSettings
 
 ROW_PX, MARGIN_PX, FONT_SCALE = 24, 12, 0.5

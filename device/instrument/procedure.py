@@ -25,7 +25,15 @@ from device.instrument.acquisition.light_check import DimmingWatch
 from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.encoded_frames import EncodedFrames
-from device.instrument.press.record import SAVE_LIGHT_EVERY_S, Adviser, Estimator, PressAnswers, PressBook
+from device.instrument.press.record import (
+    SAVE_LIGHT_EVERY_S,
+    Adviser,
+    Estimator,
+    LookAhead,
+    PressAnswers,
+    PressBook,
+    look_at_nothing,
+)
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.scan import Scan, ScanTaken
 from device.instrument.press.states import Guidance, PressState, before_contact
@@ -74,6 +82,7 @@ class Procedure:
         adviser: Adviser,
         modes: tuple[Mode, ...],
         worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({}),
+        look_ahead: LookAhead = look_at_nothing,
         calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
@@ -84,8 +93,8 @@ class Procedure:
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
 
-        `adviser` says what a scan tells so far, `worth` what their answers are worth by the model cards, `folder_of`
-        where an installed model lies.
+        `adviser` says what a scan tells so far, `worth` what their answers are worth by the model cards, `look_ahead`
+        reads the press beside the lesion before that on it, `folder_of` says where an installed model lies.
         """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
@@ -93,7 +102,15 @@ class Procedure:
         self._show_what_was_kept()
         self._encoded = EncodedFrames()
         self._answers = PressAnswers(
-            config, calibration, estimator, adviser, store, self.progress, simulated_truth, self._encoded.png_of
+            config,
+            calibration,
+            estimator,
+            adviser,
+            store,
+            self.progress,
+            simulated_truth,
+            self._encoded.png_of,
+            look_ahead,
         )
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
@@ -327,6 +344,7 @@ class Procedure:
         try:
             self.bench.budget.require_for_press(FRAMES[job.mode].most_ramps)
             beside = [*unloaded, *self._frames_beside(job)]
+            self._answers.look_ahead(beside, job.mode, started_at)
             frames, scan = self._frames_on_lesion(job, beside, started_at)
             with self._requests.deciding:  # whoever has cancelled until here was in time
                 if self._capture.cancelled.is_set():

@@ -16,6 +16,7 @@ from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.model import QuickModel, estimate_quick
 from device.measurement.ramp_modes.estimate import advise_scan, estimate_ramp
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
+from device.measurement.ramp_modes.radial_profile import RampReader, press_profiles
 from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice
 
@@ -23,11 +24,12 @@ OwnModel = TypeVar("OwnModel", QuickModel, RampModel)
 
 
 class ModeModels(NamedTuple):
-    """`paper` of mode paper, `quick` of quick, `ramp` of standard and precise."""
+    """`paper` of mode paper, `quick` of quick, `ramp` of standard and precise, whose ramps `read` reads."""
 
     paper: ModelBundle
     quick: QuickModel | None = None
     ramp: RampModel | None = None
+    read: RampReader = press_profiles
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -43,7 +45,7 @@ class ModeModels(NamedTuple):
 
     def for_probe(self, serial: str) -> ModeModels:
         """Return the models that are for one probe."""
-        return ModeModels(self.paper, _if_for(serial, self.quick), _if_for(serial, self.ramp))
+        return self._replace(quick=_if_for(serial, self.quick), ramp=_if_for(serial, self.ramp))
 
     def prove(self) -> None:
         """Run the golden vectors of every model; raise `BundleRefused` when one of them does not hold any more."""
@@ -59,10 +61,8 @@ class ModeModels(NamedTuple):
         """
         if mode == "quick" and self.quick:
             return estimate_quick(recording, self.quick, calibration)
-        if mode == "precise" and self.ramp:
-            return self.advise(recording, calibration).estimate
         if mode in RAMP_MODES and self.ramp:
-            return estimate_ramp(recording, mode, self.ramp, calibration)
+            return estimate_ramp(recording, mode, self.ramp, calibration, self.read)
         if mode == "paper":
             return estimate_paper(recording, self.paper, calibration)
         raise self._unavailable(mode)
@@ -74,7 +74,7 @@ class ModeModels(NamedTuple):
         """
         if not self.ramp:
             raise self._unavailable("precise")
-        return advise_scan(recording, self.ramp, calibration)
+        return advise_scan(recording, self.ramp, calibration, self.read)
 
     def _unavailable(self, mode: Mode) -> InvalidQuantity:
         available = ", ".join(self.modes)

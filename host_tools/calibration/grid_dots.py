@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.radial_profile import TOUCHED_N
+from device.measurement.recording.frame_light import TOUCHED_N
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import Image, saturated_ratio
 

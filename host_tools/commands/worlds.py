@@ -9,7 +9,13 @@ import typer
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, require
-from host_tools.commands.measured_chapters import measure_chapters, print_chapter, print_table, shown
+from host_tools.commands.measured_chapters import (
+    chosen_chapters,
+    measure_chapters,
+    print_chapter,
+    print_table,
+    shown,
+)
 from host_tools.commands.output import Scheduler, note, require_writable
 from host_tools.workers import workers
 
@@ -44,39 +50,52 @@ def robustness(
     phantoms: Annotated[Path, typer.Option(help="File of the phantoms of every probe.")] = SIMULATED_PROBE
     / "phantoms.toml",
     table: Annotated[Path, typer.Option(help="Folder of the design's tables.")] = SIMULATED_PROBE,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it. The page keeps the others.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of probes, presses and phantoms.")] = 1,
     scheduler: Scheduler = None,
 ) -> None:
-    """Measure how presses of probes of random tolerances are answered, before and after commissioning.
+    """Measure how presses of probes that somebody built are answered, before and after commissioning: of random
+    tolerances, with one thing at a time, and with what no test notices.
 
-    A quarter of an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
+    Half an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
     """
-    from device.files.bundle_file import read_ramp_model
+    from device.files.bundle_file import read_quick_model, read_ramp_model
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.pages.page import Results, write_page
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+    from host_tools.scores.one_thing.one_at_a_time import one_at_a_time_chapter
+    from host_tools.scores.one_thing.press_answers import DesignToTry
+    from host_tools.scores.one_thing.silent_errors import silent_errors_chapter
     from host_tools.scores.robustness import robustness_chapter
 
     require("probes", probes, Bound(1, 99, "probes"), "ask for at least one")
     require("presses", presses, Bound(4, 10_000, "presses"), "ask for at least four of each probe")
     if out:
         require_writable(out, (".md",))
-    trained, derivatives = read_ramp_model(model), load_derivatives(table)
+    trained, quick, derivatives = read_ramp_model(model), read_quick_model(MODELS / "quick"), load_derivatives(table)
     stated, tables = read_phantoms(phantoms, blocks_needed=BLOCKS_NEEDED), ProbeTables.load(table)
+    design = DesignToTry(trained, quick, derivatives, tables)
+    chapters = {
+        "tolerances": lambda: robustness_chapter(
+            trained, derivatives, tables, stated, probes=probes, presses=presses, seed=seed
+        ),
+        "one at a time": lambda: one_at_a_time_chapter(design, stated, seed=seed),
+        "silent errors": lambda: silent_errors_chapter(design, seed=seed),
+    }
     with workers(scheduler):
-        measured = measure_chapters({
-            "tolerances": lambda: robustness_chapter(
-                trained, derivatives, tables, stated, probes=probes, presses=presses, seed=seed
-            )
-        })  # fmt: skip
+        measured = measure_chapters(chosen_chapters(only, chapters))
     missed = sum(print_chapter(timed) for timed in measured.values())
     for timed in measured.values():
         for one in timed.chapter.tables:
             print_table(one)
     if out:
-        command = f"host_tools robustness --probes {probes} --presses {presses} --out {shown(out)}"
-        write_page(out, Results("robustness", command, measured))
+        counts = f" --probes {probes} --presses {presses}" if "tolerances" in measured else ""
+        chosen = "".join(f' --only "{name}"' for name in only or [])
+        command = f"host_tools robustness{counts}{chosen} --out {shown(out)}"
+        write_page(out, Results("robustness", command, measured).in_chapters(out, list(chapters)))
         note.print(f"{out} written.")
     if missed:
         raise typer.Exit(1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from math import isfinite, nan
 from pathlib import Path
@@ -47,11 +47,15 @@ class Timed:
 
 @dataclass(frozen=True)
 class Results:
-    """Everything that a page shows beside its prose; `facts` are what the prose quotes, numbers, lists and texts."""
+    """Everything that a page shows beside its prose; `facts` are what the prose quotes, numbers, lists and texts.
+
+    `kept` are chapters as JSON that were measured before and stay; a page with any says of each how it was measured.
+    """
 
     page: str
     command: str
     chapters: Mapping[str, Timed] = field(default_factory=dict)
+    kept: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tables: Mapping[str, Table] = field(default_factory=dict)
     facts: Mapping[str, Any] = field(default_factory=dict)
     software: str = __version__
@@ -66,15 +70,44 @@ class Results:
             "date": self.date,
             "facts": dict(self.facts),
             "tables": {name: _table_record(table) for name, table in self.tables.items()},
-            "chapters": {name: chapter_record(timed) for name, timed in self.chapters.items()},
+            "chapters": {**self.kept, **{name: chapter_record(timed) for name, timed in self.chapters.items()}},
         }
+
+    def in_chapters(self, out: Path, order: Sequence[str]) -> Results:
+        """Return the same with chapters of a page that was written before, but for those measured now.
+
+        Chapters that a page may have are in `order`; the facts of each then say by which command, software and when it
+        was measured.
+        """
+        old, origin = _before(out), ("command", "software", "date")
+        before = {
+            name: chapter | {"facts": {one: old[one] for one in origin} | chapter["facts"]}
+            for name, chapter in old.get("chapters", {}).items()
+        }
+        mine = {one: getattr(self, one) for one in origin}
+        chapters = {
+            name: replace(timed, chapter=replace(timed.chapter, facts=mine | dict(timed.chapter.facts)))
+            for name, timed in self.chapters.items()
+        }
+        found = before | {name: chapter_record(timed) for name, timed in chapters.items()}
+        return replace(self, chapters=chapters, kept={name: found[name] for name in order if name in found})
+
+
+def _before(out: Path) -> dict[str, Any]:
+    """Return the results that stand beside a page; {} where there are none."""
+    record = _record_of(out)
+    return dict(json.loads(record.read_text(encoding="utf-8"))) if record.exists() else {}
+
+
+def _record_of(out: Path) -> Path:
+    return out.parent / "results" / f"{out.stem}.json"
 
 
 def write_page(out: Path, results: Results) -> None:
     """Write figures and results into folders beside the page, and the page from these results."""
     for figure in (figure for timed in results.chapters.values() for figure in timed.chapter.figures):
         _draw(figure, out.parent / FIGURES / figure.name)
-    record = out.parent / "results" / f"{out.stem}.json"
+    record = _record_of(out)
     record.parent.mkdir(exist_ok=True)
     write_durably(record, f"{dumps(results.record())}\n".encode())
     write_durably(out, render(record).encode())

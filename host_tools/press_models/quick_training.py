@@ -196,7 +196,12 @@ def quick_press_set(training_set: PressSet, camera: Array, seed: int) -> QuickPr
 
 def quick_rows(rows: Single | Array, force_n: Array) -> Array:
     """Return the rows [n, 12] of presses held at forces [n], for profile rows [n, P]."""
-    powers = np.vander(PROFILE_FORCES_N, increasing=True)
-    weights = np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers)
+    weights = force_weights(force_n)
     at_forces = np.asarray(rows[:, :CONTRAST_COLUMNS], np.float64).reshape(len(rows), -1, RINGS)
     return np.column_stack([np.einsum("nk,nkj->nj", weights, at_forces), force_n])
+
+
+def force_weights(force_n: Array) -> Array:
+    """Return the weights [n, K] of what is at the profile's forces: the cubic through them, at forces [n]."""
+    powers = np.vander(PROFILE_FORCES_N, increasing=True)
+    return np.asarray(np.vander(force_n, len(PROFILE_FORCES_N), increasing=True) @ np.linalg.inv(powers))

@@ -2,7 +2,8 @@
 
 Modules in reading order: `score_recordings`, `paper_scores`, `dial`, `coverage`, `posterior`,
 `rank_histograms`, `scan`, `noise_free`, `span`, `outside`, `just_outside`, `ellipsoids`, `breast_imager`,
-`foreign_probes`, `camera_trial`, `foreign_presses`, `robustness`.
+`foreign_probes`, `camera_trial`, `foreign_presses`, `scored_presses`, `robustness`. In `one_thing`, what each thing
+alone costs.
 
 No training; what is scored has been frozen before, and `dial` adds its figures to the card.
 """

@@ -24,7 +24,7 @@ from device.simulation.physics.world import OverLesion, PressTilts, Relaxation, 
 from device.simulation.scenario import NO_INCLUSION
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.phantom_ramps import PhantomRamp, stated_coordinates
-from host_tools.press_models.press_samples import PressedScene, draw_parameters, harmonics_along
+from host_tools.press_models.press_samples import PressedRings, PressedScene, draw_parameters, harmonics_along
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.scenes.phantom_set import PhantomSet
 
@@ -119,6 +119,11 @@ def _seen(
     """Return what is read of one press in a world, with noise."""
     direction_rad = np.array([rng.uniform(0, 2 * np.pi)])
     pressed = PressedScene(tables, world=world).press(parameters, float(direction_rad[0]))
-    along = pressed.as_row(float(direction_rad[0]))
-    across = [part.ravel() for part in harmonics_along(pressed.rings, float(direction_rad[0]), across=True)]
-    return to_bright_side(seen_with_noise(np.concatenate([along, *across])[None], noise, rng), direction_rad)
+    columns = seen_columns(pressed, float(direction_rad[0]))
+    return to_bright_side(seen_with_noise(columns[None], noise, rng), direction_rad)
+
+
+def seen_columns(pressed: PressedRings, direction_rad: float) -> Array:
+    """Return all that is seen of one press [S], along its inclusion's direction in the image."""
+    across = [part.ravel() for part in harmonics_along(pressed.rings, direction_rad, across=True)]
+    return np.concatenate([pressed.as_row(direction_rad), *across])

@@ -9,31 +9,26 @@ mechanics are not among it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from device.measurement.arrays import Array
-from device.measurement.parameters import denormalise_unknowns, normalise
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe
 from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, STD, RowDerivatives
-from device.measurement.ramp_modes.estimate import rejections, stands_out
-from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
+from device.measurement.ramp_modes.model import RampModel
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
-from host_tools.commissioning.joint_fit import FLAT_FIELD_RATIO, MODEL_RATIOS, PROBE, Design, fit_probe, tolerances_only
-from host_tools.commissioning.left_out import answers_of, answers_to_seen, left_out
+from host_tools.commissioning.joint_fit import PROBE, Design, fit_probe
+from host_tools.commissioning.left_out import answers_of, left_out
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
-from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.seeds import derived_seed
 from host_tools.scenes.phantom_set import PhantomSet
-from host_tools.scores.foreign_presses import ForeignPresses, foreign_phantoms, foreign_presses, probe_part
+from host_tools.scores.foreign_presses import foreign_phantoms, foreign_presses, probe_part
 from host_tools.scores.foreign_probes import foreign_world
+from host_tools.scores.scored_presses import ScoredPresses, joined, scored, tolerant
 
 PROBES, PRESSES, MOST_KNOWN = 20, 60, 300
 TOLERANT = 10
@@ -44,24 +39,6 @@ HEADER = (
     "size RMSE (mm)", "depth RMSE (mm)", "median misfit",
 )  # fmt: skip
 GOALS = {"pooled": 0.86, "each probe": 0.80, "joint": 0.84, "answered": 0.95, "rmse": 1.3}
-
-
-@dataclass(frozen=True, eq=False)
-class ForeignScores:
-    """Answers to presses in which something stands out: in coordinates, misfit [n], and which are not refused [n]."""
-
-    evaluated: EvaluatedPresses
-    misfit_ratio: Array
-    is_answered: NDArray[np.bool_]
-
-    def error_mm(self) -> Array:
-        """Return errors of size and depth [n, 2] of what is answered (mm)."""
-        mean, truth = (denormalise_unknowns(one) for one in (self.evaluated.mean, self.evaluated.truth))
-        return np.asarray((mean - truth)[self.is_answered, :2])
-
-    def covered(self) -> NDArray[np.bool_]:
-        """Return whether intervals of size and depth hold [n, 2] of what is answered."""
-        return self.evaluated.is_covered[self.is_answered, :2]
 
 
 def robustness_chapter(
@@ -78,7 +55,7 @@ def robustness_chapter(
 ) -> Chapter:
     """Return how presses of foreign probes are answered, before and after commissioning on phantoms."""
     design = Design(model.answers, derivatives)
-    scores: dict[str, list[ForeignScores]] = {name: [] for name in ("as it ships", "with tolerances", "commissioned")}
+    scores: dict[str, list[ScoredPresses]] = {name: [] for name in ("as it ships", "with tolerances", "commissioned")}
     rows = []
     for number in range(1, probes + 1):
         say(f"probe {number} of {probes}")
@@ -90,9 +67,9 @@ def robustness_chapter(
         answers = answers_of(design, fit)
         critical = limits(answers, model, left_out(ramps, design, model.first_guesses, fit, jobs), seed)
         of_probe = {
-            "as it ships": _scored(model.answers, model, model.critical["standard"], taken, jobs),
-            "with tolerances": _scored(_tolerant(design), model, critical, taken.first(TOLERANT), jobs),
-            "commissioned": _scored(answers, model, critical, taken, jobs),
+            "as it ships": scored(model.answers, model, model.critical["standard"], taken, jobs),
+            "with tolerances": scored(tolerant(design), model, critical, taken.first(TOLERANT), jobs),
+            "commissioned": scored(answers, model, critical, taken, jobs),
         }
         for name, one in of_probe.items():
             scores[name].append(one)
@@ -108,7 +85,7 @@ def robustness_chapter(
             Table(
                 "All probes together",
                 HEADER,
-                tuple((name, *_row(_joined(found))) for name, found in {**scores, "known exactly": known}.items()),
+                tuple((name, *_row(joined(found))) for name, found in {**scores, "known exactly": known}.items()),
             ),
             Table("Each probe, commissioned", header, tuple(rows)),
         ),
@@ -116,8 +93,8 @@ def robustness_chapter(
     )
 
 
-def _benchmarks(commissioned: Sequence[ForeignScores], known: ForeignScores) -> list[Benchmark]:
-    whole = _joined(commissioned)
+def _benchmarks(commissioned: Sequence[ScoredPresses], known: ScoredPresses) -> list[Benchmark]:
+    whole = joined(commissioned)
     covered, names = whole.covered(), UNKNOWNS[:2]
     rms, of_known = (np.sqrt((one.error_mm() ** 2).mean(axis=0)) for one in (whole, known))
     each = np.array([one.covered().mean(axis=0) for one in commissioned])
@@ -140,28 +117,7 @@ def _benchmarks(commissioned: Sequence[ForeignScores], known: ForeignScores) -> 
     ]
 
 
-def _scored(
-    answers: RampAnswers, model: RampModel, critical: CriticalValues, taken: ForeignPresses, jobs: int
-) -> ForeignScores:
-    shown = [number for number, one in enumerate(taken.seen) if stands_out(one.rows[0], model.answers.noise)]
-    seen = [taken.seen[number] for number in shown]
-    found = answers_to_seen(answers, model.first_guesses, seen, jobs)
-    values = [found_values(*pair, answers, model.ranges.log_odds) for pair in zip(found, seen, strict=True)]
-    return ForeignScores(
-        evaluated(normalise(taken.parameters[shown])[:, : len(UNKNOWNS)], found),
-        np.array([one.misfit_ratio for one in found]),
-        np.array([not rejections(one, critical) for one in values]),
-    )
-
-
-def _tolerant(design: Design) -> OwnAnswers:
-    """Return what answers a probe of which nothing is known but its builder's tolerances."""
-    levels = replace(design.answers.noise.levels, flat_field_ratio=FLAT_FIELD_RATIO, model_ratio=MODEL_RATIOS[1])
-    noise = replace(design.answers.noise, levels=levels)
-    return OwnAnswers(design.answers.surrogate, noise, tolerances_only(design.derivatives, levels))
-
-
-def _of_known(design: Design, model: RampModel, tables: ProbeTables, count: int, seed: int, jobs: int) -> ForeignScores:
+def _of_known(design: Design, model: RampModel, tables: ProbeTables, count: int, seed: int, jobs: int) -> ScoredPresses:
     """Return presses of the design's own probe, known exactly, by the same hand on the same patients."""
     probe: World = AS_BELIEVED
     probe = replace(probe, texture=probe_part(foreign_world(seed, 1)).texture)
@@ -170,30 +126,20 @@ def _of_known(design: Design, model: RampModel, tables: ProbeTables, count: int,
     )
     mean, std = np.array(MEAN), np.array(STD)
     mean[PROBE], std[PROBE] = 0.0, NEGLIGIBLE
-    believed = _tolerant(design)
+    believed = tolerant(design)
     own = OwnProbe(design.derivatives, mean, np.diag(std**2), believed.own.levels)
     answers = OwnAnswers(believed.surrogate, believed.noise, own)
     critical = replace(limits(answers, model, [], seed), misfit_ratio=LARGEST_MISFIT_RATIO)
-    return _scored(answers, model, critical, taken, jobs)
+    return scored(answers, model, critical, taken, jobs)
 
 
-def _joined(parts: Sequence[ForeignScores]) -> ForeignScores:
-    of_all = [one.evaluated for one in parts]
-    names = ("truth", "mean", "low", "high", "is_known")
-    return ForeignScores(
-        EvaluatedPresses(*(np.concatenate([getattr(one, name) for one in of_all]) for name in names)),
-        np.concatenate([one.misfit_ratio for one in parts]),
-        np.concatenate([one.is_answered for one in parts]),
-    )
-
-
-def _row(scored: ForeignScores) -> tuple[str, ...]:
-    known, covered = scored.evaluated.is_known[scored.is_answered], scored.covered()
+def _row(found: ScoredPresses) -> tuple[str, ...]:
+    known, covered = found.evaluated.is_known[found.is_answered], found.covered()
     if not len(known):
-        return ("100 %", *[""] * 7, f"{np.median(scored.misfit_ratio):.2f}")
-    rms = np.sqrt((scored.error_mm() ** 2).mean(axis=0))
+        return ("100 %", *[""] * 7, f"{np.median(found.misfit_ratio):.2f}")
+    rms = np.sqrt((found.error_mm() ** 2).mean(axis=0))
     shares = (
-        1 - scored.is_answered.mean(),
+        1 - found.is_answered.mean(),
         *covered.mean(axis=0),
         covered.all(axis=1).mean(),
         known[:, :2].all(axis=1).mean(),
@@ -202,5 +148,5 @@ def _row(scored: ForeignScores) -> tuple[str, ...]:
     return (
         *(f"{100 * share:.0f} %" for share in shares),
         *(f"{one:.2f}" for one in rms),
-        f"{np.median(scored.misfit_ratio):.2f}",
+        f"{np.median(found.misfit_ratio):.2f}",
     )

@@ -25,7 +25,8 @@ from device.measurement.quick_mode.profile import quick_press
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.model import RampModel
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, light_ratio
-from device.measurement.ramp_modes.radial_profile import TOUCHED_N, press_profile
+from device.measurement.ramp_modes.radial_profile import press_profile
+from device.measurement.recording.frame_light import TOUCHED_N
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import Counts
 from device.simulation.physics.pressed_face import ProbePlacement

@@ -15,7 +15,8 @@ import numpy as np
 
 from device.files.recording_file import read_picture, read_recording
 from device.measurement.quantities import InvalidQuantity
-from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid, lights_of
+from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid
+from device.measurement.recording.frame_light import lights_of
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import REPAIR, Recording
 from device.measurement.recording.reference_light import Image, reference_light

@@ -24,7 +24,7 @@ from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.estimate import Estimate
-from device.measurement.mode import Mode
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Frame
@@ -34,8 +34,14 @@ from device.records.store import ENDED, Store
 log = logging.getLogger(__name__)
 Estimator = Callable[[Recording, Mode], Estimate]
 Adviser = Callable[[Recording], ScanAdvice]
+LookAhead = Callable[[Recording], None]
+"""What reads dark and reference frames of a ramp before there is one on the lesion, so that its answer comes sooner."""
 SAVE_LIGHT_EVERY_S = 10.0
 """So much light may be missing from the hours counter after a power cut, and that of the press under way."""
+
+
+def look_at_nothing(recording: Recording) -> None:
+    """Stand for models that have nothing to look at before the press on the lesion."""
 
 
 class PressBook:
@@ -106,8 +112,10 @@ class PressAnswers:
         progress: ProgressBoard,
         truth: Inclusion | None,
         encode: FrameEncoder = png_of,
+        look_ahead: LookAhead = look_at_nothing,
     ) -> None:
         """Take the inclusion that a simulated probe presses on as `truth`; `encode` may know PNGs of the frames."""
+        self._look_ahead = look_ahead
         self._config, self._calibration, self._truth = config, calibration, truth
         self._estimator, self._adviser = estimator, adviser
         self._store, self._progress, self._encode = store, progress, encode
@@ -116,6 +124,11 @@ class PressAnswers:
     def is_simulated(self) -> bool:
         """Whether what is pressed on is known, as on the simulated probe alone."""
         return self._truth is not None
+
+    def look_ahead(self, beside: Sequence[Frame], mode: Mode, started_at: str) -> None:
+        """Read the frames of the press beside the lesion, while the hand goes on to it."""
+        if FRAMES[mode].is_ramp:
+            self._look_ahead(self._recording(beside, started_at))
 
     def advise(self, frames: Sequence[Frame], started_at: str) -> ScanAdvice:
         """Return what the frames of a scan tell so far; raises as `answer` does."""

@@ -16,7 +16,8 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, harmonic, lights_of, rings_of
+from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, harmonic, rings_of
+from device.measurement.recording.frame_light import lights_of
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import reference_light
 from device.measurement.recording.ring_means import RING_RADII_MM

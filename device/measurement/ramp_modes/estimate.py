@@ -27,7 +27,7 @@ from device.measurement.estimate import (
     with_numbers,
     without_numbers,
 )
-from device.measurement.mode import Mode
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.ramp_modes.answers import RampAnswer
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
@@ -36,6 +36,7 @@ from device.measurement.ramp_modes.radial_profile import (
     CONTRAST,
     FORCES,
     RESPONSE,
+    RampReader,
     SeenPresses,
     press_profiles,
     seen_presses,
@@ -52,23 +53,28 @@ PLACES_MM = (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 """Where it may be asked for: nearer than these nobody places a hand-held probe on purpose."""
 
 
-def estimate_ramp(recording: Recording, mode: Mode, model: RampModel, calibration: Calibration) -> Estimate:
+def estimate_ramp(
+    recording: Recording, mode: Mode, model: RampModel, calibration: Calibration, read: RampReader = press_profiles
+) -> Estimate:
     """Return the estimate of a recording in mode standard, of one ramp on the lesion, or precise, of all its ramps.
 
     Raises `InvalidQuantity` for another mode, a probe or pixel size that model and certificate are not for, or a
     recording whose reference and presses are no force ramps.
     """
-    return _answered(recording, mode, model, calibration)[0]
+    return _answered(recording, mode, model, calibration, read)[0]
 
 
-def advise_scan(recording: Recording, model: RampModel, calibration: Calibration) -> ScanAdvice:
+def advise_scan(
+    recording: Recording, model: RampModel, calibration: Calibration, read: RampReader = press_profiles
+) -> ScanAdvice:
     """Return the estimate of all ramps of a scan so far, and where the next one would tell most.
 
-    Raises as `estimate_ramp`. Where a further ramp would narrow nothing by `WORTH_A_RAMP`, none is asked for.
+    Raises as `estimate_ramp`. None is asked for where a further ramp would narrow nothing by `WORTH_A_RAMP`, or a scan
+    has no more of them.
     """
-    estimate, answered = _answered(recording, "precise", model, calibration)
+    estimate, answered = _answered(recording, "precise", model, calibration, read)
     now = half_widths(estimate)
-    if answered is None or not now:
+    if answered is None or not now or len(recording.ramps()) >= FRAMES["precise"].most_ramps:
         return ScanAdvice(estimate, now, None, now)
     seen, answer = answered
     parts = model.answers.worth(seen, answer, PLACES_MM)
@@ -80,7 +86,7 @@ def advise_scan(recording: Recording, model: RampModel, calibration: Calibration
 
 
 def _answered(
-    recording: Recording, mode: Mode, model: RampModel, calibration: Calibration
+    recording: Recording, mode: Mode, model: RampModel, calibration: Calibration, read: RampReader
 ) -> tuple[Estimate, tuple[SeenPresses, RampAnswer] | None]:
     """Return the estimate, and the presses and answer behind it, if there was one to give."""
     if mode not in RAMP_MODES:
@@ -89,7 +95,7 @@ def _answered(
     origin = origin_of(recording, mode, model.bundle, calibration)
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin), None
-    profiles = press_profiles(recording)
+    profiles = read(recording)
     profiles = profiles if mode == "precise" else profiles[:1]
     seen = seen_presses(profiles)
     contrast = max(contrast_deviations(row, model.answers.noise) for row in seen.rows)

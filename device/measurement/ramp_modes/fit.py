@@ -7,6 +7,8 @@ Source: the iterated loop asked for by Lee & Won 2013, section V.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from itertools import pairwise
 from typing import Protocol
 
@@ -58,23 +60,43 @@ class PressPosterior:
         `direction_rad` [N]: where the image says that the inclusion lies; one that is no number is not known.
         """
         presses = np.atleast_2d(rows)
-        self._direction_rad = direction_rad
-        self.presses, self.dimensions = len(presses), OFFSET + len(presses)
-        self._row, self._surrogate = as_one_row(presses), surrogate
+        self._rows, self._direction_rad = presses, direction_rad
+        self._surrogate, self._noise = surrogate, noise
         self._units = reach_mm / float(HIGH[OFFSET])  # of `normalise`, for one of the offset's own
-        self._whitening = np.linalg.inv(np.linalg.cholesky(noise.scan_covariance(presses)))
+        self._columns = _columns(*presses.shape)
+        self._whitening = whitening(noise.scan_covariance(presses), self._columns)
+        self.presses, self.dimensions = len(presses), OFFSET + len(presses)
+        self._row = as_one_row(presses)
+
+    def with_further(self, row: Array) -> PressPosterior:
+        """Return the posterior of one press more, with a row [P] and without a direction; cheaper than anew."""
+        further = copy(self)
+        further._rows = np.vstack([self._rows, row])
+        if self._direction_rad is not None:
+            further._direction_rad = np.append(self._direction_rad, np.nan)
+        shared, own = self._noise.further_covariance(self._rows, row)
+        further._columns = _columns(*further._rows.shape)
+        further._whitening = _extended(self._whitening, shared, own)
+        further.presses, further.dimensions = self.presses + 1, self.dimensions + 1
+        further._row = as_one_row(further._rows)
+        return further
 
     def residuals(self, at: Array) -> Array:
         """Return whitened residuals [..., S] at coordinates [..., 8 + N], in their precision."""
         points = at.reshape(-1, self.dimensions)
         rows = self._surrogate.rows(self._of_presses(points), self._directions(len(points)))
         away = self._joined(self._apart(rows)) - self._row.astype(at.dtype)
-        residuals = away @ self._whitening.T.astype(at.dtype)
-        return np.asarray(residuals.reshape(*at.shape[:-1], len(self._row)))
+        factor, residuals = self._whitening.astype(at.dtype), np.empty_like(away)
+        for own in self._columns:
+            residuals[:, own] = away[:, : own.stop] @ factor[own, : own.stop].T
+        return residuals.reshape(*at.shape[:-1], len(self._row))
 
     def whitened(self, change: Array) -> Array:
-        """Return a change [S] of the rows in standard deviations of the noise."""
-        return np.asarray(self._whitening @ change)
+        """Return changes [..., S, k] of the rows, or one change [S], in standard deviations of the noise."""
+        if change.ndim == 1:
+            return np.asarray(self._whitening @ change)
+        parts = [self._whitening[own, : own.stop] @ change[..., : own.stop, :] for own in self._columns]
+        return np.concatenate(parts, axis=-2)
 
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
         """Return the same [n, S] at coordinates [n, 8 + N], and their derivatives [n, S, 8 + N]."""
@@ -82,11 +104,11 @@ class PressPosterior:
         slopes = self._apart(slopes)
         jacobian = np.zeros((len(at), len(self._row), self.dimensions))
         jacobian[:, :, :OFFSET] = self._joined(slopes[..., :OFFSET])
-        for number, columns in enumerate(self._columns(self.presses, slopes.shape[2])):
+        for number, columns in enumerate(self._columns):
             own = slopes[:, number, :, OFFSET] if number == 0 else slopes[:, number, FURTHER, OFFSET]
             jacobian[:, columns, OFFSET + number] = self._units * own
         joined = self._joined(self._apart(rows))
-        return (joined - self._row) @ self._whitening.T, self._whitening @ jacobian
+        return (joined - self._row) @ self._whitening.T, self.whitened(jacobian)
 
     def log_density(self, at: Array) -> Array:
         """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, 8 + N].
@@ -120,11 +142,33 @@ class PressPosterior:
         further = parts[:, 1:, FURTHER].reshape(len(parts), count, *parts.shape[3:])
         return np.concatenate([parts[:, 0], further], axis=1)
 
-    @staticmethod
-    def _columns(presses: int, first: int) -> list[slice]:
-        """Return where the columns of each press stand in one row."""
-        ends = [first + number * len(FURTHER) for number in range(presses)]
-        return [slice(0, first), *(slice(*pair) for pair in pairwise(ends))]
+
+def _columns(presses: int, first: int) -> list[slice]:
+    """Return where the columns of each press stand in one row, of which the first has so many."""
+    ends = [0, *(first + number * len(FURTHER) for number in range(presses))]
+    return [slice(*pair) for pair in pairwise(ends)]
+
+
+def whitening(covariance: Array, columns: Sequence[slice]) -> Array:
+    """Return what whitens a covariance [S, S]: W with W C W' = 1, triangular, a press's columns after the other's.
+
+    Those of a press are found from those before, which a further one leaves as they are.
+    """
+    found = np.zeros((0, 0))
+    for own in columns:
+        found = _extended(found, covariance[: own.start, own], covariance[own, own])
+    return found
+
+
+def _extended(found: Array, shared: Array, own: Array) -> Array:
+    """Return what whitens p columns more, of covariance `own` [p, p] and `shared` [S, p] with those of `found`."""
+    before, count = len(found), len(found) + len(own)
+    told = found @ shared
+    extended = np.zeros((count, count))
+    extended[:before, :before] = found
+    extended[before:, before:] = np.linalg.inv(np.linalg.cholesky(own - told.T @ told))
+    extended[before:, :before] = -extended[before:, before:] @ (told.T @ found)
+    return extended
 
 
 def best_fit(posterior: Explained, start: Array) -> Array:

@@ -101,6 +101,13 @@ class PressNoise:
         ]
         return np.block(blocks)
 
+    def further_covariance(self, rows: Array, row: Array) -> tuple[Array, Array]:
+        """Return what `scan_covariance` has of a further row [P]: with rows [N, P] [S, Q], and its own [Q, Q]."""
+        shared = light_ratio(rows)[:, :, None] * light_ratio(row) * self._shared_by_presses
+        with_first, with_others = shared[0, :, FURTHER].T, shared[1:, FURTHER][:, :, FURTHER]
+        own = self.covariance(row)[np.ix_(FURTHER, FURTHER)]
+        return np.concatenate([with_first, with_others.reshape(-1, len(FURTHER))]), own
+
     @cached_property
     def _shared_by_presses(self) -> Array:
         """Covariance [P, P] of what two presses with one reference share, for a light ratio of 1 everywhere.

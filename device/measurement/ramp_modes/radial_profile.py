@@ -8,19 +8,16 @@ Source: docs/measurement.md; that the ramp and the whole profile are what the un
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from device.measurement.recording.camera_geometry import face_map
-from device.measurement.recording.led_sides import LedRatio
-from device.measurement.recording.pixel_scale import PixelScale
+from device.measurement.recording.frame_light import FrameLight, RampLights, frame_light, touched
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import BEYOND_RATIO, HeldLight, Image, RampLight, reference_light
 from device.measurement.recording.ring_means import RING_RADII_MM, RINGS, RingMeans, ring_weights
@@ -29,17 +26,11 @@ from device.measurement.recording.tactile_image import Frame
 Rows = TypeVar("Rows", Array, NDArray[np.float32])
 PROFILE_FORCES_N: Array = np.array([0.12, 0.25, 0.40, 0.55])
 """From some 0.6 to 2.7 mm of indentation."""
-BINNED_MM = 0.125
-"""Pixels are put together to about this width: light spreads eight times as far in the skin."""
 FLOOR_COUNTS = 3.0
 """A binned reference dimmer than this above dark (of 8 bits) is no flat field."""
 RAMP_DEGREE = 3
 RAMP_LOW_N, RAMP_HIGH_N = 0.17, 0.5
 """A ramp reaches from at most the first to at least the second of these forces."""
-TOUCHED_N = 0.07
-"""Below this force a reference frame shows an untouched face."""
-LED_STEP = 1 / 255
-"""One step of the LED chip's brightness: sides may be off so much by rounding."""
 MIN_RAMP_FRAMES = 6
 LARGEST_STEP_N = 0.17
 """Between forces further apart than this a ramp's polynomials are not held: four forces hold them, three do not."""
@@ -136,19 +127,6 @@ def _network_names() -> tuple[str, ...]:
 NETWORK_NAMES = _network_names()
 
 
-@dataclass(frozen=True, eq=False)
-class RampLights:
-    """Light above dark of lit frames, binned: forces [n] and images [n, height, width] of a pixel scale.
-
-    `seen` [height, width] of the face, where the camera did not see all of the image.
-    """
-
-    force_n: Array
-    images: Sequence[Image]
-    scale: PixelScale
-    seen: NDArray[np.bool_] | None = None
-
-
 def press_profile(recording: Recording) -> RadialProfile:
     """Return the profile of a recording whose reference and one press are force ramps; raises as `press_profiles`."""
     return press_profiles(recording)[0]
@@ -160,61 +138,63 @@ def press_profiles(recording: Recording) -> list[RadialProfile]:
     Press frames far below or above the reference's forces count nothing. Raises `InvalidQuantity` when a role is
     missing, or a ramp is too short, has too few frames or a gap.
     """
-    ramps = sorted(recording.ramps()) or [0]
-    return [profile_of_lights(*lights_of(recording.of_ramp(number))) for number in ramps]
+    beside = read_beside(recording)
+    return [beside.profile_of(frames) for frames in frames_of_ramps(recording)]
 
 
-def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
-    """Return the light of the touched reference frames and of the press frames, all as bright as the first of them.
+def frames_of_ramps(recording: Recording) -> list[list[Frame]]:
+    """Return the press frames of each ramp on the lesion, in order; one without frames when there is none."""
+    return list(recording.ramps().values()) or [[]]
 
-    The camera's axis and distortion are undone in it: its images are of the face, about its middle.
-    Raises `InvalidQuantity` without dark frames, and for a frame whose sides are not lit in the first one's proportion.
+
+RampReader = Callable[[Recording], list[RadialProfile]]
+"""`press_profiles`, or what gives the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadBeside:
+    """What the press beside the lesion says: its light at any force, and the reference response [K - 1, J].
+
+    `force_n` are the forces of its touched frames, `camera` brings frames to light.
     """
-    dark = recording.with_role("dark")
-    if not dark:
-        raise InvalidQuantity("dark frames", 0, "at least one", "record dark frames before the press")
-    factor = _binning(recording.camera.scale)
-    base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
-    per_count = 1 if recording.camera.bits == 8 else 1 / 256
-    lit = {role: _touched(recording, role) for role in ("reference", "press")}
-    first = next((frame.led_ratio for frames in lit.values() for frame in frames), None)
-    scale = binned_scale(recording.camera.scale)
-    on_face = face_map(recording.camera.geometry, base.shape, scale)
 
-    def light(frame: Frame) -> Image:
-        assert first is not None  # of a frame that is there
-        image = (_binned(frame, factor) - base) * np.float32(per_count / _brightness(frame.led_ratio, first))
-        return on_face(image) if on_face else image
+    camera: FrameLight
+    force_n: Array
+    light: HeldLight | RampLight
+    response: Array
 
-    seen = on_face.seen if on_face else None
-    reference, press = (
-        RampLights(np.array([frame.force_n for frame in frames]), [light(frame) for frame in frames], scale, seen)
-        for frames in lit.values()
-    )
-    return reference, press
+    def profile_of(self, frames: Sequence[Frame]) -> RadialProfile:
+        """Return the profile of a ramp's press frames; raises as `press_profiles`."""
+        press = _within(self.camera.lights(frames), self.force_n)
+        _require_ramp("press", press.force_n)
+        rings, residual = _at_profile_forces(press.force_n, rings_of(press, self.light))
+        return RadialProfile(
+            force_n=PROFILE_FORCES_N,
+            contrast=rings.mean,
+            reference_response=self.response,
+            first_harmonic=first_harmonic(rings),
+            first_across=first_across(rings),
+            second_harmonic=second_harmonic(rings),
+            direction_rad=bright_side_rad(rings),
+            residual=residual,
+        )
 
 
-def profile_of_lights(reference: RampLights, press: RampLights) -> RadialProfile:
-    """Return the profile of lights above dark (counts of 8 bits); as `press_profile`, for light without a camera."""
+def read_beside(recording: Recording) -> ReadBeside:
+    """Return what the dark and the reference frames of a recording say; its press frames are not looked at.
+
+    Raises as `press_profiles`.
+    """
+    frames = touched(recording, "reference")
+    camera = frame_light(recording, frames)
+    reference = camera.lights(frames)
     _require_ramp("reference", reference.force_n)
-    press = _within(press, reference.force_n)
-    _require_ramp("press", press.force_n)
     light = reference_light(list(reference.force_n), list(reference.images), FLOOR_COUNTS)
-    rings, residual = _at_profile_forces(press.force_n, rings_of(press, light))
-    baseline_light = np.array([light.at(force) for force in PROFILE_FORCES_N])
-    weights = ring_weights(press.images[0].shape, press.scale)
-    everywhere = np.ones(baseline_light.shape, dtype=bool)
-    baseline = weights.means(baseline_light, everywhere if press.seen is None else everywhere & press.seen).mean
-    return RadialProfile(
-        force_n=PROFILE_FORCES_N,
-        contrast=rings.mean,
-        reference_response=np.log(baseline[:-1] / baseline[-1]),
-        first_harmonic=first_harmonic(rings),
-        first_across=first_across(rings),
-        second_harmonic=second_harmonic(rings),
-        direction_rad=bright_side_rad(rings),
-        residual=residual,
-    )
+    lit = np.array([light.at(force) for force in PROFILE_FORCES_N])
+    everywhere = np.ones(lit.shape, dtype=bool)
+    weights = ring_weights(lit.shape[1:], reference.scale)
+    mean = weights.means(lit, everywhere if reference.seen is None else everywhere & reference.seen).mean
+    return ReadBeside(camera, reference.force_n, light, np.log(mean[:-1] / mean[-1]))
 
 
 def rings_of(press: RampLights, light: HeldLight | RampLight) -> RingMeans:
@@ -288,21 +268,6 @@ def _along(cosine: Array, sine: Array, direction: float) -> Array:
     return np.asarray(cosine * np.cos(direction) + sine * np.sin(direction))
 
 
-def _touched(recording: Recording, role: str) -> list[Frame]:
-    return [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > TOUCHED_N]
-
-
-def _brightness(led_ratio: LedRatio, first: LedRatio) -> float:
-    """Return how many times as bright a frame is lit as the first one; raises unless every side is so many times."""
-    times = sum(led_ratio) / sum(first) if sum(first) > 0 else 0.0
-    if times <= 0 or any(
-        abs(side - times * of_first) > LED_STEP for side, of_first in zip(led_ratio, first, strict=True)
-    ):
-        action = "press beside the lesion and on it under one light"
-        raise InvalidQuantity("led_ratio of a frame", led_ratio, f"above 0 and in the proportion of {first}", action)
-    return times
-
-
 def _within(press: RampLights, reference_n: Array) -> RampLights:
     """Return the press frames whose force the reference's light follows; others have no flat field of their force."""
     if not len(press.force_n):
@@ -311,24 +276,6 @@ def _within(press: RampLights, reference_n: Array) -> RampLights:
     kept = (press.force_n >= low * reference_n.min()) & (press.force_n <= high * reference_n.max())
     images = [image for image, keep in zip(press.images, kept, strict=True) if keep]
     return replace(press, force_n=press.force_n[kept], images=images)
-
-
-def _binning(scale: PixelScale) -> tuple[int, int]:
-    return tuple(max(round(BINNED_MM / size), 1) for size in (scale.mm_per_px_x, scale.mm_per_px_y))  # type: ignore[return-value]
-
-
-def binned_scale(scale: PixelScale) -> PixelScale:
-    """Return the size of the pixels after binning."""
-    x, y = _binning(scale)
-    return PixelScale(x * scale.mm_per_px_x, y * scale.mm_per_px_y)
-
-
-def _binned(frame: Frame, factor: tuple[int, int]) -> Image:
-    """Return the frame's means over blocks of pixels; the rows and columns left over are dropped evenly."""
-    (height, width), (x, y) = frame.counts.shape, factor
-    top, left = height % y // 2, width % x // 2
-    counts = frame.counts[top : top + height // y * y, left : left + width // x * x].astype(np.float32)
-    return np.asarray(cv2.resize(counts, (width // x, height // y), interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
 def _require_ramp(name: str, force_n: Array) -> None:

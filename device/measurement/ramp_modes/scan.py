@@ -43,9 +43,10 @@ def scan_starts(
     tried = 2 * OFFSETS_TRIED_MM / reach_mm - 1
     starts = np.zeros((len(estimates), OFFSET + len(rows)))
     starts[:, :COUNT] = estimates
-    for start in starts:
-        points = np.column_stack([np.tile(start[:OFFSET], (len(tried), 1)), tried])
-        start[OFFSET:] = [tried[np.argmin(np.sum(press.residuals(points) ** 2, axis=1))] for press in presses]
+    points = np.column_stack([np.repeat(starts[:, :OFFSET], len(tried), axis=0), np.tile(tried, len(starts))])
+    for number, press in enumerate(presses, start=OFFSET):
+        left = np.sum(press.residuals(points) ** 2, axis=1)
+        starts[:, number] = tried[np.argmin(left.reshape(-1, len(tried)), axis=1)]
     return starts
 
 
@@ -63,13 +64,12 @@ def worth_of_places(
     `rows` [N, P] and directions [N] are those of the presses so far, `best` [8 + N] their best fit. The direction of
     the further one is the hand's choice.
     """
-    before = bound_of(PressPosterior(rows, surrogate, noise, reach_mm, direction_rad), best)
-    directions = None if direction_rad is None else np.append(direction_rad, np.nan)
+    posterior = PressPosterior(rows, surrogate, noise, reach_mm, direction_rad)
+    before = bound_of(posterior, best)
     parts = []
     for place_mm in places_mm:
         further = np.append(best[:OFFSET], 2 * place_mm / float(HIGH[OFFSET]) - 1)
-        expected = np.concatenate([rows, surrogate.rows(further[None])])
-        after = PressPosterior(expected, surrogate, noise, reach_mm, directions)
+        after = posterior.with_further(surrogate.rows(further[None])[0])
         parts.append(bound_of(after, np.append(best, 2 * place_mm / reach_mm - 1)) / before)
     return np.array(parts)
 

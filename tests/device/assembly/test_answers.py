@@ -11,10 +11,13 @@ from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
 from device.config import PressSection, simulated_config
 from device.errors import ConfigError, ModelError
+from device.files.bundle_file import read_models
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import MODES
 from device.measurement.paper_mode.estimate import estimate_paper
+from device.measurement.parameters import NOMINAL
 from device.simulation.scenario import Scenario
+from host_tools.press_models.recorded_presses import recorded_press
 
 
 def test_the_estimate_of_a_paper_press_is_that_of_its_model(bundle, calibration, recording):
@@ -74,3 +77,22 @@ def test_every_run_of_a_watched_answer_is_progress_of_the_inference():
     answers.prove()
     assert "inference" not in progress.stall(15.0).parts
     assert begun == [20.0, 40.0, 80.0]
+
+
+def test_a_scans_answer_is_that_of_its_recording_whatever_was_read_of_it_before(tables, bundle, calibration):
+    """The daemon's, press by press, to the last bit what a program on a workstation says of the whole recording."""
+    parameters = np.array([12.0, 6.0, 60.0, *NOMINAL.values()])
+    scan = recorded_press(tables, parameters, "precise", 5, further_mm=(4.0,))
+    config = simulated_config()
+    answers, plain = (
+        answers_for(config, bundle, calibration),
+        read_models(bundle, config.quick_model, config.standard_model),
+    )
+    beside = tuple(frame for frame in scan.frames if frame.role != "press")
+    answers.look_ahead(replace(scan, frames=beside))
+    for count in (1, 2):
+        so_far = replace(scan, frames=(*beside, *(f for f in scan.with_role("press") if f.ramp < count)))
+        assert answers.adviser(so_far) == plain.advise(so_far, calibration)
+    expected = plain.estimate(scan, "precise", calibration)
+    assert answers.estimator(scan, "precise") == expected
+    assert expected.size_mm.value is not None

@@ -114,3 +114,18 @@ def test_every_page_of_docs_is_what_its_results_and_template_say(record):
 @pytest.mark.parametrize("record", sorted(RESULTS.glob("*.json")), ids=lambda path: path.stem)
 def test_no_verdict_of_a_page_is_open(record):
     assert "**open**" not in render(record)
+
+
+def test_a_chapter_that_is_not_measured_again_stays_as_it_is(tmp_path):
+    out, order = tmp_path / "verification.md", ("patch", "rates", "hayes")
+    write_page(out, Results("verification", "first", {"patch": Timed(GOOD, 1.5)}, date="2025-01-01"))
+    for command, name, chapter in (("second", "hayes", ABSENT), ("third", "rates", BAD), ("fourth", "hayes", BROKEN)):
+        write_page(out, Results("verification", command, {name: Timed(chapter, 2.0)}).in_chapters(out, order))
+    found = json.loads((tmp_path / "results" / "verification.json").read_text())["chapters"]
+    assert list(found) == list(order)
+    assert [found[name]["facts"]["command"] for name in order] == ["first", "third", "fourth"]
+    assert found["patch"]["facts"]["date"] == "2025-01-01"
+    assert found["patch"]["tables"][0]["rows"][1][0] == 10.48
+    assert "## Good" in out.read_text()
+    assert "## Broken" in out.read_text()
+    assert "## Absent" not in out.read_text()

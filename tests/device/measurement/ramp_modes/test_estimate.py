@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from device.measurement.estimate import NO_NUMBERS, NOTHING_STANDS_OUT
+from device.measurement.mode import FRAMES
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.ramp_modes import answers as answers_module
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
@@ -301,6 +302,17 @@ def test_where_there_are_no_numbers_nothing_is_advised(pressed, ramp_model, cali
         advice = advise_scan(recording, ramp_model, calibration)
         assert advice.estimate.size_mm.value is None
         assert (advice.next_offset_mm, dict(advice.half_width), dict(advice.expected_half_width)) == (None, {}, {})
+
+
+def test_after_the_last_ramp_of_a_scan_none_is_asked_for(ramp, ramp_model, calibration, monkeypatch):
+    """Nor is it weighed what one would tell: that takes as long as the answer."""
+    monkeypatch.setattr(answers_module, "worth_of_places", None)
+    numbers = range(FRAMES["precise"].most_ramps)
+    press = [replace(f, ramp=number) for number in numbers for f in ramp.with_role("press")]
+    full = replace(ramp, frames=(*(f for f in ramp.frames if f.role != "press"), *press))
+    advice = advise_scan(full, ramp_model, calibration)
+    assert advice.next_offset_mm is None
+    assert advice.expected_half_width == advice.half_width != {}
 
 
 def test_a_further_ramp_that_narrows_nothing_is_not_asked_for(ramp, ramp_model, calibration, monkeypatch):

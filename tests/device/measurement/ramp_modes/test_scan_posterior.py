@@ -1,11 +1,13 @@
 """Presses of a scan share inclusion, tissue and reference press; their joint posterior, with answers known on paper."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from small_surrogate import COLUMNS, EXACT, REACH_MM, LinearRows, random_scan_surrogate, white_noise
 
 from device.measurement.parameters import HIGH, PARAMETERS
-from device.measurement.ramp_modes.fit import PressPosterior, best_fits
+from device.measurement.ramp_modes.fit import PressPosterior, best_fits, whitening
 from device.measurement.ramp_modes.noise import FURTHER, ErrorLevels, PressNoise, as_one_row
 from device.measurement.ramp_modes.posterior import CELLS, sample_press
 from device.measurement.ramp_modes.radial_profile import RESPONSE
@@ -77,6 +79,33 @@ def test_many_points_are_asked_about_as_each_alone():
         alone = posterior.residuals_and_jacobian(point[None])
         np.testing.assert_allclose(residual, alone[0][0], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(jacobian, alone[1][0], rtol=1e-9, atol=1e-9)
+
+
+def test_a_press_more_leaves_what_whitens_those_before_as_it_is():
+    """To the last bit: a scan's answer does not depend on how its presses were put together."""
+    noise, rows = white_noise(STD, ErrorLevels()), 0.05 * np.random.default_rng(2).normal(size=(3, COLUMNS))
+    ends = np.append(0, COLUMNS + len(FURTHER) * np.arange(3))
+    columns = [slice(*pair) for pair in pairwise(ends)]
+    covariance = noise.scan_covariance(rows)
+    three, two = whitening(covariance, columns), whitening(covariance[: ends[2], : ends[2]], columns[:2])
+    np.testing.assert_allclose(three @ covariance @ three.T, np.eye(ends[3]), atol=1e-9)
+    np.testing.assert_array_equal(three[: ends[2], : ends[2]], two)
+    np.testing.assert_array_equal(three[: ends[2], ends[2] :], 0.0)
+
+
+@pytest.mark.parametrize("direction_rad", [None, DIRECTIONS], ids=["any", "told"])
+def test_with_a_further_press_it_is_the_posterior_of_all_of_them(direction_rad):
+    surrogate, noise = random_scan_surrogate(), white_noise(STD, ErrorLevels())
+    rows = with_one_reference(rows_at(surrogate, direction_rad=direction_rad))
+    before = None if direction_rad is None else direction_rad[:2]
+    further = PressPosterior(rows[:2], surrogate, noise, REACH_MM, before).with_further(rows[2])
+    of_all = None if direction_rad is None else np.append(before, np.nan)
+    expected = PressPosterior(rows, surrogate, noise, REACH_MM, of_all)
+    assert (further.presses, further.dimensions) == (3, OFFSET + 3)
+    at = np.concatenate([SHARED, PLACES])[None] + 0.05
+    for one, other in zip(further.residuals_and_jacobian(at), expected.residuals_and_jacobian(at), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+    np.testing.assert_allclose(further.log_density(at), expected.log_density(at), rtol=1e-5)
 
 
 def test_an_unknown_direction_of_one_press_is_the_mean_over_all_of_them_and_leaves_the_others():

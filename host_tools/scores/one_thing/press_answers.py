@@ -1,0 +1,137 @@
+"""Every mode's answers to the same presses: as it ships, and by what allows for a probe of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.confidence_belt import ends_in_belts
+from device.measurement.estimate import outside_training
+from device.measurement.parameters import normalise, normalise_unknowns
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.quick_mode.model import SEEN_BY, QuickModel, visible_contrast
+from device.measurement.quick_mode.profile import QuickPress
+from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
+from device.measurement.ramp_modes.commissioned.row_derivatives import RowDerivatives
+from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
+from device.measurement.recording.ring_means import RINGS
+from device.simulation.virtual_probe import ProbeTables
+from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
+from host_tools.commissioning.joint_fit import Design, fit_probe
+from host_tools.commissioning.left_out import answers_of
+from host_tools.press_models.mode_outcome import EvaluatedPresses
+from host_tools.press_models.recorded_presses import in_parallel
+from host_tools.press_models.seeds import derived_seed
+from host_tools.scenes.phantom_set import PhantomSet
+from host_tools.scores.foreign_presses import foreign_phantoms
+from host_tools.scores.one_thing.causes import Cause
+from host_tools.scores.one_thing.tried_presses import TriedPresses
+from host_tools.scores.scored_presses import ScoredPresses, scored, tolerant
+
+SHIPPED, TOLERANT, COMMISSIONED = "as it ships", "tolerances", "commissioned"
+FEWER = 2
+"""As it ships most is refused, which fewer presses show: one in so many are answered."""
+FIGURES = ("stand out", "answered", "refused", "size covered", "depth covered", "both covered", "size RMSE (mm)",
+           "depth RMSE (mm)", "size bias (mm)", "depth bias (mm)", "median misfit")  # fmt: skip
+
+
+class DesignToTry(NamedTuple):
+    """The design's bundles of all modes, its derivatives, and the simulated probe's tables."""
+
+    model: RampModel
+    quick: QuickModel
+    derivatives: RowDerivatives
+    tables: ProbeTables
+
+    @property
+    def shared(self) -> Design:
+        """What commissioning starts from."""
+        return Design(self.model.answers, self.derivatives)
+
+
+class OwnLimits(NamedTuple):
+    """What answers presses of a probe of one's own, and above what they are refused."""
+
+    answers: OwnAnswers
+    critical: CriticalValues
+
+
+def with_tolerances(design: DesignToTry, seed: int) -> OwnLimits:
+    """Return what answers presses of a probe that has not been commissioned."""
+    return _limited(tolerant(design.shared), design.model, seed)
+
+
+def commissioned(
+    design: DesignToTry, causes: Sequence[Cause], phantoms: PhantomSet, seed: int, jobs: int
+) -> list[OwnLimits]:
+    """Return the same of probes that are commissioned, each on ramps of its own on the phantoms."""
+    noise = design.model.answers.noise
+
+    def own(number: int) -> OwnLimits:
+        of_phantoms = derived_seed(seed, "phantoms of one thing at a time")
+        probe = causes[number].probe
+        ramps = foreign_phantoms(design.tables, probe, noise, phantoms, seed=of_phantoms, jobs=1)
+        answers = answers_of(design.shared, fit_probe(ramps, design.shared))
+        return _limited(answers, design.model, seed)
+
+    return in_parallel(own, len(causes), jobs)
+
+
+def _limited(answers: OwnAnswers, model: RampModel, seed: int) -> OwnLimits:
+    """Return the limits; that of the misfit is the largest that commissioning allows, for no phantom is left out."""
+    return OwnLimits(answers, replace(limits(answers, model, [], seed), misfit_ratio=LARGEST_MISFIT_RATIO))
+
+
+def ramp_scores(tried: TriedPresses, design: DesignToTry, own: OwnLimits, jobs: int) -> dict[str, ScoredPresses]:
+    """Return standard and precise, "... as it ships" of the first presses and "... after" of all."""
+    found, model = {}, design.model
+    for mode, taken in zip(RAMP_MODES, (tried.single, tried.scans), strict=True):
+        few = taken.first(max(len(taken.seen) // FEWER, 1))
+        found[f"{mode} {SHIPPED}"] = scored(model.answers, model, model.critical[mode], few, jobs)
+        found[f"{mode} after"] = scored(own.answers, model, own.critical, taken, jobs)
+    return found
+
+
+def quick_scores(parameters: Array, held: Sequence[QuickPress], model: QuickModel) -> ScoredPresses:
+    """Return the answers of mode quick to held presses, as if it had been trained for their probe."""
+    shown = [number for number, one in enumerate(held) if _shows(one.row, model)]
+    rows = np.array([held[number].row for number in shown])
+    raw = model.bundle.estimate(rows)
+    mean = normalise_unknowns(raw.estimate)
+    ends = [ends_in_belts(at, spread, model.belts) for at, spread in zip(mean, raw.spread, strict=True)]
+    low, high, known = (np.array(part) for part in zip(*ends, strict=True))
+    truth = normalise(parameters[shown])[:, : len(UNKNOWNS)]
+    answered = [
+        held[number].elongation_ratio <= model.elongation_ratio and not outside_training(model.bundle, held[number].row)
+        for number in shown
+    ]
+    nothing = np.full(len(shown), np.nan)
+    return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), nothing, np.array(answered))
+
+
+def _shows(row: Array, model: QuickModel) -> bool:
+    seen = visible_contrast(row[:RINGS])
+    return any(seen[name] > model.faintest_contrast[name] for name in SEEN_BY)
+
+
+def figures_of(found: ScoredPresses) -> tuple[str, ...]:
+    """Return the cells under `FIGURES`, empty where nothing is answered."""
+    shown, answered = len(found.is_answered), int(found.is_answered.sum())
+    if not shown:
+        return ("0", *[""] * (len(FIGURES) - 1))
+    misfit = "" if np.isnan(found.misfit_ratio).all() else f"{np.median(found.misfit_ratio):.2f}"
+    counts = (f"{shown}", f"{answered}", f"{100 * (1 - answered / shown):.0f} %")
+    if not answered:
+        return (*counts, *[""] * 7, misfit)
+    error, covered = found.error_mm(), found.covered()
+    return (
+        *counts,
+        *(f"{100 * share:.0f} %" for share in (*covered.mean(axis=0), covered.all(axis=1).mean())),
+        *(f"{one:.2f}" for one in np.sqrt((error**2).mean(axis=0))),
+        *(f"{one:+.2f}" for one in error.mean(axis=0)),
+        misfit,
+    )

@@ -1,0 +1,102 @@
+"""What a row must reach, how far a quantity may be off by its rows, and a chapter from nothing to its tables."""
+
+import json
+
+import numpy as np
+import pytest
+from told_answers import scored_presses
+from typer.testing import CliRunner
+
+from device.files.bundle_file import read_quick_model, read_ramp_model
+from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.quantities import InvalidQuantity
+from host_tools.__main__ import app
+from host_tools.pages.page import Results, Timed, write_page
+from host_tools.press_models.press_derivatives import load_derivatives
+from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+from host_tools.scores.one_thing.causes import causes
+from host_tools.scores.one_thing.one_at_a_time import TITLES, _largest_held, holds, one_at_a_time_chapter
+from host_tools.scores.one_thing.press_answers import FIGURES, DesignToTry, figures_of
+from host_tools.scores.scored_presses import joined
+
+TRUTH = (8.0, 6.0)
+
+
+def presses(good, wrong=0, refused=0):
+    """So many presses covered, too sure of a wrong size, and refused."""
+    parts = [
+        *([scored_presses([TRUTH] * good, [TRUTH] * good)] if good else []),
+        *([scored_presses([(11.0, 6.0)] * wrong, [TRUTH] * wrong)] if wrong else []),
+        *([scored_presses([TRUTH] * refused, [TRUTH] * refused, answered=False)] if refused else []),
+    ]
+    return joined(parts)
+
+
+def test_a_row_holds_but_for_one_deviation_of_chance():
+    assert holds(presses(36, wrong=4))
+    assert holds(presses(33, wrong=7))  # 82.5 % of 40; 86 % less 5.5 %
+    assert not holds(presses(32, wrong=8))
+    assert holds(presses(37, refused=3))
+    assert not holds(presses(36, refused=4))
+
+
+def test_a_mode_that_may_refuse_needs_to_cover_what_it_answers():
+    assert holds(presses(4, refused=36), may_refuse=True)
+    assert holds(presses(0, refused=40), may_refuse=True)
+    assert not holds(presses(2, wrong=2, refused=36), may_refuse=True)
+    assert not holds(presses(0, refused=40))
+
+
+def test_the_largest_size_that_holds_has_none_below_it_that_does_not():
+    sizes = ("0.3 %", "0.5 %", "1 %")
+    assert _largest_held(sizes, [True, True, True]) == "all tried"
+    assert _largest_held(sizes, [True, False, True]) == "up to 0.3 %"
+    assert _largest_held(sizes, [False, True, True]) == "**none tried**"
+    assert _largest_held(("+2 %", "-2 %"), [False, True]) == "-2 %"
+    assert _largest_held(("0.5 mm",), [True]) == "0.5 mm"
+
+
+def test_figures_of_a_row_are_of_what_is_answered():
+    cells = dict(zip(FIGURES, figures_of(presses(3, wrong=1, refused=4)), strict=True))
+    assert (cells["stand out"], cells["answered"], cells["refused"]) == ("8", "4", "50 %")
+    assert (cells["size covered"], cells["depth covered"], cells["both covered"]) == ("75 %", "100 %", "75 %")
+    assert (cells["size RMSE (mm)"], cells["size bias (mm)"], cells["depth bias (mm)"]) == ("1.50", "+0.75", "+0.00")
+    assert figures_of(presses(0, refused=2))[:4] == ("2", "0", "100 %", "")
+
+
+def test_a_chapter_that_is_not_one_is_refused() -> None:
+    done = CliRunner().invoke(app, ["robustness", "--only", "colour"])
+    assert done.exit_code == 1
+    assert isinstance(done.exception, InvalidQuantity)
+    assert "one of tolerances, one at a time, silent errors" in str(done.exception)
+
+
+@pytest.mark.long
+def test_a_few_things_become_tables_and_a_figure(tables, tmp_path):
+    design = DesignToTry(
+        read_ramp_model(MODELS / "standard"),
+        read_quick_model(MODELS / "quick"),
+        load_derivatives(SIMULATED_PROBE),
+        tables,
+    )
+    phantoms = read_phantoms(SIMULATED_PROBE / "phantoms.toml", blocks_needed=BLOCKS_NEEDED)
+    tried = [
+        one for one in causes() if one.name in ("nothing", "load cell's span +2 %", "tilt on the lesion 0.5 degrees")
+    ]
+    chapter = one_at_a_time_chapter(design, phantoms, presses=12, scans=6, tried=tried, jobs=1)
+    assert [table.caption for table in chapter.tables[1:]] == list(TITLES.values())
+    tightness, as_it_ships, after, *_ = chapter.tables
+    assert [row[0] for row in tightness.rows] == ["load cell's span", "tilt on the lesion"]
+    assert [row[2] for row in after.rows] == ["tolerances", "commissioned", "tolerances"]
+    refused = {row[0]: row[2 + FIGURES.index("refused")] for row in as_it_ships.rows}
+    assert refused["tilt on the lesion"] == "100 %"
+    answered = {row[0]: int(row[3 + FIGURES.index("answered")]) for row in after.rows}
+    assert min(answered.values()) >= 8
+    out = tmp_path / "robustness.md"
+    results = Results("robustness", "host_tools robustness", {"one at a time": Timed(chapter, 1.0)})
+    write_page(out, results.in_chapters(out, ["tolerances", "one at a time"]))
+    assert "(figures/robustness_one_thing.svg)" in out.read_text()
+    assert (tmp_path / "figures" / "robustness_one_thing.svg").read_text().startswith("<?xml")
+    facts = json.loads((tmp_path / "results" / "robustness.json").read_text())["chapters"]["one at a time"]["facts"]
+    assert facts["command"] == "host_tools robustness"
+    assert np.isfinite(chapter.benchmarks[0].measured)

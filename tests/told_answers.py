@@ -1,0 +1,18 @@
+"""Answers that are told: presses of sizes and depths with intervals about them, as if a mode had found them."""
+
+import numpy as np
+
+from device.measurement.parameters import normalise_unknowns
+from host_tools.press_models.mode_outcome import EvaluatedPresses
+from host_tools.scores.scored_presses import ScoredPresses
+
+
+def scored_presses(found_mm, truth_mm, half_mm=1.0, answered=True):
+    """Presses of sizes and depths as told, intervals so far either way, all answered or none."""
+    mean, truth, low, high = (
+        normalise_unknowns(np.column_stack([np.asarray(one, float), np.full(len(one), 60.0)]))
+        for one in (found_mm, truth_mm, np.subtract(found_mm, half_mm), np.add(found_mm, half_mm))
+    )
+    count = len(mean)
+    known = np.ones((count, 3), bool)
+    return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), np.ones(count), np.full(count, answered))
