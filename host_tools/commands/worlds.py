@@ -57,7 +57,7 @@ def robustness(
     scheduler: Scheduler = None,
 ) -> None:
     """Measure how presses of probes that somebody built are answered, before and after commissioning: of random
-    tolerances, with one thing at a time, and with what no test notices.
+    tolerances, of other optics, with one thing at a time, and with what no test notices.
 
     Half an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
     """
@@ -69,7 +69,7 @@ def robustness(
     from host_tools.scores.one_thing.one_at_a_time import one_at_a_time_chapter
     from host_tools.scores.one_thing.press_answers import DesignToTry
     from host_tools.scores.one_thing.silent_errors import silent_errors_chapter
-    from host_tools.scores.robustness import robustness_chapter
+    from host_tools.scores.robustness import other_optics_chapter, robustness_chapter
 
     require("probes", probes, Bound(1, 99, "probes"), "ask for at least one")
     require("presses", presses, Bound(4, 10_000, "presses"), "ask for at least four of each probe")
@@ -82,6 +82,7 @@ def robustness(
         "tolerances": lambda: robustness_chapter(
             trained, derivatives, tables, stated, probes=probes, presses=presses, seed=seed
         ),
+        "other optics": lambda: other_optics_chapter(trained, derivatives, tables, stated, presses=presses, seed=seed),
         "one at a time": lambda: one_at_a_time_chapter(design, stated, seed=seed),
         "silent errors": lambda: silent_errors_chapter(design, seed=seed),
     }
@@ -92,7 +93,8 @@ def robustness(
         for one in timed.chapter.tables:
             print_table(one)
     if out:
-        counts = f" --probes {probes} --presses {presses}" if "tolerances" in measured else ""
+        counts = f" --probes {probes}" if "tolerances" in measured else ""
+        counts += f" --presses {presses}" if measured.keys() & {"tolerances", "other optics"} else ""
         chosen = "".join(f' --only "{name}"' for name in only or [])
         command = f"host_tools robustness{counts}{chosen} --out {shown(out)}"
         write_page(out, Results("robustness", command, measured).in_chapters(out, list(chapters)))
