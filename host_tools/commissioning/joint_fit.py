@@ -35,6 +35,7 @@ from host_tools.commissioning.prior_discrepancy import SharedLack, prior_discrep
 PROBE = owned_by("probe")
 MODEL_RATIOS = (0.002, 0.003, 0.004, 0.006, 0.009, 0.013)
 """Levels of the smooth error of the model that are weighed against each other, of the light."""
+USUAL_MODEL_RATIO = MODEL_RATIOS[1]
 FLAT_FIELD_RATIO = 0.0047
 """Flat field of 0.2 % as the design's bundle has it, and 0.3 % of skin that differs from place to place, of both."""
 FLAT_FIELD_RATIOS = (FLAT_FIELD_RATIO, 0.006, 0.008)
@@ -117,18 +118,19 @@ def fit_probe(ramps: Sequence[PhantomRamp], design: Design, believed: BelievedEr
 
 
 def _likeliest_fit(ramps: Sequence[PhantomRamp], design: Design) -> ProbeFit:
-    """Return the fit of the largest evidence, each level tried from the least.
+    """Return the fit of the largest evidence, one level after the other and each from the least.
 
-    First, for an ordinary skin, that of what the forward model lacks, each with the likeliest of its smooth error; then
-    that of skin and flat field, which hardly trades with them: it is alike at all forces.
+    First, with an ordinary smooth error and skin, that of what the forward model lacks; then that of its smooth error;
+    then that of skin and flat field, which hardly trades with them: it is alike at all forces.
     """
 
     def solved(*levels: float) -> ProbeFit:
         return _JointFit(ramps, design, BelievedErrors(*levels)).solved()
 
+    found = _likeliest(solved(lacking, USUAL_MODEL_RATIO, FLAT_FIELD_RATIO) for lacking in DISCREPANCY_RATIOS)
+    lacking = found.believed.discrepancy_ratio
     found = _likeliest(
-        _likeliest(solved(lacking, model_ratio, FLAT_FIELD_RATIO) for model_ratio in MODEL_RATIOS)
-        for lacking in DISCREPANCY_RATIOS
+        found if ratio == USUAL_MODEL_RATIO else solved(lacking, ratio, FLAT_FIELD_RATIO) for ratio in MODEL_RATIOS
     )
     chosen = found.believed[:2]
     return _likeliest(chain([found], (solved(*chosen, ratio) for ratio in FLAT_FIELD_RATIOS[1:])))

@@ -9,7 +9,6 @@ docs/own_probe.md.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from device.measurement.arrays import Array
 from device.measurement.ramp_modes.commissioned.discrepancy import KNOWN_BY, NOTHING, PARTS, PROBES, Discrepancy
@@ -32,6 +31,7 @@ LACK_MM, LACK_LOG_N = 2.5, 1.0
 """Over so many millimetres and logarithms of force what it lacks is alike."""
 TINY = 1e-6
 """What is added to a covariance of smooth functions, of their size, so that it has a factor."""
+ROUNDING = 1e-12
 
 
 def prior_discrepancy(ratio: float) -> Discrepancy:
@@ -59,23 +59,30 @@ def _alike(at: Array) -> Array:
 
 
 class SharedLack:
-    """What all ramps share that the forward model lacks: `lack` [S, R] is a factor of it, each ramp white by itself."""
+    """What all ramps share that the forward model lacks: `lack` [S, R] is a factor of it, each ramp white by itself.
+
+    Their covariance is 1 + L L'. What is whitened loses along each of L's principal directions what it has too much;
+    directions in which that is less than rounding are left out.
+    """
 
     def __init__(self, lack: Array) -> None:
         self.lack = lack
-        self._factor = np.linalg.cholesky(np.eye(len(lack)) + lack @ lack.T) if lack.shape[1] else None
+        variance, parts = np.linalg.eigh(lack.T @ lack)
+        told = variance > ROUNDING * max(1.0, float(variance.max(initial=0.0)))
+        self._variance, self._parts = variance[told], parts[:, told]
+        self._along = lack @ self._parts / np.sqrt(self._variance)
 
     @property
     def log_volume(self) -> float:
         """Logarithm of the density of all ramps over that of each by itself, at its middle."""
-        return 0.0 if self._factor is None else -float(np.log(np.diag(self._factor)).sum())
+        return -0.5 * float(np.log1p(self._variance).sum())
 
     def whitened(self, values: Array) -> Array:
         """Return values [S, ...] of all ramps, white together."""
-        if self._factor is None:
-            return values
-        return np.asarray(solve_triangular(self._factor, values, lower=True, check_finite=False))
+        less = 1 - 1 / np.sqrt(1 + self._variance)
+        return np.asarray(values - (self._along * less) @ (self._along.T @ values))
 
     def mean(self, left: Array) -> Array:
         """Return the likeliest of what is lacking [R], of residuals [S] of all ramps."""
-        return -np.asarray(self.whitened(self.lack).T @ self.whitened(left))
+        ratio = np.sqrt(self._variance) / (1 + self._variance)
+        return -np.asarray(self._parts @ (ratio * (self._along.T @ left)))
