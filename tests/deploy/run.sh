@@ -34,6 +34,6 @@ until answers 18022; do
   sleep 1
 done
 cd "$project"
-PYTHONPATH="$here:$project/tests/systemd" "$project/.venv/bin/python" -m stories "$folder" &
+PYTHONPATH="$here" "$project/.venv/bin/python" -m stories "$folder" &
 stories=$!
 wait "$stories"

@@ -11,11 +11,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from claim import Claim
-from probe_at_hand import BROWSER, URL, Ended, NotReached, ProbeAtHand, asked, posted, until
-from releases import ReleaseShop
-
 HERE = Path(__file__).parent
+sys.path.append(str(HERE.parent / "systemd"))  # by no PYTHONPATH: Python would begin with the units' sitecustomize
+
+from claim import Claim  # noqa: E402
+from probe_at_hand import BROWSER, URL, Ended, NotReached, ProbeAtHand, asked, posted, until  # noqa: E402
+from releases import ReleaseShop  # noqa: E402
+
 UNITS = "/etc/systemd/system"
 MB = 10**6
 CODE = re.compile(r"\bE01[0-9]\b")
