@@ -4,7 +4,7 @@ import numpy as np
 
 from device.measurement.parameters import normalise_unknowns
 from host_tools.press_models.mode_outcome import EvaluatedPresses
-from host_tools.scores.scored_presses import ScoredPresses
+from host_tools.scores.scored_presses import ScoredPresses, joined
 
 
 def scored_presses(found_mm, truth_mm, half_mm=1.0, answered=True):
@@ -16,3 +16,16 @@ def scored_presses(found_mm, truth_mm, half_mm=1.0, answered=True):
     count = len(mean)
     known = np.ones((count, 3), bool)
     return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), np.ones(count), np.full(count, answered))
+
+
+TRUTH_MM = (8.0, 6.0)
+
+
+def told_presses(good, wrong=0, refused=0):
+    """So many presses covered, too sure of a wrong size, and refused."""
+    parts = [
+        *([scored_presses([TRUTH_MM] * good, [TRUTH_MM] * good)] if good else []),
+        *([scored_presses([(11.0, 6.0)] * wrong, [TRUTH_MM] * wrong)] if wrong else []),
+        *([scored_presses([TRUTH_MM] * refused, [TRUTH_MM] * refused, answered=False)] if refused else []),
+    ]
+    return joined(parts)

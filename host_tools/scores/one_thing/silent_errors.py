@@ -7,7 +7,7 @@ the same skins. The bound is on how much further off sizes and depths are than w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -62,7 +62,8 @@ MODES = {
     "quick": ("quick", SHIPPED),
 }
 BOUNDED = "standard after", "precise after"
-HEADER = ("what differs", "mode", "answered by", *FIGURES, "size further off (mm)", "depth further off (mm)")
+HEADER = ("what differs", "mode", "answered by", *FIGURES, "size further off (mm)", "depth further off (mm)",
+          "size moved, RMS (mm)", "depth moved, RMS (mm)")  # fmt: skip
 Scores = dict[str, ScoredPresses]
 
 
@@ -101,7 +102,13 @@ def silent_errors_chapter(
         source="host_tools/scores/one_thing/silent_errors.py; host_tools/probe_tables/ellipsoid.py",
         benchmarks=tuple(_benchmarks(found, without)),
         tables=(Table("What each leaves", HEADER, tuple(_rows(found, without))),),
-        facts={"presses": presses, "scans": scans, "bound_mm": BOUND_MM, "largest": _largest(found, without)},
+        facts={
+            "presses": presses,
+            "scans": scans,
+            "bound_mm": BOUND_MM,
+            "largest": _largest(further_off_mm, found, without),
+            "largest_moved": _largest(moved_mm, found, without),
+        },
     )
 
 
@@ -158,13 +165,33 @@ def further_off_mm(found: ScoredPresses, without: ScoredPresses) -> Array:
     return np.asarray(found.error_mm().mean(axis=0) - without.error_mm().mean(axis=0))
 
 
+def moved_mm(found: ScoredPresses, without: ScoredPresses) -> Array:
+    """Return by how much a thing moves answers of size and depth [2], root mean square over presses that have both.
+
+    Presses are told by their truths: noise is the same in both. NaN without any.
+    """
+    without_it = dict(zip(map(tuple, _answered_truths(without)), without.error_mm(), strict=True))
+    moved = [
+        error - without_it[truth]
+        for truth, error in zip(map(tuple, _answered_truths(found)), found.error_mm(), strict=True)
+        if truth in without_it
+    ]
+    return np.sqrt(np.mean(np.square(moved), axis=0)) if moved else np.full(2, np.nan)
+
+
+def _answered_truths(found: ScoredPresses) -> Array:
+    return found.evaluated.truth[found.is_answered]
+
+
 def _rows(found: Mapping[str, Scores], without: Mapping[str, Scores]) -> list[tuple[str, ...]]:
     rows = []
     for name, of_one in found.items():
         for kind, (mode, by) in MODES.items():
             further = further_off_mm(of_one[kind], without[name][kind])
-            shown = ("" if np.isnan(one) else f"{one:+.2f}" for one in further)
-            rows.append((name, mode, by, *figures_of(of_one[kind]), *shown))
+            moved = moved_mm(of_one[kind], without[name][kind])
+            shown = [*(f"{one:+.2f}" for one in further), *(f"{one:.2f}" for one in moved)]
+            cells = ("" if cell.endswith("nan") else cell for cell in shown)
+            rows.append((name, mode, by, *figures_of(of_one[kind]), *cells))
     return rows
 
 
@@ -178,7 +205,9 @@ def _benchmarks(found: Mapping[str, Scores], without: Mapping[str, Scores]) -> l
     ]
 
 
-def _largest(found: Mapping[str, Scores], without: Mapping[str, Scores]) -> list[float]:
-    """Return the largest of what is further off, of size and depth (mm)."""
-    all_of_them = [further_off_mm(found[name][kind], without[name][kind]) for name in found for kind in BOUNDED]
+def _largest(
+    of: Callable[[ScoredPresses, ScoredPresses], Array], found: Mapping[str, Scores], without: Mapping[str, Scores]
+) -> list[float]:
+    """Return the largest of what is further off or moved, of size and depth (mm), in the modes with a bound."""
+    all_of_them = [of(found[name][kind], without[name][kind]) for name in found for kind in BOUNDED]
     return [round(float(one), 2) for one in np.nanmax(np.abs(all_of_them), axis=0)]

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from told_answers import scored_presses
+from told_answers import told_presses
 from typer.testing import CliRunner
 
 from device.files.bundle_file import read_quick_model, read_ramp_model
@@ -16,35 +16,22 @@ from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
 from host_tools.scores.one_thing.causes import causes
 from host_tools.scores.one_thing.one_at_a_time import TITLES, _largest_held, holds, one_at_a_time_chapter
-from host_tools.scores.one_thing.press_answers import FIGURES, DesignToTry, figures_of
-from host_tools.scores.scored_presses import joined
-
-TRUTH = (8.0, 6.0)
-
-
-def presses(good, wrong=0, refused=0):
-    """So many presses covered, too sure of a wrong size, and refused."""
-    parts = [
-        *([scored_presses([TRUTH] * good, [TRUTH] * good)] if good else []),
-        *([scored_presses([(11.0, 6.0)] * wrong, [TRUTH] * wrong)] if wrong else []),
-        *([scored_presses([TRUTH] * refused, [TRUTH] * refused, answered=False)] if refused else []),
-    ]
-    return joined(parts)
+from host_tools.scores.one_thing.press_answers import FIGURES, DesignToTry
 
 
 def test_a_row_holds_but_for_one_deviation_of_chance():
-    assert holds(presses(36, wrong=4))
-    assert holds(presses(33, wrong=7))  # 82.5 % of 40; 86 % less 5.5 %
-    assert not holds(presses(32, wrong=8))
-    assert holds(presses(37, refused=3))
-    assert not holds(presses(36, refused=4))
+    assert holds(told_presses(36, wrong=4))
+    assert holds(told_presses(33, wrong=7))  # 82.5 % of 40; 86 % less 5.5 %
+    assert not holds(told_presses(32, wrong=8))
+    assert holds(told_presses(37, refused=3))
+    assert not holds(told_presses(36, refused=4))
 
 
 def test_a_mode_that_may_refuse_needs_to_cover_what_it_answers():
-    assert holds(presses(4, refused=36), may_refuse=True)
-    assert holds(presses(0, refused=40), may_refuse=True)
-    assert not holds(presses(2, wrong=2, refused=36), may_refuse=True)
-    assert not holds(presses(0, refused=40))
+    assert holds(told_presses(4, refused=36), may_refuse=True)
+    assert holds(told_presses(0, refused=40), may_refuse=True)
+    assert not holds(told_presses(2, wrong=2, refused=36), may_refuse=True)
+    assert not holds(told_presses(0, refused=40))
 
 
 def test_the_largest_size_that_holds_has_none_below_it_that_does_not():
@@ -54,14 +41,6 @@ def test_the_largest_size_that_holds_has_none_below_it_that_does_not():
     assert _largest_held(sizes, [False, True, True]) == "**none tried**"
     assert _largest_held(("+2 %", "-2 %"), [False, True]) == "-2 %"
     assert _largest_held(("0.5 mm",), [True]) == "0.5 mm"
-
-
-def test_figures_of_a_row_are_of_what_is_answered():
-    cells = dict(zip(FIGURES, figures_of(presses(3, wrong=1, refused=4)), strict=True))
-    assert (cells["stand out"], cells["answered"], cells["refused"]) == ("8", "4", "50 %")
-    assert (cells["size covered"], cells["depth covered"], cells["both covered"]) == ("75 %", "100 %", "75 %")
-    assert (cells["size RMSE (mm)"], cells["size bias (mm)"], cells["depth bias (mm)"]) == ("1.50", "+0.75", "+0.00")
-    assert figures_of(presses(0, refused=2))[:4] == ("2", "0", "100 %", "")
 
 
 def test_a_chapter_that_is_not_one_is_refused() -> None:

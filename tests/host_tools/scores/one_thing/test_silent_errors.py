@@ -13,6 +13,7 @@ from host_tools.scores.one_thing.silent_errors import (
     _balls,
     _benchmarks,
     further_off_mm,
+    moved_mm,
     solved_prolate,
 )
 
@@ -25,6 +26,14 @@ def test_further_off_is_beyond_what_the_same_presses_are_without_it():
     assert further_off_mm(off_by((0.7, -0.2)), off_by((0.2, 0.1))) == pytest.approx([0.5, -0.3], abs=1e-9)
     refused = replace(off_by((0.0, 0.0)), is_answered=np.zeros(3, bool))
     assert np.isnan(further_off_mm(refused, off_by((0.0, 0.0)))).all()
+
+
+def test_moved_is_of_the_same_presses_and_hides_no_sign():
+    truth = [(8.0, 6.0), (9.0, 5.0), (10.0, 7.0)]
+    without = scored_presses(truth, truth)
+    found = scored_presses(np.add(truth, [(0.3, 0.0), (-0.3, 0.1), (0.3, 0.0)])[::-1], truth[::-1])
+    assert moved_mm(found, without) == pytest.approx([0.3, 0.1 / np.sqrt(3)], abs=1e-9)
+    assert np.isnan(moved_mm(found, scored_presses([(4.0, 5.0)], [(4.0, 5.0)]))).all()
 
 
 def test_the_bound_is_on_every_thing_but_what_it_is_compared_with():

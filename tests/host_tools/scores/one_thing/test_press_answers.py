@@ -1,0 +1,51 @@
+"""Figures of answers, and mode quick's answers to held presses as if their probe were its own."""
+
+import numpy as np
+import pytest
+from told_answers import told_presses
+
+from device.files.bundle_file import read_quick_model, read_ramp_model
+from device.files.shipped import MODELS
+from device.measurement.recording.ring_means import RINGS
+from device.simulation.physics.world import AS_BELIEVED
+from host_tools.scores.one_thing.press_answers import FIGURES, figures_of, quick_scores
+from host_tools.scores.one_thing.tried_presses import Setting, random_design, tried_presses
+
+DESIGN = random_design(16, 0, seed=4)
+
+
+@pytest.fixture(scope="module")
+def held(tables):
+    noise = read_ramp_model(MODELS / "standard").answers.noise
+    return tried_presses(DESIGN, lambda number, rng: [Setting(tables, AS_BELIEVED)], noise, jobs=1).held
+
+
+@pytest.fixture(scope="module")
+def quick():
+    return read_quick_model(MODELS / "quick")
+
+
+def test_figures_of_a_row_are_of_what_is_answered():
+    cells = dict(zip(FIGURES, figures_of(told_presses(3, wrong=1, refused=4)), strict=True))
+    assert (cells["stand out"], cells["answered"], cells["refused"]) == ("8", "4", "50 %")
+    assert (cells["size covered"], cells["depth covered"], cells["both covered"]) == ("75 %", "100 %", "75 %")
+    assert (cells["size RMSE (mm)"], cells["size bias (mm)"], cells["depth bias (mm)"]) == ("1.50", "+0.75", "+0.00")
+    assert figures_of(told_presses(0, refused=2))[:4] == ("2", "0", "100 %", "")
+
+
+def test_quick_finds_most_presses_of_its_own_probe_inside_its_intervals(held, quick):
+    found = quick_scores(DESIGN.parameters, held, quick)
+    assert found.is_answered.all()
+    assert 10 <= len(found.is_answered) <= 16
+    assert found.covered().mean() >= 0.75
+    assert np.abs(found.error_mm()).mean() < 1.5
+
+
+def test_quick_refuses_what_is_oblong_and_leaves_out_what_does_not_stand_out(held, quick):
+    oblong = [one._replace(elongation_ratio=quick.elongation_ratio * 2) for one in held]
+    faint = [one._replace(row=np.where(np.arange(RINGS + 1) < RINGS, 0.0, one.row)) for one in held]
+    shown = len(quick_scores(DESIGN.parameters, held, quick).is_answered)
+    assert not quick_scores(DESIGN.parameters, oblong, quick).is_answered.any()
+    brightest = max(held, key=lambda one: one.row[0])
+    one_bright = quick_scores(DESIGN.parameters[:3], [*faint[:2], brightest], quick)
+    assert len(one_bright.is_answered) == 1 < shown
