@@ -51,7 +51,7 @@ SHORT = NetworkBudget(presses=200, widths=(4, 8), members=1, steps=20, trained_o
 """Enough to try the chain."""
 
 
-class ScoredPresses(NamedTuple):
+class NoisyRows(NamedTuple):
     """Noisy rows [n, F] as networks read them, and the unknowns' true values [n, 3]."""
 
     rows: Single
@@ -87,7 +87,7 @@ Choices = Sequence[Choice]
 """One network's point for each unknown."""
 
 
-def _committed(network: bytes, scored: ScoredPresses) -> list[Choices]:
+def _committed(network: bytes, scored: NoisyRows) -> list[Choices]:
     """Return the committed ensemble, by its members and in integers."""
     whole = members_of(network)
     fewer = {n: with_members(network, n) for n in range(1, whole + 1)}
@@ -95,7 +95,7 @@ def _committed(network: bytes, scored: ScoredPresses) -> list[Choices]:
     return exact + [_points(f"{n} int8", INTEGERS, in_integers(fewer[n]), scored) for n in (1, whole)]
 
 
-def _trained(training_set: NetworkPresses, asked: NetworkBudget, scored: ScoredPresses, jobs: int) -> list[Choices]:
+def _trained(training_set: NetworkPresses, asked: NetworkBudget, scored: NoisyRows, jobs: int) -> list[Choices]:
     """Return networks of every width, trained for a short while."""
     networks = {
         width: train_ensemble(training_set, seed=2, members=asked.members, steps=asked.steps, hidden=width, jobs=jobs)
@@ -112,13 +112,13 @@ def _press_set(model: RampModel, count: int, purpose: str) -> NetworkPresses:
     return NetworkPresses(random_press_set(answers.surrogate, answers.noise, count, derived_seed(2, purpose)))
 
 
-def _scored(presses: NetworkPresses) -> ScoredPresses:
+def _scored(presses: NetworkPresses) -> NoisyRows:
     rng = np.random.default_rng(derived_seed(2, "noise on the trade-off of the networks"))
     rows = presses.noisy(np.arange(len(presses.rows)), rng)
-    return ScoredPresses(rows, denormalise(presses.normalised.astype(np.float64))[:, : len(UNKNOWNS)])
+    return NoisyRows(rows, denormalise(presses.normalised.astype(np.float64))[:, : len(UNKNOWNS)])
 
 
-def _points(name: str, family: str, network: bytes, scored: ScoredPresses, *, chosen: bool = False) -> Choices:
+def _points(name: str, family: str, network: bytes, scored: NoisyRows, *, chosen: bool = False) -> Choices:
     """Return a network's point for each unknown."""
     session = open_session(network)
     (found,) = session.run(["estimate"], {"features": scored.rows})
