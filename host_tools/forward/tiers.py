@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from netgen.meshing import NgException
@@ -14,8 +15,14 @@ from host_tools.forward.plan import GRADED, ModelPlan
 from host_tools.forward.press_model import PressFailed, PressModel
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.linear_model import LinearModel
+from host_tools.forward.small_strain.off_axis_inclusion import (
+    ROUND_ORDER,
+    OffAxisModel,
+    RoundBody,
+    is_round_but_for_inclusion,
+)
 from host_tools.forward.symmetry import AXISYMMETRIC, SOLID, Symmetry
-from host_tools.scenes.scene import Scene
+from host_tools.scenes.scene import Placement, Scene
 
 AXISYMMETRIC_SIZES = {
     "coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=10.0),
@@ -82,9 +89,18 @@ def build(scene: Scene, plan: ModelPlan) -> Meshed:
             mixed=mixed,
             curvature_per_mm=probe.dome_mm / probe.radius_mm**2,
         )
+    elif plan.grading == GRADED and not axisymmetric and not mixed and is_round_but_for_inclusion(scene):
+        model = OffAxisModel(mesh, sampler, _without_inclusion(scene), order=plan.order, other_order=other_order)
     else:
         model = LinearModel(mesh, symmetry, sampler, order=plan.order, other_order=other_order, mixed=mixed)
     return Meshed(model, mesh, symmetry, sampler, rays)
+
+
+def _without_inclusion(scene: Scene) -> RoundBody:
+    """Return the body of a scene in axisymmetry, which it has but for the inclusion."""
+    plain = replace(scene, inclusion=None, placement=Placement())
+    mesh = axisymmetric_mesh(plain, order=ROUND_ORDER, resolution=AXISYMMETRIC_SIZES[GRADED])
+    return RoundBody(mesh, FaceSampler(mesh, Rays.over(scene.waveguide), "axisymmetric"))
 
 
 def _mesh(scene: Scene, plan: ModelPlan) -> Any:

@@ -62,7 +62,7 @@ class LinearPress:
             w_mm=sampler(w_mm),
             p_kpa=sampler(pressure),
             total_mm3=sampler.copies * integral_over_face(self.mesh, self.symmetry, w_mm),
-            force_n=sampler.copies * self._reaction_mn(u, elasticity) / MN_PER_N,
+            force_n=sampler.copies * self.reaction_mn(u, elasticity) / MN_PER_N,
             contact_force_n=sampler.copies * integral_over_face(self.mesh, self.symmetry, pressure) / MN_PER_N,
         )
 
@@ -75,7 +75,7 @@ class LinearPress:
         probe, _ = self.contact.bodies(u.components)
         return self._stress(elasticity, probe, self.contact.pressure(u.components))
 
-    def _reaction_mn(self, u: Any, elasticity: Elasticity) -> float:
+    def reaction_mn(self, u: Any, elasticity: Elasticity) -> float:
         """Return the force of the back on the modelled part: the work of the stress on a unit push of the back."""
         form = BilinearForm(self.contact.space, symmetric=True)
         for term in self.weak_form(elasticity, *self.contact.space.TnT()):
