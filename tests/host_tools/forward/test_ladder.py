@@ -52,5 +52,13 @@ def test_the_departure_of_small_strain_is_an_error_unless_small_strain_was_asked
     chosen = climb(aside, [aside.press], tolerance=0.05, strain="auto", within_s=0.01)
     assert chosen.departure > 0.05
     assert chosen.solutions[0].plan.order == 4  # the one below states more than 5 %
-    assert "small strain departs" in chosen.missed
+    assert "small strain may depart" in chosen.missed
     assert not chosen.as_record()["held"]
+
+
+def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
+    light, deep = (Scene(SCENE.inclusion, Press(indentation_mm=mm)) for mm in (0.05, 1.5))
+    assert climb(light, [light.press], tolerance=0.02).solutions[0].plan.strain == "small"
+    plan = climb(deep, [deep.press], tolerance=0.05).solutions[0].plan
+    assert (plan.strain, plan.contact) == ("finite", "true_sliding")
+    assert "more than the tolerance of 5 %" in plan.reasons["strain"]

@@ -8,7 +8,7 @@ from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.accuracy import accuracy_table
 from host_tools.forward.plan import STANDARD, aligned, model_plan
 from host_tools.forward.solve import solve
-from host_tools.scenes.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
+from host_tools.scenes.scene import Placement, Scene, Tissue, TissueLayer, Waveguide
 
 INCLUSION = Inclusion(10.0, 6.0, 80.0)
 SQUARE, DOMED, EDGE = Waveguide(face="square"), Waveguide(dome_mm=0.5), Tissue(edge_mm=20.0)
@@ -95,20 +95,6 @@ def test_without_a_tolerance_every_scene_gets_the_same_level():
     assert {(plan.grading, plan.order) for plan in plans} == {STANDARD}
 
 
-def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
-    light, deep = Press(indentation_mm=0.05), Press(indentation_mm=3.0)
-    assert model_plan(Scene(INCLUSION, light), strain="auto", tolerance=0.02).strain == "small"
-    plan = model_plan(Scene(INCLUSION, deep), strain="auto", tolerance=0.02)
-    assert (plan.strain, plan.contact) == ("finite", "true_sliding")
-    assert "more than the tolerance" in plan.reasons["strain"]
-
-
-def test_off_the_axis_auto_stays_small_and_says_what_that_costs():
-    plan = model_plan(Scene(INCLUSION, Press(indentation_mm=3.0), placement=Placement(6.0)), strain="auto")
-    assert plan.strain == "small"
-    assert "axisymmetric" in plan.reasons["strain"]
-
-
 @pytest.mark.parametrize(
     ("scene", "quantity"),
     [
@@ -126,4 +112,4 @@ def test_finite_strain_is_refused_where_no_model_has_it(scene, quantity):
 def test_the_tables_were_measured_by_the_command_they_name():
     table = accuracy_table()
     assert table["command"] == "host_tools verify --tables"
-    assert {"axisymmetric", "solid", "finite", "small_strain_departure"} <= table.keys()
+    assert {"axisymmetric", "solid", "finite"} <= table.keys()
