@@ -146,8 +146,9 @@ def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within
     from host_tools.forward.plan import DEFAULT_TOLERANCE
 
     aim = DEFAULT_TOLERANCE if tolerance is None else ratio_of(tolerance)
-    climbed = climb(scene, [scene.press], tolerance=aim, strain=strain, within_s=within_s)
-    return held(climbed, best=best or tolerance is None)
+    takes_best = best or tolerance is None
+    climbed = climb(scene, [scene.press], tolerance=aim, strain=strain, within_s=within_s, best=takes_best)
+    return held(climbed, best=takes_best)
 
 
 def _plot(solution: Solution, path: Path) -> None:

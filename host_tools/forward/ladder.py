@@ -89,26 +89,22 @@ class Climb:
     @property
     def missed(self) -> str:
         """One sentence on what was asked for and is not held; empty where it is."""
-        asked = f"{100 * self.tolerance:.3g} %"
         if self.was_chosen and self.departure > self.tolerance:
-            return (
-                f"tolerance is {asked}, but {_departs(self.departure)}, and {FINITE_IS_LIMITED}: press less deep, or "
-                f"{SMALL_IS_ENOUGH}."
-            )
+            return _departs_by_more(self.tolerance, self.departure)
         if self.reached <= self.tolerance:
             return ""
         return (
-            f"tolerance is {asked}, but {self.feature} is only good to {100 * self.reached:.3g} % ({self.ended}): "
-            f"allow a larger tolerance or more time (--within-s), or {TAKE_THE_BEST}."
+            f"tolerance is {100 * self.tolerance:.3g} %, but {self.feature} is only good to {100 * self.reached:.3g} % "
+            f"({self.ended}): allow a larger tolerance or more time (--within-s), or {TAKE_THE_BEST}."
         )
 
 
 class ToleranceMissed(PressFailed):
-    """A tolerance that no model held; `climb` has the best."""
+    """A tolerance that no model held; `climb` has the best, if anything was solved."""
 
-    def __init__(self, climb: Climb) -> None:
+    def __init__(self, missed: str, climb: Climb | None = None) -> None:
         self.climb = climb
-        super().__init__(climb.missed)
+        super().__init__(missed)
 
 
 def climb(
@@ -118,35 +114,40 @@ def climb(
     tolerance: float,
     strain: AskedStrain = "auto",
     within_s: float = WITHIN_S,
+    best: bool = True,
 ) -> Climb:
     """Solve a scene at presses, as `solve_ramp`, on higher rungs until what is stated is within a relative tolerance.
 
-    `within_s` is wall time; the first rung is solved in any case. Raise as `model_plan` and `solve_ramp` do.
+    `within_s` is wall time; the first rung is solved in any case. Raise as `model_plan` and `solve_ramp` do; without
+    `best` also `ToleranceMissed` where small strain alone departs by more and finite strain does not serve the scene.
     """
     began = time.perf_counter()
     plan, departure = _plan(scene.with_press(presses[-1]), tolerance, strain)
-    best, told = None, ""
+    if departure > tolerance and not best:
+        raise ToleranceMissed(_departs_by_more(tolerance, departure))
+    reached, told = None, ""
     rung = _Rung(scene, presses, plan, tolerance, was_chosen=strain == "auto")
-    aim = tolerance + departure if departure > tolerance else tolerance  # what can be had
-    for level in _rungs(plan, aim - departure):
+    is_out_of_reach = departure > tolerance  # then the mesh alone is to hold the tolerance
+    aim = tolerance + departure if is_out_of_reach else tolerance
+    for level in _rungs(plan, tolerance if is_out_of_reach else tolerance - departure):
         took = time.perf_counter()
         try:
             found = rung.solved(level, told)
         except PressFailed as failed:
-            best = replace(rung.at_widest_rim(best, failed), ended=f"the next level gives way: {failed}")
+            reached = replace(rung.at_widest_rim(reached, failed), ended=f"the next level gives way: {failed}")
             break
-        best = min((one for one in (best, found) if one), key=lambda one: one.reached)
+        reached = min((one for one in (reached, found) if one), key=lambda one: one.reached)
         if found.reached <= aim:
             break
         told = f"{level.grading}, order {level.order} stated {100 * found.reached:.2g} %"
         now = time.perf_counter()
         if now + NEXT_RUNG * (now - took) > began + within_s:
-            best = replace(best, ended=f"the next level would take longer than the {within_s:g} s allowed")
+            reached = replace(reached, ended=f"the next level would take longer than the {within_s:g} s allowed")
             break
     else:
-        best = replace(best, ended="no level holds more") if best else None
-    assert best is not None  # every plan has rungs
-    return best
+        reached = replace(reached, ended="no level holds more") if reached else None
+    assert reached is not None  # every plan has rungs
+    return reached
 
 
 def _plan(scene: Scene, tolerance: float, asked: AskedStrain) -> tuple[ModelPlan, float]:
@@ -167,6 +168,13 @@ def _departs(departure: float) -> str:
     if departure == inf:
         return "what small strain departs from finite strain by could not be found"
     return f"small strain may depart from finite strain by {100 * departure:.2g} % here"
+
+
+def _departs_by_more(tolerance: float, departure: float) -> str:
+    return (
+        f"tolerance is {100 * tolerance:.3g} %, but {_departs(departure)}, and {FINITE_IS_LIMITED}: press less deep, "
+        f"or {SMALL_IS_ENOUGH}."
+    )
 
 
 def solved_at(scene: Scene, level: Level, *, strain: StrainModel) -> Solution:
@@ -287,5 +295,5 @@ def worst_error(solution: Solution) -> tuple[str, float]:
 def held(climbed: Climb, *, best: bool) -> Climb:
     """Return a climb that holds its tolerance, or with `best` any; raise `ToleranceMissed` otherwise."""
     if climbed.missed and not best:
-        raise ToleranceMissed(climbed)
+        raise ToleranceMissed(climbed.missed, climbed)
     return climbed

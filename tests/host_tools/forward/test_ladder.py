@@ -56,6 +56,13 @@ def test_the_departure_of_small_strain_is_an_error_unless_small_strain_was_asked
     assert not chosen.as_record()["held"]
 
 
+def test_where_the_model_alone_misses_the_tolerance_nothing_is_solved_unless_the_best_is_taken():
+    aside = Scene(SCENE.inclusion, Press(indentation_mm=1.0), placement=Placement(offset_x_mm=3.0))
+    with pytest.raises(ToleranceMissed, match="small strain may depart .*--strain small") as refused:
+        climb(aside, [aside.press], tolerance=0.05, best=False)
+    assert refused.value.climb is None
+
+
 def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
     light, deep = (Scene(SCENE.inclusion, Press(indentation_mm=mm)) for mm in (0.05, 1.5))
     assert climb(light, [light.press], tolerance=0.02).solutions[0].plan.strain == "small"
