@@ -44,7 +44,7 @@ def strain_departure(scene: Scene) -> dict[str, float]:
     """
     nearest = nearest_finite_scene(scene)
     try:
-        whole = solve(nearest, _plan(nearest, "small"))
+        whole = small_strain_press(nearest)
     except PressFailed:
         if nearest == scene:
             raise
@@ -58,6 +58,11 @@ def strain_departure(scene: Scene) -> dict[str, float]:
             continue
         return _stated(whole, light, share)
     return UNKNOWN
+
+
+def small_strain_press(scene: Scene) -> Solution:
+    """Return a scene at `LIGHT_LEVEL` in small strain; raise `PressFailed` where matter is turned inside out."""
+    return solve(scene, _plan(scene, "small"))
 
 
 def largest_departure(scene: Scene) -> float:
