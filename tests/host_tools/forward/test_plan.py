@@ -6,7 +6,7 @@ import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.accuracy import accuracy_table
-from host_tools.forward.plan import STANDARD, aligned, model_plan
+from host_tools.forward.plan import GRADED, STANDARD, aligned, model_plan
 from host_tools.forward.solve import solve
 from host_tools.scenes.scene import Placement, Scene, Tissue, TissueLayer, Waveguide
 
@@ -77,7 +77,7 @@ def test_what_is_promised_is_kept(truth):
     scene = Scene(Inclusion(*truth))
     plan = model_plan(scene, tolerance=0.005)
     found = solve(scene, plan)
-    finest = solve(scene, replace(plan, mesh="remeshed", grading="finest", order=4))
+    finest = solve(scene, replace(plan, mesh="remeshed", grading=GRADED, order=7))
     assert found.force_n == pytest.approx(finest.force_n, rel=0.005)
     assert found.inclusion_field.max_deformation_mm == pytest.approx(
         finest.inclusion_field.max_deformation_mm, rel=0.005
