@@ -86,11 +86,15 @@ def moved(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def measure(scenes: int = SCENES, seed: int = SEED, jobs: int = -1) -> list[list[ToleranceAnswer]]:
-    """Return every scene's answers, one a tolerance; every other one is off the axis; a process a scene."""
-    rng = np.random.default_rng(seed)
-    centred = [random_scene(rng) for _ in range(scenes)]
-    chosen = [moved(scene, rng) if i % 2 else scene for i, scene in enumerate(centred)]
-    return list(Parallel(n_jobs=jobs)(delayed(answers)(scene) for scene in chosen))
+    """Return every scene's answers, one a tolerance; a process a scene."""
+    return list(Parallel(n_jobs=jobs)(delayed(answers)(drawn_scene(seed, number)) for number in range(scenes)))
+
+
+def drawn_scene(seed: int, number: int) -> Scene:
+    """Return a scene by its number, whatever others are drawn; every other one is off the axis."""
+    rng = np.random.default_rng([seed, number])
+    scene = random_scene(rng)
+    return moved(scene, rng) if number % 2 else scene
 
 
 def answers(scene: Scene) -> list[ToleranceAnswer]:
