@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 SimulateStrain = Literal["small", "finite", "auto"]
 PLOTS, PICTURES, SCENES = (".png", ".pdf", ".svg"), (".png",), (".toml",)
+IDEALISATIONS = {
+    "half_width_departure": "a slab twice as wide",
+    "dome_departure": "a first layer as much thicker as the dome is on average",
+}
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
 
 
@@ -69,7 +73,10 @@ def simulate(
         _plot(solution, plot)
     if frame:
         _take_frame(solution, frame, exposure_us, seed, probe, light)
-    _print(solution.as_record() | {"tolerance": climbed.as_record()}, as_json=as_json, explain=explain)
+    record = solution.as_record() | {"tolerance": climbed.as_record()}
+    if explain:
+        record["plan"] |= _idealisations(solution)
+    _print(record, as_json=as_json, explain=explain)
     if climbed.missed:
         note.print(climbed.missed, soft_wrap=True)
 
@@ -151,6 +158,13 @@ def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within
     return held(climbed, best=takes_best)
 
 
+def _idealisations(solution: Solution) -> dict[str, float]:
+    """Return by how much idealisations of the scene depart; two or three solves more."""
+    from host_tools.forward.model_departures import idealisation_departures
+
+    return idealisation_departures(solution.scene)
+
+
 def _plot(solution: Solution, path: Path) -> None:
     from host_tools.forward.plots import write_plot
 
@@ -181,10 +195,9 @@ def _print_plan(plan: dict[str, Any]) -> None:
     for choice, reason in plan["reasons"].items():
         value = f"{plan['grading']}, order {plan['order']}" if choice == "level" else plan[choice]
         print(f"{choice:12} {value:20} {reason}")
-    if plan["predicted_error"]:
-        errors = ", ".join(f"{name} {100 * error:.2g} %" for name, error in plan["predicted_error"].items())
-        print(f"{'predicted':12} {errors}")
-        print(f"{'':12} about {plan['predicted_seconds']:.2g} s where the tables were measured")
+    for name, words in IDEALISATIONS.items():
+        if name in plan:
+            print(f"{name:26} {100 * plan[name]:12.2g} %    from {words}; in no error below")
 
 
 def _print_solution(record: dict[str, Any]) -> None:

@@ -19,11 +19,11 @@ from typing import Any, Literal
 from host_tools.forward.accuracy import Level
 from host_tools.forward.error_estimates.foretold_error import foretold_error
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE, numbers
+from host_tools.forward.model_departures import largest_departure, small_strain_press, strain_departure
 from host_tools.forward.plan import FINITE_IS_LIMITED, GRADED, ModelPlan, StrainModel, has_finite_strain, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
-from host_tools.forward.strain_departure import largest_departure, small_strain_press, strain_departure
 from host_tools.scenes.scene import Press, Scene
 
 AskedStrain = Literal["small", "finite", "auto"]

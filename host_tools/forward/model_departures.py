@@ -1,9 +1,12 @@
-"""A scene to what small strain departs from finite strain by, measured on the scene itself.
+"""A scene to what its model departs from the truth by, apart from its mesh: small strain, the slab's width, the dome.
 
 What small strain leaves out grows in proportion to the press as long as it is small. So a light press is solved twice
 on one blunt mesh of low order, where the errors of the mesh cancel, and the difference scaled up: half a second, and no
 element folds. A strain read from the small-strain solution alone costs a tenth of that, but over random scenes the
 departure is 0.07 to 6 times such a strain (`host_tools verify --effectivity` measures what is stated here).
+
+That tissue ends at the slab's half width, and that a dome is a gap of the contact and no thicker layer, are
+idealisations of the scene: they are told apart, and in no stated error.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from host_tools.forward.accuracy import Level
 from host_tools.forward.deformation import Deformation
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE, numbers
 from host_tools.forward.materials import LOCKING_POISSON_RATIO
-from host_tools.forward.plan import ModelPlan, StrainModel, model_plan
+from host_tools.forward.plan import GRADED, ModelPlan, StrainModel, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
@@ -31,6 +34,11 @@ DEPARTURE_FACTOR = 2.0
 """Stated over what the light press tells: deep presses depart by more than in proportion."""
 LEAST_SHARE = 0.25
 """A feature whose own departure crosses zero by chance is given this much of the largest of all."""
+
+CONVERGED_LEVEL = Level(GRADED, 3)
+"""By which two idealisations of a scene are compared, in small strain."""
+DOME_VOLUME_RATIO = 0.5
+"""Mean height of a paraboloid over its height."""
 
 UNKNOWN = dict.fromkeys(("force_n", "indentation_mm", *(one.name for one in fields(Deformation))), inf)
 
@@ -65,6 +73,32 @@ def small_strain_press(scene: Scene) -> Solution:
     return solve(scene, _plan(scene, "small"))
 
 
+@lru_cache(maxsize=64)
+def idealisation_departures(scene: Scene) -> dict[str, float]:
+    """Return by how much force or indentation and O1-O3 depart, relative, the worst of them, by idealisation.
+
+    `half_width_departure`: from a slab twice as wide. `dome_departure`, under a dome alone: from a first layer as much
+    thicker as the dome is on average. Both of `nearest_finite_scene`. Raise `PressFailed` as `solve` does.
+    """
+    nearest = nearest_finite_scene(scene)
+    tissue, probe = nearest.tissue, nearest.waveguide
+    wider = replace(nearest, tissue=replace(tissue, half_width_mm=2 * tissue.half_width_mm))
+    found = {"half_width_departure": _worst_difference(nearest, wider)}
+    if scene.waveguide.dome_mm:
+        first_mm, *rest_mm = probe.layer_thicknesses_mm
+        thicker_mm = first_mm + DOME_VOLUME_RATIO * scene.waveguide.dome_mm
+        thicker = replace(nearest, waveguide=replace(probe, layer_thicknesses_mm=(thicker_mm, *rest_mm)))
+        found["dome_departure"] = _worst_difference(nearest, thicker)
+    return found
+
+
+def _worst_difference(scene: Scene, other: Scene) -> float:
+    pair = [solve(one, _plan(one, "small", CONVERGED_LEVEL)) for one in (scene, other)]
+    mine, others = (numbers(one.rays, one.pressed, one.baseline) for one in pair)
+    uncounted = CANCELLING_UNDER_FORCE if scene.press.force_n is not None else ""
+    return max(abs(mine[name] / value - 1) for name, value in others.items() if value and name != uncounted)
+
+
 def largest_departure(scene: Scene) -> float:
     """Return the largest departure that counts, relative; raise as `strain_departure` does."""
     uncounted = CANCELLING_UNDER_FORCE if scene.press.force_n is not None else ""
@@ -93,9 +127,9 @@ def _unlocked(poisson_ratio: float) -> float:
     return min(poisson_ratio, LOCKING_POISSON_RATIO)
 
 
-def _plan(scene: Scene, strain: StrainModel) -> ModelPlan:
+def _plan(scene: Scene, strain: StrainModel, level: Level = LIGHT_LEVEL) -> ModelPlan:
     plan = model_plan(scene, strain=strain)
-    return replace(plan, grading=LIGHT_LEVEL.grading, order=LIGHT_LEVEL.order, mesh="remeshed")
+    return replace(plan, grading=level.grading, order=level.order, mesh="remeshed")
 
 
 def _stated(whole: Solution, light: Solution, share: float) -> dict[str, float]:

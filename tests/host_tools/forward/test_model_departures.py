@@ -1,4 +1,4 @@
-"""What small strain is said to depart by, against finite strain solved on a finer mesh."""
+"""What small strain is said to depart by, against finite strain on a finer mesh; what a slab's width and a dome do."""
 
 from dataclasses import replace
 from math import inf
@@ -8,10 +8,15 @@ import pytest
 from device.measurement.quantities import Inclusion
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.ladder import climb
+from host_tools.forward.model_departures import (
+    idealisation_departures,
+    largest_departure,
+    nearest_finite_scene,
+    strain_departure,
+)
 from host_tools.forward.plan import has_finite_strain, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solve import solve
-from host_tools.forward.strain_departure import largest_departure, nearest_finite_scene, strain_departure
 from host_tools.scenes.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
 
 THIN = Scene(Inclusion(0.3, 0.3, 80.0), Press(indentation_mm=0.1), tissue=Tissue(thickness_mm=1.0))
@@ -96,6 +101,19 @@ def test_a_scene_without_finite_strain_has_a_nearest_one_that_has_it():
     assert nearest.waveguide.radius_mm == pytest.approx(1.12838 * ODD.waveguide.radius_mm, rel=1e-5)
     assert nearest.placement.width_ratio_x == pytest.approx(1.5**0.5)
     assert nearest_finite_scene(THIN) == THIN
+
+
+def test_a_slab_twice_as_wide_is_told_apart_and_a_dome_where_there_is_one():
+    """On paper a rigid side of a slab as wide as it is thick is felt by a tenth; one five times as wide is not."""
+    narrow, wide = (Scene(Inclusion(5.0, 3.0, 80.0), tissue=Tissue(5.0, 15.0, half_mm)) for half_mm in (16.0, 75.0))
+    felt, unfelt = (idealisation_departures(one) for one in (narrow, wide))
+    assert felt.keys() == unfelt.keys() == {"half_width_departure"}
+    assert felt["half_width_departure"] > 0.03 > 5 * unfelt["half_width_departure"]
+    flat, high = (
+        idealisation_departures(Scene(Inclusion(8.0, 6.0, 80.0), waveguide=Waveguide(dome_mm=dome_mm)))
+        for dome_mm in (0.1, 0.4)
+    )
+    assert 2 * flat["dome_departure"] < high["dome_departure"] < 8 * flat["dome_departure"]
 
 
 def test_a_press_beyond_small_strain_is_refused_and_that_of_a_nearest_scene_is_unknown():
