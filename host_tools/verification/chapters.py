@@ -68,9 +68,9 @@ def extremes_chapter() -> Chapter:
 
 def effectivity_chapter() -> Chapter:
     """Return the chapter on stated against true errors; many minutes."""
-    from host_tools.verification.effectivity import chapter_of, measure_effectivity
+    from host_tools.verification.effectivity import DEPARTED_SCENES, chapter_of, measure_effectivity
 
-    return chapter_of(measure_effectivity())
+    return chapter_of(measure_effectivity(departed_scenes=DEPARTED_SCENES))
 
 
 def tolerances_chapter(scenes: int | None = None, seed: int | None = None) -> Chapter:
