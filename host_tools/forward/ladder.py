@@ -79,6 +79,7 @@ class Climb:
             "held": not self.missed,
             "small_strain_departure": self.departure,
             "departure_is_stated": self.was_chosen,
+            "missed": self.missed,
         }
 
     @cached_property

@@ -48,6 +48,26 @@ def test_the_scene_that_was_asked_for_is_saved_with_every_key_and_solved_again_f
     assert again["max_deformation_mm"] == pytest.approx(asked["max_deformation_mm"], rel=1e-9)
 
 
+def test_several_files_are_a_line_of_json_each_and_one_refused_stops_none(tmp_path):
+    good, bad = tmp_path / "good.toml", tmp_path / "bad.toml"
+    write_scene(Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2)), good)
+    bad.write_text("[inclusion]\nsize = 3\n")
+    files = [word for path in (good, bad, good) for word in ("--scene", path)]
+    done = run_toolkit("simulate", *files, "--strain", "small")
+    first, refused, again = map(json.loads, done.stdout.splitlines())
+    assert done.returncode == 1
+    assert first == again
+    assert (first["scene"], first["force_n"], first["tolerance"]["missed"]) == (str(good), pytest.approx(0.2), "")
+    assert refused.keys() == {"scene", "refused"}
+    assert "bad.toml" in refused["scene"]
+
+
+def test_several_files_have_no_single_figure(tmp_path):
+    done = run_toolkit("simulate", "--scene", "a.toml", "--scene", "b.toml", "--plot", tmp_path / "w.png")
+    assert done.returncode == 1
+    assert "scene is 2 files, but must be one to write" in done.stderr
+
+
 def test_a_scene_is_saved_as_toml_alone(tmp_path):
     refused = run_toolkit("simulate", *INCLUSION, "--save-scene", tmp_path / "scene.yaml")
     assert refused.returncode != 0
