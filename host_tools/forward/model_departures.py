@@ -35,8 +35,8 @@ DEPARTURE_FACTOR = 2.0
 LEAST_SHARE = 0.25
 """A feature whose own departure crosses zero by chance is given this much of the largest of all."""
 
-CONVERGED_LEVEL = Level(GRADED, 3)
-"""By which two idealisations of a scene are compared, in small strain."""
+CONVERGED_LEVEL = Level(GRADED, 5)
+"""By which two idealisations of a scene are compared, in small strain: their meshes differ, and must not be seen."""
 DOME_VOLUME_RATIO = 0.5
 """Mean height of a paraboloid over its height."""
 

@@ -108,7 +108,8 @@ def test_a_slab_twice_as_wide_is_told_apart_and_a_dome_where_there_is_one():
     narrow, wide = (Scene(Inclusion(5.0, 3.0, 80.0), tissue=Tissue(5.0, 15.0, half_mm)) for half_mm in (16.0, 75.0))
     felt, unfelt = (idealisation_departures(one) for one in (narrow, wide))
     assert felt.keys() == unfelt.keys() == {"half_width_departure"}
-    assert felt["half_width_departure"] > 0.03 > 5 * unfelt["half_width_departure"]
+    assert felt["half_width_departure"] > 0.03 > 0.002 > unfelt["half_width_departure"]
+    assert idealisation_departures(THIN)["half_width_departure"] < 0.002  # 60 times as wide as thick
     flat, high = (
         idealisation_departures(Scene(Inclusion(8.0, 6.0, 80.0), waveguide=Waveguide(dome_mm=dome_mm)))
         for dome_mm in (0.1, 0.4)
