@@ -37,6 +37,8 @@ LEAST_SHARE = 0.25
 
 CONVERGED_LEVEL = Level(GRADED, 5)
 """By which two idealisations of a scene are compared, in small strain: their meshes differ, and must not be seen."""
+LARGEST_MM, WIDEST_MM = 100.0, 1e3
+"""Of a face's radius and a layer's thickness, and of a slab's half width: what scenes may have."""
 DOME_VOLUME_RATIO = 0.5
 """Mean height of a paraboloid over its height."""
 
@@ -78,15 +80,17 @@ def idealisation_departures(scene: Scene) -> dict[str, float]:
     """Return by how much force or indentation and O1-O3 depart, relative, the worst of them, by idealisation.
 
     `half_width_departure`: from a slab twice as wide. `dome_departure`, under a dome alone: from a first layer as much
-    thicker as the dome is on average. Both of `nearest_finite_scene`. Raise `PressFailed` as `solve` does.
+    thicker as the dome is on average. Both of `nearest_finite_scene` under a light press, for they do not depend on
+    the press. Raise `PressFailed` as `solve` does.
     """
     nearest = nearest_finite_scene(scene)
+    nearest = nearest.with_press(nearest.press.scaled(LIGHT_RATIOS[0]))
     tissue, probe = nearest.tissue, nearest.waveguide
-    wider = replace(nearest, tissue=replace(tissue, half_width_mm=2 * tissue.half_width_mm))
+    wider = replace(nearest, tissue=replace(tissue, half_width_mm=min(2 * tissue.half_width_mm, WIDEST_MM)))
     found = {"half_width_departure": _worst_difference(nearest, wider)}
     if scene.waveguide.dome_mm:
         first_mm, *rest_mm = probe.layer_thicknesses_mm
-        thicker_mm = first_mm + DOME_VOLUME_RATIO * scene.waveguide.dome_mm
+        thicker_mm = min(first_mm + DOME_VOLUME_RATIO * scene.waveguide.dome_mm, LARGEST_MM)
         thicker = replace(nearest, waveguide=replace(probe, layer_thicknesses_mm=(thicker_mm, *rest_mm)))
         found["dome_departure"] = _worst_difference(nearest, thicker)
     return found
@@ -111,7 +115,7 @@ def nearest_finite_scene(scene: Scene) -> Scene:
     Centred, under a flat, round face of equal area, in a slab without an edge, and of no Poisson ratio that locks.
     """
     probe, tissue, place = scene.waveguide, scene.tissue, scene.placement
-    radius_mm = probe.radius_mm * (2 / sqrt(pi) if probe.face == "square" else 1.0)
+    radius_mm = min(probe.radius_mm * (2 / sqrt(pi) if probe.face == "square" else 1.0), LARGEST_MM)
     width_ratio = place.width_ratio_x if place.is_round else sqrt(place.width_ratio_x * place.width_ratio_y)
     layers = tuple(replace(one, poisson_ratio=_unlocked(one.poisson_ratio)) for one in tissue.layers)
     return Scene(

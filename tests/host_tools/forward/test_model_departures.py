@@ -117,6 +117,12 @@ def test_a_slab_twice_as_wide_is_told_apart_and_a_dome_where_there_is_one():
     assert 2 * flat["dome_departure"] < high["dome_departure"] < 8 * flat["dome_departure"]
 
 
+def test_the_largest_scenes_have_a_nearest_one_and_idealisations_too():
+    widest = Scene(None, waveguide=Waveguide(radius_mm=100.0, face="square"), tissue=Tissue(5.0, 30.0, 900.0))
+    assert nearest_finite_scene(widest).waveguide.radius_mm == 100.0
+    assert idealisation_departures(widest)["half_width_departure"] < 0.01
+
+
 def test_a_press_beyond_small_strain_is_refused_and_that_of_a_nearest_scene_is_unknown():
     deep = Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=100.0))
     with pytest.raises(PressFailed, match=r"below 3\.1"):
