@@ -155,7 +155,11 @@ def as_chapter(found: Sequence[Sequence[ToleranceAnswer]]) -> Chapter:
         "Tolerances",
         f"{len(found)} random scenes far beyond the training box, every other one off the axis: what is answered is "
         "within the tolerance, all else is refused in words. Inclusions of 1-25 mm, 0.5-20 mm deep, of 1-1000 kPa, in "
-        "tissue of 2-30 kPa and slabs of 12-80 mm. Indentations of 0.1-4 mm, half of them by force.",
+        "tissue of 2-30 kPa and slabs of 12-80 mm. Indentations of 0.1-4 mm, half of them by force. "
+        "The strain measure is chosen by the tolerance. Centred answers are compared with finite strain on the finest "
+        "level that takes the press, without what its mesh errs in small strain. Off the axis there is no finite "
+        "strain: answers are compared with small strain two orders higher, at most order 6, and what small strain "
+        "departs by is not judged. What is refused at one tolerance is not tried at a tighter one.",
         "No reference: a finer level of the same model.",
         tuple(_judged(flat, len(found))),
         (
