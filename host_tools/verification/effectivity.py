@@ -66,7 +66,7 @@ class ErrorStatement(NamedTuple):
     @property
     def is_held(self) -> bool:
         """Whether the true error lies within."""
-        return self.true <= max(self.stated, UNRESOLVED)
+        return bool(self.true <= max(self.stated, UNRESOLVED))
 
 
 class ModelKind(NamedTuple):

@@ -67,8 +67,8 @@ def test_chapters_that_are_not_measured_stay_on_the_page_with_how_they_were(fake
     for name in ("patch", "hertz"):
         run("--only", name, "--out", str(out))
     for line in (
-        "- patch: measured by `host_tools verify --only patch ",
-        "- hertz: measured by `host_tools verify --only h",
+        "| patch | `host_tools verify --only patch ",
+        "| hertz | `host_tools verify --only hertz ",
     ):
         assert line in out.read_text()
 
