@@ -113,8 +113,8 @@ bench: .venv/all.stamp ## time everything that somebody waits for, in one table 
 	$(PY) tests/bench.py $(ONLY) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE))
 
 verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md
-	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md
 	$(HOST_TOOLS) optics verify --mitsuba --out docs/optics.md
+	$(HOST_TOOLS) verify --extremes --effectivity --out docs/verification.md
 
 sweep: .venv/all.stamp ## solve the 134 scenes of the training set into build/sweep.nc
 	$(HOST_TOOLS) sweep --scenes 134 --seed 1 --out build/sweep.nc

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -21,11 +23,18 @@ if TYPE_CHECKING:
 
 SimulateStrain = Literal["small", "finite", "auto"]
 PLOTS, PICTURES, SCENES = (".png", ".pdf", ".svg"), (".png",), (".toml",)
+IDEALISATIONS = {
+    "half_width_departure": "a slab twice as wide",
+    "dome_departure": "a first layer as much thicker as the dome is on average",
+}
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
 
 
 def simulate(
-    scene: Annotated[Path | None, typer.Option(help="TOML file of the scene; the options below change it.")] = None,
+    scene: Annotated[
+        list[Path] | None,
+        typer.Option(help="TOML file of the scene; the options below change it. Of several, a line of JSON each."),
+    ] = None,
     size_mm: Annotated[float | None, typer.Option(help="Diameter of the inclusion; 0 for none.")] = None,
     depth_mm: Annotated[float | None, typer.Option(help="Surface to the top of the inclusion.")] = None,
     modulus_kpa: Annotated[float | None, typer.Option(help="Young's modulus of the inclusion.")] = None,
@@ -58,18 +67,29 @@ def simulate(
     """
     require("within_s", within_s, Bound(0.0, 1e6, "s", low_included=False), "allow some time")
     _require_outputs(plot, frame, save_scene, exposure_us, seed)
-    base = with_probe(_read(scene), probe)
-    inclusion = _inclusion(base.inclusion, (size_mm, depth_mm, modulus_kpa), scene)
-    asked = _scene(base, inclusion, tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n))
+
+    def asked_for(path: Path | None) -> Scene:
+        base = with_probe(_read(path), probe)
+        inclusion = _inclusion(base.inclusion, (size_mm, depth_mm, modulus_kpa), path)
+        return _scene(base, inclusion, tissue_modulus_kpa, poisson, offset_mm, (indentation_mm, force_n))
+
+    def climbed_to(one: Scene) -> Climb:
+        return _climbed(one, tolerance, strain, within_s, best=best)
+
+    if scene and len(scene) > 1:
+        _require_no_files(scene, plot, frame, save_scene)
+        _print_lines(scene, lambda path: _record(climbed_to(asked_for(path)), explain=explain))
+        return
+    asked = asked_for(scene[0] if scene else None)
     if save_scene:
         _save(asked, save_scene)
-    climbed = _climbed(asked, tolerance, strain, within_s, best=best)
+    climbed = climbed_to(asked)
     solution = climbed.solutions[0]
     if plot:
         _plot(solution, plot)
     if frame:
         _take_frame(solution, frame, exposure_us, seed, probe, light)
-    _print(solution.as_record() | {"tolerance": climbed.as_record()}, as_json=as_json, explain=explain)
+    _print(_record(climbed, explain=explain), as_json=as_json, explain=explain)
     if climbed.missed:
         note.print(climbed.missed, soft_wrap=True)
 
@@ -82,6 +102,14 @@ def _require_outputs(
         require_writable(path, endings)
     require("exposure_us", exposure_us, Bound(0.0, 1e7, "us", low_included=False), "expose for a while")
     require("seed", seed, Bound(0, 2**63, ""), "give a whole number from 0")
+
+
+def _require_no_files(scenes: Sequence[Path], *files: Path | None) -> None:
+    """Refuse to write one file of several scenes."""
+    if written := [str(path) for path in files if path]:
+        raise InvalidQuantity(
+            "scene", f"{len(scenes)} files", f"one to write {', '.join(written)}", "call once for each"
+        )
 
 
 def _read(path: Path | None) -> Scene:
@@ -146,8 +174,40 @@ def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within
     from host_tools.forward.plan import DEFAULT_TOLERANCE
 
     aim = DEFAULT_TOLERANCE if tolerance is None else ratio_of(tolerance)
-    climbed = climb(scene, [scene.press], tolerance=aim, strain=strain, within_s=within_s)
-    return held(climbed, best=best or tolerance is None)
+    takes_best = best or tolerance is None
+    climbed = climb(scene, [scene.press], tolerance=aim, strain=strain, within_s=within_s, best=takes_best)
+    return held(climbed, best=takes_best)
+
+
+def _record(climbed: Climb, *, explain: bool) -> dict[str, Any]:
+    """Return what was reached as a JSON object; to explain it, with what idealisations of the scene depart by."""
+    solution = climbed.solutions[0]
+    record = solution.as_record() | {"tolerance": climbed.as_record()}
+    for errors in (record["stated_error"], record["tolerance"]):
+        errors.update(
+            {name: None for name, error in errors.items() if isinstance(error, float) and not isfinite(error)}
+        )
+    if explain:
+        from host_tools.forward.model_departures import idealisation_departures
+
+        record["plan"] |= idealisation_departures(solution.scene)
+    return record
+
+
+def _print_lines(paths: Sequence[Path], record_of: Callable[[Path], dict[str, Any]]) -> None:
+    """Print a line of JSON for every file, as soon as it is there; exit with 1 where any was refused."""
+    from host_tools.forward.press_model import PressFailed
+
+    refused = False
+    for path in paths:
+        line: dict[str, Any] = {"scene": str(path)}
+        try:
+            line |= record_of(path)
+        except (InvalidQuantity, PressFailed) as failed:
+            line["refused"], refused = str(failed), True
+        print(json.dumps(line), flush=True)
+    if refused:
+        raise typer.Exit(1)
 
 
 def _plot(solution: Solution, path: Path) -> None:
@@ -180,18 +240,21 @@ def _print_plan(plan: dict[str, Any]) -> None:
     for choice, reason in plan["reasons"].items():
         value = f"{plan['grading']}, order {plan['order']}" if choice == "level" else plan[choice]
         print(f"{choice:12} {value:20} {reason}")
-    if plan["predicted_error"]:
-        errors = ", ".join(f"{name} {100 * error:.2g} %" for name, error in plan["predicted_error"].items())
-        print(f"{'predicted':12} {errors}")
-        print(f"{'':12} about {plan['predicted_seconds']:.2g} s where the tables were measured")
+    for name, words in IDEALISATIONS.items():
+        if name in plan:
+            print(f"{name:26} {100 * plan[name]:12.2g} %    from {words}; in no error below")
 
 
 def _print_solution(record: dict[str, Any]) -> None:
     for name, value in record.items():
         unit = UNITS.get("_" + name.rpartition("_")[2])
         if unit and isinstance(value, float):
-            error = record["stated_error"].get(name)
-            print(f"{name:26} {value:12.6g} {unit:4}" + (f" +- {100 * error:.3f} %" if error else ""))
+            error = record["stated_error"].get(name, 0.0)
+            known = " +- unknown" if error is None else f" +- {100 * error:.3f} %" if error else ""
+            print(f"{name:26} {value:12.6g} {unit:4}{known}")
     print(f"{'pressure_is_positive':26} {record['pressure_is_positive']!s:>12}")
-    if departure := record["tolerance"]["small_strain_departure"]:
-        print(f"{'small_strain_departure':26} {100 * departure:12.2g} %    of finite strain, in no error above")
+    departure = record["tolerance"]["small_strain_departure"]
+    if departure != 0:
+        shown = "unknown" if departure is None else f"{100 * departure:12.2g} %   "
+        counted = "counted in every error above" if record["tolerance"]["departure_is_stated"] else "in no error above"
+        print(f"{'small_strain_departure':26} {shown} from finite strain, at most; {counted}")

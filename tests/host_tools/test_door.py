@@ -158,7 +158,7 @@ def test_a_solution_says_in_one_line_what_it_is(solution):
 def test_a_notebook_shows_numbers_with_errors_reasons_and_a_picture(solution):
     page = solution._repr_html_()
     assert "<td>max_deformation_mm</td>" in page
-    assert "small strain departs from finite strain" in page
+    assert "<td>strain</td><td>small</td><td>asked for</td>" in page
     assert "data:image/png;base64,iVBOR" in page
     assert f"{100 * solution.stated_error['force_n']:.2g} %" in page
     assert len(page) < 100_000

@@ -26,9 +26,19 @@ def test_a_statement_holds_where_the_true_error_is_within_or_not_resolved():
 
 def test_a_chapter_judges_what_held_level_by_level_and_names_what_is_overstated():
     found = chapter_of([*[GOOD] * 99, UNRESOLVED, WRONG, GOOD._replace(level="graded 5", stated=0.06)])
-    assert [one.passed for one in found.benchmarks] == [True, False, True]
+    assert [one.passed for one in found.benchmarks] == [True, True, False, True, True, False]
+    assert [one.quantity for one in found.benchmarks[-2:]] == [
+        "share of 1 statements held (at least)",
+        "median of stated over true error",
+    ]
     assert found.tables[0].rows[0][1:6] == ("graded 4", "100", "1.000", "2.0", "2")
     assert found.facts == {"statements": 102, "held": 101, "overstated": ["kind: graded 5, 6.0"]}
+
+
+def test_what_small_strain_departs_by_is_a_kind_of_its_own():
+    found = measure_effectivity([], seed=2, departed_scenes=1)
+    assert {(one.kind, one.level) for one in found} == {("small strain against finite", "light press")}
+    assert all(one.is_held for one in found)
 
 
 def test_every_level_that_a_climb_begins_with_is_measured():
