@@ -76,11 +76,12 @@ def solve_ramp(
     if not presses:
         raise InvalidQuantity("presses", "none", "at least one", "give the loads")
     aim = TOLERANCE if tolerance is None else tolerance
+    takes_best = best or tolerance is None
     allowed = require("tolerance", aim, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
-    climbed = climb(scene, presses, tolerance=allowed, strain=strain, within_s=within_s)
+    climbed = climb(scene, presses, tolerance=allowed, strain=strain, within_s=within_s, best=takes_best)
     if tolerance is None and not best and climbed.missed:
         warnings.warn(climbed.missed, stacklevel=3)
-    return held(climbed, best=best or tolerance is None).solutions
+    return held(climbed, best=takes_best).solutions
 
 
 def sweep(

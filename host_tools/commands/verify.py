@@ -25,14 +25,22 @@ def verify(
     extremes: Annotated[bool, typer.Option(help="Add scenes at the ends of every range.")] = False,
     effectivity: Annotated[bool, typer.Option(help="Add how often stated errors hold the true ones.")] = False,
     tolerances: Annotated[bool, typer.Option(help="Add whether tolerances that are asked for are held.")] = False,
+    scenes: Annotated[int | None, typer.Option(min=1, help="How many random scenes of tolerances.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the scenes of tolerances.")] = None,
     tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
     scheduler: Scheduler = None,
 ) -> None:
-    """Check the forward model against answers known on paper; exit code 1 when one misses its bound."""
+    """Check the forward model against answers known on paper; exit code 1 when one misses its bound.
+
+    A page keeps the chapters that were not measured this time, and says of each how it was measured.
+    """
     require_writable(out, (".md",))
     longer = {"extremes": extremes, "effectivity": effectivity, "tolerances": tolerances}
     extra = [name for name, wanted in longer.items() if wanted]
-    chapters = _chapters(only or [], extra, short=short)
+    drawn = {name: value for name, value in (("scenes", scenes), ("seed", seed)) if value is not None}
+    if drawn and not tolerances and "tolerances" not in (only or []):
+        raise InvalidQuantity(f"--{next(iter(drawn))}", drawn, "given with --tolerances", "ask for that chapter")
+    chapters = _chapters(only or [], extra, short=short, **drawn)
     with workers(scheduler):
         if tables:
             _measure_tables()
@@ -43,24 +51,35 @@ def verify(
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
         flags += ["--short"] if short else []
-        write_page(
-            out, Results("verification", " ".join(["host_tools verify", *flags, f"--out {shown(out)}"]), measured)
-        )
+        flags += [f"--{name} {value}" for name, value in drawn.items()]
+        results = Results("verification", " ".join(["host_tools verify", *flags, f"--out {shown(out)}"]), measured)
+        write_page(out, results.in_chapters(out, _order()))
         note.print(f"{out} written.")
     if failed:
         note.print(f"{failed} benchmarks miss their bound.")
         raise typer.Exit(1)
 
 
-def _chapters(only: list[str], extra: list[str], *, short: bool) -> dict[str, Callable[[], Chapter]]:
-    """Return the chapters asked for, all of them without a name; refuse a name that is none."""
+def _chapters(only: list[str], extra: list[str], *, short: bool, **drawn: int) -> dict[str, Callable[[], Chapter]]:
+    """Return the chapters asked for, all short ones without a name; refuse a name that is none.
+
+    `drawn` is how many scenes of tolerances to draw, and by which seed.
+    """
     from host_tools.verification.chapters import CHAPTERS, EXTRA_CHAPTERS
 
-    unknown = [name for name in only if name not in CHAPTERS]
+    unknown = [name for name in only if name not in _order()]
     if unknown:
-        raise InvalidQuantity("only", ", ".join(unknown), "a chapter", f"choose from {', '.join(CHAPTERS)}")
+        raise InvalidQuantity("only", ", ".join(unknown), "a chapter", f"choose from {', '.join(_order())}")
     chosen = {name: partial(chapter, short) for name, chapter in CHAPTERS.items() if not only or name in only}
-    return {**chosen, **{name: EXTRA_CHAPTERS[name] for name in extra}}
+    longer = EXTRA_CHAPTERS | {"tolerances": partial(EXTRA_CHAPTERS["tolerances"], **drawn)}
+    return {**chosen, **{name: chapter for name, chapter in longer.items() if name in (*only, *extra)}}
+
+
+def _order() -> list[str]:
+    """Return the chapters in the order of the page."""
+    from host_tools.verification.chapters import CHAPTERS, EXTRA_CHAPTERS
+
+    return [*CHAPTERS, *EXTRA_CHAPTERS]
 
 
 def _measure_tables() -> None:

@@ -1,4 +1,4 @@
-"""Measured accuracy and cost of every level of mesh and order, and how far small strain departs from finite strain.
+"""Measured accuracy and cost of every level of mesh and order.
 
 The tables are measured against the finest tier by `host_tools verify --tables`, which writes `accuracy_table.json`
 beside this file. A scene between two rows of a table is promised the worse of both.
@@ -103,25 +103,3 @@ def _bracket(nodes: list[float], value: float) -> list[int]:
     """Return the indices of the nodes on both sides of a value; the end node beyond an end."""
     right = int(np.clip(np.searchsorted(nodes, value), 0, len(nodes) - 1))
     return [right] if nodes[right] == value or right == 0 else [right - 1, right]
-
-
-def small_strain_departure(scene: Scene) -> float:
-    """Return by how much (relative, the worst of O1-O3 of the inclusion) small strain departs from finite strain.
-
-    Interpolated in indentation, the worst around the scene's size and depth. A force is taken for the indentation it
-    makes in the default probe, in proportion to the tissue's modulus.
-    """
-    table = accuracy_table().get("small_strain_departure")
-    if table is None:
-        return 0.0
-    cells = np.array(table["departure"][prescribed(scene)])  # indentation x size x depth
-    worst = [_worst_near(scene, table, layer) for layer in cells] if scene.has_inclusion else cells.max(axis=(1, 2))
-    indentation_mm = scene.press.indentation_mm
-    if indentation_mm is None:
-        assert scene.press.force_n is not None  # Press guarantees one of the two
-        softer = table["tissue_modulus_kpa"] / scene.tissue.youngs_modulus_kpa
-        indentation_mm = scene.press.force_n / table["stiffness_n_per_mm"] * softer
-    nodes = [0.0, *table["indentation_mm"]]
-    slope = worst[-1] / nodes[-1]  # beyond the table, in proportion
-    beyond = max(0.0, indentation_mm - nodes[-1])
-    return float(np.interp(indentation_mm, nodes, [0.0, *worst]) + slope * beyond)

@@ -1,7 +1,7 @@
 """A scene and a tolerance to the cheapest model that holds it, each choice with its reason.
 
-Symmetry, contact and formulation follow from the scene alone. Strain, order and grading follow from measured tables
-(`accuracy.py`), not from taste.
+Symmetry, contact and formulation follow from the scene alone. Strain is told, or chosen by what small strain departs by
+(`ladder.py`). Order and grading follow from measured tables (`accuracy.py`), not from taste.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from math import atan2
 from typing import Any, Literal
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.forward.accuracy import Level, cheapest_level, small_strain_departure
+from host_tools.forward.accuracy import Level, cheapest_level
 from host_tools.forward.materials import LOCKING_POISSON_RATIO, baseline, with_inclusion
 from host_tools.forward.meshes.mesh import PER_CONTACT, Resolution, touching_radius_mm
 from host_tools.forward.meshes.morph import reaches
@@ -60,22 +60,24 @@ def model_plan(
     scene: Scene,
     *,
     tolerance: float | None = None,
-    strain: Literal["small", "finite", "auto"] = "small",
+    strain: StrainModel = "small",
+    because: str = "asked for",
 ) -> ModelPlan:
     """Return the plan for a relative tolerance on O1-O3; without one, at the level that all data sets share.
+
+    `because` is why the strain measure was chosen (`ladder.py`).
 
     Raise `InvalidQuantity` when no model of ours serves the scene (finite strain off the axis or under a dome).
     """
     reasons: dict[str, str] = {}
     symmetry = _symmetry(scene, reasons)
-    chosen_strain = _strain(scene, symmetry, strain, tolerance or DEFAULT_TOLERANCE, reasons)
-    contact = _contact(scene, chosen_strain, reasons)
-    formulation = _formulation(scene, chosen_strain, reasons)
+    _require_strain(scene, symmetry, strain)
+    reasons["strain"] = because
+    contact = _contact(scene, strain, reasons)
+    formulation = _formulation(scene, strain, reasons)
     mesh = _mesh(scene, symmetry, reasons)
-    level, error, seconds = _level(scene, symmetry, chosen_strain, tolerance, reasons)
-    return ModelPlan(
-        symmetry, chosen_strain, contact, formulation, mesh, level.grading, level.order, reasons, error, seconds
-    )
+    level, error, seconds = _level(scene, symmetry, strain, tolerance, reasons)
+    return ModelPlan(symmetry, strain, contact, formulation, mesh, level.grading, level.order, reasons, error, seconds)
 
 
 def _symmetry(scene: Scene, reasons: dict[str, str]) -> FaceSector:
@@ -111,26 +113,20 @@ def aligned(scene: Scene) -> tuple[Scene, float]:
     return replace(scene, placement=turned), atan2(place.offset_y_mm, place.offset_x_mm)
 
 
-def _strain(scene: Scene, symmetry: FaceSector, asked: str, tolerance: float, reasons: dict[str, str]) -> StrainModel:
-    departure = small_strain_departure(scene)
-    known = f"small strain departs from finite strain by about {100 * departure:.2g} % here"
-    of_one_section = symmetry == "axisymmetric" and scene.waveguide.dome_mm == 0
-    can_finite = of_one_section and not _locks(scene)
-    if asked == "finite" and not of_one_section:
+def has_finite_strain(scene: Scene) -> bool:
+    """Return whether finite strain serves a scene."""
+    return _is_flat_section(scene, _symmetry(scene, {})) and not _locks(scene)
+
+
+def _is_flat_section(scene: Scene, symmetry: FaceSector) -> bool:
+    return symmetry == "axisymmetric" and scene.waveguide.dome_mm == 0
+
+
+def _require_strain(scene: Scene, symmetry: FaceSector, strain: StrainModel) -> None:
+    if strain == "finite" and not _is_flat_section(scene, symmetry):
         raise InvalidQuantity(
             "strain", "finite", "small for a scene that is not axisymmetric or has a domed face", "ask for small strain"
         )
-    if asked == "auto" and departure > tolerance and can_finite:
-        reasons["strain"] = f"{known}, more than the tolerance of {100 * tolerance:g} %"
-        return "finite"
-    if asked == "finite":
-        reasons["strain"] = f"asked for; {known}"
-        return "finite"
-    if asked == "auto" and departure > tolerance:
-        reasons["strain"] = f"{known}, more than the tolerance, but {FINITE_IS_LIMITED}"
-    else:
-        reasons["strain"] = ("asked for; " if asked == "small" else "") + known
-    return "small"
 
 
 def _contact(scene: Scene, strain: StrainModel, reasons: dict[str, str]) -> Contact:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 class PressFailed(RuntimeError):  # noqa: N818 - reads as what it says
     """A press that no solution was found for; says how far it got and what to do."""
 
+    reached_mm = 0.0
+    """The indentation that it got to, where a load path was followed."""
+
 
 class Loaded(NamedTuple):
     """The face at one press, and by another order on the same mesh when an error estimate was asked for.

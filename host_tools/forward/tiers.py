@@ -28,9 +28,6 @@ AXISYMMETRIC_SIZES = {
     "coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=10.0),
     "standard": Resolution(),
     "fine": Resolution(bulk_mm=2.0),
-    "finest": Resolution(
-        bulk_mm=1.5, face_mm=0.5, contact_rim_mm=0.005, back_rim_mm=0.005, per_inclusion=20.0, grading=0.3
-    ),
     GRADED: Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=8.0, grading=0.5, rim_layers=5),
     "sliding_coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.02, per_inclusion=10.0, grading=0.5),
     "sliding": Resolution(bulk_mm=4.0, contact_rim_mm=0.2, back_rim_mm=0.02, per_inclusion=10.0, grading=0.5),

@@ -184,6 +184,13 @@ class Press:
         if self.force_n is not None:
             _positive("force_n", self.force_n, 1e4, "N")
 
+    def scaled(self, ratio: float) -> Press:
+        """Return so many times the press, by what it is prescribed by."""
+        if self.indentation_mm is not None:
+            return Press(indentation_mm=ratio * self.indentation_mm)
+        assert self.force_n is not None  # guaranteed above
+        return Press(force_n=ratio * self.force_n)
+
 
 PAPER_BOX_LOW = (0.0, 4.0, 40.0)
 PAPER_BOX_HIGH = (15.0, 12.0, 120.0)

@@ -73,11 +73,12 @@ def effectivity_chapter() -> Chapter:
     return chapter_of(measure_effectivity())
 
 
-def tolerances_chapter() -> Chapter:
-    """Return the chapter on tolerances that are asked for; minutes."""
+def tolerances_chapter(scenes: int | None = None, seed: int | None = None) -> Chapter:
+    """Return the chapter on tolerances that are asked for, of so many random scenes; a minute a scene."""
+    from host_tools.verification.tolerances import SCENES, SEED
     from host_tools.verification.tolerances import tolerances_chapter as measured_chapter
 
-    return measured_chapter()
+    return measured_chapter(SCENES if scenes is None else scenes, SEED if seed is None else seed)
 
 
 EXTRA_CHAPTERS: dict[str, Callable[[], Chapter]] = {

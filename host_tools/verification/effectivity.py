@@ -17,7 +17,7 @@ from joblib import Parallel, delayed
 from device.measurement.quantities import Inclusion
 from host_tools.forward.accuracy import Level, prescribed
 from host_tools.forward.error_estimates.stated_error import numbers
-from host_tools.forward.ladder import FINITE_RUNGS, lightened, solved_at
+from host_tools.forward.ladder import FINITE_RUNGS, solved_at
 from host_tools.forward.plan import BLUNT, GRADED, STANDARD, StrainModel, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
@@ -26,6 +26,7 @@ from host_tools.pages.benchmark import Chapter, Table, at_least
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Placement, Press, Scene, Tissue, Waveguide
 from host_tools.verification.level_tables import FEATURES
 from host_tools.verification.tolerances import STIFFNESS_N_PER_MM, random_scene
+from host_tools.verification.truths import true_numbers
 
 REQUIRED_SHARE = 0.97
 REQUIRED_MEDIAN = 5.0
@@ -181,7 +182,7 @@ def measure_effectivity(
 
 def scored(kind: ModelKind, scene: Scene) -> list[ErrorStatement]:
     """Return what every level of a kind states of a scene; nothing of levels that give way, or where the truth does."""
-    truth_level, truth = _truth(kind, scene)
+    truth_level, truth = true_numbers(scene, kind.truths, "finite" if kind.is_finite else "small")
     found = []
     for level in kind.levels:
         if level == truth_level:
@@ -204,35 +205,6 @@ def _at_level(kind: ModelKind, scene: Scene, level: Level) -> Solution:
     if level in (STANDARD, BLUNT):
         return solve(scene, model_plan(scene, strain=strain), estimate_error=True)
     return solved_at(scene, level, strain=strain)
-
-
-def _truth(kind: ModelKind, scene: Scene) -> tuple[Level | None, dict[str, float]]:
-    """Return the best level that can be had, and its numbers; in finite strain without what it errs in small."""
-    plan = model_plan(scene, strain="finite" if kind.is_finite else "small")
-    for level in kind.truths:
-        fine = replace(plan, grading=level.grading, order=level.order, mesh="remeshed")
-        try:
-            solution = solve(scene, fine)
-        except PressFailed:
-            continue
-        found = numbers(solution.rays, solution.pressed, solution.baseline)
-        if not kind.is_finite:
-            return level, found
-        errs = _small_strain_errors(scene, level)
-        return level, {name: value / (1 + errs[name]) for name, value in found.items()}
-    return None, {}
-
-
-def _small_strain_errors(scene: Scene, level: Level) -> dict[str, float]:
-    """Return by how much a mesh for finite strain errs in small strain; relative, with its sign."""
-    plan = replace(model_plan(scene), mesh="remeshed")
-    light = scene.with_press(lightened(scene.press))
-    pair = []
-    for one in (level, Level(GRADED, 6)):
-        solution = solve(light, replace(plan, grading=one.grading, order=one.order))
-        pair.append(numbers(solution.rays, solution.pressed, solution.baseline))
-    same_mesh, true = pair
-    return {name: same_mesh[name] / value - 1 if value else 0.0 for name, value in true.items()}
 
 
 def chapter_of(found: Sequence[ErrorStatement]) -> Chapter:

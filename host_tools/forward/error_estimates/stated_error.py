@@ -42,6 +42,9 @@ ROUNDING = 1e-12
 CANCELLING = ("total_deformation_mm3", "deformation_area_mm2")
 """At equal force the total all but cancels, and the area steps when the half maximum leaves the window."""
 
+CANCELLING_UNDER_FORCE = "total_deformation_mm3"
+"""At equal force what the centre gains the rim loses: its relative error says nothing, and counts nowhere."""
+
 
 def stated_error(
     plan: ModelPlan, rays: Rays, pressed: Loaded, baseline: Loaded, *, by_force: bool = False

@@ -52,7 +52,7 @@ class PathEnded(PressFailed):
         self.reached_mm, self.reached_n = reached_mm, reached_n
         super().__init__(
             f"{asked}, but the press could be followed only to {reached_mm:.4g} mm and {reached_n:.4g} N ({why}): "
-            "press less, or make the elements at the rims larger."
+            "press less."
         )
 
 

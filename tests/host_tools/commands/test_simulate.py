@@ -60,7 +60,7 @@ def test_the_poisson_ratio_of_everything_can_be_given():
 
 
 def test_strain_is_chosen_by_the_tolerance_unless_it_is_told():
-    """At 1 mm small strain departs by 5.7 %: enough for 20 %, and not for 5 %."""
+    """At 1 mm small strain departs by 3.7 %, and states 7.3 %: enough for 20 %, and not for 5 %."""
     by_tolerance = {
         asked: json.loads(run_toolkit("simulate", *INCLUSION, "--tolerance", asked, "--json").stdout)
         for asked in ("20%", "5%")
@@ -75,7 +75,7 @@ def test_a_scene_that_finite_strain_does_not_serve_is_refused_unless_small_strai
     """A Poisson ratio that locks: errors of the mesh alone would be within 1 %, those of the model are not."""
     refused = run_toolkit("simulate", *INCLUSION, "--poisson", "0.4995", "--tolerance", "1%")
     assert (refused.returncode, refused.stdout) == (1, "")
-    assert "small strain departs from finite strain by about" in refused.stderr
+    assert "small strain may depart from finite strain by" in refused.stderr
     assert "--strain small" in refused.stderr
 
 
@@ -129,7 +129,7 @@ def test_what_is_stated_is_within_the_tolerance_and_the_record_says_so():
         ),
         (("--scene", "nowhere.toml"), "nowhere.toml"),
         ((*INCLUSION, "--force-n", "100", "--strain", "small"), "force_n is 100 N, but must be below 3.0"),
-        ((*INCLUSION, "--force-n", "100"), "force_n is 100, but the press could be followed only to"),
+        ((*INCLUSION, "--force-n", "100"), "force_n is 100 N, but must be below 3.1"),
     ],
 )
 def test_what_cannot_be_solved_is_refused_in_one_sentence(options, words):

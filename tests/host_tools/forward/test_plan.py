@@ -6,9 +6,9 @@ import pytest
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from host_tools.forward.accuracy import accuracy_table
-from host_tools.forward.plan import STANDARD, aligned, model_plan
+from host_tools.forward.plan import GRADED, STANDARD, aligned, model_plan
 from host_tools.forward.solve import solve
-from host_tools.scenes.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
+from host_tools.scenes.scene import Placement, Scene, Tissue, TissueLayer, Waveguide
 
 INCLUSION = Inclusion(10.0, 6.0, 80.0)
 SQUARE, DOMED, EDGE = Waveguide(face="square"), Waveguide(dome_mm=0.5), Tissue(edge_mm=20.0)
@@ -77,7 +77,7 @@ def test_what_is_promised_is_kept(truth):
     scene = Scene(Inclusion(*truth))
     plan = model_plan(scene, tolerance=0.005)
     found = solve(scene, plan)
-    finest = solve(scene, replace(plan, mesh="remeshed", grading="finest", order=4))
+    finest = solve(scene, replace(plan, mesh="remeshed", grading=GRADED, order=7))
     assert found.force_n == pytest.approx(finest.force_n, rel=0.005)
     assert found.inclusion_field.max_deformation_mm == pytest.approx(
         finest.inclusion_field.max_deformation_mm, rel=0.005
@@ -93,20 +93,6 @@ def test_what_is_promised_is_kept(truth):
 def test_without_a_tolerance_every_scene_gets_the_same_level():
     plans = [model_plan(Scene(Inclusion(size, 6.0, 80.0))) for size in (1.0, 5.0, 20.0)]
     assert {(plan.grading, plan.order) for plan in plans} == {STANDARD}
-
-
-def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
-    light, deep = Press(indentation_mm=0.05), Press(indentation_mm=3.0)
-    assert model_plan(Scene(INCLUSION, light), strain="auto", tolerance=0.02).strain == "small"
-    plan = model_plan(Scene(INCLUSION, deep), strain="auto", tolerance=0.02)
-    assert (plan.strain, plan.contact) == ("finite", "true_sliding")
-    assert "more than the tolerance" in plan.reasons["strain"]
-
-
-def test_off_the_axis_auto_stays_small_and_says_what_that_costs():
-    plan = model_plan(Scene(INCLUSION, Press(indentation_mm=3.0), placement=Placement(6.0)), strain="auto")
-    assert plan.strain == "small"
-    assert "axisymmetric" in plan.reasons["strain"]
 
 
 @pytest.mark.parametrize(
@@ -126,4 +112,4 @@ def test_finite_strain_is_refused_where_no_model_has_it(scene, quantity):
 def test_the_tables_were_measured_by_the_command_they_name():
     table = accuracy_table()
     assert table["command"] == "host_tools verify --tables"
-    assert {"axisymmetric", "solid", "finite", "small_strain_departure"} <= table.keys()
+    assert {"axisymmetric", "solid", "finite"} <= table.keys()

@@ -43,8 +43,34 @@ def test_an_unknown_chapter_is_refused_before_anything_runs(fakes):
     result = run("--only", "patch", "--only", "nothing")
     assert isinstance(result.exception, InvalidQuantity)
     assert "nothing" in str(result.exception)
-    assert "patch, hertz" in str(result.exception)
+    assert "patch, hertz, extremes" in str(result.exception)
     assert fakes == []
+
+
+def test_a_longer_chapter_is_run_by_its_name_with_its_own_scenes(fakes, monkeypatch):
+    drawn = []
+
+    def fake(**asked):
+        drawn.append(asked)
+        return Chapter("Tolerances", "", "", (at_most("case", "noise", 0.5, 1.0),))
+
+    monkeypatch.setattr(chapters, "EXTRA_CHAPTERS", {"tolerances": fake})
+    assert run("--only", "tolerances", "--scenes", "7", "--seed", "3").exit_code == 0
+    assert (drawn, fakes) == ([{"scenes": 7, "seed": 3}], [])
+    refused = run("--only", "patch", "--scenes", "7")
+    assert isinstance(refused.exception, InvalidQuantity)
+    assert "given with --tolerances" in str(refused.exception)
+
+
+def test_chapters_that_are_not_measured_stay_on_the_page_with_how_they_were(fakes, tmp_path):
+    out = tmp_path / "verification.md"
+    for name in ("patch", "hertz"):
+        run("--only", name, "--out", str(out))
+    for line in (
+        "- patch: measured by `host_tools verify --only patch ",
+        "- hertz: measured by `host_tools verify --only h",
+    ):
+        assert line in out.read_text()
 
 
 def test_the_document_repeats_the_command(fakes, tmp_path):
