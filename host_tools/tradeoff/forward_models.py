@@ -186,7 +186,7 @@ EqualError = tuple[str, float, float, float]
 
 
 def equal_errors(panels: Sequence[Panel]) -> list[EqualError]:
-    """Return title, error, and the least cost of ours, which states none either, and of CalculiX, where both hold it."""
+    """Return title, error, and the least cost that holds it of ours, without a stated error, and of CalculiX."""
     rows = []
     for panel in panels:
         for error in EQUAL_ERRORS:
