@@ -79,7 +79,8 @@ def tradeoff(
         print_table(timed.chapter.tables[0])
     if out:
         chosen = "".join(f" --only {name}" for name in only or []) + (" --short" if short else "")
-        write_page(out, Results("tradeoff", f"host_tools tradeoff --out {shown(out)}{chosen}", measured))
+        results = Results("tradeoff", f"host_tools tradeoff --out {shown(out)}{chosen}", measured)
+        write_page(out, results.in_chapters(out, list(chapters)))
         note.print(f"{out} written.")
     if missed:
         raise typer.Exit(1)

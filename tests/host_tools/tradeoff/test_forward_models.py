@@ -1,0 +1,47 @@
+"""The front of the forward models: levels that commands choose, timed with and without their stated error."""
+
+import pytest
+
+from host_tools.forward.ladder import FINITE_RUNGS
+from host_tools.forward.plan import BLUNT, GRADED, STANDARD
+from host_tools.tradeoff.forward_models import (
+    CALCULIX,
+    SHORT,
+    STATING,
+    WITHOUT,
+    cases,
+    equal_errors,
+    measured,
+)
+from host_tools.tradeoff.fronts import Panel
+from host_tools.tradeoff.pareto import Choice
+
+
+def test_every_level_is_one_that_a_command_can_choose():
+    for case in cases():
+        for strain, level in case.levels:
+            climbed = level in FINITE_RUNGS if strain == "finite" else level.grading == GRADED
+            assert climbed or level in (STANDARD, BLUNT)
+            assert level not in case.truths
+
+
+def test_a_level_errs_the_same_with_its_stated_error_and_without():
+    panel, benchmark = measured(SHORT[0], repeats=1)
+    by_way = {(one.name, one.family): one.error for one in panel.choices}
+    names = {name for name, _ in by_way}
+    assert len(names) == len(SHORT[0].levels)
+    for name in names:
+        assert by_way[name, STATING] == pytest.approx(by_way[name, WITHOUT], rel=1e-6)
+    assert by_way["small strain, graded 4", STATING] < by_way["small strain, graded 3", STATING]
+    assert benchmark.passed
+
+
+def test_calculix_is_compared_with_ours_where_neither_states_an_error():
+    choices = (
+        Choice("graded 3", STATING, 1.0, 0.004),
+        Choice("graded 3", WITHOUT, 2.0, 0.004),
+        Choice("rim 0.3", CALCULIX, 5.0, 0.02),
+        Choice("rim 0.1", CALCULIX, 8.0, 0.004),
+    )
+    found = equal_errors([Panel("a scene", "error", choices)])
+    assert found == [("a scene", 0.02, 2.0, 5.0), ("a scene", 0.01, 2.0, 8.0), ("a scene", 0.005, 2.0, 8.0)]
