@@ -78,7 +78,8 @@ class ModeModels(NamedTuple):
 
     def _unavailable(self, mode: Mode) -> InvalidQuantity:
         available = ", ".join(self.modes)
-        return InvalidQuantity("mode", mode, f"one of {available}", "choose one of them, or install its model")
+        action = "choose one of them, install its model, or commission the probe"
+        return InvalidQuantity("mode", mode, f"one of {available}", action)
 
 
 def mode_of_recording(recording: Recording) -> Mode:
