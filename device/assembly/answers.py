@@ -23,6 +23,7 @@ from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode, ModeWorth
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice
 from device.records.calibrations import Calibrations
@@ -49,13 +50,14 @@ def require_own(calibration: Calibration, config: Config, bundle: ModelBundle) -
 
 def _foreign(calibration: Calibration, config: Config, bundle: ModelBundle) -> Iterator[InvalidQuantity]:
     yield from calibration.foreign(config.serial, bundle)
-    if not calibration.holds_at(config.press.target_n):
-        bound = f"{calibration.force_n:g} N as calibrated"
+    lines = calibration.lines
+    if lines and not lines.holds_at(config.press.target_n):
+        bound = f"{lines.force_n:g} N as calibrated"
         action = "set that force, or calibrate with this one"
         yield InvalidQuantity("press.target_n", config.press.target_n, bound, action)
     camera = config.camera
     yield from calibration.other_settings(
-        camera.scale,
+        CameraGeometry(camera.scale, camera.axis_x_mm, camera.axis_y_mm, camera.rim_distortion_percent),
         exposure_us=camera.exposure_us,
         gain=camera.gain,
         cell_counts_per_n=config.cell.sensitivity_counts_per_n,
@@ -101,12 +103,13 @@ class Answers(NamedTuple):
                 begin()
                 self.prove()
 
-        return Answers(self.modes, estimator, adviser, prove, self.worth, self.look_ahead)
+        return self._replace(estimator=estimator, adviser=adviser, prove=prove)
 
 
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
     """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
+    Mode paper is none of its modes where the certificate has no lines.
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
     ramps = RememberedRamps()
@@ -124,8 +127,10 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     def advise(recording: Recording) -> ScanAdvice:
         return models.advise(recording, certificate())
 
-    worth = {mode: models.worth(mode) for mode in models.modes}
-    return Answers(models.modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside)
+    has_lines = calibration is None or calibration.lines is not None
+    modes = tuple(mode for mode in models.modes if has_lines or mode != "paper")
+    worth = {mode: models.worth(mode) for mode in modes}
+    return Answers(modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside)
 
 
 def _prove(models: ModeModels) -> None:
