@@ -123,6 +123,7 @@ def test_the_daemon_takes_up_bundle_and_certificate_and_offers_what_they_are_for
     calibration = active_calibration(config, paper)
     answers = answers_for(config, paper, calibration)
     assert answers.modes == ("standard", "precise")
+    assert answers.expires_at == calibration.validity.expires_at
     moved = replace(config, camera=replace(config.camera, axis_x_mm=0.0))
     with pytest.raises(ForeignCalibration, match=r"camera\.axis_x_mm is 0, but must be -0\.2"):
         active_calibration(moved, paper)

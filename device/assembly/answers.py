@@ -70,7 +70,8 @@ def _nothing_to_prove() -> None:
 
 class Answers(NamedTuple):
     """The modes in which this probe has a model, what answers in them, what advises on a scan, what proves that both
-    still do, what each mode's answers are worth by its model card, and what reads a reference press before them."""
+    still do, what each mode's answers are worth by its model card, what reads a reference press before them, and until
+    when a commissioned model holds."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
@@ -78,6 +79,7 @@ class Answers(NamedTuple):
     prove: Callable[[], None] = _nothing_to_prove
     worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
     look_ahead: LookAhead = look_at_nothing
+    expires_at: str | None = None
 
     def require(self, mode: Mode) -> None:
         """Raise `ConfigError` when the settings ask for a mode that is not among them."""
@@ -130,7 +132,7 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     has_lines = calibration is None or calibration.lines is not None
     modes = tuple(mode for mode in models.modes if has_lines or mode != "paper")
     worth = {mode: models.worth(mode) for mode in modes}
-    return Answers(modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside)
+    return Answers(modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside, models.expires_at)
 
 
 def _prove(models: ModeModels) -> None:
