@@ -282,7 +282,9 @@ def _record(options: argparse.Namespace) -> int:
         print(f"{settings.warning.code} {settings.warning}", file=sys.stderr)
 
     def opened(phantom: PhantomTruth) -> PhantomPress:
-        pressed = scenario and scenario.on(phantom.inclusion, is_grid=phantom.is_grid)
+        pressed = scenario and scenario.on(
+            phantom.inclusion, is_grid=phantom.is_grid, tissue_kpa_mm=phantom.tissue_kpa_mm
+        )
         return open_phantom_press(settings.config, pressed)
 
     return run_record_command(options, opened)

@@ -70,7 +70,7 @@ def _paper_works(tables: ProbeTables, calibration: Calibration) -> Works:
     row = np.array([[0.05, 1.7, 57.0]])
     return {
         "frame: correction": (lambda: tactile_image(press, base, recording.camera.scale), None),
-        "frame: features": (lambda: extract_features(image, calibration.settings), None),
+        "frame: features": (lambda: extract_features(image, calibration.paper_lines.settings), None),
         "frame: 100 networks (ONNX)": (lambda: bundle.estimate(row), None),
         "press, mode paper: frames to an estimate": (lambda: estimate_paper(recording, bundle, calibration), None),
     }

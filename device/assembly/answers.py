@@ -23,6 +23,7 @@ from device.measurement.estimate import Estimate
 from device.measurement.mode import Mode, ModeWorth
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.camera_geometry import CameraGeometry
 from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice
 from device.records.calibrations import Calibrations
@@ -49,13 +50,14 @@ def require_own(calibration: Calibration, config: Config, bundle: ModelBundle) -
 
 def _foreign(calibration: Calibration, config: Config, bundle: ModelBundle) -> Iterator[InvalidQuantity]:
     yield from calibration.foreign(config.serial, bundle)
-    if not calibration.holds_at(config.press.target_n):
-        bound = f"{calibration.force_n:g} N as calibrated"
+    lines = calibration.lines
+    if lines and not lines.holds_at(config.press.target_n):
+        bound = f"{lines.force_n:g} N as calibrated"
         action = "set that force, or calibrate with this one"
         yield InvalidQuantity("press.target_n", config.press.target_n, bound, action)
     camera = config.camera
     yield from calibration.other_settings(
-        camera.scale,
+        CameraGeometry(camera.scale, camera.axis_x_mm, camera.axis_y_mm, camera.rim_distortion_percent),
         exposure_us=camera.exposure_us,
         gain=camera.gain,
         cell_counts_per_n=config.cell.sensitivity_counts_per_n,
@@ -68,7 +70,8 @@ def _nothing_to_prove() -> None:
 
 class Answers(NamedTuple):
     """The modes in which this probe has a model, what answers in them, what advises on a scan, what proves that both
-    still do, what each mode's answers are worth by its model card, and what reads a reference press before them."""
+    still do, what each mode's answers are worth by its model card, what reads a reference press before them, and until
+    when a commissioned model holds."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
@@ -76,6 +79,7 @@ class Answers(NamedTuple):
     prove: Callable[[], None] = _nothing_to_prove
     worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
     look_ahead: LookAhead = look_at_nothing
+    expires_at: str | None = None
 
     def require(self, mode: Mode) -> None:
         """Raise `ConfigError` when the settings ask for a mode that is not among them."""
@@ -101,12 +105,13 @@ class Answers(NamedTuple):
                 begin()
                 self.prove()
 
-        return Answers(self.modes, estimator, adviser, prove, self.worth, self.look_ahead)
+        return self._replace(estimator=estimator, adviser=adviser, prove=prove)
 
 
 def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
     """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
+    Mode paper is none of its modes where the certificate has no lines.
     Raises `BundleRefused` or `InvalidQuantity` when the model of another mode is there but does not hold.
     """
     ramps = RememberedRamps()
@@ -124,8 +129,10 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     def advise(recording: Recording) -> ScanAdvice:
         return models.advise(recording, certificate())
 
-    worth = {mode: models.worth(mode) for mode in models.modes}
-    return Answers(models.modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside)
+    has_lines = calibration is None or calibration.lines is not None
+    modes = tuple(mode for mode in models.modes if has_lines or mode != "paper")
+    worth = {mode: models.worth(mode) for mode in modes}
+    return Answers(modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside, models.expires_at)
 
 
 def _prove(models: ModeModels) -> None:

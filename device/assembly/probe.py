@@ -303,6 +303,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
     assert answers is not None
     assert watch is not None
     assert store is not None
+    watch.model_expires_at = answers.expires_at
     answers = answers.watched(progress, begin=partial(probe.faults.hold_up, "inference_frozen"))
     progress.exercise("inference", answers.prove)
     return Procedure(

@@ -113,9 +113,8 @@ def require_trained_for(recording: Recording, bundle: ModelBundle, calibration: 
     serials = bundle.card.get("serials", [])
     if recording.serial not in serials:
         expected = f"one of {', '.join(serials)}, which {bundle.name} is trained for"
-        raise InvalidQuantity(
-            "serial", recording.serial, expected, "press in mode paper, or train a model for this one"
-        )
+        action = "commission this probe with `host_tools commission`, and press in mode standard"
+        raise InvalidQuantity("serial", recording.serial, expected, action)
     expires_at = bundle.card.get("expires_at")
     if expires_at is not None and moment(recording.started_at, "started_at") > moment(expires_at, "expires_at"):
         action = "commission the probe again"

@@ -37,6 +37,11 @@ class ModeModels(NamedTuple):
         quick: tuple[Mode, ...] = ("quick",) if self.quick else ()
         return (*quick, *(RAMP_MODES if self.ramp else ()), "paper")
 
+    @property
+    def expires_at(self) -> str | None:
+        """Until when the model of force ramps holds (RFC 3339); None of one that was not commissioned, or none."""
+        return self.ramp.bundle.card.get("expires_at") if self.ramp else None
+
     def worth(self, mode: Mode) -> ModeWorth | None:
         """Return what the answers of a mode are worth by its model card, None when that does not say."""
         bundles = {"quick": self.quick and self.quick.bundle, "paper": self.paper}
@@ -78,7 +83,8 @@ class ModeModels(NamedTuple):
 
     def _unavailable(self, mode: Mode) -> InvalidQuantity:
         available = ", ".join(self.modes)
-        return InvalidQuantity("mode", mode, f"one of {available}", "choose one of them, or install its model")
+        action = "choose one of them, install its model, or commission the probe"
+        return InvalidQuantity("mode", mode, f"one of {available}", action)
 
 
 def mode_of_recording(recording: Recording) -> Mode:

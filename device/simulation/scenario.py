@@ -88,10 +88,27 @@ class Scenario:
         _ = self.world.lesion.skin(self.skin, 1.0)  # refuses an albedo above 1
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
 
-    def on(self, inclusion: Inclusion | None, *, is_grid: bool = False) -> Scenario:
-        """Return the scene pressed on an inclusion, on a block without one, or on its grid target."""
+    def on(
+        self,
+        inclusion: Inclusion | None,
+        *,
+        is_grid: bool = False,
+        tissue_kpa_mm: tuple[float, float] | None = None,
+    ) -> Scenario:
+        """Return the scene pressed on an inclusion, on a block without one, or on its grid target.
+
+        `tissue_kpa_mm` are modulus and thickness of the slab, the scene's unless given; raises `InvalidQuantity` for
+        tissue that the tables do not hold.
+        """
         grid = (self.grid or GridTarget()) if is_grid else None
-        return replace(self, inclusion=inclusion or NO_INCLUSION, grid=grid)
+        modulus_kpa, thickness_mm = tissue_kpa_mm or (self.tissue_modulus_kpa, self.slab_thickness_mm)
+        return replace(
+            self,
+            inclusion=inclusion or NO_INCLUSION,
+            grid=grid,
+            tissue_modulus_kpa=modulus_kpa,
+            slab_thickness_mm=thickness_mm,
+        )
 
     @property
     def slab(self) -> Slab:

@@ -4,17 +4,14 @@ Three straight lines map image features to deformation features; their leave-one
 residuals, put on scenes of the whole box and sent through the network, give the held-out scenes behind every interval.
 Source: Lee & Won 2013, section III (regressions on nine phantoms).
 
-The certificate holds what the untouched probe shows, dark and lit, with which each later start is compared. Beside the
-version, which many states of the sources share, it names one hash of the sources that run.
+What else a certificate holds: host_tools/calibration/certified_probe.py.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -25,20 +22,19 @@ from device.measurement.bundle import ModelBundle
 from device.measurement.calibration import (
     VALID_DAYS,
     Calibration,
-    Regression,
     Validity,
     certificate_id,
-    moment,
     written,
 )
 from device.measurement.paper_mode.estimate import PAPER_UNITS, image_features
 from device.measurement.paper_mode.features import FeatureSettings
 from device.measurement.paper_mode.intervals import HeldOut
+from device.measurement.paper_mode.lines import PaperLines, Regression
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
-from device.measurement.recording.tactile_image import Frame
-from device.measurement.recording.untouched_face import UntouchedFace, lit_counts, mean_led_ratio, side_levels, split
+from device.measurement.recording.untouched_face import UntouchedFace
 from device.simulation.physics.surface_table import SurfaceTable
+from host_tools.calibration.certified_probe import oldest_at, source_sha256, untouched_face
 from host_tools.calibration.gates import (
     Gate,
     age_gate,
@@ -54,53 +50,10 @@ from host_tools.forward.solve import solve
 from host_tools.scenes.phantom_set import INCLUSIONS_NEEDED
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("device", "host_tools")
-UNTOUCHED_RATIO = 0.05
-"""Reference frames at less than this part of the largest force are of the untouched probe."""
 A_YEAR_DAYS = 365.0
 HELD_OUT_SCENES = 1000
 WEAKEST_PEAK_MM = 5e-4
 """Inclusions with a lower peak are not answered (contrast below 0.2 %), so their area's error need not grow further."""
-
-
-def source_sha256() -> str:
-    """Return the hash over names and contents of all Python files of both packages, in the order of their names."""
-    digest = hashlib.sha256()
-    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
-        digest.update(f"{path.relative_to(ROOT).as_posix()}\0".encode())
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
-
-
-def untouched_face(recordings: Sequence[Recording]) -> UntouchedFace:
-    """Return what the untouched probe showed: the mean over recordings, and how much a frame's level scatters.
-
-    Light is a sum over the LEDs, each in proportion to its brightness: so the mean of frames of different brightness is
-    that of the mean brightness, but scatters more.
-    Raises `InvalidQuantity` when a recording has no dark, no unloaded lit or no pressed reference frames.
-    """
-    dark_counts, side_counts, pressed_counts = [], [], []
-    untouched: list[Frame] = []
-    for recording in recordings:
-        lit = [frame for frame in recording.with_role("reference") if any(frame.led_ratio)]
-        highest_n = max((frame.force_n for frame in lit), default=0.0)
-        pressed = [frame for frame in lit if frame.force_n > UNTOUCHED_RATIO * highest_n]
-        unloaded = [frame for frame in lit if frame.force_n <= UNTOUCHED_RATIO * highest_n]
-        dark, unloaded = split([*recording.with_role("dark"), *unloaded])
-        without = side_levels(dark).mean(axis=0)
-        dark_counts.append(float(without.mean()))
-        side_counts.append(lit_counts(unloaded, without))
-        pressed_counts.append(float(lit_counts(pressed, without).mean()))
-        untouched += unloaded
-    levels, led_ratio = np.concatenate(side_counts), mean_led_ratio(untouched)
-    return UntouchedFace(
-        dark_counts=round(float(np.mean(dark_counts)), 4),
-        side_counts=tuple(round(float(level), 4) for level in levels.mean(axis=0)),
-        spread_counts=round(float(levels.std(axis=0, ddof=1).max()), 4),
-        pressed_counts=round(float(np.mean(pressed_counts)), 4),
-        led_ratio=led_ratio[0] if len(set(led_ratio)) == 1 else led_ratio,
-    )
 
 
 @dataclass(frozen=True)
@@ -163,6 +116,14 @@ def calibrate(
     errors = scaled_errors(measured.fit.residuals, measured.fit.features[:, 0])
     first = recordings[0]
     assert first.cell is not None  # `unusable` has refused it otherwise
+    lines = PaperLines(
+        model_sha256=bundle.sha256,
+        model_card_sha256=bundle.card_sha256,
+        force_n=force_n,
+        settings=settings,
+        regressions=measured.fit.lines,
+        held_out=held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed),
+    )
     certificate = Calibration(
         id="",
         made_at=measured.made_at,
@@ -170,19 +131,14 @@ def calibrate(
         operator=stated.operator,
         serial=first.serial,
         phantom_serial=stated.phantom_serial or first.phantom_serial,
-        model_sha256=bundle.sha256,
-        model_card_sha256=bundle.card_sha256,
-        force_n=force_n,
         camera=first.camera,
         cell=first.cell,
         untouched=measured.untouched,
-        settings=settings,
-        regressions=measured.fit.lines,
         phantoms=len(recordings),
-        held_out=held_out_scenes(bundle, table, errors, force_n=force_n, seed=seed),
         software=__version__,
         software_sha256=source_sha256(),
         simulated=any(recording.simulated for recording in recordings),
+        lines=lines,
     )
     return Calibrated(replace(certificate, id=certificate_id(certificate)), measured.gates)
 
@@ -206,10 +162,9 @@ def _measured(
 
 def _validity(recordings: Sequence[Recording], valid_days: float | None) -> Validity:
     """Return the days from the first of the recordings: a calibration is as old as its oldest phantom."""
-    started = (moment(recording.started_at, f"started_at of {recording.id}") for recording in recordings)
     is_ageless = all(recording.simulated for recording in recordings)
     usual_days = VALID_DAYS.high if is_ageless else A_YEAR_DAYS
-    return Validity.of(written(min(started)), usual_days if valid_days is None else valid_days)
+    return Validity.of(oldest_at(recordings), usual_days if valid_days is None else valid_days)
 
 
 def _fit(recordings: Sequence[Recording], settings: FeatureSettings, force_n: float, bench: KnownBench) -> Fit:

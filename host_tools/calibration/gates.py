@@ -5,15 +5,16 @@ A calibration that fails any of them is rejected, with all that it fails at once
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from device.measurement.calibration import FORCE_TOLERANCE, Regression, Validity
+from device.measurement.calibration import Validity
 from device.measurement.estimate import SATURATED_RATIO
 from device.measurement.paper_mode.estimate import PAPER_UNITS
+from device.measurement.paper_mode.lines import FORCE_TOLERANCE, Regression
 from device.measurement.quantities import UNKNOWNS, Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import saturated_ratio
@@ -84,11 +85,7 @@ def unusable(recordings: Sequence[Recording], force_n: float) -> list[InvalidQua
     problems: list[InvalidQuantity] = []
     for recording in recordings:
         problems += _unusable(recording, force_n)
-    for quantity, values, action in _must_agree(recordings):
-        if len(set(values)) > 1:
-            found = " and ".join(sorted({str(value) for value in values}))
-            problems.append(InvalidQuantity(quantity, found, "the same in all recordings", action))
-    return problems
+    return [*problems, *disagreements(recordings)]
 
 
 def _unusable(recording: Recording, force_n: float) -> list[InvalidQuantity]:
@@ -114,6 +111,14 @@ def _unusable(recording: Recording, force_n: float) -> list[InvalidQuantity]:
     return problems
 
 
+def disagreements(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:
+    """Yield what recordings of one probe's calibration must have in common, and do not."""
+    for quantity, values, action in _must_agree(recordings):
+        if len(set(values)) > 1:
+            found = " and ".join(sorted({str(value) for value in values}))
+            yield InvalidQuantity(quantity, found, "the same in all recordings", action)
+
+
 def _must_agree(recordings: Sequence[Recording]) -> Iterable[tuple[str, list[object], str]]:
     yield "serial", [one.serial for one in recordings], "calibrate each probe on its own"
     yield "camera", [one.camera for one in recordings], "record all phantoms with the same settings"
@@ -129,11 +134,15 @@ def number_gate(recordings: Sequence[Recording]) -> Gate:
 
 def recording_gates(recordings: Sequence[Recording], untouched: UntouchedFace) -> list[Gate]:
     """Return the gates of what was recorded, before anything is fitted; the recordings are usable."""
+    spreads = _spread_gates([one.truth for one in recordings if one.truth])
+    return [number_gate(recordings), *spreads, *light_gates(recordings, untouched)]
+
+
+def light_gates(recordings: Sequence[Recording], untouched: UntouchedFace) -> list[Gate]:
+    """Return the gates of the light in the recordings: none from outside, and no more than the camera can count."""
     saturated = max(saturated_ratio(frame.counts) for one in recordings for frame in one.frames)
     dark, full = Bound(0.0, MAX_DARK_COUNTS, "counts"), Bound(0.0, SATURATED_RATIO, "")
     return [
-        number_gate(recordings),
-        *_spread_gates([one.truth for one in recordings if one.truth]),
         Gate("dark level", untouched.dark_counts, dark, "shade the probe, and record anew"),
         Gate("saturated pixels", saturated, full, "lower the light, and record anew"),
     ]

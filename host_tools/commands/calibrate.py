@@ -6,6 +6,7 @@ Either is written once, or all that speaks against it is told.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,7 @@ from host_tools.commands.output import note, problem_record
 from host_tools.commands.probe import ProbeOption, probe_with_tables
 
 if TYPE_CHECKING:
+    from device.measurement.calibration import Calibration
     from host_tools.calibration.calibrate import Calibrated
     from host_tools.calibration.gates import Gate
     from host_tools.calibration.known_bench import OnBench
@@ -124,7 +126,7 @@ def _show(done: Calibrated, path: Path) -> None:
     from device.measurement.paper_mode.features import FEATURE_NAMES
 
     certificate = done.certificate
-    for image, line, name in zip(FEATURE_NAMES, certificate.regressions, PAPER_UNITS, strict=True):
+    for image, line, name in zip(FEATURE_NAMES, certificate.paper_lines.regressions, PAPER_UNITS, strict=True):
         law = f"{name} = {line.slope:.4g} {image} {line.intercept:+.3g}"
         print(f"{law:76} R2 {line.r_squared:.5f}  leave-one-out {line.leave_one_out_std:.3g}")
     for gate in done.gates:
@@ -150,21 +152,25 @@ def commission(
     table: Annotated[Path, typer.Option(help="Folder of the design's tables and derivatives.")] = SIMULATED_PROBE,
     valid_days: Annotated[float, typer.Option(help="Days until the probe is to be commissioned again.")] = 365.0,
     seed: Annotated[int, typer.Option(help="Seed of the presses that limits and the card are made of.")] = 1,
+    operator: Annotated[str, typer.Option(help="Who commissions.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
 ) -> None:
     """Find out what a probe is from its ramps on phantoms, and make its modes standard and precise of the design's.
 
     Each phantom is also answered as unknown, by a probe commissioned without it. Gates of misfit and coverage of these,
     and of how far the probe lies from its design, must be passed; otherwise nothing is written and the exit code is 1.
+    The probe's certificate stands in the same folder, where the recordings show its untouched face.
     Some two minutes on two cores.
     """
     from datetime import UTC, datetime
 
     from device.files.bundle_file import read_ramp_model
     from device.files.recording_file import read_recording
+    from device.measurement.calibration import written
     from host_tools.calibration.gates import CalibrationRejected
     from host_tools.commissioning.commission import commission as run_commission
-    from host_tools.commissioning.own_bundle import write_own_bundle
+    from host_tools.commissioning.own_bundle import CERTIFICATE_FILE, write_own_bundle
+    from host_tools.commissioning.own_certificate import own_certificate
     from host_tools.commissioning.phantom_ramps import phantom_ramps
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
@@ -176,8 +182,11 @@ def commission(
     made_by, stated = probe_of(probe), read_phantoms(phantoms, blocks_needed=BLOCKS_NEEDED)
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
+    made, made_at = [read_recording(path) for path in recordings], datetime.now(UTC)
+    said_by = {"phantom_serial": stated.serial, "operator": operator, "made_at": written(made_at)}
     try:
-        ramps = phantom_ramps([read_recording(path) for path in recordings], names, stated, made_by)
+        ramps = phantom_ramps(made, names, stated, made_by)
+        certificate = _or_why_not(lambda: own_certificate(made, names, made_by, **said_by, valid_days=valid_days))
         done = run_commission(ramps, model, derivatives, seed=seed, say=note.print)
     except CalibrationRejected as rejection:
         if not as_json:
@@ -189,19 +198,33 @@ def commission(
         design,
         out,
         serial=made_by.serial,
-        made_at=datetime.now(UTC),
+        made_at=made_at,
         valid_days=valid_days,
         command=f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}",
         origin={"phantoms": stated.serial, "design": model.bundle.name},
+        certificate=certificate,
     )
     if as_json:
-        print(json.dumps({"accepted": True, "path": str(out), "gates": [gate.as_record() for gate in done.gates]}))
+        gates = [gate.as_record() for gate in done.gates]
+        path = str(out / CERTIFICATE_FILE) if certificate else None
+        print(json.dumps({"accepted": True, "path": str(out), "certificate": path, "gates": gates}))
     else:
-        _show_commissioned(done, out)
+        _show_commissioned(done, out, certificate)
 
 
-def _show_commissioned(done: CommissionedProbe, out: Path) -> None:
+def _or_why_not(certify: Callable[[], Calibration]) -> Calibration | None:
+    """Return the certificate; where recordings do not make one, tell everything that they lack."""
+    try:
+        return certify()
+    except InvalidQuantity as refusal:
+        note.print("The bundle gets no certificate, and the daemon takes no press without one:")
+        note.print(str(refusal), soft_wrap=True)
+        return None
+
+
+def _show_commissioned(done: CommissionedProbe, out: Path, certificate: Calibration | None) -> None:
     from host_tools.commissioning.joint_fit import PROBE
+    from host_tools.commissioning.own_bundle import CERTIFICATE_FILE
     from host_tools.commissioning.report import phantom_lines, probe_lines
 
     for line in (*probe_lines(done.fit, PROBE), *phantom_lines(done.phantoms)):
@@ -209,3 +232,5 @@ def _show_commissioned(done: CommissionedProbe, out: Path) -> None:
     for gate in done.gates:
         print(_gate_line(gate))
     print(f"bundle in {out}: set standard_model to it, and serial to the probe's own")
+    if certificate:
+        print(f"certificate in it until {certificate.validity.expires_at}: set calibration to {out / CERTIFICATE_FILE}")

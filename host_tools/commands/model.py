@@ -87,6 +87,9 @@ def phantom(
     scenes: Annotated[int, typer.Option(help="How many random phantoms.")] = 20,
     scenario: Annotated[Path | None, typer.Option(help="Scenario file: what the probe is made of.")] = None,
     force_n: Annotated[list[float] | None, typer.Option(help="Force of the press; repeat for a ramp.")] = None,
+    ramp: Annotated[
+        bool, typer.Option("--ramp", help="Press the ramp of mode standard: ten frames from 0.08 to 0.60 N.")
+    ] = False,
     offset_mm: Annotated[float, typer.Option(help="How far beside the lesion's middle it is pressed.")] = 0.0,
     model: Annotated[Path, typer.Option(help="Bundle whose phantom scenes to record.")] = MODELS / "paper",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
@@ -94,6 +97,10 @@ def phantom(
     probe: ProbeOption = None,
     phantoms: Annotated[
         Path | None, typer.Option(help="File of the phantoms to record instead of a set, phantoms.toml.")
+    ] = None,
+    camera_of: Annotated[
+        Path | None,
+        typer.Option(help="The probe's file whose camera geometry the recordings state, once a grid target told it."),
     ] = None,
     grid: Annotated[int | None, typer.Option(help="Record a grid target instead, so many times.")] = None,
     pitch_mm: Annotated[float, typer.Option(help="Distance of the grid's dots.")] = 2.0,
@@ -112,13 +119,19 @@ def phantom(
     from device.simulation.scenario import Scenario, read_scenario
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
+    from host_tools.press_models.recorded_presses import protocol_of
+    from host_tools.scenes.probe_file import probe_of
 
     require(
         "offset_mm", offset_mm, Bound(-FARTHEST_MM, FARTHEST_MM, "mm"), "press on the lesion, or a little beside it"
     )
     made_of = read_scenario(scenario) if scenario else Scenario()
-    protocol = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
+    if ramp and force_n:
+        raise InvalidQuantity("force_n", force_n, "not given with --ramp", "give one of them")
+    held = PhantomProtocol(tuple(force_n or [TARGET_N]), place=ProbePlacement(x_mm=offset_mm))
+    protocol = protocol_of("standard", offset_mm, 0.0) if ramp else held
     tables, made_by = ProbeTables.load(table), probe_with_tables(probe, table)
+    stated_by = probe_of(camera_of) if camera_of else None
     if grid is not None:
         _record_grid(out, grid, pitch_mm, play_mm, made_of, tables, seed, made_by)
         return
@@ -134,7 +147,8 @@ def phantom(
             ramps=one.ramps(),
             probe=made_by,
         )
-        known = replace(recording, truth=one.truth, phantom_serial=one.set_serial)
+        camera = recording.camera.seen_as(stated_by.geometry) if stated_by else recording.camera
+        known = replace(recording, truth=one.truth, phantom_serial=one.set_serial, camera=camera)
         write_recording(known, out / one.name)
         note.print(f"{out / one.name}: {_told(one.truth)}")
 

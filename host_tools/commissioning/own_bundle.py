@@ -1,5 +1,7 @@
 """A commissioned probe to the bundle of its modes standard and precise: the design's, with what is its own.
 
+Its certificate stands in the same folder, and both hold until the same moment.
+
 Networks, polynomials and the camera's noise are the design's, to the byte. Serial, what is believed of the probe,
 limits, and what the answers are worth are its own. Source of the format: the model bundle of docs/contracts.md.
 """
@@ -17,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from device.measurement.bundle import CARD_FILE
+from device.measurement.calibration import Calibration, written
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
@@ -28,6 +31,7 @@ from host_tools.press_models.mode_statistics import reachable_half_width, statis
 
 VALID_DAYS = Bound(1.0, 730.0, "days")
 """How long a commissioning may hold: silicone stiffens, LEDs fade."""
+CERTIFICATE_FILE = "calibration.json"
 OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width"
 """What a card says of the design's own probe, and of no other."""
 
@@ -42,9 +46,11 @@ def write_own_bundle(
     valid_days: float,
     command: str,
     origin: dict[str, str],
+    certificate: Calibration | None = None,
 ) -> None:
     """Write the bundle of a probe to a new folder, from the design's in `design`; whole or not at all.
 
+    With a certificate the bundle holds as long as that, else for `valid_days` from `made_at`.
     Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
     """
     require("valid_days", valid_days, VALID_DAYS, "commission again before that")
@@ -56,7 +62,7 @@ def write_own_bundle(
         "serials": [serial],
         "training_command": command,
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
-        "expires_at": (made_at + timedelta(days=valid_days)).isoformat(timespec="seconds").replace("+00:00", "Z"),
+        "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
         "commissioned": _record(done, made_at, origin),
     }
     for mode, presses in (("standard", done.presses), ("precise", done.scans)):
@@ -66,14 +72,15 @@ def write_own_bundle(
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
     names = (*(name for name in files if name.endswith(".onnx")),)
     assert RANGE_FILE in names
-    write_folder(folder, {name: files[name] for name in names} | {SURROGATE_FILE: surrogate, CARD_FILE: text})
+    kept_files = {name: files[name] for name in names} | {SURROGATE_FILE: surrogate, CARD_FILE: text}
+    write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))
 
 
 def _record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:
     """Return what the card says of the commissioning: the probe, its model error, phantoms left out, gates."""
     std = np.sqrt(np.diag(done.fit.covariance))
     return {
-        "made_at": made_at.isoformat(timespec="seconds").replace("+00:00", "Z"),
+        "made_at": written(made_at),
         **origin,
         **done.fit.believed._asdict(),
         "probe": {

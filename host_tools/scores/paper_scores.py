@@ -51,7 +51,7 @@ class Rig:
 
     def features(self, truth: Inclusion) -> Array:
         """Return the exact deformation features [3] of a press with the certificate's force."""
-        return as_row(solve(Scene(truth, Press(force_n=self.calibration.force_n))).inclusion_field)
+        return as_row(solve(Scene(truth, Press(force_n=self.calibration.paper_lines.force_n))).inclusion_field)
 
     def through_camera(self, truth: Inclusion, seed: int) -> Estimate:
         """Return the device's answer to a recording with fresh noise."""
@@ -90,9 +90,9 @@ def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) ->
 
     The paper fits its regressions on the very inclusions that it scores; here that would flatter the size by a third.
     """
-    settings = rig.calibration.settings
+    calibrated = rig.calibration.paper_lines
     first, fresh = (
-        [image_features(rig.recording(p, s + i), settings) for i, p in enumerate(phantoms)]
+        [image_features(rig.recording(p, s + i), calibrated.settings) for i, p in enumerate(phantoms)]
         for s in (seed, seed + len(phantoms))
     )
     image = np.array([rows.mean(axis=0) for rows in first])
@@ -101,7 +101,7 @@ def left_out_estimates(rig: Rig, phantoms: Sequence[Inclusion], *, seed: int) ->
     for i, rows in enumerate(fresh):
         others = np.arange(len(phantoms)) != i
         lines = tuple(fit_line(x, y)[0] for x, y in zip(image[others].T, exact[others].T, strict=True))
-        features = replace(rig.calibration, regressions=lines).deformation_features(rows)
+        features = replace(calibrated, regressions=lines).deformation_features(rows)
         estimates.append(rig.bundle.estimate(features).estimate.mean(axis=0))
     return np.array(estimates)
 

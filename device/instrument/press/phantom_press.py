@@ -35,12 +35,14 @@ log = logging.getLogger(__name__)
 class PhantomTruth:
     """What is pressed: its inclusion, None in a bare block, and the serial number of its set, empty if it has none.
 
-    A grid target has none either; `is_grid` says that its plates lie in oil.
+    A grid target has none either; `is_grid` says that its plates lie in oil. `tissue_kpa_mm` are modulus and thickness
+    where they are known: a virtual probe is pressed on such tissue.
     """
 
     inclusion: Inclusion | None
     serial: str = ""
     is_grid: bool = False
+    tissue_kpa_mm: tuple[float, float] | None = None
 
 
 class PhantomPress:

@@ -7,6 +7,7 @@ yet is warned of and measured with: the weight of a tilted probe is enough force
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from device.errors import (
@@ -19,7 +20,7 @@ from device.errors import (
     SlightDriftError,
     UncheckedCalibration,
 )
-from device.measurement.calibration import Calibration
+from device.measurement.calibration import Calibration, days_between
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.tactile_image import Frame
 from device.measurement.recording.untouched_face import Drift
@@ -31,6 +32,7 @@ UNTOUCHED_N = 0.01
 SOON_DAYS = 30.0
 OWN_WARNINGS = (CalibrationEndsSoon, SlightDriftError, UncheckedCalibration)
 CALIBRATE = "Calibrate the probe and activate the new certificate, then start the daemon again."
+COMMISSION = "Commission the probe again and set standard_model to the new bundle, then start the daemon again."
 WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
 FREE = (
     "Let nothing touch the probe; if the force stays, the load cell's zero is off by it: "
@@ -39,11 +41,15 @@ FREE = (
 
 
 class CalibrationWatch:
-    """Judges the certificate that the daemon started with, or the lack of one."""
+    """Judges the certificate that the daemon started with, or the lack of one.
+
+    `model_expires_at` is until when a commissioned model holds, None where there is none.
+    """
 
     def __init__(self, calibration: Calibration | None) -> None:
         """Take the certificate, None for a probe that was never calibrated."""
         self.calibration = calibration
+        self.model_expires_at: str | None = None
         self._ending: CalibrationEndsSoon | None = None
         self._drift: SlightDriftError | LargeDriftError | None = None
         self._unchecked: UncheckedCalibration | None = None
@@ -67,11 +73,17 @@ class CalibrationWatch:
         if validity.is_before(now):
             cause = f"The clock says {now[:10]}, before the calibration of {validity.measured_at[:10]}."
             raise ClockBehindError(cause, "Set the board's clock, and check its time server.")
+        model_days = days_between(now, self.model_expires_at) if self.model_expires_at else math.inf
         days_left = validity.days_left(now)
+        if model_days < 0:  # a commissioned probe's certificate ends with it
+            raise ExpiredCalibration(f"The commissioned model has expired on {self.model_expires_at}.", COMMISSION)
         if days_left < 0:
             raise ExpiredCalibration(f"The calibration has expired on {validity.expires_at}.", CALIBRATE)
         self._ending = None
-        if days_left < SOON_DAYS:
+        if model_days <= days_left and model_days < SOON_DAYS:
+            cause = f"The commissioned model expires on {self.model_expires_at}, in {model_days:.0f} days."
+            self._ending = CalibrationEndsSoon(cause, "Commission the probe before that day.")
+        elif days_left < SOON_DAYS:
             cause = f"The calibration expires on {validity.expires_at}, in {days_left:.0f} days."
             self._ending = CalibrationEndsSoon(cause, "Calibrate the probe before that day.")
 

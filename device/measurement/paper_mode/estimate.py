@@ -30,6 +30,7 @@ from device.measurement.estimate import (
 )
 from device.measurement.feature_definitions import INCLUSION_FIELD_FEATURES, units_of
 from device.measurement.paper_mode.features import FEATURE_NAMES, FeatureSettings, extract_features
+from device.measurement.paper_mode.lines import PaperLines
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
 
@@ -44,9 +45,11 @@ VISIBLE_CONTRAST = 0.002
 def estimate_paper(recording: Recording, bundle: ModelBundle, calibration: Calibration) -> Estimate:
     """Return the estimate of a recording in mode paper.
 
-    Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe.
+    Raises `InvalidQuantity` when the recording lacks a role, or the calibration is not for this model or probe, or has
+    no lines.
     """
     calibration.require_for(recording.serial, bundle)
+    lines = calibration.paper_lines
     origin = origin_of(recording, "paper", bundle, calibration)
     press = recording.with_role("press")
     if not press:
@@ -55,18 +58,16 @@ def estimate_paper(recording: Recording, bundle: ModelBundle, calibration: Calib
     if force_n < CONTACT_N:
         reason = f"The mean force is {force_n:.3f} N, below {CONTACT_N} N: press the lesion."
         return without_numbers("no_contact", reason, origin)
-    if not calibration.holds_at(force_n):
-        reason = (
-            f"The mean force is {force_n:.3f} N, not the {calibration.force_n:g} N of the calibration: press again."
-        )
+    if not lines.holds_at(force_n):
+        reason = f"The mean force is {force_n:.3f} N, not the {lines.force_n:g} N of the calibration: press again."
         return without_numbers("rejected", reason, origin)
     if reason := saturation(recording):
         return without_numbers("saturated", reason, origin)
-    image_rows = image_features(recording, calibration.settings)
+    image_rows = image_features(recording, lines.settings)
     if float(image_rows[:, 0].mean()) < VISIBLE_CONTRAST:
         features = with_critical(_named(FEATURE_NAMES, image_rows), {FEATURE_NAMES[0]: VISIBLE_CONTRAST})
         return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features)
-    return _answer(image_rows, bundle, calibration, origin)
+    return _answer(image_rows, bundle, lines, origin)
 
 
 def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[np.float64]:
@@ -74,13 +75,13 @@ def image_features(recording: Recording, settings: FeatureSettings) -> NDArray[n
     return np.array([extract_features(image, settings).as_row() for image in recording.press_images()])
 
 
-def _answer(image_rows: NDArray[np.float64], bundle: ModelBundle, calibration: Calibration, origin: Origin) -> Estimate:
-    rows = calibration.deformation_features(image_rows)
+def _answer(image_rows: NDArray[np.float64], bundle: ModelBundle, lines: PaperLines, origin: Origin) -> Estimate:
+    rows = lines.deformation_features(image_rows)
     features = _named(FEATURE_NAMES, image_rows) | _named(bundle.feature_names, rows)
     estimates = bundle.estimate(rows).estimate.astype(float)
     if outside := outside_training(bundle, rows.mean(axis=0)):
         return without_numbers("outside_range", f"{UNKNOWN_IMAGE} {NO_NUMBERS}", origin, features | outside)
-    mean, held_out = estimates.mean(axis=0), calibration.held_out
+    mean, held_out = estimates.mean(axis=0), lines.held_out
     interval, box = held_out.interval(mean), (held_out.box_low, held_out.box_high)
     numbers = Numbers(mean, _scatter(estimates), interval.low, interval.high, interval.identifiable, *box)
     return with_numbers(numbers, features, origin)

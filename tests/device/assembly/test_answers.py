@@ -16,6 +16,7 @@ from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import MODES
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.parameters import NOMINAL
+from device.measurement.quantities import InvalidQuantity
 from device.simulation.scenario import Scenario
 from host_tools.press_models.recorded_presses import recorded_press
 
@@ -36,6 +37,15 @@ def test_a_probe_without_their_models_has_the_papers_mode_only(bundle, calibrati
         simulated_config("SIM-LINEAR"), serial="SIM-0001", standard_model=tmp_path / "a", quick_model=tmp_path / "b"
     )
     assert answers_for(config, bundle, calibration).modes == ("paper",)
+
+
+def test_a_certificate_without_lines_answers_in_every_mode_but_the_papers(bundle, calibration, recording):
+    without = replace(calibration, lines=None)
+    answers = answers_for(simulated_config(), bundle, without)
+    assert answers.modes == ("quick", "standard", "precise")
+    assert set(answers.worth) == set(answers.modes)
+    with pytest.raises(InvalidQuantity, match="without the lines of mode paper"):
+        answers.estimator(recording, "paper")
 
 
 def test_a_mode_without_a_model_is_no_default():

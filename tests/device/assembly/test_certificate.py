@@ -30,6 +30,14 @@ def config(tmp_path):
     return Config(serial="TSIS-0007", calibration=tmp_path, camera=camera)
 
 
+def test_one_without_lines_holds_for_any_force_and_model_of_mode_paper(config):
+    without = small_certificate(lines=None)
+    path = config.calibration / "calibration.json"
+    path.write_text(without.to_json())
+    other = replace(config, calibration=path, press=replace(config.press, target_n=0.7))
+    assert active_calibration(other, Model(sha256="cd" * 32)).id == without.id
+
+
 def test_the_active_certificate_of_this_probe_is_used(config):
     assert active_calibration(config, Model()).id == CERTIFICATE.id
 

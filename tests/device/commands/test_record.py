@@ -12,7 +12,9 @@ from simulated_time_probe import simulate_time
 
 from device.__main__ import main
 from device.files.recording_file import read_recording
+from device.instrument.press.frame_choice import ramp_targets_n
 from device.measurement.quantities import Inclusion
+from device.measurement.ramp_modes.radial_profile import press_profiles
 from device.measurement.recording.recording import RecordedCell
 from host_tools.calibration.camera_fit import GridPrint, camera_of
 from host_tools.calibration.gates import unusable
@@ -94,10 +96,62 @@ def test_a_block_without_an_inclusion_is_recorded_without_truth(run):
     assert [len(recording.with_role(role)) for role in ("dark", "reference", "press")] == [4, 4 + 10, 10]
 
 
+def tissue(modulus_kpa=5.5, thickness_mm=32.0):
+    return f"tissue_modulus_kpa = {modulus_kpa}\ntissue_thickness_mm = {thickness_mm}\n"
+
+
+def write_phantoms(inclusion="size_mm = 10.0\ndepth_mm = 6\nyoungs_modulus_kpa = 80.0\n"):
+    block = f'[[phantoms]]\nname = "B1"\n{tissue()}'
+    Path("phantoms.toml").write_text(f'serial = "PH-7"\n[[phantoms]]\nname = "A1"\n{tissue()}{inclusion}{block}')
+
+
+OF_FILE = ("--phantoms", "phantoms.toml")
+
+
+@pytest.mark.parametrize(("name", "truth"), [("A1", Inclusion(10.0, 6.0, 80.0)), ("B1", None)])
+def test_a_phantom_of_a_file_is_recorded_under_its_name_by_the_ramp_that_commissioning_reads(run, name, truth):
+    write_phantoms()
+    code, out, told = run(command(*OF_FILE, "--name", name))
+    assert (code, out) == (0, [f"ramps/{name}"]), told
+    assert told[0].startswith(f"Phantom {name} of PH-7: ")
+    recording = read_recording(Path("ramps") / name)
+    assert (recording.truth, recording.phantom_serial) == (truth, "PH-7")
+    [profile] = press_profiles(recording)
+    assert profile.contrast[:, 0].max() > 0.05 or truth is None
+    forces_n = [frame.force_n for frame in recording.with_role("press")]
+    assert forces_n == pytest.approx(ramp_targets_n(10, "press"), abs=0.04)
+
+
+def test_the_virtual_probe_is_pressed_on_the_tissue_of_the_file_or_refuses_it(run):
+    Path("phantoms.toml").write_text(f'serial = "PH-7"\n[[phantoms]]\nname = "B3"\n{tissue(9.0)}')
+    code, _, told = run(command(*OF_FILE, "--name", "B3"))
+    assert code == 1
+    assert "tissue_modulus_kpa is 9" in told[-1]
+
+
+@pytest.mark.parametrize(
+    ("inclusion", "arguments", "refusal"),
+    [
+        ("", ("--name", "C4"), "name is 'C4', but must be a phantom of phantoms.toml: A1, B1: name one of these"),
+        ("size_mm = 9.0\n", ("--name", "A1"), "depth_mm of A1 is missing"),
+        ("", ("--name", "A1", "--out", "ramps/1"), "out is ramps/1, but must be a folder named A1"),
+    ],
+)
+def test_a_phantom_that_the_file_does_not_tell_is_refused_before_anything_is_opened(run, inclusion, arguments, refusal):
+    write_phantoms(inclusion)
+    code, out, told = run(command(*OF_FILE, *arguments))
+    assert (code, out) == (1, [])
+    assert told[-1].startswith(refusal)
+    assert not Path("var").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "refusal"),
     [
         (PHANTOM[:4], "give --size-mm, --depth-mm and --modulus-kpa, or --bare, or --grid"),
+        (("--phantoms", "phantoms.toml"), "give --phantoms and --name together"),
+        (("--phantoms", "phantoms.toml", "--name", "A1", "--bare"), "give nothing else of it"),
+        ((*PHANTOM, "--name", "A1"), "give nothing else of it"),
         ((*PHANTOM, "--bare"), "with --bare or --grid there is no --size-mm"),
         (("--grid", "--size-mm", "10"), "with --bare or --grid there is no --size-mm"),
         (("--grid", "--bare"), "not allowed with argument"),

@@ -9,7 +9,8 @@ import pytest
 from small_certificate import small_certificate
 
 from device.files.certificate_file import read_calibration
-from device.measurement.calibration import Regression, certificate_id
+from device.measurement.calibration import certificate_id
+from device.measurement.paper_mode.lines import Regression
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.pixel_scale import PixelScale
 
@@ -65,7 +66,7 @@ def edited(path, change):
 
 def test_each_feature_goes_through_its_own_line(certificate):
     """2 x + 0.5, -x, and x / 10 - 3."""
-    found = certificate.deformation_features(np.array([[1.0, 2.0, 50.0], [0.0, 0.0, 0.0]]))
+    found = certificate.lines.deformation_features(np.array([[1.0, 2.0, 50.0], [0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(found, [[2.5, -2.0, 2.0], [0.5, 0.0, -3.0]])
 
 
@@ -75,8 +76,22 @@ def test_a_certificate_comes_back_from_json_as_it_was(certificate, path, led_rat
     path.write_text(certificate.to_json())
     found = read_calibration(path)
     for name in ("estimate", "truth", "box_low", "box_high"):
-        np.testing.assert_array_equal(getattr(found.held_out, name), getattr(certificate.held_out, name))
-    assert replace(found, held_out=certificate.held_out) == certificate
+        np.testing.assert_array_equal(getattr(found.lines.held_out, name), getattr(certificate.lines.held_out, name))
+    assert replace(found.lines, held_out=certificate.lines.held_out) == certificate.lines
+    assert replace(found, lines=certificate.lines) == certificate
+
+
+def test_a_certificate_without_lines_is_for_its_probe_whatever_the_model_of_mode_paper(path):
+    certificate = small_certificate(lines=None)
+    path.write_text(certificate.to_json())
+    assert not set(json.loads(path.read_text())) & {"regressions", "held_out", "settings", "model_sha256", "force_n"}
+    found = read_calibration(path)
+    assert found == certificate
+    assert found.require_for("TSIS-0007", Model(sha256="cd" * 32)) is None
+    with pytest.raises(InvalidQuantity, match="for probe TSIS-0007"):
+        found.require_for("TSIS-0008", Model())
+    with pytest.raises(InvalidQuantity, match="without the lines of mode paper.*host_tools calibrate"):
+        _ = found.paper_lines
 
 
 def test_the_committed_certificate_holds_for_the_committed_model_and_the_simulated_probe(calibration, bundle):
@@ -118,14 +133,17 @@ def test_frames_of_another_pixel_size_are_refused_with_both(certificate, scale):
     ("force_n", "holds"), [(0.5, True), (0.529, True), (0.531, False), (0.471, True), (0.469, False)]
 )
 def test_a_certificate_holds_within_six_percent_of_its_force(certificate, force_n, holds):
-    assert certificate.holds_at(force_n) is holds
+    assert certificate.lines.holds_at(force_n) is holds
 
 
 def settings_of(certificate, **changes):
     camera = certificate.camera
     same = {"exposure_us": camera.exposure_us, "gain": camera.gain, "cell_counts_per_n": certificate.cell.counts_per_n}
-    scale = changes.pop("scale", camera.scale)
-    return [problem.quantity for problem in certificate.other_settings(scale, **(same | changes))]
+    geometry = replace(camera.geometry, **{name: changes.pop(name) for name in GEOMETRY if name in changes})
+    return [problem.quantity for problem in certificate.other_settings(geometry, **(same | changes))]
+
+
+GEOMETRY = ("scale", "axis_x_mm", "axis_y_mm", "rim_distortion_percent")
 
 
 @pytest.mark.parametrize(
@@ -145,6 +163,12 @@ def settings_of(certificate, **changes):
 )
 def test_settings_that_are_not_those_of_the_calibration_are_all_named(certificate, changes, problems):
     assert settings_of(certificate, **changes) == problems
+
+
+def test_axis_and_distortion_are_those_of_the_commissioning_where_its_modes_undo_them(certificate):
+    moved = {"axis_x_mm": 0.06, "axis_y_mm": 0.04, "rim_distortion_percent": -0.4}
+    assert settings_of(certificate, **moved) == []
+    assert settings_of(small_certificate(lines=None), **moved) == ["camera.axis_x_mm", "camera.rim_distortion_percent"]
 
 
 def test_a_certificate_of_another_probe_and_model_says_both(certificate):

@@ -61,7 +61,7 @@ def test_the_json_has_the_contracts_fields_and_no_other(estimated, recording, bu
 def test_frames_are_estimated_one_by_one_then_averaged_and_their_scatter_is_given(
     estimated, recording, bundle, calibration
 ):
-    rows = calibration.deformation_features(image_features(recording, calibration.settings))
+    rows = calibration.lines.deformation_features(image_features(recording, calibration.lines.settings))
     each = bundle.estimate(rows).estimate
     assert len(each) == 3
     estimate = estimated(recording)
@@ -144,18 +144,22 @@ def test_a_press_of_another_force_than_the_calibrations_is_rejected_with_both(es
     assert_no_number(estimate)
 
 
+def with_held_out(calibration, held_out):
+    return replace(calibration, lines=replace(calibration.lines, held_out=held_out))
+
+
 def test_a_value_never_leaves_its_interval_even_where_the_network_extrapolates(bundle, calibration, recording):
     """A box of at most 6 mm: whatever the network says, the answer is at most 6 mm."""
-    held_out = calibration.held_out
-    shrunk = replace(calibration, held_out=replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
+    held_out = calibration.lines.held_out
+    shrunk = with_held_out(calibration, replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
     size = estimate_paper(recording, bundle, shrunk).size_mm
     assert size.low <= size.value <= size.high <= 6.0
 
 
 def test_an_interval_that_ends_with_the_box_is_open_there(bundle, calibration, recording):
     """12 mm in a box of at most 6 mm: no held-out scene says how large it is, only that it is not small."""
-    held_out = calibration.held_out
-    shrunk = replace(calibration, held_out=replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
+    held_out = calibration.lines.held_out
+    shrunk = with_held_out(calibration, replace(held_out, box_high=np.array([6.0, 12.0, 120.0])))
     size = estimate_paper(recording, bundle, shrunk).size_mm
     assert size.high_is_open
     assert size.low_is_open == (size.low <= held_out.box_low[0])
@@ -163,9 +167,9 @@ def test_an_interval_that_ends_with_the_box_is_open_there(bundle, calibration, r
 
 def test_where_all_is_determined_the_status_is_ok(bundle, calibration, recording):
     """Held-out scenes whose estimates were right within 0.01."""
-    held_out = calibration.held_out
+    held_out = calibration.lines.held_out
     jittered = held_out.truth + np.random.default_rng(1).normal(0.0, 0.01, held_out.truth.shape)
-    exact = replace(calibration, held_out=replace(held_out, estimate=jittered))
+    exact = with_held_out(calibration, replace(held_out, estimate=jittered))
     estimate = estimate_paper(recording, bundle, exact)
     assert (estimate.status, estimate.reason) == ("ok", "")
 

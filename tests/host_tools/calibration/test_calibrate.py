@@ -62,10 +62,10 @@ def test_leave_one_out_residuals_are_those_of_lines_fitted_without_the_point():
 def test_the_lines_hold_for_a_phantom_that_was_not_used(recordings, bundle, tables, table):
     certificate = calibrate(recordings, bundle, table, force_n=0.5).certificate
     fresh = Inclusion(10.0, 5.5, 70.0)
-    image = image_features(phantom_recording(fresh, tables, seed=77, scenario=LINEAR), certificate.settings)
-    found = certificate.deformation_features(image).mean(axis=0)
+    image = image_features(phantom_recording(fresh, tables, seed=77, scenario=LINEAR), certificate.lines.settings)
+    found = certificate.lines.deformation_features(image).mean(axis=0)
     np.testing.assert_allclose(found, table_features(table, fresh, 0.5), rtol=0.05)
-    assert certificate.regressions[0].r_squared > 0.995
+    assert certificate.lines.regressions[0].r_squared > 0.995
     assert certificate.simulated
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.calibration import Regression
+from device.measurement.paper_mode.lines import Regression
 from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.recording.untouched_face import UntouchedFace
 from host_tools.calibration.gates import CalibrationRejected, Gate, fit_gates, recording_gates, require_all

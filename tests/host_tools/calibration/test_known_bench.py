@@ -63,7 +63,7 @@ def test_with_the_tissue_of_the_file_the_lines_are_nearer_those_of_tissue_of_5_k
     made, bench = on_bench(stiffer, NAMES, None, SET)
     known = calibrate(made, bundle, table, force_n=0.5, bench=bench).certificate
     assumed = calibrate(stiffer, bundle, table, force_n=0.5).certificate
-    slopes = [np.array([line.slope for line in one.regressions[:2]]) for one in (of_nominal, known, assumed)]
+    slopes = [np.array([line.slope for line in one.lines.regressions[:2]]) for one in (of_nominal, known, assumed)]
     of_known, of_assumed = (np.abs(one / slopes[0] - 1) for one in slopes[1:])
     assert (of_known < 0.5 * of_assumed).all()
     assert (of_known < 0.05).all()

@@ -13,7 +13,7 @@ from device.simulation.hand import BESIDE_MM
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import VirtualProbe
-from host_tools.calibration.calibrate import untouched_face
+from host_tools.calibration.certified_probe import untouched_face
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 
 

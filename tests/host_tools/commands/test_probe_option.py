@@ -10,6 +10,8 @@ from toolkit_process import run_toolkit
 from device.files.certificate_file import read_calibration
 from device.files.recording_file import read_recording
 from device.files.shipped import SIMULATED_PROBE
+from device.instrument.press.frame_choice import ramp_targets_n
+from device.measurement.mode import FRAMES
 from device.measurement.quantities import Inclusion
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.data.dataset import read_dataset
@@ -115,6 +117,21 @@ def test_the_phantoms_of_a_file_are_recorded_and_calibrate_the_probe_of_a_file(t
     done = run_toolkit("calibrate", *made[3:], *files, "--out", tmp_path / "c.json")
     assert done.returncode == 0, done.stderr
     assert read_calibration(tmp_path / "c.json").phantom_serial == "SIM-PHANTOMS"
+
+
+def test_the_ramp_of_mode_standard_is_recorded_and_states_the_camera_that_a_grid_told(tmp_path):
+    told = replace(OWN, camera=replace(OWN.camera, axis_x_mm=0.3))
+    (tmp_path / "probe.toml").write_text(probe_text(told))
+    asked = ("phantom", "--set", "random", "--scenes", 1, "--ramp", "--camera-of", tmp_path / "probe.toml")
+    done = run_toolkit(*asked, "--out", tmp_path / "ramps")
+    assert done.returncode == 0, done.stderr
+    recording = read_recording(tmp_path / "ramps/random001")
+    assert recording.camera.geometry == told.geometry
+    press = [frame.force_n for frame in recording.with_role("press")]
+    assert press == pytest.approx(ramp_targets_n(FRAMES["standard"].count, "press"), abs=0.03)
+    both = run_toolkit(*asked, "--force-n", 0.4, "--out", tmp_path / "both")
+    assert both.returncode == 1
+    assert "not given with --ramp" in both.stderr
 
 
 def test_a_probes_recording_is_of_its_camera_load_cell_and_leds(tables):

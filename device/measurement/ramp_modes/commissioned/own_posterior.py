@@ -214,7 +214,7 @@ def _places(presses: int) -> list[NDArray[np.intp]]:
 def _joined(seen: Array) -> Array:
     """Return what is seen of N presses [n, N, S] as one row of each [n, ...]."""
     further = seen[:, 1:, OF_FURTHER]
-    return np.concatenate([seen[:, 0], further.reshape(len(seen), further[0].size if len(seen) else 0)], axis=1)
+    return np.concatenate([seen[:, 0], further.reshape(len(seen), further.shape[1] * further.shape[2])], axis=1)
 
 
 def _turned(rows: Array, angle_rad: Array) -> Array:

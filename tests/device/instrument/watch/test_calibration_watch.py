@@ -69,6 +69,26 @@ def test_the_last_month_is_warned_of_and_the_warning_ends_with_it(watch):
     assert codes(watch) == []
 
 
+def test_a_commissioned_model_that_ends_before_the_certificate_is_warned_of_and_ends_the_presses(watch):
+    watch.model_expires_at = "2026-07-01T00:00:00Z"
+    watch.require_valid("2026-05-01T00:00:00Z")
+    assert codes(watch) == []
+    watch.require_valid("2026-06-20T00:00:00Z")
+    assert codes(watch) == ["E407"]
+    assert "commissioned model expires on 2026-07-01T00:00:00Z, in 11 days" in watch.warned(())[0].cause
+    with pytest.raises(ExpiredCalibration, match="commissioned model has expired on 2026-07-01"):
+        watch.require_valid("2026-07-02T00:00:00Z")
+
+
+def test_where_certificate_and_commissioned_model_end_together_it_is_told_to_commission(watch):
+    watch.model_expires_at = watch.calibration.validity.expires_at
+    watch.require_valid(LAST_MONTH)
+    assert watch.warned(())[0].remedy == "Commission the probe before that day."
+    with pytest.raises(ExpiredCalibration) as refusal:
+        watch.require_valid("2027-02-01T00:00:00Z")
+    assert refusal.value.remedy.startswith("Commission the probe again")
+
+
 @pytest.mark.parametrize(
     ("light", "expected"), [(20, []), (19, []), (18, []), (17, ["E405"]), (15, ["E405"]), (24, ["E405"])]
 )

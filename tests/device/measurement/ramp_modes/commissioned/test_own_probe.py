@@ -153,6 +153,16 @@ def test_derivatives_of_the_posterior_are_its_differences(derivatives, ramp_mode
         assert np.abs(difference - jacobian[:, k]).max() < 1e-4 * np.abs(difference).max()
 
 
+@pytest.mark.parametrize("presses", [1, 2])
+def test_samples_that_all_lie_outside_have_no_density(derivatives, ramp_model, presses):
+    """Then not one is left to be computed, of a scan's columns either."""
+    at, rows = rows_at(ramp_model, np.tile(TRUTH, (presses, 1)))
+    seen = seen_of(turned_columns(rows, 0.0), np.zeros(presses))
+    place = np.append(at[0, :OFFSET], np.zeros(AXES * presses))
+    posterior = own_posterior(seen, ramp_model, believed(derivatives), place)
+    assert (posterior.log_density(np.full((3, posterior.dimensions), 1.5)) == -np.inf).all()
+
+
 def test_a_press_of_the_design_is_explained_as_well_as_by_the_designs_own_posterior(derivatives, ramp_model):
     """With no directions and the inclusion on the bright side both are the same, but for harmonics across."""
     at, rows = rows_at(ramp_model)

@@ -1,0 +1,113 @@
+"""The certificate of a commissioned probe: its own face and camera, how long it holds, and what keeps it from being."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toolkit_process import run_toolkit
+
+from device.files.recording_file import write_recording
+from device.files.shipped import SIMULATED_PROBE
+from device.measurement.quantities import Inclusion, InvalidQuantity
+from device.measurement.recording.camera_geometry import CameraGeometry
+from host_tools.calibration.gates import CalibrationRejected
+from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
+from host_tools.commissioning import commission as commission_module
+from host_tools.commissioning.own_certificate import own_certificate
+from host_tools.scenes.phantom_set import read_phantoms
+from host_tools.scenes.probe_file import NAME, simulated_probe
+
+RAMP = PhantomProtocol(tuple(np.linspace(0.1, 0.6, 6)), frames=1)
+MADE_AT = "2026-11-02T12:00:00Z"
+
+
+@pytest.fixture(scope="module")
+def recordings(tables):
+    inclusions = Inclusion(10.0, 6.0, 80.0), Inclusion(12.0, 5.0, 60.0)
+    return [phantom_recording(one, tables, seed=7 + n, protocol=RAMP) for n, one in enumerate(inclusions)]
+
+
+def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365):
+    return own_certificate(
+        recordings,
+        names,
+        probe or simulated_probe(),
+        phantom_serial="PH-7",
+        operator="N. N.",
+        made_at=MADE_AT,
+        valid_days=valid_days,
+    )
+
+
+def test_it_is_for_the_probe_with_the_cameras_geometry_of_its_file_and_has_no_lines(recordings):
+    probe = simulated_probe()
+    moved = replace(probe, camera=replace(probe.camera, axis_x_mm=0.3))
+    made = certified(recordings, probe=moved)
+    assert (made.serial, made.phantom_serial, made.phantoms, made.operator) == ("SIM-0001", "PH-7", 2, "N. N.")
+    assert made.camera.geometry == moved.geometry != recordings[0].camera.geometry
+    assert made.camera.exposure_us == recordings[0].camera.exposure_us
+    assert made.cell == recordings[0].cell
+    assert made.lines is None
+    assert certified(recordings, probe=moved).id == made.id
+
+
+def test_drift_is_watched_by_the_untouched_frames_of_the_ramps(recordings):
+    untouched = certified(recordings).untouched
+    unloaded = [frame for frame in recordings[0].frames if frame.role != "press" and frame.force_n < 0.01]
+    drift = untouched.drift(unloaded)
+    assert abs(drift.change_ratio) < 0.01
+    brighter = [replace(one, counts=one.counts + np.uint8(30 * any(one.led_ratio))) for one in unloaded]
+    assert untouched.drift(brighter).change_ratio > 0.25
+
+
+@pytest.mark.parametrize(
+    ("simulated", "started_at", "expires_at"),
+    [(True, "1970-01-01T00:00:00Z", "2027-11-02T12:00:00Z"), (False, "2026-10-01T08:00:00Z", "2027-10-01T08:00:00Z")],
+)
+def test_it_is_as_old_as_its_oldest_recording_but_for_simulated_ones(recordings, simulated, started_at, expires_at):
+    first, second = (replace(one, simulated=simulated, started_at="2026-10-20T08:00:00Z") for one in recordings)
+    made = certified([first, replace(second, started_at=started_at)])
+    assert (made.validity.measured_at, made.validity.expires_at) == (started_at, expires_at)
+
+
+def test_everything_that_recordings_lack_is_named_with_their_phantoms(recordings):
+    first, second = recordings
+    pressed_only = tuple(one for one in second.frames if one.role == "press" or one.force_n > 0.01)
+    with pytest.raises(CalibrationRejected) as rejected:
+        certified([replace(first, cell=None), replace(second, frames=pressed_only)])
+    told = [problem.quantity for problem in rejected.value.problems]
+    assert told == ["cell of A1", "dark frames of A2"]
+
+
+def test_recordings_that_are_too_old_or_of_two_cameras_make_none(recordings):
+    first, second = (replace(one, simulated=False, started_at="2024-01-01T00:00:00Z") for one in recordings)
+    with pytest.raises(CalibrationRejected) as rejected:
+        certified([first, replace(second, camera=replace(second.camera, gain=2.0))])
+    assert {problem.quantity for problem in rejected.value.problems} == {"camera", "age of the oldest recording"}
+
+
+def test_recordings_of_one_camera_whose_geometry_was_told_in_between_make_one(recordings):
+    first, second = recordings
+    known = CameraGeometry(second.camera.scale, axis_y_mm=0.1)
+    assert certified([first, replace(second, camera=second.camera.seen_as(known))])
+
+
+def test_the_command_tells_what_a_certificate_lacks_before_it_computes(recordings, tmp_path, monkeypatch):
+    """Here no frame shows the untouched face; what is then computed of the ramps is left out."""
+
+    def no_further(*ramps, **options):
+        raise CalibrationRejected([InvalidQuantity("computing", "left out", "done", "not in this test")])
+
+    monkeypatch.setattr(commission_module, "commission", no_further)
+    file = SIMULATED_PROBE / "phantoms.toml"
+    touched = (frame for frame in recordings[0].frames if frame.role != "reference" or frame.force_n > 0.01)
+    made = replace(recordings[0], frames=tuple(touched))
+    for one in read_phantoms(file).phantoms:
+        write_recording(replace(made, truth=one.inclusion), tmp_path / "ramps" / one.name)
+    ramps, files = sorted((tmp_path / "ramps").iterdir()), ("--probe", SIMULATED_PROBE / NAME, "--phantoms", file)
+    told = run_toolkit("commission", *ramps, *files, "--out", tmp_path / "own")
+    assert told.returncode == 1
+    assert "The bundle gets no certificate" in told.stderr
+    assert "lit unloaded frames of block1 is 0, but must be at least one" in told.stderr
+    assert "lit unloaded frames of phantom9" in told.stderr
+    assert not (tmp_path / "own").exists()
