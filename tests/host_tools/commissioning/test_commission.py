@@ -23,6 +23,7 @@ from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning import commission as commission_module
+from host_tools.commissioning import left_out as left_out_module
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, commission, gates_of
 from host_tools.commissioning.joint_fit import (
     DISCREPANCY_RATIOS,
@@ -130,6 +131,21 @@ def test_probe_and_phantoms_are_reported_in_words(fit):
     lines = list(probe_lines(fit, PROBE))
     assert len(lines) == len(PROBE) + 4
     assert lines[1].startswith("contact_exponent")
+
+
+def test_a_second_ramp_of_a_phantom_is_left_out_with_it(ramps, model, derivatives, fit, monkeypatch):
+    kept = []
+
+    def fitted(others, design, believed):
+        kept.append([one.name for one in others])
+        return fit
+
+    monkeypatch.setattr(left_out_module, "fit_probe", fitted)
+    monkeypatch.setattr(left_out_module, "_answered", lambda ramp, answers, guess: ramp.name)
+    twice = [*ramps, ramps[0]]
+    names = left_out(twice, Design(model.answers, derivatives), model.first_guesses, fit, jobs=1)
+    assert len(names) == len(kept)
+    assert not any(name in others for name, others in zip(names, kept, strict=True))
 
 
 @pytest.mark.long
