@@ -14,8 +14,9 @@ import typer
 from device.files.durable import write_once
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.commands.output import note, problem_record
+from host_tools.commands.output import Scheduler, note, problem_record
 from host_tools.commands.probe import ProbeOption, probe_with_tables
+from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from host_tools.calibration.calibrate import Calibrated
@@ -150,6 +151,7 @@ def commission(
     table: Annotated[Path, typer.Option(help="Folder of the design's tables and derivatives.")] = SIMULATED_PROBE,
     valid_days: Annotated[float, typer.Option(help="Days until the probe is to be commissioned again.")] = 365.0,
     seed: Annotated[int, typer.Option(help="Seed of the presses that limits and the card are made of.")] = 1,
+    scheduler: Scheduler = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
 ) -> None:
     """Find out what a probe is from its ramps on phantoms, and make its modes standard and precise of the design's.
@@ -177,8 +179,9 @@ def commission(
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
     try:
-        ramps = phantom_ramps([read_recording(path) for path in recordings], names, stated, made_by)
-        done = run_commission(ramps, model, derivatives, seed=seed, say=note.print)
+        with workers(scheduler):
+            ramps = phantom_ramps([read_recording(path) for path in recordings], names, stated, made_by)
+            done = run_commission(ramps, model, derivatives, seed=seed, say=note.print)
     except CalibrationRejected as rejection:
         if not as_json:
             raise
