@@ -65,7 +65,7 @@ def _identified(
     recording: Recording, name: str, phantoms: PhantomSet
 ) -> tuple[Recording, Tissue, list[InvalidQuantity]]:
     """Return a recording with its phantom's truth, that phantom's tissue, and what contradicts both."""
-    problems = list(_of_another_set(recording, name, phantoms))
+    problems = list(another_set(recording, name, phantoms))
     phantom = _phantom_of(recording, name, phantoms)
     if isinstance(phantom, InvalidQuantity):
         return recording, Tissue(), [*problems, phantom]
@@ -92,11 +92,6 @@ def _not_of(probe: Probe, recordings: Sequence[Recording]) -> Iterator[InvalidQu
                 yield InvalidQuantity(f"{name} of {recording.id}", number, bound, action)
 
 
-def _of_another_set(recording: Recording, name: str, phantoms: PhantomSet) -> Iterator[InvalidQuantity]:
-    if recording.phantom_serial not in ("", phantoms.serial):
-        yield InvalidQuantity(f"phantom_serial of {name}", recording.phantom_serial, f"{phantoms.serial}", SET)
-
-
 def _phantom_of(recording: Recording, name: str, phantoms: PhantomSet) -> StatedPhantom | InvalidQuantity:
     """Return the phantom that a recording is of, or why there is none."""
     truth = recording.truth
@@ -110,8 +105,25 @@ def _phantom_of(recording: Recording, name: str, phantoms: PhantomSet) -> Stated
     if named.inclusion is None:
         action = "leave it out: the three lines need an inclusion"
         return InvalidQuantity(f"phantom of {name}", "a bare block", "one with an inclusion", action)
-    if truth and not named.agrees_with(truth):
-        said, own = ("{:g} mm, {:g} mm deep, {:g} kPa".format(*one.as_tuple()) for one in (truth, named.inclusion))
-        action = "find out which phantom was pressed: name and truth contradict each other"
-        return InvalidQuantity(f"truth of {name}", said, f"{own} within {SIGMAS:g} tolerances", action)
-    return named
+    return truth_contradiction(recording, name, named) or named
+
+
+def truth_contradiction(recording: Recording, name: str, phantom: StatedPhantom) -> InvalidQuantity | None:
+    """Return in what the truth of a recording, in a file of this name, is not that of its phantom; None where it is.
+
+    A recording without truth contradicts nothing; an inclusion of 0 mm is that of a bare block.
+    """
+    truth, own = recording.truth, phantom.inclusion
+    if truth is None or phantom.agrees_with(truth) or (own is None and not truth.size_mm):
+        return None
+    said, expected = (
+        "{:g} mm, {:g} mm deep, {:g} kPa".format(*one.as_tuple()) if one else "a bare block" for one in (truth, own)
+    )
+    action = "find out which phantom was pressed: name and truth contradict each other"
+    return InvalidQuantity(f"truth of {name}", said, f"{expected} within {SIGMAS:g} tolerances", action)
+
+
+def another_set(recording: Recording, name: str, phantoms: PhantomSet) -> Iterator[InvalidQuantity]:
+    """Yield that a recording is of another set than that of the file, where it says so."""
+    if recording.phantom_serial not in ("", phantoms.serial):
+        yield InvalidQuantity(f"phantom_serial of {name}", recording.phantom_serial, f"{phantoms.serial}", SET)

@@ -15,8 +15,9 @@ import typer
 from device.files.durable import write_once
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.commands.output import note, problem_record
+from host_tools.commands.output import Scheduler, note, problem_record
 from host_tools.commands.probe import ProbeOption, probe_with_tables
+from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from device.measurement.calibration import Calibration
@@ -153,6 +154,7 @@ def commission(
     valid_days: Annotated[float, typer.Option(help="Days until the probe is to be commissioned again.")] = 365.0,
     seed: Annotated[int, typer.Option(help="Seed of the presses that limits and the card are made of.")] = 1,
     operator: Annotated[str, typer.Option(help="Who commissions.")] = "",
+    scheduler: Scheduler = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print gates, or problems, as one JSON object.")] = False,
 ) -> None:
     """Find out what a probe is from its ramps on phantoms, and make its modes standard and precise of the design's.
@@ -160,34 +162,34 @@ def commission(
     Each phantom is also answered as unknown, by a probe commissioned without it. Gates of misfit and coverage of these,
     and of how far the probe lies from its design, must be passed; otherwise nothing is written and the exit code is 1.
     The probe's certificate stands in the same folder, where the recordings show its untouched face.
-    Some two minutes on two cores.
+    All that is wrong in the files is told at once. Some two minutes on two cores.
     """
     from datetime import UTC, datetime
 
     from device.files.bundle_file import read_ramp_model
-    from device.files.recording_file import read_recording
     from device.measurement.calibration import written
     from host_tools.calibration.gates import CalibrationRejected
+    from host_tools.commissioning.bench_files import read_bench
     from host_tools.commissioning.commission import commission as run_commission
     from host_tools.commissioning.own_bundle import CERTIFICATE_FILE, write_own_bundle
     from host_tools.commissioning.own_certificate import own_certificate
-    from host_tools.commissioning.phantom_ramps import phantom_ramps
     from host_tools.press_models.press_derivatives import load_derivatives
-    from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
-    from host_tools.scenes.probe_file import probe_of
+    from host_tools.scenes.probe_file import simulated_probe
 
     if out.exists():
         raise InvalidQuantity("bundle", out, "a new folder", "a bundle is written once: give another name")
     require("valid_days", valid_days, Bound(1.0, 730.0, "days"), "commission again before that")
-    made_by, stated = probe_of(probe), read_phantoms(phantoms, blocks_needed=BLOCKS_NEEDED)
+    probe_with_tables(None, table)
     model, derivatives = read_ramp_model(design), load_derivatives(table)
-    names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
-    made, made_at = [read_recording(path) for path in recordings], datetime.now(UTC)
-    said_by = {"phantom_serial": stated.serial, "operator": operator, "made_at": written(made_at)}
+    made_at = datetime.now(UTC)
     try:
-        ramps = phantom_ramps(made, names, stated, made_by)
-        certificate = _or_why_not(lambda: own_certificate(made, names, made_by, **said_by, valid_days=valid_days))
-        done = run_commission(ramps, model, derivatives, seed=seed, say=note.print)
+        with workers(scheduler):
+            bench = read_bench(recordings, probe, phantoms, simulated_probe())
+            said_by = {"phantom_serial": bench.phantoms.serial, "operator": operator, "made_at": written(made_at)}
+            certificate = _or_why_not(
+                lambda: own_certificate(bench.recordings, bench.names, bench.probe, **said_by, valid_days=valid_days)
+            )
+            done = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=seed, say=note.print)
     except CalibrationRejected as rejection:
         if not as_json:
             raise
@@ -197,11 +199,11 @@ def commission(
         done,
         design,
         out,
-        serial=made_by.serial,
+        serial=bench.probe.serial,
         made_at=made_at,
         valid_days=valid_days,
         command=f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}",
-        origin={"phantoms": stated.serial, "design": model.bundle.name},
+        origin={"phantoms": bench.phantoms.serial, "design": model.bundle.name},
         certificate=certificate,
     )
     if as_json:

@@ -19,7 +19,7 @@ from device.measurement.quantities import UNKNOWNS, Bound
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.commissioned.own_probe import SEEN_COLUMNS, Place, turned_columns
-from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, NAMES, STD, RowDerivatives
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, RowDerivatives
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
@@ -28,6 +28,7 @@ from host_tools.calibration.gates import Gate, require_all
 from host_tools.commissioning.joint_fit import PROBE, Design, ProbeFit, fit_probe
 from host_tools.commissioning.left_out import LeftOut, answers_of, answers_to_seen, left_out
 from host_tools.commissioning.phantom_ramps import PhantomRamp
+from host_tools.commissioning.probe_prior import OF_DESIGN, ProbePrior
 from host_tools.press_models.mode_outcome import CRITICAL_RATIO, EvaluatedPresses, evaluated
 from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.ramp_training import further_offsets_mm
@@ -42,7 +43,7 @@ PRESSES, SCANS = 160, 40
 ODDS_PRESSES = 1_000
 FEWEST_COVERED, MOST_TOLERANCES = 0.7, 6.0
 """Share of the statements on phantoms left out that must hold, of which nine in ten do of an honest probe's; and how
-far a direction may lie from the design. Layers carry what the model lacks, and lie up to four tolerances off."""
+far a direction may lie from what is stated. Layers carry what the model lacks, and lie up to four tolerances off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +64,16 @@ def commission(
     model: RampModel,
     derivatives: RowDerivatives,
     *,
+    prior: ProbePrior = OF_DESIGN,
     seed: int = 1,
     jobs: int = -1,
     say: Callable[[str], None] = lambda step: None,
 ) -> CommissionedProbe:
     """Return the probe that recorded the ramps, from the design's model of ramps and its derivatives.
 
-    Raises `CalibrationRejected` with every gate that is not passed.
+    `prior` is what the probe's file says of it. Raises `CalibrationRejected` with every gate that is not passed.
     """
-    design = Design(model.answers, derivatives)
+    design = Design(model.answers, derivatives, prior)
     say(f"{len(ramps)} ramps together")
     fit = fit_probe(ramps, design)
     say("each phantom left out")
@@ -87,9 +89,10 @@ def commission(
 
 
 def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
-    """Return what a commissioning must pass: phantoms answered, their truths covered, a probe near its tolerances."""
+    """Return what a commissioning must pass: phantoms answered, their truths covered, a probe near what its file
+    states."""
     covered = [one.is_covered[:2] for one in phantoms]
-    away = np.abs(fit.mean - MEAN[PROBE]) / STD[PROBE]
+    away = np.abs(fit.tolerances_away)
     farthest, worst = int(np.argmax(away)), max(phantoms, key=lambda one: one.misfit_ratio)
     return [
         Gate(
@@ -105,10 +108,10 @@ def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
             "measure the phantoms again, or state larger tolerances",
         ),
         Gate(
-            f"tolerances between {NAMES[PROBE[farthest]]} and its design",
+            f"tolerances between {NAMES[PROBE[farthest]]} and what was expected of it",
             float(away[farthest]),
             Bound(0.0, MOST_TOLERANCES, ""),
-            "find out what differs in this probe: it is not of this design",
+            "measure what its file states; if that holds, the probe is not of this design",
         ),
     ]
 

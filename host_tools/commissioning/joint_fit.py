@@ -31,6 +31,7 @@ from device.measurement.ramp_modes.radial_profile import RESPONSE
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.commissioning.prior_discrepancy import SharedLack, prior_discrepancy
+from host_tools.commissioning.probe_prior import OF_DESIGN, ProbePrior
 
 PROBE = owned_by("probe")
 MODEL_RATIOS = (0.002, 0.003, 0.004, 0.006, 0.009, 0.013)
@@ -56,16 +57,16 @@ FARTHEST = 1.5
 NEGLIGIBLE = 1e-6
 
 
-def tolerances_only(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:
+def tolerances_only(derivatives: RowDerivatives, levels: ErrorLevels, prior: ProbePrior = OF_DESIGN) -> OwnProbe:
     """Return what is believed of a probe before any phantom: its builder's tolerances, and a hand's habits."""
-    return OwnProbe(derivatives, MEAN, np.diag(STD**2), levels)
+    return OwnProbe(derivatives, prior.mean, np.diag(prior.std**2), levels)
 
 
 @dataclass(frozen=True, eq=False)
 class ProbeFit:
     """Posterior of the probe's directions: mean [D] and covariance [D, D]; `log_evidence` of all ramps.
 
-    `misfit_ratio` [n] of each ramp: squared residuals over their number.
+    `misfit_ratio` [n] of each ramp: squared residuals over their number. `prior` is what its builder stated.
     """
 
     mean: Array
@@ -75,21 +76,31 @@ class ProbeFit:
     levels: ErrorLevels
     discrepancy: Discrepancy
     believed: BelievedErrors
+    prior: ProbePrior = OF_DESIGN
+
+    @property
+    def tolerances_away(self) -> Array:
+        """How far each direction [D] lies from what was expected of it, in standard deviations of that."""
+        return np.asarray((self.mean - self.prior.mean[PROBE]) / self.prior.std[PROBE])
 
     def own_probe(self, derivatives: RowDerivatives) -> OwnProbe:
         """Return what is believed of the probe and its presses from now on."""
-        believed = tolerances_only(derivatives, self.levels)
+        believed = tolerances_only(derivatives, self.levels, self.prior)
         mean, covariance = np.array(believed.mean), np.array(believed.covariance)
         mean[PROBE] = self.mean
-        covariance[np.ix_(PROBE, PROBE)] = np.diag((FLOOR * STD[PROBE]) ** 2)
+        covariance[np.ix_(PROBE, PROBE)] = np.diag((FLOOR * self.prior.std[PROBE]) ** 2)
         return replace(believed, mean=mean, covariance=covariance, discrepancy=self.discrepancy)
 
 
 class Design(NamedTuple):
-    """The forward model and noise that all probes of a design share, and the derivatives by what they differ in."""
+    """The forward model and noise that all probes of a design share, and the derivatives by what they differ in.
+
+    `prior` is what one probe's builder says of it.
+    """
 
     answers: RampAnswers
     derivatives: RowDerivatives
+    prior: ProbePrior = OF_DESIGN
 
 
 class BelievedErrors(NamedTuple):
@@ -201,13 +212,15 @@ class _JointFit:
         self._lacking = prior_discrepancy(believed.discrepancy_ratio)
         self._ramps, self._surrogate, self._levels = ramps, design.answers.surrogate, levels
         self._noise, self._derivatives = replace(noise, levels=levels), design.derivatives
+        self._prior = design.prior
+        self._expected, self._tolerances = (part[PROBE] for part in design.prior)
         self._stated = np.array([np.append(ramp.stated[:OFFSET], np.zeros(AXES)) for ramp in ramps])
         self._std = np.array([np.append(ramp.std[:OFFSET], np.full(AXES, EVEN_STD)) for ramp in ramps])
-        self._prior = _of_presses(design.derivatives, levels)
+        self._of_presses = _of_presses(design.derivatives, levels)
 
     def solved(self) -> ProbeFit:
         """Return the best fit and the Gaussian posterior about it."""
-        at = np.concatenate([MEAN[PROBE], self._start().ravel()])
+        at = np.concatenate([self._expected, self._start().ravel()])
         low, high = self._bounds()
         for _ in range(WHITENED_AGAIN):
             explained = self._explained(at)
@@ -230,7 +243,8 @@ class _JointFit:
         left, slopes = self._of_ramps(at, explained)
         covariance, discrepancy = self._posterior(left, slopes, shared)
         misfit = _mean_squares(left + shared.lack @ shared.mean(left), [len(one) for one in lack])
-        return ProbeFit(at[: len(PROBE)], covariance, evidence, misfit, self._levels, discrepancy, self._believed)
+        told = at[: len(PROBE)]
+        return ProbeFit(told, covariance, evidence, misfit, self._levels, discrepancy, self._believed, self._prior)
 
     def _lack(self, x: Array, explained: Sequence[_Ramp]) -> list[Array]:
         """Return what a unit of each part of the discrepancy changes of each ramp [S, R], whitened."""
@@ -243,7 +257,7 @@ class _JointFit:
         Both are told by the same ramps, whose own coordinates are marginalised.
         """
         design = np.hstack([slopes, shared.lack])
-        tolerances = np.concatenate([STD[PROBE], self._std.ravel(), np.ones(shared.lack.shape[1])])
+        tolerances = np.concatenate([self._tolerances, self._std.ravel(), np.ones(shared.lack.shape[1])])
         covariance = np.linalg.inv(design.T @ design + np.diag(tolerances**-2))
         told = np.r_[: len(PROBE), slopes.shape[1] : design.shape[1]]
         factor: Array = np.linalg.cholesky(covariance[np.ix_(told, told)]).astype(np.float64)
@@ -270,7 +284,7 @@ class _JointFit:
         """Return what whitens each ramp, about where the fit has come to."""
         _, at = self._parts(x)
         return [
-            OwnPosterior(ramp.seen, self._surrogate, self._noise, self._prior, REACH_MM, point)
+            OwnPosterior(ramp.seen, self._surrogate, self._noise, self._of_presses, REACH_MM, point)
             if ramp.has_inclusion
             else _PlainBlock(ramp, self._surrogate, self._noise, self._derivatives)
             for ramp, point in zip(self._ramps, at, strict=True)
@@ -279,8 +293,8 @@ class _JointFit:
     def _residuals(self, x: Array, explained: Sequence[_Ramp], shared: SharedLack) -> tuple[Array, Array]:
         """Return whitened residuals of ramps, of their statements and of tolerances, and their derivatives."""
         left, slopes = self._of_ramps(x, explained)
-        std = np.concatenate([STD[PROBE], self._std.ravel()])
-        middle = np.concatenate([MEAN[PROBE], self._stated.ravel()])
+        std = np.concatenate([self._tolerances, self._std.ravel()])
+        middle = np.concatenate([self._expected, self._stated.ravel()])
         return (
             np.concatenate([shared.whitened(left), (x - middle) / std]),
             np.concatenate([shared.whitened(slopes), np.diag(1 / std)]),

@@ -55,13 +55,16 @@ def left_out(
 ) -> list[LeftOut]:
     """Return how each phantom with an inclusion is answered by a probe commissioned on the others.
 
-    `guess` says of rows where a fit may begin. The sizes of all errors stay those of all phantoms.
+    `guess` says of rows where a fit may begin. All ramps of a phantom are left out with it. The sizes of all errors
+    stay those of all phantoms, of which it is one: chosen anew without it they were the same in fourteen of fifteen
+    cases (of worlds 2 and 7 of `host_tools worlds`), and took six times as long. In the other one the misfit was 1.19
+    instead of 1.12, and both truths were covered either way.
     """
     chosen = [number for number, ramp in enumerate(ramps) if ramp.has_inclusion]
 
     def answered(place: int) -> LeftOut:
         ramp = ramps[chosen[place]]
-        others = [one for one in ramps if one is not ramp]
+        others = [one for one in ramps if one.name != ramp.name]
         return _answered(ramp, answers_of(design, fit_probe(others, design, fit.believed)), guess)
 
     return in_parallel(answered, len(chosen), jobs)

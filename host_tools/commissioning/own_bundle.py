@@ -21,7 +21,7 @@ import numpy as np
 from device.measurement.bundle import CARD_FILE
 from device.measurement.calibration import Calibration, written
 from device.measurement.quantities import Bound, require
-from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE
 from host_tools.commissioning.commission import CommissionedProbe
@@ -78,13 +78,18 @@ def write_own_bundle(
 
 def _record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:
     """Return what the card says of the commissioning: the probe, its model error, phantoms left out, gates."""
-    std = np.sqrt(np.diag(done.fit.covariance))
+    std, prior = np.sqrt(np.diag(done.fit.covariance)), done.fit.prior
     return {
         "made_at": written(made_at),
         **origin,
         **done.fit.believed._asdict(),
         "probe": {
-            NAMES[number]: {"mean": round(float(mean), 5), "std": round(float(own), 5), "tolerance": float(STD[number])}
+            NAMES[number]: {
+                "mean": round(float(mean), 5),
+                "std": round(float(own), 5),
+                "expected": round(float(prior.mean[number]), 5),
+                "tolerance": round(float(prior.std[number]), 5),
+            }
             for number, mean, own in zip(PROBE, done.fit.mean, std, strict=True)
         },
         "phantoms_left_out": [

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from device.measurement.quantities import Bound, InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from device.measurement.recording.recording import Recording
 from host_tools.calibration.gates import CalibrationRejected
+from host_tools.calibration.known_bench import another_set, truth_contradiction
 from host_tools.scenes.phantom_set import BLOCKS_NEEDED, INCLUSION, INCLUSIONS_NEEDED, PhantomSet, StatedPhantom
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.stated import SIGMAS, SUFFIX
@@ -44,32 +46,48 @@ class PhantomRamp:
 
 
 def phantom_ramps(
-    recordings: Sequence[Recording], names: Sequence[str], phantoms: PhantomSet, probe: Probe
+    recordings: Sequence[Recording],
+    names: Sequence[str],
+    phantoms: PhantomSet | None,
+    probe: Probe | None,
+    unread: Sequence[str] = (),
 ) -> list[PhantomRamp]:
     """Return the ramps of recordings in files of these names, as made by a probe on phantoms.
 
-    Raises `CalibrationRejected` with everything that contradicts them: another probe, an unknown phantom, one that the
-    design's model does not hold, a press that is no ramp, or too few.
+    `unread` are names of recordings that cannot be read, whose phantoms count as recorded. Without the phantoms or the
+    probe, whose file does not hold, only what does not ask for it is told.
+    Raises `CalibrationRejected` with everything that contradicts them: another probe, an unknown phantom or another
+    truth, one that the design's model does not hold, a press that is no ramp, or too few.
     """
-    problems = list(_problems(recordings, names, phantoms, probe))
+    problems = [
+        *chain.from_iterable(_of_probe(one, name, probe) for one, name in zip(recordings, names, strict=True) if probe),
+        *_of_several_spans(recordings),
+        *(_of_phantoms(recordings, names, phantoms, unread) if phantoms else ()),
+    ]
     ramps: list[PhantomRamp] = []
     for recording, name in zip(recordings, names, strict=True):
-        phantom = _named(name, phantoms)
-        if phantom is None or list(_outside(phantom)):
-            continue
         try:
-            ramps.append(_ramp(recording, phantom, probe))
+            seen = _seen(recording, probe)
         except InvalidQuantity as error:
             problems.append(InvalidQuantity(f"{name}: {error.quantity}", error.value, error.bound, error.action))
+            continue
+        phantom = _named(name, phantoms)
+        if phantom and not list(_outside(phantom)):
+            ramps.append(PhantomRamp(phantom.name, seen, *stated_coordinates(phantom)))
     if problems:
         raise CalibrationRejected(problems)
     return ramps
 
 
-def _ramp(recording: Recording, phantom: StatedPhantom, probe: Probe) -> PhantomRamp:
-    by_file = replace(recording, camera=recording.camera.seen_as(probe.geometry))
-    seen = seen_presses(press_profiles(by_file)[:1])
-    return PhantomRamp(phantom.name, seen, *stated_coordinates(phantom))
+def counts_per_n_of(recordings: Sequence[Recording]) -> float | None:
+    """Return the span by which recordings took forces, None where none says it."""
+    return next((one.cell.counts_per_n for one in recordings if one.cell), None)
+
+
+def _seen(recording: Recording, probe: Probe | None) -> SeenPresses:
+    """Return what is seen of the first press, through the camera of the probe's file."""
+    camera = recording.camera.seen_as(probe.geometry) if probe else recording.camera
+    return seen_presses(press_profiles(replace(recording, camera=camera))[:1])
 
 
 def stated_coordinates(phantom: StatedPhantom) -> tuple[Array, Array, bool]:
@@ -89,23 +107,40 @@ def stated_coordinates(phantom: StatedPhantom) -> tuple[Array, Array, bool]:
     return normalise(values), std, phantom.inclusion is not None
 
 
-def _problems(
-    recordings: Sequence[Recording], names: Sequence[str], phantoms: PhantomSet, probe: Probe
+def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[InvalidQuantity]:
+    """Yield what a recording says otherwise than the file of the probe: serial number, frame, span."""
+    frame, expected = (f"{one.width_px} x {one.height_px} px" for one in (recording.camera, probe.camera))
+    for quantity, value, wanted in (("serial", recording.serial, probe.serial), ("frame", frame, expected)):
+        if value != wanted:
+            yield InvalidQuantity(f"{quantity} of {name}", value, f"{wanted} as in the probe's file", OTHER_PROBE)
+    span, tolerance = probe.cell.counts_per_n, probe.cell.counts_per_n_tolerance
+    if recording.cell and abs(recording.cell.counts_per_n - span) > SIGMAS * tolerance:
+        bound = f"within {SIGMAS * tolerance:.3g} of the file's {span:g}"
+        action = f"{OTHER_PROBE}, or correct the file"
+        yield InvalidQuantity(f"counts_per_n of {name}", recording.cell.counts_per_n, bound, action)
+
+
+def _of_several_spans(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:
+    spans = sorted({one.cell.counts_per_n for one in recordings if one.cell})
+    if len(spans) > 1:
+        found = " and ".join(f"{one:g}" for one in spans)
+        action = "record all phantoms under one setting: the probe is commissioned for its forces"
+        yield InvalidQuantity("counts_per_n of the recordings", found, "the same in all", action)
+
+
+def _of_phantoms(
+    recordings: Sequence[Recording], names: Sequence[str], phantoms: PhantomSet, unread: Sequence[str]
 ) -> Iterator[InvalidQuantity]:
-    found = {name: _named(name, phantoms) for name in names}
+    """Yield what does not agree with the phantoms' file, and how many of its phantoms are missing."""
     for recording, name in zip(recordings, names, strict=True):
-        if recording.serial != probe.serial:
-            bound = f"{probe.serial} as in the probe's file"
-            yield InvalidQuantity(f"serial of {name}", recording.serial, bound, OTHER_PROBE)
-        span, tolerance = probe.cell.counts_per_n, probe.cell.counts_per_n_tolerance
-        if recording.cell and abs(recording.cell.counts_per_n - span) > SIGMAS * tolerance:
-            bound = f"within {SIGMAS * tolerance:.3g} of the file's {span:g}"
-            action = "name the file of the probe that made it, or correct the file"
-            yield InvalidQuantity(f"counts_per_n of {name}", recording.cell.counts_per_n, bound, action)
-        if found[name] is None:
+        yield from another_set(recording, name, phantoms)
+        phantom = _named(name, phantoms)
+        if phantom is None:
             action = "name its file as the phantom is named"
             yield InvalidQuantity(f"phantom of {name}", "none", f"one of the set {phantoms.serial}", action)
-    stated = [one for one in found.values() if one]
+        elif contradiction := truth_contradiction(recording, name, phantom):
+            yield contradiction
+    stated = [one for name in dict.fromkeys((*names, *unread)) if (one := _named(name, phantoms))]
     for phantom in stated:
         yield from _outside(phantom)
     inclusions = sum(one.inclusion is not None for one in stated)
@@ -126,5 +161,5 @@ def _outside(phantom: StatedPhantom) -> Iterator[InvalidQuantity]:
             yield InvalidQuantity(f"{name} of {phantom.name}", stated, str(Bound(low, high, "")), action)
 
 
-def _named(name: str, phantoms: PhantomSet) -> StatedPhantom | None:
-    return next((one for one in phantoms.phantoms if one.name == name), None)
+def _named(name: str, phantoms: PhantomSet | None) -> StatedPhantom | None:
+    return next((one for one in phantoms.phantoms if one.name == name), None) if phantoms else None

@@ -8,17 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from host_tools.commissioning.joint_fit import ProbeFit
 from host_tools.commissioning.left_out import LeftOut
 
 
 def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
-    """Yield what is known of the probe; layers carry what the model lacks, and are no measurement of the silicone."""
-    yield f"{'of the probe':28} {'found':>8} {'1 sd':>8} {'tolerance':>10}"
-    std = np.sqrt(np.diag(fit.covariance))
+    """Yield what is known of the probe, beside what was expected.
+
+    Layers carry what the model lacks, and are no measurement of the silicone.
+    """
+    yield f"{'of the probe':28} {'found':>8} {'1 sd':>8} {'expected':>9} {'tolerance':>10}"
+    std, prior = np.sqrt(np.diag(fit.covariance)), fit.prior
     for number, mean, own in zip(directions, fit.mean, std, strict=True):
-        yield f"{NAMES[number]:28} {mean:8.4f} {own:8.4f} {STD[number]:10.3g}"
+        yield f"{NAMES[number]:28} {mean:8.4f} {own:8.4f} {prior.mean[number]:9.4f} {prior.std[number]:10.3g}"
     yield f"{'lacking of an inclusion':28} {fit.believed.discrepancy_ratio:8.2%}"
     yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
     yield f"{'skin and flat field':28} {fit.levels.flat_field_ratio:8.2%}"

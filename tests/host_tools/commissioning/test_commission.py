@@ -23,6 +23,7 @@ from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning import commission as commission_module
+from host_tools.commissioning import left_out as left_out_module
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, commission, gates_of
 from host_tools.commissioning.joint_fit import (
     DISCREPANCY_RATIOS,
@@ -37,6 +38,7 @@ from host_tools.commissioning.joint_fit import (
 from host_tools.commissioning.left_out import LeftOut, left_out
 from host_tools.commissioning.own_bundle import write_own_bundle
 from host_tools.commissioning.phantom_ramps import phantom_ramps
+from host_tools.commissioning.probe_prior import LAYERS, OF_DESIGN, ProbePrior
 from host_tools.commissioning.report import phantom_lines, probe_lines
 from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scenes.phantom_set import read_phantoms
@@ -132,6 +134,46 @@ def test_probe_and_phantoms_are_reported_in_words(fit):
     assert lines[1].startswith("contact_exponent")
 
 
+def test_layers_that_are_expected_to_be_stiffer_are_found_stiffer(fit, ramps, model, derivatives):
+    """Ten per cent stiffer, as if known to half of one: ramps alone say otherwise of two of the three, and strongly."""
+    layers = [NAMES.index(name) for name in LAYERS]
+    mean, std = np.array(OF_DESIGN.mean), np.array(OF_DESIGN.std)
+    mean[layers], std[layers] = np.log(1.1), 0.005
+    told = fit_probe(ramps, Design(model.answers, derivatives, ProbePrior(mean, std)), fit.believed)
+    of_layers = np.isin(PROBE, layers)
+    away, before = (np.abs(one.mean - np.log(1.1))[of_layers] for one in (told, fit))
+    assert np.all(away < before)
+    assert np.linalg.norm(away) < 0.6 * np.linalg.norm(before)
+    assert np.all(np.diag(told.covariance)[of_layers] < np.diag(fit.covariance)[of_layers])
+    own = told.own_probe(derivatives)
+    assert np.sqrt(np.diag(own.covariance))[PROBE] == pytest.approx(FLOOR * std[PROBE])
+
+
+def test_a_probe_is_held_against_its_own_file(fit):
+    """Found as the design has it, a probe is far from a file that states layers of a quarter more."""
+    answered = LeftOut("A1", *np.full((5, 3), 10.0), np.full(3, True), 1.0)
+    assert gates_of(fit, [answered])[2].problem is None
+    stated = replace(fit, prior=OF_DESIGN._replace(mean=OF_DESIGN.mean + 0.7, std=OF_DESIGN.std))
+    problem = gates_of(stated, [answered])[2].problem
+    assert "what was expected of it" in problem.quantity
+    assert list(probe_lines(stated, PROBE))[2].split()[3:] == ["0.7000", "0.1"]
+
+
+def test_a_second_ramp_of_a_phantom_is_left_out_with_it(ramps, model, derivatives, fit, monkeypatch):
+    kept = []
+
+    def fitted(others, design, believed):
+        kept.append([one.name for one in others])
+        return fit
+
+    monkeypatch.setattr(left_out_module, "fit_probe", fitted)
+    monkeypatch.setattr(left_out_module, "_answered", lambda ramp, answers, guess: ramp.name)
+    twice = [*ramps, ramps[0]]
+    names = left_out(twice, Design(model.answers, derivatives), model.first_guesses, fit, jobs=1)
+    assert len(names) == len(kept)
+    assert not any(name in others for name, others in zip(names, kept, strict=True))
+
+
 @pytest.mark.long
 def test_a_phantom_left_out_is_answered_as_unknown_and_wrong_truths_are_told(fit, ramps, model, derivatives):
     """Two phantoms whose truths are exchanged are not covered: the gate names what to measure again."""
@@ -177,6 +219,8 @@ def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives,
     assert answer.mean == pytest.approx(before.mean, abs=1e-3)
     card = json.loads((out / "model.json").read_text())
     assert "dial" not in card["modes"]["standard"]
+    of_layer = card["commissioned"]["probe"][LAYERS[0]]
+    assert (of_layer["expected"], of_layer["tolerance"]) == (0.0, 0.1)
     (out / "model.json").write_text(json.dumps(card | {"serials": ["TSIS-0008"]}))
     with pytest.raises(BundleRefused):
         read_ramp_model(out)

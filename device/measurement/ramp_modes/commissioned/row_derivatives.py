@@ -67,9 +67,11 @@ DIRECTIONS: dict[str, BelievedDirection] = {
 }
 """Standard deviations are a builder's tolerances and a hand's habits, as `host_tools worlds` draws them.
 
-Logarithms of the ratios of the layers' moduli and of the lesion's skin and tissue to those beside it; true force over
-the one that the cell says; the part of its motion with which the face is drawn; the part of its modulus that tissue
-loses in the end; light of the sides along the inclusion against those opposite, and of both pairs against each other.
+Logarithms of the ratios of the layers' moduli and of the lesion's skin and tissue to those beside it; the cell's counts
+of a newton over those by which forces are told; the part of its motion with which the face is drawn; the part of its
+modulus that tissue loses in the end; light of the sides along the inclusion against those opposite, and of both pairs
+against each other. The largest contact of skin has none: skin that wets less easily shows nearly the same, so that each
+press tells it by its own coordinates.
 """
 NAMES = tuple(DIRECTIONS)
 COUNT = len(NAMES)
