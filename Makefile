@@ -119,19 +119,8 @@ verify: .venv/all.stamp ## check forward model and light against known answers; 
 sweep: .venv/all.stamp ## solve the 134 scenes of the training set into build/sweep.nc
 	$(HOST_TOOLS) sweep --scenes 134 --seed 1 --out build/sweep.nc
 
-train: sweep ## regenerate everything in models/ from nothing
-	rm -rf build/phantoms
-	$(HOST_TOOLS) table --out models/simulated_probe
-	$(HOST_TOOLS) optics build --out models/simulated_probe
-	$(HOST_TOOLS) train --mode paper --data build/sweep.nc --out models/paper
-	$(HOST_TOOLS) phantom --out build/phantoms/physical
-	rm -f models/simulated_probe/calibration.json models/simulated_probe/calibration_linear.json
-	$(HOST_TOOLS) calibrate build/phantoms/physical/* --operator "make train" --out models/simulated_probe/calibration.json
-	$(HOST_TOOLS) phantom --scenario scenarios/linear_light.toml --out build/phantoms/linear
-	$(HOST_TOOLS) calibrate build/phantoms/linear/* --operator "make train" --out models/simulated_probe/calibration_linear.json
-	$(HOST_TOOLS) table --part wide
-	$(HOST_TOOLS) train --mode standard --out models/standard
-	$(HOST_TOOLS) train --mode quick --out models/quick
+train: .venv/all.stamp ## regenerate everything in models/ from nothing (some hours)
+	$(HOST_TOOLS) train --mode all
 
 modes: .venv/all.stamp ## measure what the modes of a press are worth; write docs/modes.md
 	$(HOST_TOOLS) modes --out docs/modes.md

@@ -57,8 +57,11 @@ LOOKING = ("status", "exams", "export", "retention")
 """Verbs that only read what is kept, or ask the daemon: in a room of their own."""
 WITHOUT_SETTINGS = ("analyse", "config", "faults", "openapi", "support")
 """Verbs whose `run` takes the options alone; that of the others takes the settings, too."""
-ONE_THREAD = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS")
-"""A frame is small work: more threads of a library would wait for each other. The camera's process inherits this."""
+OF_LIBRARIES = {"OPENCV_FOR_THREADS_NUM": "1", "OPENBLAS_NUM_THREADS": "1", "PYDANTIC_DISABLE_PLUGINS": "__all__"}
+"""A frame is small work: more threads of a library would wait for each other. The camera's process inherits this.
+
+There is no plugin: to look for one in all installed packages is a tenth of what `config` takes.
+"""
 
 EXAMPLES = """examples:
   python -m device --simulate --port 8000          the virtual probe, screen at http://127.0.0.1:8000/
@@ -132,8 +135,8 @@ def _verb_first(words: list[str]) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; return its exit code."""
-    for library in ONE_THREAD:
-        os.environ.setdefault(library, "1")
+    for name, value in OF_LIBRARIES.items():
+        os.environ.setdefault(name, value)
     arguments = in_any_order(sys.argv[1:] if arguments is None else arguments)
     parser = _parser([verb for verb in VERBS if {verb, *ALIASES.get(verb, ())} & set(arguments)])
     options = parser.parse_args(arguments)
@@ -185,9 +188,10 @@ def _run(options: argparse.Namespace) -> int:
 
             return run_erase_command(options, _started(options), _stated(options))
         case "led-off":
-            from device.commands.led_off import led_off
+            from device.commands.led_off import led_off_by_settings
+            from device.files.plain_settings import layer_files
 
-            led_off(_start_settings(options, None).config.light)
+            led_off_by_settings(layer_files(options.root, options.config))
             return 0
         case verb:
             run: Callable[..., int] = import_module(_module_of(verb)).run
@@ -215,8 +219,9 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
     Those of the scene lie over the simulated probe's.
     """
     from device.config import simulated_config
+    from device.files.plain_settings import layer_files
     from device.settings.last_good import StartSettings, start_settings
-    from device.settings.layers import layer_files, overridden, read_layers
+    from device.settings.layers import overridden, read_layers
 
     if not scenario:
         settings = start_settings(read_layers(layer_files(options.root, options.config)))
@@ -234,7 +239,8 @@ def _start_settings(options: argparse.Namespace, scenario: Scenario | None) -> S
 def _stated(options: argparse.Namespace) -> Mapping[str, Any]:
     """Return what this machine's settings files say, by full names; of a simulated probe its own settings."""
     from device.config import simulated_config
-    from device.settings.layers import layer_files, read_layers
+    from device.files.plain_settings import layer_files
+    from device.settings.layers import read_layers
 
     scenario = _scenario(options)
     if scenario and not options.config:

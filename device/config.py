@@ -2,14 +2,13 @@
 
 Out-of-range values are refused, never clipped. Paths are relative to where the daemon is started. docs/settings.md is
 made from here; which files are read, and in which order, is in device/settings/layers.py. What has to fit together is
-compared when each setting holds alone. No NumPy is loaded: what darkens the LEDs has to be quick
-(device/commands/led_off.py).
+compared when each setting holds alone. No NumPy is loaded: a short verb, as `config`, has to be quick.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import field, fields
 from datetime import date
 from itertools import combinations
 from pathlib import Path
@@ -20,7 +19,18 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 from typing_extensions import Doc
 
-from device.config_chips import CHIP_ADDRESSES, INTERNAL_HZ, LightChip, PwmClock, RawFormat, RawMode
+from device.config_chips import (
+    CHIP_ADDRESSES,
+    GPIO_LINES,
+    I2C_ADDRESSES,
+    I2C_BUSES,
+    OSCILLATOR_HZ,
+    PWM_HZ,
+    LightChip,
+    LightWiring,
+    RawFormat,
+    RawMode,
+)
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.files.toml_record import STRICT, InvalidRecord
 from device.measurement.mode import RAMP_FROM_N, RAMP_TO_N, Mode
@@ -170,33 +180,35 @@ class CameraSection(Section):
 
 
 @dataclass(frozen=True, config=STRICT)
-class LightSection(Section):
+class LightSection(LightWiring, Section):
     """The LED driver: chip, I2C bus and address, the brightness of the four sides while measuring, when light is right.
 
     Lists have one number a side: +x, +y, -x, -y.
     """
 
     chip: Annotated[LightChip, Doc("LED driver on the board: a pca9685 needs an exposure of whole PWM periods.")] = (
-        "tlc59116"
+        LightWiring.chip
     )
-    bus: Annotated[int, Bound(0, 255, ""), Doc("I2C bus of the LED driver.")] = 1
+    bus: Annotated[int, I2C_BUSES, Doc("I2C bus of the LED driver.")] = LightWiring.bus
     address: Annotated[
         int | None,
-        Bound(0x08, 0x77, ""),
+        I2C_ADDRESSES,
         HEXADECIMAL,
         Doc("I2C address of the LED driver; 0x60 of a tlc59116 and 0x40 of a pca9685 unless given."),
-    ] = None
-    enable_chip: Annotated[str, Doc("GPIO chip of the line that enables the LEDs' outputs.")] = "/dev/gpiochip0"
+    ] = LightWiring.address
+    enable_chip: Annotated[str, Doc("GPIO chip of the line that enables the LEDs' outputs.")] = LightWiring.enable_chip
     enable_line: Annotated[
         int | None,
-        Bound(0, 511, ""),
+        GPIO_LINES,
         Doc(
             "Line of that chip that is wired to RESET of a tlc59116 or OE of a pca9685; "
             "unless given only the bus switches the light."
         ),
-    ] = None
-    pwm_hz: Annotated[float, Bound(24.0, 1526.0, "Hz"), Doc("Frequency of the brightness of a pca9685.")] = 1526.0
-    oscillator_hz: Annotated[float, Bound(20e6, 30e6, "Hz"), Doc("Oscillator of a pca9685, as measured.")] = INTERNAL_HZ
+    ] = LightWiring.enable_line
+    pwm_hz: Annotated[float, PWM_HZ, Doc("Frequency of the brightness of a pca9685.")] = LightWiring.pwm_hz
+    oscillator_hz: Annotated[float, OSCILLATOR_HZ, Doc("Oscillator of a pca9685, as measured.")] = (
+        LightWiring.oscillator_hz
+    )
     ratio: Annotated[
         tuple[SideRatio, SideRatio, SideRatio, SideRatio],
         Doc("Brightness of each side while measuring, of the first press if it is held at light.target_counts."),
@@ -239,19 +251,9 @@ class LightSection(Section):
     ] = 5.0
 
     @property
-    def chip_address(self) -> int:
-        """The chip's I2C address: as given, or with its address pins as they come."""
-        return CHIP_ADDRESSES[self.chip].default if self.address is None else self.address
-
-    @property
-    def is_enabled_low(self) -> bool:
-        """Whether a low level lets the chip shine: OE of a PCA9685 does, RESET of a TLC59116 takes its light away."""
-        return self.chip == "pca9685"
-
-    @property
-    def pwm_clock(self) -> PwmClock:
-        """The period of a PCA9685."""
-        return PwmClock.nearest(self.pwm_hz, self.oscillator_hz)
+    def wiring(self) -> LightWiring:
+        """Where the chip is, without what is asked of its light."""
+        return LightWiring(**{place.name: getattr(self, place.name) for place in fields(LightWiring)})
 
     def conflicts(self) -> Iterator[Conflict]:
         """Yield an address that the chip cannot have, or that is not its own."""

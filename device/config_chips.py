@@ -1,6 +1,7 @@
-"""What camera and light are set to, as their chips have it: a mode of the sensor, an LED driver's addresses and period.
+"""What camera and light are set to, as their chips have it: a mode of the sensor, an LED driver's wiring and period.
 
-Numbers only, without NumPy: the settings are compared by them, and the drivers in device/hardware set them. Sources:
+Numbers only, without NumPy and pydantic: the settings are compared by them, and the drivers in device/hardware set
+them, also where the settings cannot be read as a whole (device/settings/plain_light.py). Sources:
 libcamera formats R8, R10, R12, R16; picamera2 0.3.38 (`helpers.make_array`); NXP PCA9685 datasheet rev. 4, section
 7.3.5 "PWM frequency PRE_SCALE".
 """
@@ -9,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
+
+from device.measurement.quantities import Bound
 
 RawFormat = Literal["R8", "R10", "R12", "R16"]
 RAW_BITS: dict[RawFormat, int] = {"R8": 8, "R10": 10, "R12": 12, "R16": 16}
@@ -99,9 +102,45 @@ class ChipAddresses:
     shared: tuple[int, ...]
     default: int
 
+    def has(self, address: int) -> bool:
+        """Return whether a chip can have an address for its own."""
+        return self.first <= address <= self.last and address not in self.shared
+
 
 CHIP_ADDRESSES: dict[LightChip, ChipAddresses] = {
     "tlc59116": ChipAddresses(0x60, 0x6F, (0x68, 0x6B), 0x60),
     "pca9685": ChipAddresses(0x40, 0x77, (0x70,), 0x40),
 }
 """All call and software reset are shared (TLC59116 datasheet SLDS157E, 10.1; PCA9685 rev. 4, 7.1)."""
+
+I2C_BUSES, I2C_ADDRESSES = Bound(0, 255, ""), Bound(0x08, 0x77, "")
+GPIO_LINES = Bound(0, 511, "")
+PWM_HZ, OSCILLATOR_HZ = Bound(24.0, 1526.0, "Hz"), Bound(20e6, 30e6, "Hz")
+
+
+@dataclass(frozen=True)
+class LightWiring:
+    """Which chip drives the LEDs, at which address of which bus, and the GPIO line that enables its outputs, if any."""
+
+    chip: LightChip = "tlc59116"
+    bus: int = 1
+    address: int | None = None
+    enable_chip: str = "/dev/gpiochip0"
+    enable_line: int | None = None
+    pwm_hz: float = PWM_HZ.high
+    oscillator_hz: float = INTERNAL_HZ
+
+    @property
+    def chip_address(self) -> int:
+        """The chip's I2C address: as given, or with its address pins as they come."""
+        return CHIP_ADDRESSES[self.chip].default if self.address is None else self.address
+
+    @property
+    def is_enabled_low(self) -> bool:
+        """Whether a low level lets the chip shine: OE of a PCA9685 does, RESET of a TLC59116 takes its light away."""
+        return self.chip == "pca9685"
+
+    @property
+    def pwm_clock(self) -> PwmClock:
+        """The period of a PCA9685."""
+        return PwmClock.nearest(self.pwm_hz, self.oscillator_hz)

@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads make small pr
 
 from bench_table import Figure, print_table, write_table
 
-CHAPTERS = ("work", "keeping", "forward", "toolkit", "acquisition", "daemon", "web", "darkness", "screen")
+CHAPTERS = ("work", "keeping", "forward", "toolkit", "starts", "acquisition", "daemon", "web", "darkness", "screen")
 """Each is a module `bench_CHAPTER` with a function `figures`."""
 ASKED_FOR = ("endurance",)
 """Takes an hour: not without being named."""

@@ -10,6 +10,7 @@ the probe tells of its own presses: the wall's time until the answer is kept on 
 
 from __future__ import annotations
 
+import http.client
 import os
 import subprocess
 import sys
@@ -20,7 +21,7 @@ from tempfile import TemporaryDirectory
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "rig"))
 
-from bench_table import Figure, median_seconds
+from bench_table import WALL, Figure, median_seconds
 from daemon_process import QUICK_HAND, Daemon
 from rig import Rig, build_shim
 
@@ -32,6 +33,9 @@ MODES = ("quick", "standard", "precise")
 STARTS = 3
 READY_BOUND = 15.0
 """1.5 s where NumPy takes 0.1."""
+ASKED, ASK_BOUND = 400, 40.0
+"""10 ms where the yardstick takes 0.25: Linux puts off an acknowledgement for 40 ms, which an answer in two parts waits
+for when TCP_NODELAY is lost."""
 ANSWERED_PRESSES = 5
 ANSWER_BOUNDS = {"quick": 200.0, "standard": 850.0, "precise": 5500.0}
 """0.05, 0.2 and 1.3 s where the yardstick takes a quarter of a millisecond; the hand's scan is one of five presses."""
@@ -90,6 +94,7 @@ def _at_rest_and_after_presses(rig: Rig) -> Iterator[Figure]:
     busy = (_cpu_s(family) - before_s) / (time.perf_counter() - begun_s)
     yield Figure(CHAPTER, "at rest", 100 * busy, "% of a core", bound=2.0)
     yield Figure(CHAPTER, "memory at rest", _memory_mb(family), "MB", bound=150.0)
+    yield _one_answer(daemon)
     rig.world.wish(url=daemon.url)
     _press(daemon, MODES)
     yield Figure(CHAPTER, "memory after a press of each mode", _memory_mb(family), "MB")
@@ -99,6 +104,22 @@ def _at_rest_and_after_presses(rig: Rig) -> Iterator[Figure]:
     grown_mb, press_s = _grown(daemon, family, more)
     here = f"{press_s:.1f} s a press"
     yield Figure(CHAPTER, f"what it grew in {len(more)} presses more", grown_mb, "MB", bound=MOST_GROWN_MB, here=here)
+
+
+def _one_answer(daemon: Daemon) -> Figure:
+    """Return how long one client waits for one answer after the other on a connection that is kept; the median."""
+    connection = http.client.HTTPConnection(daemon.url.removeprefix("http://"))
+
+    def ask() -> None:
+        connection.request("GET", "/api/v1/health/live")
+        answer = connection.getresponse()
+        answer.read()
+        assert answer.status == 200
+
+    answer_s, yardstick_s = median_seconds(ask, ASKED, WALL), median_seconds(exp_and_sum, YARDSTICK_CALLS)
+    connection.close()
+    here = f"{1e3 * answer_s:.2f} ms here"
+    return Figure(CHAPTER, "one answer, health/live, median", answer_s / yardstick_s, bound=ASK_BOUND, here=here)
 
 
 def _answers(daemon: Daemon) -> Iterator[Figure]:

@@ -36,6 +36,8 @@ CALCULIX_SIZES = Sizes(bulk_mm=6.0, rim_mm=0.07, growth=0.6, per_quarter_circle=
 """The coarsest mesh found whose error is within 0.2 % of w and of the force; even refinement spends more elements."""
 QUARTER = Sector(90.0, 6)
 """The quarter model that the paper's SOLID95 elements imply."""
+LEAST_RATIO = 4.0
+"""Of the comparison that is fair; 7 were measured."""
 BATCH = 24
 """Scenes of the two-process race."""
 
@@ -64,14 +66,15 @@ def _against_calculix() -> Iterator[Figure]:
     yield from _errors("one press", _one_press(), exact)
     if not ccx_available():  # Debian: calculix-ccx
         return
-    for words, sector, sizes, process in (
-        ("axisymmetric", "axisymmetric", FRONT_SIZES["rim 0.1"], Process(reduced_integration=True)),
-        ("quarter", QUARTER, CALCULIX_SIZES, Process()),
+    for words, sector, sizes, process, least in (
+        ("axisymmetric", "axisymmetric", FRONT_SIZES["rim 0.1"], Process(reduced_integration=True), LEAST_RATIO),
+        ("quarter", QUARTER, CALCULIX_SIZES, Process(), None),
     ):
         began = time.perf_counter()
         press = solve_with_calculix(SCENE, [1.0], finite_strain=False, sizes=sizes, sector=sector, process=process)[0]
         ratio = (time.perf_counter() - began) / ours_s
-        yield Figure(CHAPTER, f"CalculiX over ours, {words}, {press.elements} elements", ratio, "x")
+        name = f"CalculiX over ours, {words}, {press.elements} elements"
+        yield Figure(CHAPTER, name, ratio, "x", least, at_least=True)
         yield from _errors(f"CalculiX, {words}", (press.w_at_mm(0.0), press.force_n), exact)
 
 

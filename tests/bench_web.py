@@ -2,8 +2,9 @@
 
 Frames: acquisition of `bench_acquisition`, 60 a second, in the process that serves the API, which another process asks
 50 times a second for a minute. Harm: a daemon without its simulation (tests/rig) presses beside connections that never
-send, streams that nobody reads, and bodies of 100 MB, while another process asks for its status. Stops: from SIGTERM
-until the daemon has ended. All times are the wall's, so they hold for a machine that does nothing else.
+send, streams that nobody reads, and bodies of 100 MB, while another process asks for its status. Fetched: eight clients
+ask for pictures of precise presses beside one. Stops: from SIGTERM until the daemon has ended. All times are the
+wall's, so they hold for a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ import json
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -46,6 +49,7 @@ CHAPTER = "web"
 REQUESTS_A_SECOND, SECONDS, ALONE_S = 50.0, 60.0, 10.0
 PATHS = ("/api/v1/status", "/api/v1/measurements", "/api/v1/exams", "/api/v1/device", "/api/v1/presses?limit=5")
 NEVER_SENDING, NEVER_READING, SCREENS = 100, 50, 10
+FETCHING, ALONE_PRESSES, LOOK_EVERY_S = 8, 4, 0.05
 HARMED_S, STATUS_A_SECOND = 20.0, 20.0
 MOST_MS, MOST_MB, STOP_S = 150.0, 30.0, 3.0
 
@@ -56,6 +60,7 @@ def figures() -> Iterator[Figure]:
     with TemporaryDirectory(prefix="tsis-") as folder:
         yield from _frames_beside_requests(_made(Path(folder) / "frames"))
         yield from _harmed(_made(Path(folder) / "harmed"))
+        yield from _fetched(_made(Path(folder) / "fetched"))
         for name, stopping in STOPS.items():
             seconds = stopping(_made(Path(folder) / name.replace(" ", "-")))
             yield Figure(CHAPTER, f"stop {name}", seconds, "s", bound=STOP_S)
@@ -132,6 +137,48 @@ def _harmed(folder: Path) -> Iterator[Figure]:
     here = f"{len(bodies)} bodies of 100 MB"
     yield Figure(CHAPTER, "slowest other answer beside harm", found["slowest_ms"], "ms", bound=MOST_MS, here=here)
     yield Figure(CHAPTER, "memory that harm takes", most_mb - before_mb, "MB", bound=MOST_MB)
+
+
+def _fetched(folder: Path) -> Iterator[Figure]:
+    """Yield what a precise press beside clients that fetch pictures of others takes more than the largest alone."""
+    rig = Rig(folder, build_shim(folder), QUICK_HAND)
+    try:
+        daemon = rig.start()
+        family = _family(daemon.process.pid)
+        alone_mb = max(_peak_mb(daemon, family) for _ in range(ALONE_PRESSES))
+        kept = [one["id"] for one in daemon.ask("/api/v1/measurements").json["measurements"]]
+        has_ended, sizes_kb = threading.Event(), list[float]()
+
+        def fetch(number: int) -> None:
+            while not has_ended.is_set():
+                answer = daemon.ask(f"/api/v1/measurements/{kept[number % len(kept)]}/image.png")
+                assert answer.status == 200
+                sizes_kb.append(len(answer.body) / 1e3)
+
+        with ThreadPoolExecutor(FETCHING) as clients:
+            fetches = [clients.submit(fetch, number) for number in range(FETCHING)]
+            try:
+                beside_mb = _peak_mb(daemon, family)
+            finally:
+                has_ended.set()
+            for one in fetches:
+                one.result()
+    finally:
+        rig.close()
+    here = f"{len(sizes_kb)} of {sum(sizes_kb) / len(sizes_kb):.0f} kB"
+    yield Figure(
+        CHAPTER, f"memory that {FETCHING} clients take of a press", beside_mb - alone_mb, "MB", MOST_MB, here=here
+    )
+
+
+def _peak_mb(daemon: Daemon, family: list[int]) -> float:
+    """Return the largest memory of a daemon's own during a press in mode precise."""
+    with ThreadPoolExecutor(1) as hand:
+        pressing, most_mb = hand.submit(daemon.press, "precise"), 0.0
+        while not wait((pressing,), LOOK_EVERY_S).done:
+            most_mb = max(most_mb, _memory_mb(family, OWN))
+    assert pressing.result()["state"] == "done"
+    return most_mb
 
 
 def _stop_s(daemon: Daemon) -> float:

@@ -58,8 +58,9 @@ class SupportContext:
     def config(self) -> Any:
         """The settings with which a start would begin; raises what that would."""
         from device.config import simulated_config
+        from device.files.plain_settings import layer_files
         from device.settings.last_good import start_settings
-        from device.settings.layers import layer_files, read_layers
+        from device.settings.layers import read_layers
 
         if self.is_simulated and not self.stated:
             return simulated_config()
@@ -130,8 +131,9 @@ def release(context: SupportContext) -> dict[str, Any]:
 
 def settings(context: SupportContext) -> dict[str, Any]:
     """Return what the settings files set: numbers and choices, of texts only that they are set; and every problem."""
+    from device.files.plain_settings import layer_files
     from device.settings.catalogue import SETTINGS
-    from device.settings.layers import layer_files, read_layers
+    from device.settings.layers import read_layers
 
     layers = read_layers(layer_files(context.root, context.stated))
     problems = [

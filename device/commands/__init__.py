@@ -5,5 +5,5 @@ Modules in reading order: `serve`, `analyse`, `record`, `calibration`, `self_tes
 `led_off`.
 
 Those that only look are in `look`. What a verb does stands in the room that does it; here are its options and what it
-prints. `led_off` imports no NumPy.
+prints. `led_off` imports neither NumPy nor pydantic before the LEDs are dark.
 """

@@ -10,9 +10,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from device.files.plain_settings import layer_files
 from device.files.text_table import aligned
 from device.settings.catalogue import SETTINGS, Known
-from device.settings.layers import Layers, layer_files, read_layers
+from device.settings.layers import Layers, read_layers
 from device.settings.page import markdown
 
 EXAMPLES = """examples:

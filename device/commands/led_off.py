@@ -1,8 +1,9 @@
 """`python -m device led-off`: darkens the LED chip whatever became of the daemon, as systemd's `ExecStopPost=`.
 
-Imports no more than the settings and the driver, and no NumPy, so that `python -m device.commands.led_off` is done long
-before the daemon would have started. The enable line goes first, if there is one; the bus is asked in a process of its
-own, since a transfer that hangs in the kernel cannot be ended and may keep any process that made it.
+It is dark before anything is loaded that is not needed for that: the settings files are read for the chip's place
+alone, without pydantic, and checked as a whole afterwards, where they are bad. The enable line goes first, if there is
+one; the bus is asked in a process of its own, since a transfer that hangs in the kernel cannot be ended and may keep
+any process that made it.
 Exit codes: 0 dark, 1 not known to be dark, 2 usage.
 """
 
@@ -14,16 +15,16 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from device.config import LightSection
+from device.config_chips import LightWiring
 from device.errors import DeviceError, LightBusError, LightError
+from device.files.plain_settings import layer_files
 from device.hardware.led_driver import open_led_driver
 from device.hardware.light_keeper import GpioLine
-from device.settings.last_good import start_settings
-from device.settings.layers import layer_files, read_layers
+from device.settings.plain_light import PlainLight, plain_light
 
 TRY_FOR_S = 0.5
 """A transaction that the killed daemon was in may spoil the next one; beyond this a chip that is silent stays so."""
@@ -41,7 +42,46 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add nothing: the verb takes the options of the whole command line."""
 
 
-def led_off(light: LightSection) -> None:
+def led_off_by_settings(files: Sequence[Path]) -> None:
+    """Darken the chip wherever settings files, lowest first, or the last good ones say that it is.
+
+    Raises `LightError` when one of these places is not known to be dark, `ConfigError` with all that is wrong when
+    the files say no place and there are no last good ones: every chip that there is has been darkened then, if it
+    answered.
+    """
+    said = plain_light(files)
+    refused = _refused(said.wirings)
+    if not said.is_said:
+        refused = _checked(files, said, refused)
+    if refused:
+        raise next(iter(refused.values()))
+
+
+def _refused(wirings: Iterable[LightWiring]) -> dict[LightWiring, LightError]:
+    """Darken the chip at each of some places; return why not, of those that did not answer."""
+    refused = {}
+    for wiring in wirings:
+        try:
+            led_off(wiring)
+        except LightError as error:
+            refused[wiring] = error
+    return refused
+
+
+def _checked(
+    files: Sequence[Path], said: PlainLight, refused: dict[LightWiring, LightError]
+) -> dict[LightWiring, LightError]:
+    """Return what was refused at the place that the settings as a whole say; raise `ConfigError` when they cannot."""
+    from device.settings.last_good import start_settings  # dark first
+    from device.settings.layers import read_layers
+
+    wiring = start_settings(read_layers(files)).config.light.wiring
+    if wiring not in said.wirings:
+        return _refused([wiring])
+    return {wiring: refused[wiring]} if wiring in refused else {}
+
+
+def led_off(light: LightWiring) -> None:
     """Darken all sides, by the line and by the bus, and read it back; returns in time also when the bus hangs.
 
     Raises `LightError` when bus or chip do not answer: then nobody knows, or the line alone is what keeps it dark.
@@ -58,7 +98,7 @@ def led_off(light: LightSection) -> None:
             line.close()
 
 
-def _lowered(light: LightSection) -> tuple[GpioLine | None, str]:
+def _lowered(light: LightWiring) -> tuple[GpioLine | None, str]:
     """Return the enable line, low, once whoever held it has gone, and what there is to tell of it."""
     deadline_s = time.monotonic() + LINE_FOR_S
     while light.enable_line is not None:
@@ -72,7 +112,7 @@ def _lowered(light: LightSection) -> tuple[GpioLine | None, str]:
     return None, ""
 
 
-def _darken_in_time(light: LightSection) -> None:
+def _darken_in_time(light: LightWiring) -> None:
     """Darken the chip in a child process; raise what it raised, or `LightBusError` when it does not come back."""
     hearing, telling = os.pipe()
     child = os.fork()
@@ -92,7 +132,7 @@ def _darken_in_time(light: LightSection) -> None:
         raise DeviceError.by_code[code](cause, remedy)
 
 
-def _darken_and_tell(light: LightSection, telling: int) -> None:
+def _darken_and_tell(light: LightWiring, telling: int) -> None:
     """Darken the chip, say nothing or what went wrong, and end this process, which may be long after its parent."""
     _keep_only(telling)
     said = SPLIT.join(["E201", "The LED chip could not be darkened.", "Switch the probe off and on."])
@@ -116,7 +156,7 @@ def _keep_only(handle: int) -> None:
     os.closerange(handle + 1, MOST_FILES)
 
 
-def darken(light: LightSection) -> None:
+def darken(light: LightWiring) -> None:
     """Darken the chip and read it back, again and again for a while; raise `LightError` when that does not help."""
     deadline_s = time.monotonic() + TRY_FOR_S
     while True:
@@ -138,13 +178,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, metavar="FILE", help="the daemon's settings (TOML)")
     options = parser.parse_args(arguments)
     try:
-        config = start_settings(read_layers(layer_files(stated=options.config))).config
+        files = layer_files(stated=options.config)
         try:
-            led_off(config.light)
+            led_off_by_settings(files)
         finally:
             from device.instrument.watch.restart_note import note_end  # dark first
 
-            note_end(config.data, os.environ)
+            note_end(plain_light(files).data, os.environ)
     except DeviceError as error:
         print(error, file=sys.stderr)
         return 1

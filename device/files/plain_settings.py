@@ -1,8 +1,9 @@
 """Settings files for those who must not need the daemon's packages: where they lie, and what they plainly say.
 
-The updater and the page that stands in for the daemon ask here, also when the settings are why no daemon starts. So
-nothing is checked against a bound, and what cannot be read or used is passed over: the daemon itself then runs on its
-last good settings, and says so. All checks: device/settings/layers.py. Standard library only.
+The updater and the page that stands in for the daemon ask here, also when the settings are why no daemon starts, and
+what darkens the LEDs, which has no time for packages (device/settings/plain_light.py). So nothing is checked against a
+bound, and what cannot be read or used is passed over: the daemon itself then runs on its last good settings, and says
+so. All checks: device/settings/layers.py. Standard library only.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import Any
 
 VENDOR, LOCAL, DROP_INS = "usr/lib/tsis/config.toml", "etc/tsis/config.toml", "etc/tsis/config.d"
 """Below the root, lowest first."""
+ROOT = Path("/")
+LAST_GOOD = "config.last_good.toml"
+"""In the data folder: what the files set at the last start with all of them good (device/settings/last_good.py)."""
 HOST, PORT, DATA = "127.0.0.1", 8000, "/var/lib/tsis"
 """What holds unless a file says otherwise."""
 
@@ -26,12 +30,47 @@ class DaemonAddress:
     host: str = HOST
 
 
+def layer_files(root: Path = ROOT, stated: Path | None = None) -> list[Path]:
+    """Return the settings files that there are, lowest first; `root` stands for / and `stated` has to be there."""
+    installed = [path for path in (root / VENDOR, root / LOCAL) if is_there(path)]
+    return [*installed, *_drop_ins(root / DROP_INS), *([stated] if stated else [])]
+
+
+def is_there(path: Path) -> bool:
+    """Return whether there is something to read, also when it may not be read: then reading says why."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _drop_ins(folder: Path) -> list[Path]:
+    try:
+        paths = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except OSError:
+        return [folder]  # reading it says why
+    return [path for path in paths if path.suffix == ".toml" and not path.name.startswith(".")]
+
+
+def plain_table(path: Path) -> dict[str, Any]:
+    """Return what a TOML file holds; raise `OSError` when it cannot be read, `ValueError` when it is no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
 def plain_settings(root: Path) -> dict[str, Any]:
     """Return what the settings files below a root say, each over those before it; nothing of it is checked."""
     said: dict[str, Any] = {}
-    for path in (root / VENDOR, root / LOCAL, *sorted((root / DROP_INS).glob("[!.]*.toml"))):
+    for path in layer_files(root):
         try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            table = plain_table(path)
         except (OSError, ValueError):
             continue
         for name, value in table.items():

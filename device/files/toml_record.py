@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from datetime import date, time
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from device.files.plain_settings import plain_table
 from device.measurement.quantities import InvalidQuantity
 
 if TYPE_CHECKING:
@@ -55,10 +55,10 @@ def read_toml(kind: type[Record], path: Path) -> Record:
 def read_table(path: Path) -> dict[str, Any]:
     """Return what a TOML file holds; raise `InvalidQuantity` when it cannot be read, or is no TOML."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return plain_table(path)
     except OSError as error:
         raise InvalidQuantity("file", path, "readable", f"give the path of a TOML file ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise InvalidQuantity("file", path, "valid TOML", f"correct it: {error}") from error
 
 

@@ -50,7 +50,7 @@ class Bound:
         """Return whether a finite value lies inside."""
         above = value >= self.low if self.low_included else value > self.low
         below = value <= self.high if self.high_included else value < self.high
-        return math.isfinite(value) and above and below
+        return above and below and math.isfinite(value)  # last: a whole number may be too large to ask
 
     def __get_pydantic_core_schema__(self, kind: Any, schema_of: Any) -> Any:
         """Let a record declare a number with its range, as `Annotated[float, Bound(0.0, 5.0, "N")]`, or `float | None`.

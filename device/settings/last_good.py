@@ -13,12 +13,12 @@ from pathlib import Path
 from device.config import Config
 from device.errors import LastGoodConfigError
 from device.files.durable import write_durably
+from device.files.plain_settings import LAST_GOOD, is_there
 from device.settings.catalogue import SETTINGS
-from device.settings.layers import Layers, is_there, read_layers
+from device.settings.layers import Layers, read_layers
 
 log = logging.getLogger(__name__)
 
-NAME = "config.last_good.toml"
 HEADER = "# What the settings files set when this probe last started with all of them good. Written by the daemon.\n"
 
 
@@ -34,7 +34,7 @@ class StartSettings:
         """Write what good files set durably, for a start with bad ones; call it when the start has succeeded."""
         if self.layers is None:
             return
-        path, content = self.config.data / NAME, _written(self.layers).encode()
+        path, content = self.config.data / LAST_GOOD, _written(self.layers).encode()
         try:
             if not path.exists() or path.read_bytes() != content:
                 write_durably(path, content)
@@ -49,7 +49,7 @@ def start_settings(layers: Layers) -> StartSettings:
     """
     if not layers.problems:
         return StartSettings(layers.config(), layers=layers)
-    path = Path(layers.values.get("data", SETTINGS["data"].default)) / NAME
+    path = Path(layers.values.get("data", SETTINGS["data"].default)) / LAST_GOOD
     last = read_layers([path] if is_there(path) else [])
     if not last.files or last.problems:
         raise layers.refusal(*last.problems)

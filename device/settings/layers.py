@@ -14,12 +14,9 @@ from typing import Any
 
 from device.config import RENAMED, Config, Conflict
 from device.errors import ConfigError
-from device.files.plain_settings import DROP_INS, LOCAL, VENDOR
 from device.files.toml_record import as_table, from_table, read_table, table_problems
 from device.measurement.quantities import InvalidQuantity
 from device.settings.catalogue import SETTINGS
-
-ROOT = Path("/")
 
 
 @dataclass(frozen=True)
@@ -66,33 +63,6 @@ class Layers:
         """Return the error that tells all problems of these files, and those beside them."""
         cause = "\n".join(str(problem) for problem in (*self.problems, *more))
         return ConfigError(cause, "Then start the daemon again.")
-
-
-def layer_files(root: Path = ROOT, stated: Path | None = None) -> list[Path]:
-    """Return the settings files that there are, lowest first; `root` stands for / and `stated` has to be there."""
-    installed = [path for path in (root / VENDOR, root / LOCAL) if is_there(path)]
-    return [*installed, *_drop_ins(root / DROP_INS), *([stated] if stated else [])]
-
-
-def is_there(path: Path) -> bool:
-    """Return whether there is something to read, also when it may not be read: then reading says why."""
-    try:
-        path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def _drop_ins(folder: Path) -> list[Path]:
-    try:
-        paths = sorted(folder.iterdir())
-    except FileNotFoundError:
-        return []
-    except OSError:
-        return [folder]  # reading it says why
-    return [path for path in paths if path.suffix == ".toml" and not path.name.startswith(".")]
 
 
 def read_config(path: Path) -> Config:

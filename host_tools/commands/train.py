@@ -1,18 +1,26 @@
-"""`host_tools train`: the paper's network from a data set, or the other modes' from the probe's tables."""
+"""`host_tools train`: the paper's network from a data set, the other modes' from the probe's tables, or everything.
+
+Mode all runs the commands that make everything in models/ from nothing, one after the other. Each is a process of its
+own, in the source tree: what a model card keeps as its command makes the same again alone.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from device import __version__
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from host_tools.commands.output import Scheduler, note, note_left_out, own_models, progress
+from host_tools.commands.output import Scheduler, note, note_left_out, own_models, progress, source_tree
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
@@ -23,12 +31,23 @@ CERTIFICATE = "calibration.json"
 SWEPT = Path("build/sweep.nc")
 PAPER_SCENES = 134
 TRIALS = 100
-OWN_OPTIONS = {"paper": ("--data", "--trials"), "standard": ("--table", "--wide", "--dry-run"), "quick": ("--table",)}
-"""Options of each mode beside --out and --seed; precise shares the bundle of standard."""
+OWN_OPTIONS = {
+    "paper": ("--out", "--data", "--trials"),
+    "standard": ("--out", "--table", "--wide", "--dry-run"),
+    "quick": ("--out", "--table"),
+    "all": (),
+}
+"""Options of each mode beside --seed and --scheduler; precise shares the bundle of standard."""
+PROBE, PHANTOMS = "models/simulated_probe", "build/phantoms"
+CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
+"""By the light that the simulated probe's phantoms are recorded under."""
+ALL_OF = "/*"
+"""Ends a word that stands for all files of a folder, once they are there."""
+ON_A_CLUSTER = ("sweep", "table", "train")
 
 
 def train(
-    mode: Annotated[str, typer.Option(help="paper, standard (and precise), or quick (after standard).")] = "paper",
+    mode: Annotated[str, typer.Option(help="paper, standard (and precise), quick (after standard), or all.")] = "paper",
     data: Annotated[Path | None, typer.Option(help="Of paper: data set of `sweep`; swept unless given.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/MODE unless given.")] = None,
     trials: Annotated[int | None, typer.Option(help="Of paper: networks that are averaged; 100 unless given.")] = None,
@@ -44,14 +63,19 @@ def train(
 ) -> None:
     """Train a model and export its bundle.
 
+    Mode all makes everything in models/ from nothing: data set, tables, light, certificates and the models of all
+    modes. It prints each command before it runs it, and takes some hours.
+
     Example: host_tools train --mode standard --out models/standard
     """
     given = {"--data": data, "--trials": trials, "--table": table, "--wide": wide, "--dry-run": dry_run or None}
     if mode not in OWN_OPTIONS:
         raise InvalidQuantity("mode", repr(mode), f"one of {', '.join(OWN_OPTIONS)}", "choose one of them")
-    for option, value in given.items():
+    for option, value in {"--out": out, **given}.items():
         if value is not None and option not in OWN_OPTIONS[mode]:
             raise InvalidQuantity("option", option, f"one of mode {mode}", "leave it out")
+    if mode == "all":
+        return run_chain(chained_commands(seed, scheduler), source_tree("make everything in models/"))
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models(mode)
     if mode == "paper" and data is None:
@@ -203,3 +227,65 @@ def _print_modes(out: Path, bundle: ModelBundle) -> None:
         of_mode = entry["recorded"]
         errors = (f"{name} {of_mode[name]['mean_percent']:.1f} %" for name in UNKNOWNS)
         print(f"{mode:9} mean errors of {of_mode['presses']} recordings: {', '.join(errors)}")
+
+
+class ChainedCommand(NamedTuple):
+    """The words of one command, and what it does not write over and so has to be gone."""
+
+    words: tuple[str, ...]
+    replaces: str | None = None
+
+
+def chained_commands(seed: int = 1, scheduler: str | None = None) -> list[ChainedCommand]:
+    """Return the chain, each command after those whose files it reads."""
+    trained = ("--seed", str(seed))
+    chain = [
+        ChainedCommand(("sweep", "--scenes", str(PAPER_SCENES), "--seed", "1", "--out", str(SWEPT))),
+        ChainedCommand(("table", "--out", PROBE)),
+        ChainedCommand(("optics", "build", "--out", PROBE)),
+        ChainedCommand(("train", "--mode", "paper", "--data", str(SWEPT), "--out", "models/paper", *trained)),
+        *_certified("physical"),
+        *_certified("linear", "--scenario", "scenarios/linear_light.toml"),
+        ChainedCommand(("table", "--part", "derivatives", "--out", PROBE)),
+        ChainedCommand(("table", "--part", "wide")),
+        ChainedCommand(("train", "--mode", "standard", "--out", "models/standard", *trained)),
+        ChainedCommand(("train", "--mode", "quick", "--out", "models/quick", *trained)),
+    ]
+    if scheduler is None:
+        return chain
+    on = ("--scheduler", scheduler)
+    return [one._replace(words=(*one.words, *on)) if one.words[0] in ON_A_CLUSTER else one for one in chain]
+
+
+def _certified(light: str, *scenario: str) -> tuple[ChainedCommand, ChainedCommand]:
+    """Return what records the phantoms under a light and certifies the probe by them."""
+    recorded, certificate = f"{PHANTOMS}/{light}", f"{PROBE}/{CERTIFICATES[light]}"
+    words = ("calibrate", f"{recorded}{ALL_OF}", "--operator", "make train", "--out", certificate)
+    return ChainedCommand(("phantom", *scenario, "--out", recorded), recorded), ChainedCommand(words, certificate)
+
+
+def run_chain(chain: Iterable[ChainedCommand], tree: Path) -> None:
+    """Run commands in the source tree until one fails, whose exit code then is this one's (`typer.Exit`)."""
+    for one in chain:
+        if one.replaces:
+            _remove(tree / one.replaces)
+        words = [word for given in one.words for word in _written_out(given, tree)]
+        note.print(shlex.join(("host_tools", *words)), markup=False, soft_wrap=True)
+        code = subprocess.run([sys.executable, "-m", "host_tools", *words], cwd=tree, check=False).returncode
+        if code:
+            note.print(f"This ended with {code}: correct it and go on from there.", markup=False, soft_wrap=True)
+            raise typer.Exit(code if code > 0 else 1)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    path.unlink(missing_ok=True)
+
+
+def _written_out(word: str, tree: Path) -> list[str]:
+    """Return a word, or all files that it stands for."""
+    if not word.endswith(ALL_OF):
+        return [word]
+    folder = word.removesuffix(ALL_OF)
+    return sorted(f"{folder}/{path.name}" for path in (tree / folder).iterdir())

@@ -12,9 +12,9 @@ from daemon_process import ROOT
 
 from device.__main__ import main
 from device.commands import serve as serving
+from device.files.plain_settings import LAST_GOOD
 from device.files.recording_file import write_recording
 from device.measurement.paper_mode.estimate import estimate_paper
-from device.settings.last_good import NAME
 from device.web.events import snapshot
 
 
@@ -284,7 +284,7 @@ def test_with_bad_settings_the_probe_starts_on_its_last_good_ones_and_warns(run,
 def test_settings_with_which_the_probe_did_not_start_are_not_kept_as_good(run, models, started, tmp_path):
     (models / "paper" / "model.json").unlink()
     assert run("--simulate", "--port", 0, "--config", "probe.toml")[0] == 1
-    assert not (tmp_path / "var" / NAME).exists()
+    assert not (tmp_path / "var" / LAST_GOOD).exists()
 
 
 def test_a_probe_without_its_load_cell_is_served_at_fault_and_its_settings_are_not_kept_as_good(
@@ -294,12 +294,12 @@ def test_a_probe_without_its_load_cell_is_served_at_fault_and_its_settings_are_n
     (tmp_path / "scene.toml").write_text('[[faults]]\nkind = "cell_unplugged"\n')
     assert run("--simulate", "--port", 0, "--config", "probe.toml", "--scene", "scene.toml")[0] == 0
     assert [[fault["code"] for fault in status["faults"]] for status in started] == [["E304"]]
-    assert not (tmp_path / "var" / NAME).exists()
+    assert not (tmp_path / "var" / LAST_GOOD).exists()
 
 
 def test_without_a_settings_file_the_simulated_probe_keeps_none(run, started, tmp_path):
     assert run("--simulate", "--port", 0)[0] == 0
-    assert not (tmp_path / "var" / NAME).exists()
+    assert not (tmp_path / "var" / LAST_GOOD).exists()
 
 
 def test_a_probe_that_was_never_calibrated_starts(run, models, started, tmp_path):

@@ -20,13 +20,14 @@ from device.care.archive import Archive
 from device.care.backup import BackupReport, write_backup
 from device.care.restore import check_backup
 from device.errors import DiskFullError, StorageError
+from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording, write_recording
 from device.measurement.quantities import InvalidQuantity
 from device.records.retention import RetentionRule
 from device.records.saved import saved_until
 from device.records.schema import STORE_WRITES
 from device.records.store import Store
-from device.settings.layers import layer_files, read_layers
+from device.settings.layers import read_layers
 
 
 @pytest.fixture

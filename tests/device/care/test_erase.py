@@ -17,9 +17,10 @@ from device.care.backup import write_backup
 from device.care.erase import erase, plan_erasure
 from device.care.places import DATABASE
 from device.errors import BusyError
+from device.files.plain_settings import layer_files
 from device.measurement.quantities import InvalidQuantity
 from device.records.store import Store
-from device.settings.layers import layer_files, read_layers
+from device.settings.layers import read_layers
 
 HOSPITAL = '[webhook]\nurl = "https://notices.example.org/"\nsecret_file = "/etc/tsis/webhook.secret"\n'
 CANARY = "canary-of-nobody"

@@ -17,11 +17,12 @@ from device.care import restore as restore_module
 from device.care.backup import write_backup
 from device.care.restore import RestoreReport, restore_backup
 from device.errors import BusyError, DiskFullError, StorageError
+from device.files.plain_settings import layer_files
 from device.files.recording_file import read_recording
 from device.measurement.quantities import InvalidQuantity
 from device.records.schema import STORE_READS, STORE_WRITES
 from device.records.store import Store
-from device.settings.layers import layer_files, read_layers
+from device.settings.layers import read_layers
 
 PLACES = {"data": "/var/lib/tsis", "calibration": "/var/lib/tsis/calibrations", "models": {}}
 

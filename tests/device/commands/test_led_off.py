@@ -22,8 +22,8 @@ from device.__main__ import main as daemon_main
 from device.commands import led_off as led_off_module
 from device.commands.led_off import HANGS_AFTER_S, PAUSE_S, darken, main
 from device.config import LightSection
+from device.files.plain_settings import LAST_GOOD
 from device.hardware.led_driver import led_driver
-from device.settings.last_good import NAME
 from device.simulation.chips.i2c_bus import EmulatedI2cBus, EmulatedLedChip
 from device.simulation.chips.pca9685_chip import Pca9685Chip
 from device.simulation.chips.remote_line import LineServer, RemoteLine
@@ -153,11 +153,72 @@ def test_it_pauses_only_for_the_chips_oscillator_and_before_it_asks_again(board_
 def test_settings_that_have_gone_bad_since_the_start_leave_no_light_on(board_of, tmp_path):
     board = board_of("pca9685")
     board.kill_while_lit()
-    (tmp_path / NAME).write_text(SETTINGS["pca9685"])
+    (tmp_path / LAST_GOOD).write_text(SETTINGS["pca9685"])
     (tmp_path / "probe.toml").write_text('data = "."\n[light]\nchip = "pca9686"\n')
     code, _ = board.run("device.commands.led_off", "--config", "probe.toml")
     assert code == 0
     assert board.chip.led_ratio() == DARK
+
+
+@pytest.mark.parametrize(
+    ("program", "bad"),
+    [
+        (("device.commands.led_off", "--config"), "no = [toml"),
+        (("device", "--config"), 'data = "."\n[light]\nchip = "pca9686"\n'),
+    ],
+)
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_settings_that_never_were_good_leave_no_light_on_whichever_chip_it_is(board_of, tmp_path, kind, program, bad):
+    board = board_of(kind)
+    board.kill_while_lit()
+    (tmp_path / "probe.toml").write_text(bad)
+    command = ("led-off",) if program[0] == "device" else ()
+    code, errors = board.run(*program, "probe.toml", *command)
+    assert code == 1
+    assert "probe.toml" in errors, "what is wrong with the settings is told"
+    assert board.chip.led_ratio() == DARK
+
+
+def test_settings_that_are_not_there_leave_no_light_on(board_of):
+    board = board_of("pca9685")
+    board.kill_while_lit()
+    assert board.run("device.commands.led_off", "--config", "none.toml")[0] == 1
+    assert board.chip.led_ratio() == DARK
+
+
+def test_settings_that_name_another_chip_since_the_start_leave_no_light_on(board_of, tmp_path):
+    """The files hold, but the daemon that was killed had started with others: both places are asked."""
+    board = board_of("pca9685")
+    board.kill_while_lit()
+    (tmp_path / LAST_GOOD).write_text(SETTINGS["pca9685"])
+    (tmp_path / "probe.toml").write_text('data = "."\n')
+    code, errors = board.run("device.commands.led_off", "--config", "probe.toml")
+    assert (code, errors.count("\n")) == (1, 1)
+    assert "LED chip 0x60 does not answer" in errors
+    assert board.chip.led_ratio() == DARK
+
+
+@pytest.mark.parametrize("kind", ["tlc59116", "pca9685"])
+def test_the_bytes_on_the_bus_are_those_of_a_driver_that_is_opened_and_closed(board_of, kind):
+    """With settings that hold nothing else is asked, of no other address."""
+    board, again = board_of(kind), CHIPS[kind][1]()
+    bus = EmulatedI2cBus({CHIPS[kind][0]: again})
+    led_driver(LightSection(chip=kind), bus).close()
+    assert board.run("device.commands.led_off", "--config", "probe.toml") == (0, "")
+    assert list(board.bus.log) == list(bus.log)
+    assert {address for address, _ in bus.log} == {CHIPS[kind][0]}
+
+
+@pytest.mark.parametrize("program", ["device.commands.led_off", "device"])
+def test_what_checks_settings_is_loaded_only_after_darkness_and_where_they_are_bad(program, tmp_path):
+    """pydantic alone takes longer than all that darkens."""
+    (tmp_path / "probe.toml").write_text("[light]\nbus = 254\n")
+    line = ["--config", str(tmp_path / "probe.toml"), *(["led-off"] if program == "device" else [])]
+    module = "device.__main__" if program == "device" else program
+    source = f"import sys, {module} as program; program.main({line}); sys.exit('pydantic' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", source], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert "I2C bus 254 cannot be opened" in ended.stderr
+    assert ended.returncode == 0
 
 
 def test_where_nothing_is_lit_it_is_dark_again(board_of):

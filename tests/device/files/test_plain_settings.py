@@ -4,8 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from device.files.plain_settings import DATA, HOST, PORT, DaemonAddress, daemon_address, data_folder, plain_settings
-from device.settings.layers import layer_files, read_layers
+from device.files.plain_settings import (
+    DATA,
+    HOST,
+    PORT,
+    DaemonAddress,
+    daemon_address,
+    data_folder,
+    layer_files,
+    plain_settings,
+)
+from device.settings.layers import read_layers
 
 
 def say(root: Path, name: str, text: str) -> None:

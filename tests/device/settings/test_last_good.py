@@ -6,7 +6,8 @@ import tomllib
 import pytest
 
 from device.errors import ConfigError
-from device.settings.last_good import NAME, start_settings
+from device.files.plain_settings import LAST_GOOD
+from device.settings.last_good import start_settings
 from device.settings.layers import read_layers
 
 
@@ -23,7 +24,7 @@ def read(tmp_path):
 
 @pytest.fixture
 def kept(tmp_path):
-    return tmp_path / "var" / NAME
+    return tmp_path / "var" / LAST_GOOD
 
 
 def test_good_files_are_used_without_a_warning(read):

@@ -9,9 +9,10 @@ from hypothesis import HealthCheck, given, settings
 
 from device.config import CameraSection, Config, LightSection, conflict
 from device.errors import ConfigError
+from device.files.plain_settings import DROP_INS, LOCAL, VENDOR, layer_files
 from device.measurement.quantities import Bound, InvalidQuantity
 from device.settings.catalogue import SETTINGS
-from device.settings.layers import DROP_INS, LOCAL, VENDOR, layer_files, overridden, read_layers
+from device.settings.layers import overridden, read_layers
 
 SCALARS = st.one_of(st.integers(-10, 10**6), st.floats(), st.booleans(), st.text(max_size=5), st.just("paper"))
 VALUES = st.one_of(SCALARS, st.lists(SCALARS, max_size=5), st.dictionaries(st.sampled_from(["bus", "x"]), SCALARS))

@@ -18,6 +18,8 @@ from host_tools.commands import train as command
         ("paper", {"dry_run": True}),
         ("quick", {"trials": 3}),
         ("quick", {"wide": Path("build")}),
+        ("all", {"out": Path("build")}),
+        ("all", {"dry_run": True}),
     ],
 )
 def test_an_option_of_another_mode_is_refused_before_anything_is_trained(mode, options):
@@ -26,7 +28,7 @@ def test_an_option_of_another_mode_is_refused_before_anything_is_trained(mode, o
 
 
 def test_an_unknown_mode_is_refused_with_the_known_ones():
-    with pytest.raises(InvalidQuantity, match="paper, standard, quick"):
+    with pytest.raises(InvalidQuantity, match="paper, standard, quick, all"):
         command.train(mode="fast")
 
 
