@@ -7,7 +7,7 @@ profile.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +47,9 @@ class EvaluatedPresses:
 
     def part(self, chosen: slice) -> EvaluatedPresses:
         """Return some of the presses."""
-        whole = (getattr(self, field.name) for field in fields(self))
-        return EvaluatedPresses(*(None if one is None else one[chosen] for one in whole))
+        truth, mean, low, high = (part[chosen] for part in (self.truth, self.mean, self.low, self.high))
+        in_region = None if self.in_region is None else self.in_region[chosen]
+        return EvaluatedPresses(truth, mean, low, high, self.is_known[chosen], in_region)
 
     @property
     def is_covered(self) -> NDArray[np.bool_]:
@@ -58,11 +59,12 @@ class EvaluatedPresses:
 
 @dataclass(frozen=True, eq=False)
 class ModeOutcome:
-    """Critical values of a mode, and what it makes of `simulated` presses and of `recorded` ones."""
+    """Critical values of a mode, and what it makes of `simulated` presses, of so many `ramps` [n], and of recorded."""
 
     critical: CriticalValues
     simulated: EvaluatedPresses
     recorded: EvaluatedPresses
+    ramps: NDArray[np.intp]
 
 
 def answers_to(
@@ -98,10 +100,11 @@ def outcome_of(
     found: Sequence[RampAnswer],
     answers: RampAnswers,
     log_odds: Callable[[Array], Array],
+    ramps: NDArray[np.intp],
 ) -> ModeOutcome:
-    """Return the outcome of a mode from its answers to simulated and to recorded presses."""
+    """Return the outcome of a mode from its answers to simulated presses, of so many ramps [n], and to recorded."""
     truth = normalise(recorded.parameters)[:, :THREE]
-    return ModeOutcome(critical_values(recorded, found, answers, log_odds), simulated, evaluated(truth, found))
+    return ModeOutcome(critical_values(recorded, found, answers, log_odds), simulated, evaluated(truth, found), ramps)
 
 
 def critical_values(

@@ -26,6 +26,7 @@ DIGITS = 4
 PARTS = 4
 """Equal parts of the range of size and of depth, which make the cells."""
 JOINT = dict(zip(("size_and_depth", "all"), TOGETHER, strict=True))
+WIDTH_QUANTILES = np.linspace(0.05, 0.95, 19)
 EASIEST = 0.05
 """Share of the determined presses whose interval is narrower than what is called reachable."""
 
@@ -71,6 +72,21 @@ def reachable_half_width(evaluated: EvaluatedPresses) -> dict[str, float]:
     half = (denormalise_unknowns(evaluated.high) - denormalise_unknowns(evaluated.low)) / 2
     columns = zip(UNKNOWNS, half.T, evaluated.is_known.T, strict=True)
     return {name: _rounded(np.quantile(column[known], EASIEST)) for name, column, known in columns if known.any()}
+
+
+def half_width_by_ramps(evaluated: EvaluatedPresses, ramps: NDArray[np.intp]) -> dict[str, dict[str, list[float]]]:
+    """Return quantiles of half of the intervals, at `WIDTH_QUANTILES`, by the ramps [n] of a scan and by unknown.
+
+    In each unknown's own unit. A scan that does not determine the unknown counts with the whole range.
+    """
+    half = (denormalise_unknowns(evaluated.high) - denormalise_unknowns(evaluated.low)) / 2
+    return {
+        f"{count}": {
+            name: [_rounded(one) for one in np.quantile(column, WIDTH_QUANTILES)]
+            for name, column in zip(UNKNOWNS, half[ramps == count].T, strict=True)
+        }
+        for count in np.unique(ramps)
+    }
 
 
 def octile_ends(truth: Array) -> Array:

@@ -33,8 +33,8 @@ def joint_region(at: Array, weight: Array) -> JointRegion:
     """Return the region of samples [n, k] whose weights [n] add up to 1."""
     middle = weight @ at
     away = at - middle
-    precision = np.linalg.inv((away * weight[:, None]).T @ away)
+    precision = np.asarray(np.linalg.inv((away * weight[:, None]).T @ away), np.float64)
     square = np.einsum("ni,ij,nj->n", away, precision, away)
     order = np.argsort(square)
-    last = np.searchsorted(np.cumsum(weight[order]), COVERAGE)
-    return JointRegion(middle, precision, float(square[order[min(last, len(order) - 1)]]))
+    last = min(int(np.searchsorted(np.cumsum(weight[order]), COVERAGE)), len(order) - 1)
+    return JointRegion(middle, precision, float(square[order[last]]))

@@ -203,7 +203,7 @@ def test_an_outcome_keeps_what_it_makes_of_both_kinds_of_presses():
     truth = np.zeros((2, 3))
     simulated = evaluated(truth, [answer_of(0.0, 0.1)] * 2)
     recorded, found = recorded_of(seen_rows(3)), [answer_of(0.3, 0.1)] * 3
-    outcome = outcome_of(simulated, recorded, found, FLAT, thrice)
+    outcome = outcome_of(simulated, recorded, found, FLAT, thrice, np.ones(len(simulated.truth), int))
     assert outcome.simulated is simulated
     np.testing.assert_allclose(outcome.recorded.truth, normalise(recorded.parameters)[:, :3])
     np.testing.assert_array_equal(outcome.recorded.mean, 0.3)

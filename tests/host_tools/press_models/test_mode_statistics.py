@@ -9,7 +9,14 @@ from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
 from host_tools.press_models.mode_outcome import EvaluatedPresses
-from host_tools.press_models.mode_statistics import OCTILES, PARTS, interval_score, octile_of, statistics
+from host_tools.press_models.mode_statistics import (
+    OCTILES,
+    PARTS,
+    half_width_by_ramps,
+    interval_score,
+    octile_of,
+    statistics,
+)
 
 COUNT = 4000
 EVEN = np.tile((2 * np.arange(COUNT) + 1)[:, None] / COUNT - 1, 3)
@@ -152,6 +159,16 @@ def test_joint_regions_are_counted_in_all_presses_where_a_mode_has_them():
     presses = replace(presses_of(truth, truth=truth), in_region=np.array([[True, False]] * 6 + [[True, True]] * 4))
     assert statistics(presses)["joint_region"] == {"size_and_depth": 1.0, "all": 0.4}
     assert "joint_region" not in of(truth, truth=truth)
+
+
+def test_half_widths_are_told_by_the_ramps_of_a_scan_in_the_unknowns_own_units():
+    """Two ramps: 0.2 either way, 0.8 mm of depth; three: half of that. What is not known has the whole range."""
+    truth, spread = np.zeros((4, 3)), np.repeat([0.1, 0.1, 0.05, 0.05], 3).reshape(4, 3)
+    spread[0, 0] = 0.6 * EVEN_STD
+    found = half_width_by_ramps(presses_of(truth, spread, truth), np.array([2, 2, 3, 3]))
+    assert found["2"]["depth_mm"] == pytest.approx([0.8] * 19)
+    assert found["3"]["depth_mm"] == pytest.approx([0.4] * 19)
+    assert found["2"]["size_mm"][::9] == pytest.approx([1.3 + 0.05 * 5.2, 1.3 + 0.5 * 5.2, 1.3 + 0.95 * 5.2], rel=1e-3)
 
 
 def test_cells_of_size_and_depth_count_presses_what_is_determined_and_what_is_covered():
