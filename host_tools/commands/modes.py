@@ -20,7 +20,9 @@ def modes(
     ] = None,
     model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise.")] = MODELS / "standard",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
-    only: Annotated[list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it.")] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it. The page keeps the others.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of chapters dial, posterior, scan and noise-free.")] = 1,
     scheduler: Scheduler = None,
 ) -> None:
@@ -74,7 +76,8 @@ def modes(
     missed = sum(print_chapter(timed) for timed in measured.values())
     if out:
         chosen = "".join(f" --only {name}" for name in only or [])
-        write_page(out, Results("modes", f"host_tools modes --out {shown(out)}{chosen}", measured))
+        command = f"host_tools modes --out {shown(out)}{chosen}"
+        write_page(out, Results("modes", command, measured).in_chapters(out, list(chapters)))
         note.print(f"{out} written.")
     if missed:
         raise typer.Exit(1)

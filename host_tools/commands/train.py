@@ -25,6 +25,7 @@ from host_tools.workers import workers
 
 if TYPE_CHECKING:
     from device.measurement.bundle import ModelBundle
+    from device.measurement.calibration import Calibration
     from device.simulation.virtual_probe import ProbeTables
 
 CERTIFICATE = "calibration.json"
@@ -33,7 +34,7 @@ PAPER_SCENES = 134
 TRIALS = 100
 OWN_OPTIONS = {
     "paper": ("--out", "--data", "--trials"),
-    "standard": ("--out", "--table", "--wide", "--dry-run"),
+    "standard": ("--out", "--table", "--wide", "--dry-run", "--judge-only"),
     "quick": ("--out", "--table"),
     "all": (),
 }
@@ -59,6 +60,9 @@ def train(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Of standard: few presses, to try the chain; the model is a poor one.")
     ] = False,
+    judge_only: Annotated[
+        bool, typer.Option("--judge-only", help="Of standard: train nothing, judge the bundle's answers anew.")
+    ] = False,
     scheduler: Scheduler = None,
 ) -> None:
     """Train a model and export its bundle.
@@ -68,7 +72,14 @@ def train(
 
     Example: host_tools train --mode standard --out models/standard
     """
-    given = {"--data": data, "--trials": trials, "--table": table, "--wide": wide, "--dry-run": dry_run or None}
+    given = {
+        "--data": data,
+        "--trials": trials,
+        "--table": table,
+        "--wide": wide,
+        "--dry-run": dry_run or None,
+        "--judge-only": judge_only or None,
+    }
     if mode not in OWN_OPTIONS:
         raise InvalidQuantity("mode", repr(mode), f"one of {', '.join(OWN_OPTIONS)}", "choose one of them")
     for option, value in {"--out": out, **given}.items():
@@ -83,6 +94,8 @@ def train(
     with workers(scheduler):
         if data is not None:
             _paper(data, folder, TRIALS if trials is None else trials, seed, command)
+        elif judge_only:
+            _judged(table or SIMULATED_PROBE, folder, seed, dry_run)
         elif mode == "standard":
             _standard(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
         else:
@@ -142,15 +155,11 @@ def _paper(data: Path, out: Path, trials: int, seed: int, command: str) -> None:
 
 
 def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: bool, command: str) -> None:
-    from device.files.bundle_file import read_ramp_model
     from device.files.certificate_file import read_calibration
-    from device.measurement.ramp_modes.estimate import estimate_ramp
-    from device.measurement.ramp_modes.model import RAMP_MODES
     from device.simulation.scenario import SERIALS
     from host_tools.press_models.export import export_ramp
     from host_tools.press_models.ramp_training import DRY_RUN, TrainingBudget, train_ramp
     from host_tools.probe_tables.out_of_range_table import load_wide_table
-    from host_tools.scores.dial import publish_dial
 
     tables, calibration = _simulated_tables(table), read_calibration(table / CERTIFICATE)
     budget = DRY_RUN if dry_run else TrainingBudget()
@@ -159,6 +168,25 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
         export_ramp(
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
         )
+    _publish_ramp_dial(out, tables, calibration)
+
+
+def _judged(table: Path, out: Path, seed: int, dry_run: bool) -> None:
+    from device.files.certificate_file import read_calibration
+    from host_tools.press_models.judge_bundle import judge_bundle
+    from host_tools.press_models.ramp_training import DRY_RUN, TrainingBudget
+
+    tables, calibration = _simulated_tables(table), read_calibration(table / CERTIFICATE)
+    judge_bundle(out, tables, budget=DRY_RUN if dry_run else TrainingBudget(), seed=seed, say=note.print)
+    _publish_ramp_dial(out, tables, calibration)
+
+
+def _publish_ramp_dial(out: Path, tables: ProbeTables, calibration: Calibration) -> None:
+    from device.files.bundle_file import read_ramp_model
+    from device.measurement.ramp_modes.estimate import estimate_ramp
+    from device.measurement.ramp_modes.model import RAMP_MODES
+    from host_tools.scores.dial import publish_dial
+
     note.print("speed and accuracy of modes standard and precise")
     model = read_ramp_model(out)
     publish_dial(

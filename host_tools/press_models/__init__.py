@@ -2,7 +2,8 @@
 
 Modules in reading order: `seeds`, `press_samples`, `recorded_presses`, `camera_noise`, `noisy_presses`,
 `fit_surrogate`, `dense_network`, `train_ensemble`, `train_range`, `mode_outcome`, `mode_statistics`,
-`confidence_belts`, `ramp_training`, `quick_training`, `onnx_networks`, `export`, `press_derivatives`.
+`confidence_belts`, `ramp_training`, `quick_training`, `onnx_networks`, `export`, `judge_bundle`,
+`press_derivatives`.
 
 What the probe computes stands in `device.measurement`; here is only what it learned from.
 """

@@ -28,7 +28,7 @@ from device.measurement.ramp_modes.radial_profile import network_rows
 from device.measurement.ramp_modes.range_classifier import ENTRY, RANGE_FILE
 from host_tools.paper_network.export import write_folder
 from host_tools.press_models.mode_outcome import ModeOutcome
-from host_tools.press_models.mode_statistics import reachable_half_width, statistics
+from host_tools.press_models.mode_statistics import half_width_by_ramps, reachable_half_width, statistics
 from host_tools.press_models.onnx_networks import (
     budget_entry,
     build_network,
@@ -66,7 +66,7 @@ def export_ramp(
         "training_range": _training_range(dict(zip(RAMP_UNITS, network_rows(trained.samples.rows).T, strict=True))),
         "surrogate_error": _error(trained.surrogate_error),
         "beside_error": _error(trained.beside_error),
-        "modes": {mode: asdict(outcome.critical) | _answers(outcome) for mode, outcome in trained.outcomes.items()},
+        "modes": {mode: mode_entry(mode, outcome) for mode, outcome in trained.outcomes.items()},
         ENTRY: range_entry(trained.ranges, ranges, np.array(golden["features"])),
         "golden": golden,
     }
@@ -153,9 +153,19 @@ def _error(of_columns: Array) -> dict[str, float]:
     return {"largest": float(of_columns.max()), "mean": float(of_columns.mean())}
 
 
+def mode_entry(mode: Mode, outcome: ModeOutcome) -> dict[str, Any]:
+    """Return what the card says of a mode that reads ramps: critical values, statistics, and what a scan can reach."""
+    return asdict(outcome.critical) | _reachable(mode, outcome) | _answers(outcome)
+
+
 def _reachable(mode: Mode, outcome: ModeOutcome) -> dict[str, Any]:
     """Return what accuracy can be asked for, in the mode that goes on until it is there."""
-    return {"reachable_half_width": reachable_half_width(outcome.simulated)} if FRAMES[mode].is_scan else {}
+    if not FRAMES[mode].is_scan:
+        return {}
+    return {
+        "reachable_half_width": reachable_half_width(outcome.simulated),
+        "half_width_by_ramps": half_width_by_ramps(outcome.simulated, outcome.ramps),
+    }
 
 
 def _belts(belts: tuple[Belt, ...]) -> dict[str, Any]:

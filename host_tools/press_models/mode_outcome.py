@@ -7,7 +7,7 @@ profile.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, found_values
+from device.measurement.ramp_modes.posterior import TOGETHER
 from host_tools.press_models.recorded_presses import RecordedPresses, in_parallel
 
 CRITICAL_RATIO = 0.9875
@@ -32,17 +33,23 @@ Guess = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedPresses:
-    """Truth, mean and both ends of the interval [n, 3] of presses, in coordinates, and what is determined [n, 3]."""
+    """Truth, mean and both ends of the interval [n, 3] of presses, in coordinates, and what is determined [n, 3].
+
+    `in_region` [n, 2]: whether the truth lies in the joint region of each of `TOGETHER`; None of a mode without any.
+    """
 
     truth: Array
     mean: Array
     low: Array
     high: Array
     is_known: NDArray[np.bool_]
+    in_region: NDArray[np.bool_] | None = None
 
     def part(self, chosen: slice) -> EvaluatedPresses:
         """Return some of the presses."""
-        return EvaluatedPresses(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        truth, mean, low, high = (part[chosen] for part in (self.truth, self.mean, self.low, self.high))
+        in_region = None if self.in_region is None else self.in_region[chosen]
+        return EvaluatedPresses(truth, mean, low, high, self.is_known[chosen], in_region)
 
     @property
     def is_covered(self) -> NDArray[np.bool_]:
@@ -52,11 +59,12 @@ class EvaluatedPresses:
 
 @dataclass(frozen=True, eq=False)
 class ModeOutcome:
-    """Critical values of a mode, and what it makes of `simulated` presses and of `recorded` ones."""
+    """Critical values of a mode, and what it makes of `simulated` presses, of so many `ramps` [n], and of recorded."""
 
     critical: CriticalValues
     simulated: EvaluatedPresses
     recorded: EvaluatedPresses
+    ramps: NDArray[np.intp]
 
 
 def answers_to(
@@ -75,7 +83,15 @@ def evaluated(truth: Array, found: Sequence[RampAnswer]) -> EvaluatedPresses:
         np.array([one.low for one in intervals]),
         np.array([one.high for one in intervals]),
         np.array([one.is_identifiable for one in intervals]),
+        np.array([_in_regions(*pair) for pair in zip(truth, found, strict=True)]),
     )
+
+
+def _in_regions(truth: Array, answer: RampAnswer) -> list[bool]:
+    """Return whether a truth [3] lies in each joint region; where a press tells nothing that is the whole range."""
+    if not answer.fit.regions:
+        return [True] * len(TOGETHER)
+    return [region.holds(truth[:count]) for count, region in zip(TOGETHER, answer.fit.regions, strict=True)]
 
 
 def outcome_of(
@@ -84,10 +100,11 @@ def outcome_of(
     found: Sequence[RampAnswer],
     answers: RampAnswers,
     log_odds: Callable[[Array], Array],
+    ramps: NDArray[np.intp],
 ) -> ModeOutcome:
-    """Return the outcome of a mode from its answers to simulated and to recorded presses."""
+    """Return the outcome of a mode from its answers to simulated presses, of so many ramps [n], and to recorded."""
     truth = normalise(recorded.parameters)[:, :THREE]
-    return ModeOutcome(critical_values(recorded, found, answers, log_odds), simulated, evaluated(truth, found))
+    return ModeOutcome(critical_values(recorded, found, answers, log_odds), simulated, evaluated(truth, found), ramps)
 
 
 def critical_values(

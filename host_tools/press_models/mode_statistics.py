@@ -2,8 +2,9 @@
 
 An error in percent is (estimate - truth) / truth. Skill is 1 - (root mean square error / standard deviation of the even
 prior): 0 is as good as the middle of the range, 1 is perfect. Coverage counts only intervals of presses that determine
-the unknown, since the others hold the whole range and so always the truth: by the unknown's own octiles, and by those
-of every unknown.
+the unknown, since the others hold the whole range and so always the truth: by the unknown's own octiles, by those of
+every unknown, and by cells of size and depth. Together the unknowns are covered by their joint region, of every press,
+and by the rectangle or box of their intervals, where all are determined.
 """
 
 from __future__ import annotations
@@ -17,21 +18,35 @@ from device.measurement.arrays import Array
 from device.measurement.confidence_belt import COVERAGE
 from device.measurement.parameters import EVEN_STD, denormalise_unknowns
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.posterior import TOGETHER
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 
 OCTILES = 8
 DIGITS = 4
+PARTS = 4
+"""Equal parts of the range of size and of depth, which make the cells."""
+JOINT = dict(zip(("size_and_depth", "all"), TOGETHER, strict=True))
+WIDTH_QUANTILES = np.linspace(0.05, 0.95, 19)
 EASIEST = 0.05
 """Share of the determined presses whose interval is narrower than what is called reachable."""
 
 
 def statistics(evaluated: EvaluatedPresses) -> dict[str, Any]:
-    """Return the statistics of presses by unknown, and how often intervals hold together, under `joint`."""
+    """Return the statistics of presses by unknown, and how often intervals hold together, under `joint`.
+
+    Under `joint_region`: how often the joint regions hold; not there for a mode without any.
+    """
     truth, mean = denormalise_unknowns(evaluated.truth), denormalise_unknowns(evaluated.mean)
     percent = 100 * (mean - truth) / truth
     return {"presses": len(truth)} | {
         name: _of_unknown(evaluated, i, truth, percent[:, i]) for i, name in enumerate(UNKNOWNS)
-    } | {"joint": {"size_and_depth": _joint(evaluated, 2), "all": _joint(evaluated, 3)}}  # fmt: skip
+    } | {"joint": {name: _joint(evaluated, count) for name, count in JOINT.items()}} | _regions(evaluated)  # fmt: skip
+
+
+def _regions(evaluated: EvaluatedPresses) -> dict[str, Any]:
+    if evaluated.in_region is None:
+        return {}
+    return {"joint_region": dict(zip(JOINT, map(_mean, evaluated.in_region.T), strict=True))}
 
 
 def _joint(evaluated: EvaluatedPresses, count: int) -> float | None:
@@ -57,6 +72,21 @@ def reachable_half_width(evaluated: EvaluatedPresses) -> dict[str, float]:
     half = (denormalise_unknowns(evaluated.high) - denormalise_unknowns(evaluated.low)) / 2
     columns = zip(UNKNOWNS, half.T, evaluated.is_known.T, strict=True)
     return {name: _rounded(np.quantile(column[known], EASIEST)) for name, column, known in columns if known.any()}
+
+
+def half_width_by_ramps(evaluated: EvaluatedPresses, ramps: NDArray[np.intp]) -> dict[str, dict[str, list[float]]]:
+    """Return quantiles of half of the intervals, at `WIDTH_QUANTILES`, by the ramps [n] of a scan and by unknown.
+
+    In each unknown's own unit. A scan that does not determine the unknown counts with the whole range.
+    """
+    half = (denormalise_unknowns(evaluated.high) - denormalise_unknowns(evaluated.low)) / 2
+    return {
+        f"{count}": {
+            name: [_rounded(one) for one in np.quantile(column, WIDTH_QUANTILES)]
+            for name, column in zip(UNKNOWNS, half[ramps == count].T, strict=True)
+        }
+        for count in np.unique(ramps)
+    }
 
 
 def octile_ends(truth: Array) -> Array:
@@ -91,8 +121,22 @@ def _of_unknown(evaluated: EvaluatedPresses, unknown: int, truths: Array, percen
             name: [_coverage(covered[one], known[one]) for one in octiles] for name, octiles in of_octiles.items()
         },
         "determined_by_octiles": {name: [_mean(known[one]) for one in octiles] for name, octiles in of_octiles.items()},
+        "cells": _by_cells(evaluated.truth, covered, known),
         "interval_score": _rounded(interval_score(evaluated)[unknown]),
     }
+
+
+def _by_cells(truth: Array, covered: NDArray[np.bool_], known: NDArray[np.bool_]) -> dict[str, list[int]]:
+    """Return presses, how many of them are determined and how many of these covered, in cells of size and depth.
+
+    Cells of the smallest sizes come first, the shallowest first among them.
+    """
+    size, depth = np.clip((PARTS * (truth[:, :2].T + 1) / 2).astype(int), 0, PARTS - 1)
+    cell, counted = (
+        PARTS * size + depth,
+        {"presses": np.ones_like(known), "determined": known, "covered": known & covered},
+    )
+    return {name: np.bincount(cell[of], minlength=PARTS**2).tolist() for name, of in counted.items()}
 
 
 def _octiles(truth: Array) -> list[NDArray[np.bool_]]:

@@ -172,7 +172,8 @@ class ModeEvaluation:
         )
         seen_in = [one.direction_rad for one in recorded.seen]
         found = answers_to(self.answers, self.guess, recorded.rows, seen_in, self.jobs)
-        return outcome_of(answered, recorded, found, self.answers, self.log_odds)
+        ramps = np.array([1 + len(offsets_mm) for offsets_mm in further])
+        return outcome_of(answered, recorded, found, self.answers, self.log_odds, ramps)
 
     def _simulated(self, at: Array, further_mm: Array, seed: list[int]) -> tuple[Array, Array]:
         offsets_mm = np.append(at[OFFSET] + 1, further_mm)

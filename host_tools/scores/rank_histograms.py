@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from device.measurement.arrays import Array
@@ -21,8 +22,9 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import COUNT, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.joint_region import joint_region
 from device.measurement.ramp_modes.model import RAMP_MODES, RampModel
-from device.measurement.ramp_modes.posterior import WeightedSamples, weighted_samples
+from device.measurement.ramp_modes.posterior import TOGETHER, WeightedSamples, weighted_samples
 from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
 from host_tools.press_models.noisy_presses import random_scan
@@ -39,19 +41,20 @@ JOINT_ERROR = 0.03
 """A region's share may lie so far from what it promises, as that of an interval."""
 DRAWS = 150
 """So many samples of a posterior whose distances make its energy score."""
-JOINT = {"size and depth": (0, 1), "all three": (0, 1, 2)}
+JOINT = "size and depth", "all three"
+"""What `TOGETHER` is called."""
 HEADER = ("mode, unknown", *(f"rank {number + 1} of {BINS}" for number in range(BINS)))
 SCORE_HEADER = ("mode", "energy score", "that of the ranges alone", "ratio")
 
 
 class RankedPress(NamedTuple):
-    """Of one press: rank [3] of each truth, rank of its distance from the mean for each of `JOINT`, energy scores.
+    """Of one press: rank [3] of each truth, whether the joint region of each of `JOINT` holds it, energy scores.
 
     The second energy score is that of the ranges alone.
     """
 
     rank: Array
-    distance_rank: Array
+    in_region: NDArray[np.bool_]
     energy_score: float
     energy_score_of_ranges: float
 
@@ -105,18 +108,10 @@ def ranked(samples: WeightedSamples, truth: Array, rng: np.random.Generator) -> 
     of_ranges = rng.uniform(-1, 1, (DRAWS, COUNT))
     return RankedPress(
         weight @ (at < truth),
-        np.array([_distance_rank(at[:, list(of)], weight, truth[list(of)]) for of in JOINT.values()]),
+        np.array([joint_region(at[:, :count], weight).holds(truth[:count]) for count in TOGETHER]),
         energy_score(drawn, truth),
         energy_score(of_ranges, truth),
     )
-
-
-def _distance_rank(at: Array, weight: Array, truth: Array) -> float:
-    """Return the share of samples [n, k] that lie nearer to their mean than the truth [k], in their own ellipse."""
-    away = at - weight @ at
-    precision = np.linalg.inv((away * weight[:, None]).T @ away)
-    of_truth = truth - weight @ at
-    return float(weight @ (np.einsum("ni,ij,nj->n", away, precision, away) < of_truth @ precision @ of_truth))
 
 
 def energy_score(samples: Array, truth: Array) -> float:
@@ -141,7 +136,7 @@ def _benchmarks(mode: Mode, presses: Sequence[RankedPress]) -> list[Benchmark]:
         at_most(f"{mode}, {SPOKEN[name]}", "unevenness of the ranks, chi-square", unevenness(ranks[:, i]), most)
         for i, name in enumerate(UNKNOWNS)
     ]
-    inside = np.array([one.distance_rank for one in presses]) <= COVERAGE
+    inside = np.array([one.in_region for one in presses])
     for i, name in enumerate(JOINT):
         share = float(inside[:, i].mean())
         benchmarks.append(at_least(f"{mode}, {name}", "90 % region holds", share, COVERAGE - JOINT_ERROR))

@@ -2,8 +2,9 @@
 
 Scans are drawn from the forward model and its noise. A hand puts the first ramp up to 2 mm off the axis and further
 ones where mode precise asks for them, give or take a millimetre. Beside the share of moduli that are determined stands
-the share that the Cramer-Rao bound at the truth would call so: hardly more can be asked for. Source of that bound:
-`host_tools/cramer_rao/information.py`.
+the share that the Cramer-Rao bound at the truth would call so: hardly more can be asked for. That bound takes the range
+of the modulus as a Gaussian (`host_tools/cramer_rao/information.py`); the best estimate knows where the range ends, too
+(`bound_in_box`), and its errors of size and depth stand beside those found.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
-from device.measurement.parameters import COUNT, EVEN_STD, HIGH, denormalise_unknowns, normalise
+from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, denormalise_unknowns, normalise
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.answers import RampAnswer
 from device.measurement.ramp_modes.fit import PressPosterior
@@ -31,31 +33,54 @@ from host_tools.press_models.ramp_training import further_offsets_mm
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 
+UNTOLD = 1e-6
+"""Precision of what is known of the modulus where nothing is: its covariance stays finite."""
 SCENES, MOST_RAMPS = 160, 4
 """So many tell a share of 60 % to 4 %."""
 DETERMINED_AT_LEAST, MEDIAN_PERCENT_AT_MOST = {2: 0.60, 4: 0.75}, {2: 25.0, 4: 18.0}
 RMSE_RATIO = 0.6
 """Errors of size and depth over those of one press on the axis."""
 CENTRED = "1, on the axis"
-HEADER = ("ramps", "E determined", "by the bound", "median error of E (%)", "RMSE of size (mm)", "RMSE of depth (mm)",
-          "size over one on the axis", "depth over it", "size holds", "depth holds", "E holds",
-          "processor time (ms)")  # fmt: skip
+HEADER = ("ramps", "E determined", "by the bound", "with the box's ends", "median error of E (%)",
+          "RMSE of size (mm)", "its bound (mm)", "RMSE of depth (mm)", "its bound (mm) ",
+          "size over one on the axis", "by the bounds", "depth over it", "by the bounds ",
+          "size holds", "depth holds", "E holds", "processor time (ms)")  # fmt: skip
+MODULI = np.linspace(-1.0, 1.0, 401)
+"""Coordinates of the modulus over which what is known of it is summed."""
+CHANCES = norm.ppf((np.arange(101) + 0.5) / 101)
+"""Equally likely deviations of what is seen of the modulus."""
+
+
+class BoundInBox(NamedTuple):
+    """The least root mean square errors [3] of coordinates, and how likely the modulus is called determined."""
+
+    rms: Array
+    determined: float
 
 
 class AnsweredScan(NamedTuple):
-    """The answer to a scan, the processor's time it took, and the least spread [3] by the bound at the truth."""
+    """The answer to a scan, the processor's time it took, and bounds at the truth.
+
+    `least_spread` [3]: the Cramer-Rao bound with the ranges as Gaussian prior; `in_box`: with the box's ends.
+    """
 
     answer: RampAnswer
     cpu_s: float
     least_spread: Array
+    in_box: BoundInBox
 
 
 class ScansOfLength(NamedTuple):
-    """What scans of so many ramps are answered: see `AnsweredScan`; `least_spread` is [n, 3]."""
+    """What scans of so many ramps are answered: see `AnsweredScan`.
+
+    `least_spread` and `least_rms` are [n, 3]; `determined_in_box` [n].
+    """
 
     presses: EvaluatedPresses
     cpu_s: Array
     least_spread: Array
+    least_rms: Array
+    determined_in_box: Array
 
     @property
     def determined(self) -> float:
@@ -79,6 +104,12 @@ class ScansOfLength(NamedTuple):
         """Root mean square errors [3] in the unknowns' own units, determined or not."""
         error = denormalise_unknowns(self.presses.mean) - denormalise_unknowns(self.presses.truth)
         return np.asarray(np.sqrt(np.mean(error**2, axis=0)))
+
+    @property
+    def least_rmse(self) -> Array:
+        """The least that `rmse` of size and depth [2] can be, in mm."""
+        half_range_mm = (HIGH - LOW)[:MODULUS] / 2
+        return np.asarray(half_range_mm * np.sqrt(np.mean(self.least_rms[:, :MODULUS] ** 2, axis=0)))
 
     def held(self, unknown: int) -> str:
         """Return how often the interval of an unknown holds the truth where it is determined."""
@@ -131,23 +162,50 @@ def answers_by_ramps(model: RampModel, truth: Array, offsets_mm: Array, rng: np.
         began = time.process_time()
         answer = model.answer(rows[:count], direction_rad[:count])
         takes = time.process_time() - began
-        least_spread = _least_spread(model, rows[:count], direction_rad[:count], truth, offsets_mm[:count])
-        found.append(AnsweredScan(answer, takes, least_spread))
+        jacobian = _jacobian(model, rows[:count], direction_rad[:count], truth, offsets_mm[:count])
+        of_ranges = np.full(jacobian.shape[1], EVEN_STD)
+        least_spread = cramer_rao(jacobian, np.eye(len(jacobian)), of_ranges).std[:COUNT]
+        found.append(AnsweredScan(answer, takes, least_spread, bound_in_box(jacobian, float(truth[MODULUS]))))
     return found
 
 
-def _least_spread(model: RampModel, rows: Array, direction_rad: Array, truth: Array, offsets_mm: Array) -> Array:
-    """Return the bound [3] of the unknowns' coordinates at the truth, the ranges as Gaussian prior."""
+def _jacobian(model: RampModel, rows: Array, direction_rad: Array, truth: Array, offsets_mm: Array) -> Array:
+    """Return the derivatives [S, 8 + N] of whitened residuals at the truth."""
     reach_mm = model.answers.reach_mm(len(rows))
     at = np.append(truth[:OFFSET], 2 * offsets_mm / reach_mm - 1)
     posterior = PressPosterior(rows, model.answers.surrogate, model.answers.noise, reach_mm, direction_rad)
     (jacobian,) = posterior.residuals_and_jacobian(at[None])[1]
-    return cramer_rao(jacobian, np.eye(len(jacobian)), np.full(len(at), EVEN_STD)).std[:COUNT]
+    return np.asarray(jacobian)
+
+
+def bound_in_box(jacobian: Array, modulus: float) -> BoundInBox:
+    """Return the bound of a linear press with whitened derivatives [S, k], which knows where the modulus' range ends.
+
+    What is seen of the modulus strays about its true coordinate as the Cramer-Rao bound without its range says; what is
+    left of it then ends with the range. Size and depth are Gaussian given the modulus, with their ranges as prior: what
+    is left of the modulus is carried to them along the line on which they hang on it. Mean squares are those of the
+    best estimate, the mean of the posterior: over random truths none errs less. Source: Kay (1993), section 10.
+    """
+    prior = np.full(jacobian.shape[1], EVEN_STD**-2)
+    prior[MODULUS] = UNTOLD
+    covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(prior))
+    variance = covariance[MODULUS, MODULUS]
+    seen = modulus + np.sqrt(variance) * CHANCES
+    log_left = -((MODULI - seen[:, None]) ** 2) / (2 * variance)
+    left = np.exp(log_left - log_left.max(axis=1, keepdims=True))
+    left /= left.sum(axis=1, keepdims=True)
+    mean = left @ MODULI
+    in_box = left @ MODULI**2 - mean**2
+    slope = covariance[:COUNT, MODULUS] / variance
+    squares = np.diag(covariance)[:COUNT] - slope**2 * (variance - in_box.mean())
+    return BoundInBox(np.sqrt(squares), float(np.mean(np.sqrt(in_box) < IDENTIFIABLE_RATIO * EVEN_STD)))
 
 
 def _of_length(truth: Array, found: Sequence[AnsweredScan]) -> ScansOfLength:
-    answers, cpu_s, least = zip(*found, strict=True)
-    return ScansOfLength(evaluated(truth, answers), np.array(cpu_s), np.array(least))
+    answers, cpu_s, least, in_box = zip(*found, strict=True)
+    rms, determined = zip(*in_box, strict=True)
+    times_s, spreads = np.array(cpu_s), np.array(least)
+    return ScansOfLength(evaluated(truth, answers), times_s, spreads, np.array(rms), np.array(determined))
 
 
 def _benchmarks(ramps: int, found: ScansOfLength, centred: Array) -> list[Benchmark]:
@@ -162,9 +220,13 @@ def _benchmarks(ramps: int, found: ScansOfLength, centred: Array) -> list[Benchm
 
 
 def _row(name: str, found: ScansOfLength, centred: ScansOfLength) -> tuple[str, ...]:
-    rmse, over = found.rmse, found.rmse / centred.rmse
+    rmse, least = found.rmse[:MODULUS], found.least_rmse
+    in_mm, over = (
+        np.column_stack([rmse, least]),
+        np.column_stack([rmse / centred.rmse[:MODULUS], least / centred.least_rmse]),
+    )
     return (
-        name, f"{found.determined:.0%}", f"{found.determinable:.0%}", f"{found.median_percent:.1f}",
-        f"{rmse[SIZE]:.2f}", f"{rmse[DEPTH]:.2f}", f"{over[SIZE]:.2f}", f"{over[DEPTH]:.2f}",
+        name, f"{found.determined:.0%}", f"{found.determinable:.0%}", f"{found.determined_in_box.mean():.0%}",
+        f"{found.median_percent:.1f}", *(f"{one:.2f}" for one in (*in_mm.ravel(), *over.ravel())),
         *(found.held(unknown) for unknown in range(COUNT)), f"{1e3 * np.median(found.cpu_s):.0f}",
     )  # fmt: skip

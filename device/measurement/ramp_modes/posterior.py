@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import EVEN_STD
+from device.measurement.parameters import COUNT, EVEN_STD
 from device.measurement.ramp_modes.fit import Explained, best_fit, best_fits
+from device.measurement.ramp_modes.joint_region import JointRegion, joint_region
 from device.measurement.ramp_modes.surrogate import MODULUS
 
 CELLS, SAMPLES = 11, 6000
@@ -32,6 +33,8 @@ FEWEST_EFFECTIVE = 20.0
 FEW_EFFECTIVE, MOST_SPOTS, SPOT_SAMPLES = 300.0, 12, 500
 """Samples that are worth less than the first get further Gaussians, at most so many of so many samples each."""
 SEED = 20130317
+TOGETHER = (2, COUNT)
+"""Size and depth, the first two of the unknowns, and all three."""
 EDGES = np.linspace(-1.0, 1.0, CELLS + 1)
 MIDDLES = (EDGES[1:] + EDGES[:-1]) / 2
 NEAR, MOST_STEPS = 1e-5, 12
@@ -44,7 +47,8 @@ class PressFit:
 
     `best`: the best fit; `mean`, `spread`: of the posterior; `effective_samples`: what the weighted ones are worth. Too
     few, because the best fit is driven into a corner of the ranges, tell nothing: the spread is then that of the ranges
-    and the mean the best fit. `by_modulus`: the same, cell by cell of the modulus.
+    and the mean the best fit. `by_modulus`: the same, cell by cell of the modulus. `regions`: where the unknowns of
+    each of `TOGETHER` lie together; none where too few samples tell nothing.
     """
 
     best: Array
@@ -52,6 +56,7 @@ class PressFit:
     spread: Array
     effective_samples: float
     by_modulus: ModulusCells
+    regions: tuple[JointRegion, ...] = ()
 
 
 class WeightedSamples(NamedTuple):
@@ -150,7 +155,8 @@ def sample_press(posterior: Explained, start: Array) -> PressFit:
     if effective < FEWEST_EFFECTIVE:
         return PressFit(best, best, np.full(len(best), EVEN_STD), effective, _even_cells(best))
     mean, spread = _moments(samples, weight)
-    return PressFit(best, mean, spread, effective, _by_modulus(samples, weight))
+    regions = tuple(joint_region(samples[:, :count], weight) for count in TOGETHER)
+    return PressFit(best, mean, spread, effective, _by_modulus(samples, weight), regions)
 
 
 def weighted_samples(posterior: Explained, best: Array) -> WeightedSamples:

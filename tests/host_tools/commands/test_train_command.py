@@ -17,6 +17,7 @@ from host_tools.commands import train as command
         ("standard", {"trials": 3}),
         ("paper", {"dry_run": True}),
         ("quick", {"trials": 3}),
+        ("quick", {"judge_only": True}),
         ("quick", {"wide": Path("build")}),
         ("all", {"out": Path("build")}),
         ("all", {"dry_run": True}),

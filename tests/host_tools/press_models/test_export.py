@@ -57,7 +57,7 @@ def made_ensemble(read: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble
 def made_outcome(misfit_ratio: float) -> ModeOutcome:
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
     seen = EvaluatedPresses(truth, truth + 0.05, truth - 0.1, truth + 0.2, np.ones((64, 3), bool))
-    return ModeOutcome(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3), seen, seen)
+    return ModeOutcome(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3), seen, seen, np.repeat([2, 3], 32))
 
 
 def made_ranges(read: np.ndarray) -> TrainedRange:
@@ -239,6 +239,15 @@ def test_the_card_states_each_modes_errors_on_simulated_and_on_recorded_presses(
             assert entry[kind]["depth_mm"]["skill"] == pytest.approx(1 - 0.05 * np.sqrt(3), rel=1e-3)
             assert entry[kind]["joint"] == {"size_and_depth": 1.0, "all": 1.0}
             assert entry[kind]["size_mm"]["interval_score"] == pytest.approx(0.3)
+
+
+def test_the_card_of_a_scan_says_how_narrow_intervals_become(model: RampModel) -> None:
+    """Intervals of 0.3 coordinates: 0.6 mm of the depth either way, in scans of two ramps and of three."""
+    card = model.bundle.card["modes"]
+    assert card["precise"]["reachable_half_width"]["depth_mm"] == pytest.approx(0.6)
+    assert list(card["precise"]["half_width_by_ramps"]) == ["2", "3"]
+    assert card["precise"]["half_width_by_ramps"]["3"]["depth_mm"] == pytest.approx([0.6] * 19)
+    assert not card["standard"].keys() & {"reachable_half_width", "half_width_by_ramps"}
 
 
 def test_golden_rows_are_of_the_training_and_spread_over_it(trained: TrainedRamp, model: RampModel) -> None:

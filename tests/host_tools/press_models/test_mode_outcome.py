@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -13,8 +13,9 @@ from device.measurement.parameters import COUNT, EVEN_STD, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
+from device.measurement.ramp_modes.joint_region import joint_region
 from device.measurement.ramp_modes.model import CriticalValues
-from device.measurement.ramp_modes.posterior import CELLS, ModulusCells, PressFit
+from device.measurement.ramp_modes.posterior import CELLS, TOGETHER, ModulusCells, PressFit
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, PROFILE_FORCES_N, RESPONSE, SeenPresses
 from device.measurement.ramp_modes.surrogate import MODULUS, OFFSET
 from device.measurement.recording.ring_means import RINGS
@@ -90,6 +91,18 @@ def test_answers_stand_beside_their_truths_with_the_intervals_that_the_device_gi
     np.testing.assert_allclose(found.low, [[-0.16449] * 3, [-1.0] * 3], atol=1e-4)
     np.testing.assert_allclose(found.high, [[0.16449] * 3, [1.0] * 3], atol=1e-4)
     np.testing.assert_array_equal(found.is_known, [[True] * 3, [False] * 3])
+    np.testing.assert_array_equal(found.in_region, [[True] * 2] * 2)  # of no posterior the whole range
+
+
+def test_truths_stand_in_the_joint_regions_of_their_answers():
+    rng = np.random.default_rng(1)
+    at = 0.1 * rng.standard_normal((2000, COUNT))
+    regions = tuple(joint_region(at[:, :count], np.full(2000, 1 / 2000)) for count in TOGETHER)
+    answer = answer_of(0.0, 0.1)
+    answer = replace(answer, fit=replace(answer.fit, regions=regions))
+    found = evaluated(np.array([[0.0, 0.1, 0.0], [0.15, 0.1, 0.25], [0.3, 0.0, 0.0]]), [answer] * 3)
+    np.testing.assert_array_equal(found.in_region, [[True, True], [True, False], [False, False]])
+    assert found.part(slice(1, 2)).in_region.shape == (1, 2)
 
 
 def test_intervals_of_gaussian_answers_cover_nine_in_ten():
@@ -190,7 +203,7 @@ def test_an_outcome_keeps_what_it_makes_of_both_kinds_of_presses():
     truth = np.zeros((2, 3))
     simulated = evaluated(truth, [answer_of(0.0, 0.1)] * 2)
     recorded, found = recorded_of(seen_rows(3)), [answer_of(0.3, 0.1)] * 3
-    outcome = outcome_of(simulated, recorded, found, FLAT, thrice)
+    outcome = outcome_of(simulated, recorded, found, FLAT, thrice, np.ones(len(simulated.truth), int))
     assert outcome.simulated is simulated
     np.testing.assert_allclose(outcome.recorded.truth, normalise(recorded.parameters)[:, :3])
     np.testing.assert_array_equal(outcome.recorded.mean, 0.3)

@@ -1,5 +1,7 @@
 """Errors, skill, coverage and octiles of answers whose statistics are known on paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,14 @@ from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS
 from host_tools.press_models.mode_outcome import EvaluatedPresses
-from host_tools.press_models.mode_statistics import OCTILES, interval_score, octile_of, statistics
+from host_tools.press_models.mode_statistics import (
+    OCTILES,
+    PARTS,
+    half_width_by_ramps,
+    interval_score,
+    octile_of,
+    statistics,
+)
 
 COUNT = 4000
 EVEN = np.tile((2 * np.arange(COUNT) + 1)[:, None] / COUNT - 1, 3)
@@ -143,6 +152,36 @@ def test_intervals_together_are_counted_where_all_of_them_are_determined():
     mean[30:60, 1] = 0.5
     assert of(mean, spread, truth)["joint"] == {"size_and_depth": 0.7, "all": 0.75}
     assert of(mean, 0.6 * EVEN_STD, truth)["joint"] == {"size_and_depth": None, "all": None}
+
+
+def test_joint_regions_are_counted_in_all_presses_where_a_mode_has_them():
+    truth = np.zeros((10, 3))
+    presses = replace(presses_of(truth, truth=truth), in_region=np.array([[True, False]] * 6 + [[True, True]] * 4))
+    assert statistics(presses)["joint_region"] == {"size_and_depth": 1.0, "all": 0.4}
+    assert "joint_region" not in of(truth, truth=truth)
+
+
+def test_half_widths_are_told_by_the_ramps_of_a_scan_in_the_unknowns_own_units():
+    """Two ramps: 0.2 either way, 0.8 mm of depth; three: half of that. What is not known has the whole range."""
+    truth, spread = np.zeros((4, 3)), np.repeat([0.1, 0.1, 0.05, 0.05], 3).reshape(4, 3)
+    spread[0, 0] = 0.6 * EVEN_STD
+    found = half_width_by_ramps(presses_of(truth, spread, truth), np.array([2, 2, 3, 3]))
+    assert found["2"]["depth_mm"] == pytest.approx([0.8] * 19)
+    assert found["3"]["depth_mm"] == pytest.approx([0.4] * 19)
+    assert found["2"]["size_mm"][::9] == pytest.approx([1.3 + 0.05 * 5.2, 1.3 + 0.5 * 5.2, 1.3 + 0.95 * 5.2], rel=1e-3)
+
+
+def test_cells_of_size_and_depth_count_presses_what_is_determined_and_what_is_covered():
+    """Ten presses of the smallest size and greatest depth, of which six determine the depth and two miss it."""
+    truth = np.tile([-1.0, 1.0, 0.0], (14, 1))
+    truth[10:, :2] = 0.1, -0.6
+    spread, mean = np.full((14, 3), 0.1), truth + 0.0
+    spread[6:10, 1], mean[:2, 1] = 0.6 * EVEN_STD, 0.5
+    cells = of(mean, spread, truth)["depth_mm"]["cells"]
+    number, other = PARTS - 1, 2 * PARTS
+    assert [cells[name][number] for name in ("presses", "determined", "covered")] == [10, 6, 4]
+    assert [cells[name][other] for name in ("presses", "determined", "covered")] == [4, 4, 4]
+    assert [sum(cells[name]) for name in ("presses", "determined", "covered")] == [14, 10, 8]
 
 
 def test_an_interval_scores_its_width_and_twenty_times_what_it_misses_by():

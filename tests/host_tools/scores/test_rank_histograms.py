@@ -29,7 +29,7 @@ def drawn(scale: float = 1.0, shift: float = 0.0) -> list[RankedPress]:
 def test_ranks_of_a_right_posterior_are_even_and_its_regions_hold_nine_in_ten():
     found = drawn()
     assert all(benchmark.passed for benchmark in module._benchmarks("standard", found))
-    inside = np.array([one.distance_rank for one in found]) <= 0.9
+    inside = np.array([one.in_region for one in found])
     assert inside.mean(axis=0) == pytest.approx(0.9, abs=0.04)
 
 

@@ -16,7 +16,14 @@ from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONS
 from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.scores import scan
-from host_tools.scores.scan import MOST_RAMPS, ScansOfLength, answered_scans, answers_by_ramps, scan_chapter
+from host_tools.scores.scan import (
+    MOST_RAMPS,
+    ScansOfLength,
+    answered_scans,
+    answers_by_ramps,
+    bound_in_box,
+    scan_chapter,
+)
 
 STD = 0.02
 TRUTH = np.array([0.2, -0.3, 0.1, 0.1, -0.2, 0.3, 0.0, -0.1, -0.4])
@@ -67,6 +74,46 @@ def test_the_bound_falls_with_the_ramps_and_is_reached_on_a_linear_model(model):
         np.testing.assert_allclose(one.answer.spread, one.least_spread, rtol=0.2)
 
 
+def linear_press(std: float, slope: float, modulus_std: float) -> np.ndarray:
+    """Return the whitened derivatives [3, 9] of a press that sees size + slope x modulus, depth, and the modulus."""
+    jacobian = np.zeros((3, len(PARAMETERS)))
+    jacobian[0, 0], jacobian[0, 2] = 1 / std, slope / std
+    jacobian[1, 1], jacobian[2, 2] = 1 / std, 1 / modulus_std
+    return jacobian
+
+
+def test_the_bound_in_the_box_of_a_modulus_of_which_nothing_is_seen_is_that_of_its_range():
+    """It is even, with a standard deviation of 0.577; the size hangs on it by 0.03."""
+    found = bound_in_box(linear_press(0.01, 0.03, 1e3), 0.4)
+    np.testing.assert_allclose(found.rms, [np.hypot(0.01, 0.03 * EVEN_STD), 0.01, EVEN_STD], rtol=0.01)
+    assert found.determined == 0.0
+
+
+def test_far_from_its_ends_the_bound_in_the_box_is_that_of_cramer_and_rao():
+    found = bound_in_box(linear_press(0.01, 0.3, 0.1), 0.0)
+    np.testing.assert_allclose(found.rms, [np.hypot(0.01, 0.03), 0.01, 0.1], rtol=0.02)
+    assert found.determined == 1.0
+
+
+def test_the_best_estimate_errs_by_the_bound_in_the_box_and_is_as_often_determined():
+    """Sampled: even moduli, seen with 0.4; the mean of what is left errs by the root of its mean variance."""
+    rng, std = np.random.default_rng(1), 0.4
+    truth = rng.uniform(-1, 1, 4000)
+    seen = truth + std * rng.standard_normal(len(truth))
+    grid = np.linspace(-1, 1, 201)
+    left = np.exp(-((grid - seen[:, None]) ** 2) / (2 * std**2))
+    left /= left.sum(axis=1, keepdims=True)
+    mean = left @ grid
+    spread = np.sqrt(left @ grid**2 - mean**2)
+    bounds = [bound_in_box(linear_press(0.01, 0.0, std), one) for one in truth[::40]]
+    least = np.sqrt(np.mean([one.rms[2] ** 2 for one in bounds]))
+    assert least == pytest.approx(np.sqrt(np.mean((mean - truth) ** 2)), rel=0.04)
+    assert least < 0.4 * 0.9  # the range's ends tell something
+    determined = np.mean(spread < IDENTIFIABLE_RATIO * EVEN_STD)
+    assert 0.05 < determined < 0.95
+    assert np.mean([one.determined for one in bounds]) == pytest.approx(determined, abs=0.04)
+
+
 def test_all_numbers_of_ramps_are_of_the_same_inclusions(model):
     found = answered_scans(model, seed=3, scenes=1, jobs=1)
     assert len(found) == 1 + MOST_RAMPS
@@ -84,7 +131,8 @@ def made(error: float, known: list[bool], least: float = 0.1) -> ScansOfLength:
     low, mean, high = (normalise_unknowns(part * (1 + error) * truth) for part in (0.8, 1.0, 1.2))
     is_known = np.repeat(np.array(known)[:, None], 3, axis=1)
     presses = EvaluatedPresses(normalise_unknowns(truth), mean, low, high, is_known)
-    return ScansOfLength(presses, np.full(len(known), 0.05), np.full((len(known), 3), least))
+    bounds = np.full((len(known), 3), least)
+    return ScansOfLength(presses, np.full(len(known), 0.05), bounds, bounds, np.full(len(known), 0.7))
 
 
 def test_the_chapter_judges_scans_of_two_and_of_four(monkeypatch):
@@ -107,8 +155,10 @@ def test_the_chapter_judges_scans_of_two_and_of_four(monkeypatch):
     ]
     rows = chapter.tables[0].rows
     assert [row[0] for row in rows] == ["1, on the axis", "1", "2", "3", "4"]
-    assert rows[0][1:4] == ("50%", "0%", "20.0")
-    assert rows[2][1:] == ("50%", "100%", "10.0", "0.85", "0.80", "0.50", "0.50", "100%", "100%", "100%", "50")
+    assert rows[0][1:5] == ("50%", "0%", "70%", "20.0")
+    assert rows[2][1:10] == ("50%", "100%", "70%", "10.0", "0.85", "0.65", "0.80", "0.40", "0.50")
+    assert rows[2][10:] == ("0.17", "0.50", "0.17", "100%", "100%", "100%", "50")
+    assert len(rows[2]) == len(chapter.tables[0].header)
 
 
 def test_where_nothing_is_determined_nothing_passes():
