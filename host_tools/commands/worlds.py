@@ -57,7 +57,7 @@ def robustness(
     scheduler: Scheduler = None,
 ) -> None:
     """Measure how presses of probes that somebody built are answered, before and after commissioning: of random
-    tolerances, of other optics, with one thing at a time, and with what no test notices.
+    tolerances, of other optics, with one thing at a time, and with what no test notices; and what a refusal names.
 
     Half an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
     """
@@ -66,6 +66,7 @@ def robustness(
     from host_tools.pages.page import Results, write_page
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+    from host_tools.scores.one_thing.named_blocks import named_blocks_chapter
     from host_tools.scores.one_thing.one_at_a_time import one_at_a_time_chapter
     from host_tools.scores.one_thing.press_answers import DesignToTry
     from host_tools.scores.one_thing.silent_errors import silent_errors_chapter
@@ -85,6 +86,7 @@ def robustness(
         "other optics": lambda: other_optics_chapter(trained, derivatives, tables, stated, presses=presses, seed=seed),
         "one at a time": lambda: one_at_a_time_chapter(design, stated, seed=seed),
         "silent errors": lambda: silent_errors_chapter(design, seed=seed),
+        "named": lambda: named_blocks_chapter(design, seed=seed),
     }
     with workers(scheduler):
         measured = measure_chapters(chosen_chapters(only, chapters))

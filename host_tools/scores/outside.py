@@ -74,7 +74,7 @@ def kinds(tables: ProbeTables, seed: int, jobs: int = -1) -> list[Kind]:
         own = press_seed(seed, number)
         return recorded_press(tables, parameters, mode, own, levels=ErrorLevels(), further_mm=places, **others)
 
-    neighbours = [_beside(one, rng) for one in two]
+    neighbours = [neighbour_beside(one, rng) for one in two]
     wet_ratios = rng.uniform(*WET_RATIO, len(wet))
     firm, sunk = np.array(two), np.array(two)
     sunk[:, 1] += np.random.default_rng([seed, 2]).uniform(*SUNK_MM, len(sunk))
@@ -127,7 +127,8 @@ def _inclusions(
     return np.column_stack([rng.uniform(low, high, count) for low, high in (sizes_mm, depths_mm, CLEAR_KPA)])
 
 
-def _beside(first: Array, rng: np.random.Generator) -> Neighbour:
+def neighbour_beside(first: Array, rng: np.random.Generator) -> Neighbour:
+    """Return an inclusion that shows well beside a first one, whose diameter (mm) its parameters begin with."""
     size_mm, depth_mm, modulus_kpa = map(float, clear_inclusions(1, rng)[0])
     away_mm, angle = (first[0] + size_mm) / 2 + rng.uniform(*GAP_MM), rng.uniform(0, 2 * np.pi)
     return Neighbour(size_mm, depth_mm, modulus_kpa, float(away_mm * np.cos(angle)), float(away_mm * np.sin(angle)))

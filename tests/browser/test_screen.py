@@ -30,7 +30,8 @@ from device.errors import StorageError
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, without_numbers
 from device.measurement.mode import MODES, Mode, ModeWorth
-from device.measurement.ramp_modes.estimate import REASONS
+from device.measurement.ramp_modes.estimate import CAUSES, REASONS
+from device.measurement.ramp_modes.misfit_blocks import BLOCKS
 from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice, half_widths
 from device.records.updates import Updates
@@ -175,11 +176,12 @@ def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def no_numbers_in_any_mode(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To be asked for before the probe: no numbers, for every reason that there is."""
+def no_numbers_in_any_mode(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To be asked for before the probe: no numbers, for every reason that there is; the parameter is the misfit's."""
+    of_misfit, action = request.param
 
     def estimate(recording: Recording, mode: Mode) -> Estimate:
-        reason = " ".join([*REASONS.values(), NO_NUMBERS])
+        reason = " ".join([*(REASONS | {"misfit_ratio": of_misfit}).values(), action])
         return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "c", True))
 
     monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, no_advice))
@@ -369,7 +371,19 @@ def test_the_answer_is_on_the_screen_before_the_disk_has_it(
 
 @pytest.mark.long
 @pytest.mark.usefixtures("no_numbers_in_any_mode")
-def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Served):
+@pytest.mark.parametrize(
+    ("no_numbers_in_any_mode", "words"),
+    [
+        ((REASONS["misfit_ratio"], NO_NUMBERS), "note the finding without numbers."),
+        (CAUSES["contrast"], "Wipe, press a little beside it"),
+        (CAUSES["reference_response"], "have the probe commissioned again. Wipe, tare, begin beside it"),
+        (CAUSES["first_harmonic"], "The probe was tilted, or one side's light has changed."),
+        (CAUSES["second_harmonic"], "Turn by a quarter, press again"),
+    ],
+    ids=["none", *BLOCKS],
+    indirect=["no_numbers_in_any_mode"],
+)
+def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Served, words: str):
     """All three reasons at once are the longest there is: they fit above the tiles, without a figure."""
     page.goto(probe.url)
     _press_freely(page)
@@ -378,7 +392,7 @@ def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Serv
     probe.hand.go_on()
     expect(page.locator("#size-value")).to_have_text("not determined")
     expect(page.locator("#instruction")).to_have_text("No numbers")
-    expect(page.locator("#status-reason")).to_contain_text("note the finding without numbers.")
+    expect(page.locator("#status-reason")).to_contain_text(words)
     shoot(page, "result-without-numbers")
     _require_fits(page)
     cut = "tiles => tiles.filter(t => t.scrollHeight > t.clientHeight + 1).map(t => t.id)"

@@ -14,6 +14,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, HIGH, denormalise, slope_of_normalised
 from device.measurement.ramp_modes.fit import PressPosterior, best_fits
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
+from device.measurement.ramp_modes.misfit_blocks import Departure
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import PressFit, sample_press
 from device.measurement.ramp_modes.radial_profile import SeenPresses
@@ -92,6 +93,12 @@ class RampAnswers:
         return worth_of_places(
             seen.rows, at, self.surrogate, self.noise, self.surrogate.to_mm, places_mm, seen.direction_rad
         )
+
+    def departure(self, seen: SeenPresses, answer: RampAnswer) -> Departure:
+        """Return what of presses their best fit does not explain, block by block."""
+        reach_mm = self.reach_mm(len(seen.rows))
+        posterior = PressPosterior(seen.rows, self.surrogate, self.noise, reach_mm, seen.direction_rad)
+        return Departure(posterior.misfit_by_block(answer.fit.best))
 
     def _with_reach(self, best: Array, presses: int) -> Array:
         """Return the best fit of so many presses with offsets over the reach of a scan."""

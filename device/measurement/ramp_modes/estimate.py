@@ -8,6 +8,7 @@ too. Source: docs/accuracy.md on what can be known; docs/modes.md on how often e
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from device.measurement.estimate import (
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.ramp_modes.answers import RampAnswer
+from device.measurement.ramp_modes.misfit_blocks import FAR_TILT_DEVIATIONS, Departure, RowBlock, critical_ratio
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import (
@@ -105,17 +107,31 @@ def _answered(
     answer = model.answer_to(seen)
     found = model.found(answer, seen)
     residual = max(profile.residual for profile in profiles)
-    return _judged(answer, found, model.critical[mode], residual, origin), (seen, answer)
+    critical = model.critical[mode]
+    departure = model.answers.departure(seen, answer) if found.misfit_ratio > critical.misfit_ratio else None
+    return _judged(answer, found, critical, residual, departure, origin), (seen, answer)
 
 
 def _judged(
-    answer: RampAnswer, found: CriticalValues, critical: CriticalValues, residual: float, origin: Origin
+    answer: RampAnswer,
+    found: CriticalValues,
+    critical: CriticalValues,
+    residual: float,
+    departure: Departure | None,
+    origin: Origin,
 ) -> Estimate:
-    """Return the numbers of an answer, or why it is none of one round inclusion inside the trained ranges."""
+    """Return the numbers of an answer, or why it is none of one round inclusion inside the trained ranges.
+
+    `departure` is what the best fit leaves of a press whose misfit is too large.
+    """
     tissue = dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
     features = with_critical(asdict(found), asdict(critical)) | {"residual": residual} | tissue
-    if reasons := rejections(found, critical):
-        return without_numbers("outside_range", " ".join([*reasons, NO_NUMBERS]), origin, features)
+    block = departure.block if departure else None
+    if departure:
+        features |= _figures_of(departure)
+    if reasons := rejections(found, critical, block):
+        action = CAUSES[block].action if block else NO_NUMBERS
+        return without_numbers("outside_range", " ".join([*reasons, action]), origin, features)
     return with_numbers(numbers_in(answer.mean, answer.spread, answer.intervals), features, origin)
 
 
@@ -146,10 +162,53 @@ REASONS = {
 """What the operator reads when a figure is above its critical value; both are among the features."""
 
 
-def rejections(found: CriticalValues, critical: CriticalValues) -> list[str]:
+class MisfitCause(NamedTuple):
+    """What may make a block of the row depart, in one sentence, and what to do about it instead of `NO_NUMBERS`."""
+
+    sentence: str
+    action: str
+
+
+CAUSES: dict[RowBlock, MisfitCause] = {
+    "contrast": MisfitCause(
+        "No single round inclusion looks like this: there may be two, or the skin over it is unlike that beside it.",
+        "No numbers are given. Wipe face and skin, and press again a little beside it; if the message stays, note the "
+        "finding without numbers.",
+    ),
+    "reference_response": MisfitCause(
+        "Already beside the lesion the light follows the force otherwise than it should: skin or probe differ from "
+        "what this probe was commissioned with.",
+        "No numbers are given. Wipe face and skin, tare, and press beside the lesion again; if the message stays with "
+        "other patients, have this probe commissioned again.",
+    ),
+    "first_harmonic": MisfitCause(
+        "One side is brighter than an inclusion makes it: the probe was tilted, or the light of one side has changed.",
+        "No numbers are given. Hold the probe straight, and press again; if the message stays, run the self-test.",
+    ),
+    "second_harmonic": MisfitCause(
+        "The image is longer one way than across: the inclusion is not round, or the light of two sides has changed.",
+        "No numbers are given. Turn the probe by a quarter, and press again; if the message stays, note the finding "
+        "without numbers.",
+    ),
+}
+"""What is said where one block of the row alone departs, instead of the sentence on the misfit as a whole."""
+
+
+def _figures_of(departure: Departure) -> dict[str, float]:
+    """Return the misfit of each block, and the tilt where it is told, each beside its critical value."""
+    found = {f"{block}_misfit_ratio": one.ratio for block, one in departure.blocks.items()}
+    critical = {f"{block}_misfit_ratio": critical_ratio(one.columns) for block, one in departure.blocks.items()}
+    if departure.tilt_deviations is not None:
+        found["tilt_deviations"] = departure.tilt_deviations
+        critical["tilt_deviations"] = FAR_TILT_DEVIATIONS
+    return with_critical(found, critical)
+
+
+def rejections(found: CriticalValues, critical: CriticalValues, block: RowBlock | None = None) -> list[str]:
     """Return a sentence for every reason why this is not one round inclusion inside the trained ranges; [] is good.
 
-    A figure that is no number rejects, too.
+    A figure that is no number rejects, too. `block`: which part of the row makes the misfit, where one does.
     """
     limits = asdict(critical)
-    return [REASONS[name] for name, value in asdict(found).items() if not value <= limits[name]]
+    sentences = REASONS | ({"misfit_ratio": CAUSES[block].sentence} if block else {})
+    return [sentences[name] for name, value in asdict(found).items() if not value <= limits[name]]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS
 from device.measurement.ramp_modes.bounded_least_squares import least_squares
+from device.measurement.ramp_modes.misfit_blocks import BLOCK_OF_COLUMN, BlockMisfit, RowBlock, misfit_by_block
 from device.measurement.ramp_modes.noise import FURTHER, PressNoise, as_one_row
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
@@ -90,6 +91,11 @@ class PressPosterior:
         for own in self._columns:
             residuals[:, own] = away[:, : own.stop] @ factor[own, : own.stop].T
         return residuals.reshape(*at.shape[:-1], len(self._row))
+
+    def misfit_by_block(self, at: Array) -> dict[RowBlock, BlockMisfit]:
+        """Return the misfit of each block of the presses' rows at coordinates [8 + N]."""
+        blocks = np.concatenate([BLOCK_OF_COLUMN, *[BLOCK_OF_COLUMN[FURTHER]] * (self.presses - 1)])
+        return misfit_by_block(self.residuals(at), self._whitening, blocks)
 
     def whitened(self, change: Array) -> Array:
         """Return changes [..., S, k] of the rows, or one change [S], in standard deviations of the noise."""

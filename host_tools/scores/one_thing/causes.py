@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from device.measurement.ramp_modes.misfit_blocks import RowBlock
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.lens import TrueCamera
 from device.simulation.physics.skin import ContactLaw, SkinTexture
@@ -62,11 +63,45 @@ def causes() -> list[Cause]:
         *(Cause("tilt on the lesion", f"{one:g} degrees", "press", _tilted(one)) for one in (0.1, 0.5)),
         Cause("one LED between the presses", "3 % dimmer", "press", _dimmed(0.97)),
         *(Cause("texture of skin, 2 mm", f"{one:g} %", "patient", _textured(one)) for one in (0.3, 0.5, 1)),
-        *(_alike("wetting over the lesion", f"+{one} %", "patient", _wetting(1 + one / 100)) for one in (3, 10)),
+        *(_wetter(one) for one in (3, 10)),
         _alike("tissue over the lesion", "-5 %", "patient", World(lesion=OverLesion(tissue_modulus_ratio=0.95))),
-        _alike("skin of 1.5 mm", "twice as stiff", "patient", World(layers=LayerRatios(skin_modulus_ratio=2.0))),
+        _alike("skin of 1.5 mm", "twice as stiff", "patient", _stiff_skin(2)),
         relaxing(5),
     ]  # fmt: skip
+
+
+class CauseToName(NamedTuple):
+    """A thing that a refusal ought to name by a block of the row; None where several depart."""
+
+    cause: Cause
+    block: RowBlock | None
+
+
+def causes_to_name() -> list[CauseToName]:
+    """Return things of sizes at which presses are refused, and the block that each is of."""
+    response: list[Cause] = [
+        _alike("exponent of the contact law", "0.9", "probe", _exponent(0.9)),
+        _alike("form of the contact law", "Langmuir", "probe", World(contact=ContactLaw(form="langmuir"))),
+        _alike("moduli of the layers", "+25 %", "probe", _layers(1.25)),
+        _alike("skin of 1.5 mm", "4 times as stiff", "patient", _stiff_skin(4)),
+        _alike("pixel scale, not undone", "+2 %", "camera", _scale(1.02)),
+        _alike("optical axis, not undone", "0.5 mm", "camera", World(camera=TrueCamera(axis_x_mm=0.5))),
+    ]
+    first = [
+        *(Cause("tilt on the lesion", f"{one:g} degrees", "press", _tilted(one)) for one in (0.5, 2)),
+        *(Cause("one LED between the presses", f"{one} % dimmer", "press", _dimmed(1 - one / 100)) for one in (3, 10)),
+    ]
+    return [
+        *(CauseToName(one, "reference_response") for one in response),
+        *(CauseToName(_wetter(one), "contrast") for one in (10, 50)),
+        *(CauseToName(one, "first_harmonic") for one in first),
+        CauseToName(Cause("two opposite LEDs", "10 % dimmer", "press", _dimmed(0.9, are_two=True)), "second_harmonic"),
+        CauseToName(Cause("texture of skin, 2 mm", "1 %", "patient", _textured(1)), None),
+    ]
+
+
+def _wetter(percent: float) -> Cause:
+    return _alike("wetting over the lesion", f"+{percent:g} %", "patient", _wetting(1 + percent / 100))
 
 
 def relaxing(percent: float, lesion_n_per_s: float = LESION_N_PER_S) -> Cause:
@@ -102,6 +137,10 @@ def _deep(ratio: float) -> World:
     return World(layers=LayerRatios(deep_modulus_ratio=ratio))
 
 
+def _stiff_skin(ratio: float) -> World:
+    return World(layers=LayerRatios(skin_modulus_ratio=float(ratio)))
+
+
 def _scale(ratio: float) -> World:
     return World(camera=TrueCamera(scale_x_ratio=ratio, scale_y_ratio=ratio))
 
@@ -124,12 +163,13 @@ def _tilted(degrees: float) -> Callable[[np.random.Generator], TwoWorlds]:
     return worlds
 
 
-def _dimmed(ratio: float) -> Callable[[np.random.Generator], TwoWorlds]:
-    """Return presses of which one side, any, has so much of its light beside the lesion."""
+def _dimmed(ratio: float, *, are_two: bool = False) -> Callable[[np.random.Generator], TwoWorlds]:
+    """Return presses of which one side, any, or both of a pair have so much of their light beside the lesion."""
 
     def worlds(rng: np.random.Generator) -> TwoWorlds:
         dim = int(rng.integers(4))
-        x, y, minus_x, minus_y = (ratio if side == dim else 1.0 for side in range(4))
+        dimmed = {dim, (dim + 2) % 4} if are_two else {dim}
+        x, y, minus_x, minus_y = (ratio if side in dimmed else 1.0 for side in range(4))
         world = World(light=TrueLight(lesion_side_ratio=(x, y, minus_x, minus_y)))
         return world, world
 

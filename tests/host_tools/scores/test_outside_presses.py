@@ -40,7 +40,7 @@ def test_a_neighbour_leaves_a_gap_between_the_inclusions():
     rng = np.random.default_rng(3)
     for _ in range(200):
         first = np.array([rng.uniform(5.0, 10.0), 5.0, 80.0])
-        beside = outside._beside(first, rng)
+        beside = outside.neighbour_beside(first, rng)
         gap_mm = np.hypot(beside.x_mm, beside.y_mm) - (first[0] + beside.size_mm) / 2
         assert GAP_MM[0] <= gap_mm <= GAP_MM[1]
 

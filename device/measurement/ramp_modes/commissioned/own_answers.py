@@ -22,6 +22,7 @@ from device.measurement.ramp_modes.answers import (
 from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place
 from device.measurement.ramp_modes.fit import best_fit, best_fits
+from device.measurement.ramp_modes.misfit_blocks import Departure
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import sample_press
 from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE, SeenPresses
@@ -75,6 +76,12 @@ class OwnAnswers(RampAnswers):
             after = np.append(at, [place_mm / to_mm, 0.0])
             parts.append(bound_of(self._posterior(_with_further(seen, row), after, to_mm), after) / before)
         return np.array(parts)
+
+    def departure(self, seen: SeenPresses, answer: RampAnswer) -> Departure:
+        """Return what of presses their best fit does not explain, and how far the probe leant on the lesion."""
+        best = answer.fit.best
+        posterior = self._posterior(seen, best, self.reach_mm(len(seen.rows)))
+        return Departure(posterior.misfit_by_block(best), posterior.tilt_deviations(best))
 
     def _posterior(self, seen: SeenPresses, at: Array, reach_mm: float) -> OwnPosterior:
         return OwnPosterior(seen, self.surrogate, self.noise, self.own, reach_mm, at)

@@ -22,6 +22,7 @@ from device.measurement.ramp_modes.commissioned.own_probe import (
     Place,
     turned_columns,
 )
+from device.measurement.ramp_modes.misfit_blocks import BLOCK_OF_COLUMN, BlockMisfit, RowBlock, misfit_by_block
 from device.measurement.ramp_modes.noise import FURTHER, LOADS, PressNoise, light_ratio, smooth_errors
 from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE, SECOND, SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
@@ -32,6 +33,8 @@ OF_FIRST, OF_SECOND = (slice(one.start - COLUMNS, one.stop - COLUMNS) for one in
 """Harmonics among those across the bright side."""
 LEAST = 1e-4
 """An offset this small is on the axis, in units of the reach: there its direction means nothing."""
+BLOCK_OF_SEEN = np.concatenate([BLOCK_OF_COLUMN, *(BLOCK_OF_COLUMN[along] for along in (FIRST, SECOND))])
+"""Number of the block of each column of what is seen of a press: harmonics along and across are one block."""
 OF_FURTHER = np.concatenate([FURTHER, np.arange(COLUMNS, SEEN_COLUMNS)])
 """Columns of a further press of a scan: all but the reference response, which is that of the first."""
 
@@ -87,6 +90,25 @@ class OwnPosterior:
         place = self._place(at[None])
         spread = discrepancy.spread(place.normalised, self._rows(place)).transpose(2, 0, 1)
         return np.asarray(self._whitening @ _joined(turned_columns(spread, place.angle_rad[:, None])).T)
+
+    def misfit_by_block(self, at: Array) -> dict[RowBlock, BlockMisfit]:
+        """Return the misfit of each block of what is seen, at coordinates [8 + 2 N]."""
+        (blocks,) = _joined(np.tile(BLOCK_OF_SEEN, (1, self.presses, 1)))
+        return misfit_by_block(self.residuals(at), self._whitening, blocks)
+
+    def tilt_deviations(self, at: Array) -> float:
+        """Return how far the probe leant on the lesion in the press that leant most, at coordinates [8 + 2 N].
+
+        That is the mean of the tilt's posterior, given those coordinates, in standard deviations of a hand's habit.
+        """
+        place = self._place(at[None])
+        tilted = self._own.tilted_columns(place, self._rows(place))
+        told = self._whitening.T @ self.residuals(at)
+        parts = zip(_places(self.presses), tilted, strict=True)
+        return max(
+            float(np.linalg.norm(told[own] @ (one[OF_FURTHER] if number else one)))
+            for number, (own, one) in enumerate(parts)
+        )
 
     def residuals(self, at: Array) -> Array:
         """Return whitened residuals [..., S] at coordinates [..., 8 + 2 N], in their precision."""

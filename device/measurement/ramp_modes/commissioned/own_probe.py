@@ -112,6 +112,15 @@ class OwnProbe:
             parts.append(columns)
         return RowChanges(self._shift(seen, changes, place, rows), np.concatenate(parts, axis=2))
 
+    def tilted_columns(self, place: Place, rows: Array) -> Array:
+        """Return what a standard deviation of each press's tilt does to it [N, S, 2], along the bright side and across.
+
+        As of `changes`.
+        """
+        changes = self.derivatives.changes(place.normalised, rows)[:, LESION_TILT]
+        each = [vector_columns(one, angle) for one, angle in zip(changes, place.angle_rad, strict=True)]
+        return self._std(LESION_TILT) * np.array(each)
+
     def shift(self, place: Place, rows: Array) -> Array:
         """Return what is believed to shift what is seen of presses [N, S], as of `changes`."""
         changes = self.derivatives.changes(place.normalised, rows)

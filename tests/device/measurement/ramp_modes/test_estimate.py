@@ -12,6 +12,7 @@ from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.ramp_modes import answers as answers_module
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.estimate import (
+    CAUSES,
     PLACES_MM,
     REASONS,
     WORTH_A_RAMP,
@@ -20,6 +21,7 @@ from device.measurement.ramp_modes.estimate import (
     rejections,
     stands_out,
 )
+from device.measurement.ramp_modes.misfit_blocks import BLOCKS
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.radial_profile import COLUMNS, press_profile, press_profiles
@@ -27,6 +29,8 @@ from device.measurement.recording.ring_means import RINGS
 from device.measurement.scan_advice import half_widths
 from device.simulation.physics.neighbour import Neighbour
 
+FIGURES = r"\d|odds|misfit|usual|harmonic|contrast|response"
+"""What no sentence for an operator has."""
 CRITICAL = CriticalValues(misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
 
 
@@ -151,7 +155,16 @@ def test_what_is_at_its_critical_value_is_not_rejected():
 )
 def test_every_rejection_is_said_in_its_own_sentence_without_figures(found, name):
     assert rejections(found, CRITICAL) == [REASONS[name]]
-    assert not re.search(r"\d|odds|misfit|usual", REASONS[name])
+    assert not re.search(FIGURES, REASONS[name])
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_a_misfit_of_one_block_is_said_in_a_sentence_of_its_own_without_figures(block):
+    outside = CriticalValues(1.31, 3.0, 0.6)
+    assert rejections(outside, CRITICAL, block) == [CAUSES[block].sentence, REASONS["outside_log_odds"]]
+    assert rejections(CriticalValues(1.2, 3.0, 0.6), CRITICAL, block) == [REASONS["outside_log_odds"]]
+    assert not re.search(FIGURES, " ".join(CAUSES[block]))
+    assert CAUSES[block].action.startswith("No numbers are given. ")
 
 
 def test_all_rejections_are_said_and_what_is_no_number_is_rejected_too():
@@ -159,16 +172,39 @@ def test_all_rejections_are_said_and_what_is_no_number_is_rejected_too():
         assert rejections(everything, CRITICAL) == list(REASONS.values())
 
 
-def test_a_press_that_is_refused_keeps_the_figures_and_their_critical_values(pressed, ramp_model, calibration):
-    """Gel on the face: which of the three figures is above its critical value is what the sentences say."""
-    refused = estimate_ramp(pressed("standard", wet_ratio=0.4), "standard", ramp_model, calibration)
+@pytest.mark.parametrize("mode", RAMP_MODES)
+def test_a_press_that_is_refused_keeps_the_figures_and_their_critical_values(pressed, ramp_model, calibration, mode):
+    """Gel on the face is told by the light beside the lesion: which figures are above their critical values is said."""
+    refused = estimate_ramp(pressed(mode, wet_ratio=0.4), mode, ramp_model, calibration)
     assert refused.status == "outside_range"
-    critical = ramp_model.critical["standard"]
+    critical = ramp_model.critical[mode]
     for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"):
         assert refused.features[f"critical_{name}"] == getattr(critical, name)
     above = [name for name in REASONS if refused.features[name] > refused.features[f"critical_{name}"]]
-    assert above
-    assert refused.reason == " ".join([*(REASONS[name] for name in above), NO_NUMBERS])
+    assert above[0] == "misfit_ratio"
+    cause = CAUSES["reference_response"]
+    assert refused.reason == " ".join([cause.sentence, *(REASONS[name] for name in above[1:]), cause.action])
+    ratios = {block: refused.features[f"{block}_misfit_ratio"] for block in BLOCKS}
+    assert max(ratios, key=ratios.get) == "reference_response"
+    assert ratios["reference_response"] > 100 * refused.features["critical_reference_response_misfit_ratio"]
+    assert "tilt_deviations" not in refused.features  # of a commissioned probe alone
+
+
+def test_a_press_with_numbers_has_no_figures_of_blocks(ramp, ramp_model, calibration):
+    features = estimate_ramp(ramp, "standard", ramp_model, calibration).features
+    assert {name for name in features if name.endswith("misfit_ratio")} == {"misfit_ratio", "critical_misfit_ratio"}
+
+
+def test_where_several_blocks_depart_none_is_named(pressed, ramp_model, calibration):
+    """A second inclusion shows in the contrast and in both harmonics."""
+    two = pressed("standard", (8.0, 5.0, 80.0), neighbour=Neighbour(8.0, 5.0, 80.0, x_mm=9.0))
+    estimate = estimate_ramp(two, "standard", ramp_model, calibration)
+    above = {
+        b for b in BLOCKS if estimate.features[f"{b}_misfit_ratio"] > estimate.features[f"critical_{b}_misfit_ratio"]
+    }
+    assert above == {"contrast", "first_harmonic", "second_harmonic"}
+    assert estimate.reason.startswith(REASONS["misfit_ratio"])
+    assert estimate.reason.endswith(NO_NUMBERS)
 
 
 def stretched_spot(recording, contrast):

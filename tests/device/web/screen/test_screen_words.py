@@ -19,7 +19,7 @@ from device.instrument.press.states import Guidance, PressState, off_centre, too
 from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OUT, SHADE, UNKNOWN_IMAGE
 from device.measurement.mode import MODES
 from device.measurement.quantities import Bound
-from device.measurement.ramp_modes.estimate import REASONS
+from device.measurement.ramp_modes.estimate import CAUSES, REASONS
 from device.web.screen.screen_words import LANGUAGES, page, words_of
 
 STATIC = ROOT / "device" / "web" / "static"
@@ -35,6 +35,10 @@ ELSEWHERE = {
     "not_round",
     "unlike_image",
     "no_numbers",
+    "wipe_press_beside",
+    "tare_wipe",
+    "press_straight",
+    "turn_probe",
 }
 """Said where a whole daemon or a recording is needed, or never alone."""
 SAID_BY_FAULTS = {"is", "do"}
@@ -106,6 +110,7 @@ def daemon_sentences() -> list[str]:
     by_code.append(held.see(FrameSeen(1.0, 0.5, 0.5, 0.0, 0.0, 0.012), rules).reason)
     estimates = [NOTHING_STANDS_OUT, *(f"{one} {NO_NUMBERS}" for one in (*REASONS.values(), NOT_ROUND, UNKNOWN_IMAGE))]
     estimates.append(" ".join([*REASONS.values(), NO_NUMBERS]))
+    estimates += [f"{cause.sentence} {NOT_ROUND} {cause.action}" for cause in CAUSES.values()]
     estimates.append(f"The image is too bright: 1.2% of its pixels are saturated, above 0.1%. {SHADE}")
     estimates.append("This press does not determine size and depth and Young's modulus.")
     return by_code + estimates

@@ -21,6 +21,7 @@ from device.measurement.ramp_modes.commissioned.own_probe import (
     OwnProbe,
     Place,
     turned_columns,
+    vector_columns,
 )
 from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
@@ -32,6 +33,7 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import (
     row_derivatives_of,
 )
 from device.measurement.ramp_modes.fit import PressPosterior
+from device.measurement.ramp_modes.misfit_blocks import BLOCKS
 from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
@@ -212,6 +214,39 @@ def test_a_foreign_probes_press_is_answered_by_its_own_bundle_and_refused_by_the
         assert answer.intervals.low[unknown] <= truth[unknown] <= answer.intervals.high[unknown]
     assert answer.unlike is not None
     assert answer.unlike.shift.shape == (COLUMNS,)
+
+
+def leaning(derivatives, ramp_model, tilts_deg):
+    """Presses of the design at 0 and 3 mm on which the probe leans so far, along the inclusion and across."""
+    parameters = np.tile(TRUTH, (len(tilts_deg), 1))
+    parameters[:, -1] = np.array([1.0, 3.0])[: len(tilts_deg)]
+    at, rows = rows_at(ramp_model, parameters)
+    changes = derivatives.changes(at, rows)
+    seen = turned_columns(rows + np.einsum("ndp,d->np", changes, MEAN), 0.0)
+    for number, (along_deg, across_deg) in enumerate(tilts_deg):
+        tilt = changes[number, NAMES.index("tilt_lesion_deg")]
+        seen[number] += vector_columns(tilt, 0.0) @ np.array([along_deg, across_deg])
+    seen[1:, RESPONSE] = seen[0, RESPONSE]
+    return to_bright_side(
+        seen_with_noise(seen, ramp_model.answers.noise, np.random.default_rng(8)), np.zeros(len(seen))
+    )
+
+
+@pytest.mark.parametrize("tilts_deg", [((0.0, 1.5),), ((0.1, 0.0), (0.0, -1.5))])
+def test_how_far_the_probe_leant_is_told_of_the_press_that_leant_most(derivatives, ramp_model, tilts_deg):
+    """1.5 degrees are five standard deviations of a hand's habit, of which the posterior's mean keeps most."""
+    own = OwnAnswers(ramp_model.answers.surrogate, ramp_model.answers.noise, believed(derivatives))
+    found = []
+    for tilts in (tilts_deg, [(0.0, 0.0)] * len(tilts_deg)):
+        seen = leaning(derivatives, ramp_model, tilts)
+        found.append(own.departure(seen, own.answer_to(seen, ramp_model.first_guesses(seen.rows))))
+    leant, straight = found
+    assert 3.0 < leant.tilt_deviations < 5.5
+    assert straight.tilt_deviations < 1.5
+    assert (leant.block, straight.block) == ("first_harmonic", None)
+    counts = [leant.blocks[block].columns for block in BLOCKS]
+    presses = len(tilts_deg)
+    assert counts == [presses * 44, 33, presses * 80, presses * 72]
 
 
 def test_where_to_press_next_is_told_of_a_commissioned_probe_too(foreign, derivatives, ramp_model):
