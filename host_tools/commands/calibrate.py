@@ -177,7 +177,8 @@ def commission(
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     names = [path.stem if path.suffix == ".zip" else path.name for path in recordings]
     try:
-        ramps = phantom_ramps([read_recording(path) for path in recordings], names, stated, made_by)
+        made = [read_recording(path) for path in recordings]
+        ramps = phantom_ramps(made, names, stated, made_by)
         done = run_commission(ramps, model, derivatives, seed=seed, say=note.print)
     except CalibrationRejected as rejection:
         if not as_json:
@@ -193,19 +194,24 @@ def commission(
         valid_days=valid_days,
         command=f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}",
         origin={"phantoms": stated.serial, "design": model.bundle.name},
+        advice=list(stated.advice()),
+        is_simulated=any(recording.simulated for recording in made),
     )
     if as_json:
         print(json.dumps({"accepted": True, "path": str(out), "gates": [gate.as_record() for gate in done.gates]}))
     else:
         _show_commissioned(done, out)
+        for line in stated.advice():
+            print(line)
 
 
 def _show_commissioned(done: CommissionedProbe, out: Path) -> None:
     from host_tools.commissioning.joint_fit import PROBE
+    from host_tools.commissioning.page import PAGE_FILE
     from host_tools.commissioning.report import phantom_lines, probe_lines
 
     for line in (*probe_lines(done.fit, PROBE), *phantom_lines(done.phantoms)):
         print(line)
     for gate in done.gates:
         print(_gate_line(gate))
-    print(f"bundle in {out}: set standard_model to it, and serial to the probe's own")
+    print(f"bundle in {out}: set standard_model to it, and serial to the probe's own; its page is {PAGE_FILE}")

@@ -13,8 +13,11 @@ from host_tools.commissioning.joint_fit import ProbeFit
 from host_tools.commissioning.left_out import LeftOut
 
 
+SILICONE = "Fitted layers carry what the model lacks, and are never a measurement of the silicone."
+
+
 def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
-    """Yield what is known of the probe; layers carry what the model lacks, and are no measurement of the silicone."""
+    """Yield what is known of the probe, and what its layers are not."""
     yield f"{'of the probe':28} {'found':>8} {'1 sd':>8} {'tolerance':>10}"
     std = np.sqrt(np.diag(fit.covariance))
     for number, mean, own in zip(directions, fit.mean, std, strict=True):
@@ -22,6 +25,7 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
     yield f"{'lacking of an inclusion':28} {fit.believed.discrepancy_ratio:8.2%}"
     yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
     yield f"{'skin and flat field':28} {fit.levels.flat_field_ratio:8.2%}"
+    yield SILICONE
 
 
 def phantom_lines(phantoms: Sequence[LeftOut]) -> Iterator[str]:
