@@ -205,6 +205,8 @@ def commission(
         command=f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}",
         origin={"phantoms": bench.phantoms.serial, "design": model.bundle.name},
         certificate=certificate,
+        advice=list(bench.phantoms.advice()),
+        is_simulated=any(recording.simulated for recording in bench.recordings),
     )
     if as_json:
         gates = [gate.as_record() for gate in done.gates]
@@ -212,6 +214,8 @@ def commission(
         print(json.dumps({"accepted": True, "path": str(out), "certificate": path, "gates": gates}))
     else:
         _show_commissioned(done, out, certificate)
+        for line in bench.phantoms.advice():
+            print(line)
 
 
 def _or_why_not(certify: Callable[[], Calibration]) -> Calibration | None:
@@ -227,12 +231,13 @@ def _or_why_not(certify: Callable[[], Calibration]) -> Calibration | None:
 def _show_commissioned(done: CommissionedProbe, out: Path, certificate: Calibration | None) -> None:
     from host_tools.commissioning.joint_fit import PROBE
     from host_tools.commissioning.own_bundle import CERTIFICATE_FILE
+    from host_tools.commissioning.page import PAGE_FILE
     from host_tools.commissioning.report import phantom_lines, probe_lines
 
     for line in (*probe_lines(done.fit, PROBE), *phantom_lines(done.phantoms)):
         print(line)
     for gate in done.gates:
         print(_gate_line(gate))
-    print(f"bundle in {out}: set standard_model to it, and serial to the probe's own")
+    print(f"bundle in {out}: set standard_model to it, and serial to the probe's own; its page is {PAGE_FILE}")
     if certificate:
         print(f"certificate in it until {certificate.validity.expires_at}: set calibration to {out / CERTIFICATE_FILE}")

@@ -57,6 +57,8 @@ class CommissionedProbe:
     presses: EvaluatedPresses
     scans: EvaluatedPresses
     gates: list[Gate] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    """Of all phantoms and bare blocks, in the order of the fit's."""
 
 
 def commission(
@@ -85,7 +87,8 @@ def commission(
     say(f"{PRESSES} presses and {SCANS} scans of the probe that is believed in")
     presses = believed_answers(answers, model, PRESSES, derived_seed(seed, "believed presses"), jobs)
     scans = believed_answers(answers, model, SCANS, derived_seed(seed, "believed scans"), jobs, are_scans=True)
-    return CommissionedProbe(fit, answers, critical, phantoms, presses, scans, gates)
+    names = [ramp.name for ramp in ramps]
+    return CommissionedProbe(fit, answers, critical, phantoms, presses, scans, gates, names)
 
 
 def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:

@@ -23,7 +23,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, HIGH
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
-from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
+from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior, seen_covariance
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe
 from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, STD, RowDerivatives, owned_by
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
@@ -66,13 +66,16 @@ def tolerances_only(derivatives: RowDerivatives, levels: ErrorLevels, prior: Pro
 class ProbeFit:
     """Posterior of the probe's directions: mean [D] and covariance [D, D]; `log_evidence` of all ramps.
 
-    `misfit_ratio` [n] of each ramp: squared residuals over their number. `prior` is what its builder stated.
+    `misfit_ratio` [n] of each ramp: squared residuals over their number. `left_ratio` [n, contrast and response]: by
+    how much ring means of each are seen above what is explained, of the light; NaN where a bare block says nothing.
+    `prior` is what its builder stated.
     """
 
     mean: Array
     covariance: Array
     log_evidence: float
     misfit_ratio: Array
+    left_ratio: Array
     levels: ErrorLevels
     discrepancy: Discrepancy
     believed: BelievedErrors
@@ -170,6 +173,8 @@ class _Ramp(Protocol):
 
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]: ...
 
+    def weighted(self, whitened: Array) -> Array: ...
+
 
 class _PlainBlock:
     """A ramp on a block without an inclusion: only its reference response says something."""
@@ -197,6 +202,9 @@ class _PlainBlock:
         jacobian = np.zeros((1, len(self._row), at.shape[1]))
         jacobian[0, :, :OFFSET] = self._whitening @ slopes[0, RESPONSE, :OFFSET]
         return (rows[:, RESPONSE] - self._row) @ self._whitening.T, jacobian
+
+    def weighted(self, whitened: Array) -> Array:
+        return np.asarray(whitened @ self._whitening)
 
     @staticmethod
     def _point(at: Array) -> Array:
@@ -242,9 +250,28 @@ class _JointFit:
         evidence = log_volume - 0.5 * float(residuals @ residuals) - 0.5 * float(np.linalg.slogdet(precision)[1])
         left, slopes = self._of_ramps(at, explained)
         covariance, discrepancy = self._posterior(left, slopes, shared)
-        misfit = _mean_squares(left + shared.lack @ shared.mean(left), [len(one) for one in lack])
-        told = at[: len(PROBE)]
-        return ProbeFit(told, covariance, evidence, misfit, self._levels, discrepancy, self._believed, self._prior)
+        counts = np.cumsum([len(one) for one in lack])
+        unexplained = np.split(left + shared.lack @ shared.mean(left), counts[:-1])
+        misfit = np.array([np.mean(one**2) for one in unexplained])
+        of_light, mean = self._left_ratio(unexplained, explained), at[: len(PROBE)]
+        return ProbeFit(
+            mean, covariance, evidence, misfit, of_light, self._levels, discrepancy, self._believed, self._prior
+        )
+
+    def _left_ratio(self, unexplained: Sequence[Array], explained: Sequence[_Ramp]) -> Array:
+        """Return `ProbeFit.left_ratio`, of what is left of each ramp, whitened.
+
+        Gain, zero, tilts and skin over the inclusion carry the likeliest part of it, which is taken off.
+        """
+        still = replace(self._noise, levels=replace(self._levels, gain_ratio=0.0, zero_n=0.0, force_n=0.0))
+        found = np.full((len(explained), RESPONSE.stop), np.nan)
+        for row, ramp, one, whitened in zip(found, self._ramps, explained, unexplained, strict=True):
+            rows, across = ramp.seen.rows, ramp.seen.across
+            if ramp.has_inclusion and across is not None:
+                row[:] = -seen_covariance(rows, across, still)[: RESPONSE.stop] @ one.weighted(whitened)
+            else:
+                row[RESPONSE] = -still.covariance(rows[0])[RESPONSE, RESPONSE] @ one.weighted(whitened)
+        return found
 
     def _lack(self, x: Array, explained: Sequence[_Ramp]) -> list[Array]:
         """Return what a unit of each part of the discrepancy changes of each ramp [S, R], whitened."""
@@ -314,11 +341,6 @@ class _JointFit:
             residuals.append(left + changes @ probe)
             jacobian.append(whole)
         return np.concatenate(residuals), np.concatenate(jacobian)
-
-
-def _mean_squares(left: Array, counts: Sequence[int]) -> Array:
-    """Return the mean square [n] of each ramp's residuals, so many of all in one row [S]."""
-    return np.array([np.mean(one**2) for one in np.split(left, np.cumsum(counts)[:-1])])
 
 
 def _of_presses(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:

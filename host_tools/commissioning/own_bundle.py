@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -26,6 +27,7 @@ from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE
+from host_tools.commissioning.page import PAGE_FILE, commissioning_page
 from host_tools.paper_network.export import write_folder
 from host_tools.press_models.mode_statistics import reachable_half_width, statistics
 
@@ -47,10 +49,13 @@ def write_own_bundle(
     command: str,
     origin: dict[str, str],
     certificate: Calibration | None = None,
+    advice: Sequence[str] = (),
+    is_simulated: bool = False,
 ) -> None:
     """Write the bundle of a probe to a new folder, from the design's in `design`; whole or not at all.
 
     With a certificate the bundle holds as long as that, else for `valid_days` from `made_at`.
+    Beside it stands `PAGE_FILE`, which also says what more would buy, `advice`, and whether ramps were simulated.
     Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
     """
     require("valid_days", valid_days, VALID_DAYS, "commission again before that")
@@ -63,20 +68,22 @@ def write_own_bundle(
         "training_command": command,
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
         "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
-        "commissioned": _record(done, made_at, origin),
+        "commissioned": commissioned_record(done, made_at, origin),
     }
     for mode, presses in (("standard", done.presses), ("precise", done.scans)):
         kept = {name: value for name, value in card["modes"][mode].items() if name not in OF_DESIGN}
         card["modes"][mode] = kept | asdict(done.critical) | {"simulated": statistics(presses)}
     card["modes"]["precise"]["reachable_half_width"] = reachable_half_width(done.scans)
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
+    page = commissioning_page(done, card, advice, is_simulated=is_simulated).encode()
     names = (*(name for name in files if name.endswith(".onnx")),)
     assert RANGE_FILE in names
-    kept_files = {name: files[name] for name in names} | {SURROGATE_FILE: surrogate, CARD_FILE: text}
+    kept_files = {name: files[name] for name in names}
+    kept_files |= {SURROGATE_FILE: surrogate, CARD_FILE: text, PAGE_FILE: page}
     write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))
 
 
-def _record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:
+def commissioned_record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:
     """Return what the card says of the commissioning: the probe, its model error, phantoms left out, gates."""
     std, prior = np.sqrt(np.diag(done.fit.covariance)), done.fit.prior
     return {

@@ -12,12 +12,11 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from host_tools.commissioning.joint_fit import ProbeFit
 from host_tools.commissioning.left_out import LeftOut
 
+SILICONE = "Fitted layers carry what the model lacks, and are never a measurement of the silicone."
+
 
 def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
-    """Yield what is known of the probe, beside what was expected.
-
-    Layers carry what the model lacks, and are no measurement of the silicone.
-    """
+    """Yield what is known of the probe, beside what was expected, and what its layers are not."""
     yield f"{'of the probe':28} {'found':>8} {'1 sd':>8} {'expected':>9} {'tolerance':>10}"
     std, prior = np.sqrt(np.diag(fit.covariance)), fit.prior
     for number, mean, own in zip(directions, fit.mean, std, strict=True):
@@ -25,6 +24,7 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
     yield f"{'lacking of an inclusion':28} {fit.believed.discrepancy_ratio:8.2%}"
     yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
     yield f"{'skin and flat field':28} {fit.levels.flat_field_ratio:8.2%}"
+    yield SILICONE
 
 
 def phantom_lines(phantoms: Sequence[LeftOut]) -> Iterator[str]:

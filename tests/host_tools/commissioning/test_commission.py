@@ -130,7 +130,7 @@ def test_what_is_believed_is_no_narrower_than_part_of_the_tolerance(fit, derivat
 
 def test_probe_and_phantoms_are_reported_in_words(fit):
     lines = list(probe_lines(fit, PROBE))
-    assert len(lines) == len(PROBE) + 4
+    assert len(lines) == len(PROBE) + 5
     assert lines[1].startswith("contact_exponent")
 
 

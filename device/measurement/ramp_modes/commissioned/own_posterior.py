@@ -138,6 +138,10 @@ class OwnPosterior:
         residuals = (_joined(seen.reshape(parts.shape[:3])) - self._seen) @ self._whitening.T
         return residuals, self._whitening @ jacobian
 
+    def weighted(self, whitened: Array) -> Array:
+        """Return residuals over their covariance [S], of whitened ones [S]."""
+        return np.asarray(whitened @ self._whitening)
+
     def log_density(self, at: Array) -> Array:
         """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, 8 + 2 N].
 

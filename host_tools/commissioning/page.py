@@ -1,0 +1,122 @@
+"""What a commissioning found on one page for who keeps the probe: verdict first, then pictures, limits and advice.
+
+The page is one file of HTML with its pictures in it. It runs nothing and loads nothing, so it reads the same in ten
+years, and prints. The model card has its numbers for programs; it adds none of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from device.measurement.parameters import RANGES
+from device.measurement.quantities import UNKNOWNS
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
+from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE
+from host_tools.commissioning import page_pictures as pictures
+from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, CommissionedProbe
+from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
+from host_tools.commissioning.report import SILICONE
+from host_tools.press_models.mode_outcome import EvaluatedPresses
+from host_tools.press_models.mode_statistics import statistics
+
+PAGE_FILE = "commissioning.html"
+TEMPLATE = "commissioning.html.jinja"
+NOTHING_MORE = "The set has the surfaces and tissues that are asked for; no more phantoms are advised."
+
+
+def commissioning_page(
+    done: CommissionedProbe, card: Mapping[str, Any], advice: Sequence[str] = (), *, is_simulated: bool = False
+) -> str:
+    """Return the page of a commissioning as HTML; `card` is the bundle's, `advice` what would tell more.
+
+    Every text of a file, names above all, is escaped.
+    """
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["day"] = lambda moment: f"{datetime.fromisoformat(moment):%-d %B %Y}"
+    return environment.get_template(TEMPLATE).render(
+        card=card,
+        serial=card["serials"][0],
+        record=card["commissioned"],
+        is_simulated=is_simulated,
+        gates=[gate.as_record() for gate in done.gates],
+        ranges={name: RANGES[name] for name in (*UNKNOWNS, "tissue_modulus_kpa", "slab_thickness_mm")},
+        inclusions=len(done.phantoms),
+        blocks=len(done.names) - len(done.phantoms),
+        covered=_covered(done),
+        ramps=list(_ramps(done)),
+        directions=list(_directions(done.fit)),
+        floor=FLOOR,
+        levels=done.fit.levels,
+        believed=done.fit.believed,
+        critical=done.critical,
+        largest_misfit=LARGEST_MISFIT_RATIO,
+        phantoms=done.phantoms,
+        unknown_labels=list(pictures.UNKNOWN_LABELS.values()),
+        modes=[_mode("standard, one press", done.presses), _mode("precise, a scan", done.scans)],
+        silicone=SILICONE,
+        advice=list(advice) or [NOTHING_MORE],
+        pictures=dict(_pictures(done)),
+    )
+
+
+def _pictures(done: CommissionedProbe) -> Iterator[tuple[str, str]]:
+    yield "residuals", pictures.residual_maps(done.names, done.fit.left_ratio)
+    if done.fit.believed.discrepancy_ratio:
+        yield "lacking", pictures.lacking_maps(done.fit.discrepancy)
+    yield "posterior", pictures.probe_posterior(done.fit)
+    yield "left_out", pictures.left_out_intervals(done.phantoms)
+    yield "misfits", pictures.left_out_misfits(done.phantoms, done.critical.misfit_ratio, WORST_PHANTOM)
+    yield "coverage", pictures.believed_coverage([("standard", done.presses), ("precise", done.scans)])
+
+
+def _covered(done: CommissionedProbe) -> list[dict[str, Any]]:
+    """Return of each unknown how many phantoms left out are determined, and how many of these cover their truth."""
+    known = np.array([one.is_determined for one in done.phantoms])
+    held = np.array([one.is_covered for one in done.phantoms]) & known
+    columns = zip(pictures.UNKNOWN_LABELS.values(), held.sum(axis=0), known.sum(axis=0), strict=True)
+    return [{"unknown": label.partition(" (")[0], "held": int(a), "known": int(b)} for label, a, b in columns]
+
+
+def _ramps(done: CommissionedProbe) -> Iterator[dict[str, Any]]:
+    """Yield name, truth and misfit of each ramp, and what is left of it (rms, permille of the light)."""
+    truths = {one.name: one.truth for one in done.phantoms}
+    for name, misfit, left in zip(done.names, done.fit.misfit_ratio, done.fit.left_ratio, strict=True):
+        contrast, response = (1000 * float(np.sqrt(np.mean(left[part] ** 2))) for part in (CONTRAST, RESPONSE))
+        yield {
+            "name": name,
+            "truth": truths.get(name),
+            "misfit": misfit,
+            "contrast": None if np.isnan(contrast) else contrast,
+            "response": response,
+        }
+
+
+def _directions(fit: ProbeFit) -> Iterator[dict[str, Any]]:
+    """Yield each direction of the probe, with half the 90 % intervals of what is found and of its tolerance."""
+    std = np.sqrt(np.diag(fit.covariance))
+    for number, mean, own in zip(PROBE, fit.mean, std, strict=True):
+        yield {
+            "label": pictures.LABELS[NAMES[number]],
+            "expected": fit.prior.mean[number],
+            "mean": mean,
+            "half": pictures.HALF_WIDTH_STD * own,
+            "tolerance": pictures.HALF_WIDTH_STD * fit.prior.std[number],
+            "away": abs(mean - fit.prior.mean[number]) / fit.prior.std[number],
+        }
+
+
+def _mode(name: str, presses: EvaluatedPresses) -> dict[str, Any]:
+    both = presses.is_known[:, :2].all(axis=1).mean()
+    return {"name": name, "both": float(both), "statistics": statistics(presses)}
