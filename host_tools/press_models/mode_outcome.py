@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +41,8 @@ class EvaluatedPresses:
     high: Array
     is_known: NDArray[np.bool_]
 
-    def part(self, chosen: slice) -> EvaluatedPresses:
-        """Return some of the presses."""
+    def part(self, chosen: slice | NDArray[Any]) -> EvaluatedPresses:
+        """Return some of the presses, by a slice, a mask or places."""
         return EvaluatedPresses(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     @property

@@ -105,13 +105,13 @@ def ranked(samples: WeightedSamples, truth: Array, rng: np.random.Generator) -> 
     of_ranges = rng.uniform(-1, 1, (DRAWS, COUNT))
     return RankedPress(
         weight @ (at < truth),
-        np.array([_distance_rank(at[:, list(of)], weight, truth[list(of)]) for of in JOINT.values()]),
+        np.array([distance_rank(at[:, list(of)], weight, truth[list(of)]) for of in JOINT.values()]),
         energy_score(drawn, truth),
         energy_score(of_ranges, truth),
     )
 
 
-def _distance_rank(at: Array, weight: Array, truth: Array) -> float:
+def distance_rank(at: Array, weight: Array, truth: Array) -> float:
     """Return the share of samples [n, k] that lie nearer to their mean than the truth [k], in their own ellipse."""
     away = at - weight @ at
     precision = np.linalg.inv((away * weight[:, None]).T @ away)

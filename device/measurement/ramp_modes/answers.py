@@ -12,7 +12,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, HIGH, denormalise, slope_of_normalised
-from device.measurement.ramp_modes.fit import PressPosterior, best_fits
+from device.measurement.ramp_modes.fit import Explained, PressPosterior, best_fits
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import PressFit, sample_press
@@ -81,6 +81,12 @@ class RampAnswers:
     def answer_to(self, seen: SeenPresses, estimates: Array) -> RampAnswer:
         """Return the answer to what was read of presses with one reference; `estimates` as of `answer`."""
         return self.answer(seen.rows, estimates, seen.direction_rad)
+
+    def posterior_of(self, seen: SeenPresses, at: Array) -> Explained:
+        """Return the posterior of presses with one reference, for an answer's best fit `at` [k]."""
+        return PressPosterior(
+            seen.rows, self.surrogate, self.noise, self.reach_mm(len(seen.rows)), direction_rad=seen.direction_rad
+        )
 
     def ordinary_shift(self, rows: Array) -> Array:
         """Return what is believed to move rows [n, P] of ordinary presses, before anything of them is known [n, P]."""

@@ -55,6 +55,10 @@ class OwnAnswers(RampAnswers):
         unlike = posterior.unlike(fit.best, int(np.argmin(offset_mm)))
         return answer_of(fit, misfit, offset_mm, unlike)
 
+    def posterior_of(self, seen: SeenPresses, at: Array) -> OwnPosterior:
+        """Return the posterior of presses with one reference, whose changes are taken about coordinates [8 + 2 N]."""
+        return self._posterior(seen, at, self.reach_mm(len(seen.rows)))
+
     def ordinary_shift(self, rows: Array) -> Array:
         """Return what is believed to move rows [n, P] of presses on an inclusion in the middle of all ranges [n, P]."""
         count = len(rows)
