@@ -1,5 +1,7 @@
 """Answers that are told: presses of sizes and depths with intervals about them, as if a mode had found them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from device.measurement.parameters import normalise_unknowns
@@ -7,15 +9,21 @@ from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.scores.scored_presses import ScoredPresses, joined
 
 
-def scored_presses(found_mm, truth_mm, half_mm=1.0, answered=True):
+def scored_presses(found_mm, truth_mm, half_mm=1.0, answered=True, kpa=60.0):
     """Presses of sizes and depths as told, intervals so far either way, all answered or none."""
     mean, truth, low, high = (
-        normalise_unknowns(np.column_stack([np.asarray(one, float), np.full(len(one), 60.0)]))
+        normalise_unknowns(np.column_stack([np.asarray(one, float), np.full(len(one), kpa)]))
         for one in (found_mm, truth_mm, np.subtract(found_mm, half_mm), np.add(found_mm, half_mm))
     )
     count = len(mean)
     known = np.ones((count, 3), bool)
-    return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), np.ones(count), np.full(count, answered))
+    inside = np.abs(np.subtract(found_mm, truth_mm)).max(axis=1) <= half_mm
+    return ScoredPresses(
+        EvaluatedPresses(truth, mean, low, high, known, np.column_stack([inside, inside])),
+        np.ones(count),
+        np.full(count, answered),
+        np.arange(count),
+    )
 
 
 TRUTH_MM = (8.0, 6.0)
@@ -28,4 +36,5 @@ def told_presses(good, wrong=0, refused=0):
         *([scored_presses([(11.0, 6.0)] * wrong, [TRUTH_MM] * wrong)] if wrong else []),
         *([scored_presses([TRUTH_MM] * refused, [TRUTH_MM] * refused, answered=False)] if refused else []),
     ]
-    return joined(parts)
+    whole = joined(parts)
+    return replace(whole, number=np.arange(len(whole.number)))

@@ -44,7 +44,9 @@ def robustness(
         Path | None, typer.Option(help="Markdown file to write, results beside it; printed only when not given.")
     ] = None,
     probes: Annotated[int, typer.Option(help="How many foreign probes, up to 99.")] = 20,
-    presses: Annotated[int, typer.Option(help="Random presses of each.")] = 60,
+    presses: Annotated[
+        int | None, typer.Option(help="Random presses of each probe or thing; 60 and 40 when not given.")
+    ] = None,
     model: Annotated[Path, typer.Option(help="Bundle of modes standard and precise of the design.")] = MODELS
     / "standard",
     phantoms: Annotated[Path, typer.Option(help="File of the phantoms of every probe.")] = SIMULATED_PROBE
@@ -67,13 +69,15 @@ def robustness(
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
     from host_tools.scores.one_thing.named_blocks import named_blocks_chapter
+    from host_tools.scores.one_thing.one_at_a_time import PRESSES as OF_EACH
     from host_tools.scores.one_thing.one_at_a_time import one_at_a_time_chapter
     from host_tools.scores.one_thing.press_answers import DesignToTry
     from host_tools.scores.one_thing.silent_errors import silent_errors_chapter
-    from host_tools.scores.robustness import other_optics_chapter, robustness_chapter
+    from host_tools.scores.robustness import PRESSES, other_optics_chapter, robustness_chapter
 
     require("probes", probes, Bound(1, 99, "probes"), "ask for at least one")
-    require("presses", presses, Bound(4, 10_000, "presses"), "ask for at least four of each probe")
+    if presses is not None:
+        require("presses", presses, Bound(4, 10_000, "presses"), "ask for at least four of each")
     if out:
         require_writable(out, (".md",))
     trained, quick, derivatives = read_ramp_model(model), read_quick_model(MODELS / "quick"), load_derivatives(table)
@@ -81,11 +85,13 @@ def robustness(
     design = DesignToTry(trained, quick, derivatives, tables)
     chapters = {
         "tolerances": lambda: robustness_chapter(
-            trained, derivatives, tables, stated, probes=probes, presses=presses, seed=seed
+            trained, derivatives, tables, stated, probes=probes, presses=presses or PRESSES, seed=seed
         ),
-        "other optics": lambda: other_optics_chapter(trained, derivatives, tables, stated, presses=presses, seed=seed),
-        "one at a time": lambda: one_at_a_time_chapter(design, stated, seed=seed),
-        "silent errors": lambda: silent_errors_chapter(design, seed=seed),
+        "other optics": lambda: other_optics_chapter(
+            trained, derivatives, tables, stated, presses=presses or PRESSES, seed=seed
+        ),
+        "one at a time": lambda: one_at_a_time_chapter(design, stated, presses=presses or OF_EACH, seed=seed),
+        "silent errors": lambda: silent_errors_chapter(design, presses=presses or OF_EACH, seed=seed),
         "named": lambda: named_blocks_chapter(design, seed=seed),
     }
     with workers(scheduler):
@@ -96,7 +102,7 @@ def robustness(
             print_table(one)
     if out:
         counts = f" --probes {probes}" if "tolerances" in measured else ""
-        counts += f" --presses {presses}" if measured.keys() & {"tolerances", "other optics"} else ""
+        counts += f" --presses {presses}" if presses else ""
         chosen = "".join(f' --only "{name}"' for name in only or [])
         command = f"host_tools robustness{counts}{chosen} --out {shown(out)}"
         write_page(out, Results("robustness", command, measured).in_chapters(out, list(chapters)))

@@ -71,7 +71,7 @@ def left_out(
 
 
 def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
-    answer = _answer(answers, guess, ramp.seen)
+    answer = answer_to_seen(answers, guess, ramp.seen)
     low, high = (denormalise_unknowns(ends) for ends in answer.intervals[:2])
     truth, value = denormalise_unknowns(ramp.stated[:COUNT]), denormalise_unknowns(answer.mean)
     tolerance = denormalise_unknowns((ramp.stated + ramp.std)[:COUNT]) - truth
@@ -82,9 +82,9 @@ def answers_to_seen(
     answers: RampAnswers, guess: Guess, seen: Sequence[SeenPresses], jobs: int = -1
 ) -> list[RampAnswer]:
     """Return the answers to what was read of presses or scans."""
-    return in_parallel(lambda number: _answer(answers, guess, seen[number]), len(seen), jobs)
+    return in_parallel(lambda number: answer_to_seen(answers, guess, seen[number]), len(seen), jobs)
 
 
-def _answer(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:
+def answer_to_seen(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:
     """Return the answer to one press or scan, begun at the design's guess of what a press of its own would show."""
     return answers.answer_to(seen, guess(seen.rows - answers.ordinary_shift(seen.rows)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +46,8 @@ class EvaluatedPresses:
     is_known: NDArray[np.bool_]
     in_region: NDArray[np.bool_] | None = None
 
-    def part(self, chosen: slice) -> EvaluatedPresses:
-        """Return some of the presses."""
+    def part(self, chosen: slice | NDArray[Any]) -> EvaluatedPresses:
+        """Return some of the presses, by a slice, a mask or places."""
         truth, mean, low, high = (part[chosen] for part in (self.truth, self.mean, self.low, self.high))
         in_region = None if self.in_region is None else self.in_region[chosen]
         return EvaluatedPresses(truth, mean, low, high, self.is_known[chosen], in_region)

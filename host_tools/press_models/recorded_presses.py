@@ -154,13 +154,16 @@ def scenario_of(parameters: Array, neighbour: Neighbour | None = None, wet_ratio
     )
 
 
-def in_parallel(work: Callable[[int], ReadValue], count: int, jobs: int) -> list[ReadValue]:
+def in_parallel(
+    work: Callable[[int], ReadValue], count: int, jobs: int, *, smallest_batch: int = SMALLEST_BATCH
+) -> list[ReadValue]:
     """Return the results of `work` on 0 to `count` - 1, one thread a process.
 
-    What `work` holds, often tables and models, goes along with every batch: so batches grow with the count.
+    What `work` holds, often tables and models, goes along with every batch: so batches grow with the count, and are
+    small only of work that takes long.
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    batch = max(SMALLEST_BATCH, count // BATCHES)
+    batch = max(smallest_batch, count // BATCHES)
     return list(Parallel(n_jobs=jobs, batch_size=batch)(delayed(work)(number) for number in range(count)))
 
 

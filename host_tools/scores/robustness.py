@@ -1,49 +1,70 @@
 """What a builder's tolerances and a hand's habits cost: presses of foreign probes, before and after commissioning.
 
-The same presses are answered by the design's bundle as it ships, by one that allows for a builder's tolerances, and by
-the bundle that commissioning made of this probe's own phantoms; beside them those of a probe that is known exactly and
-suffers the same hand. Mechanics are always the virtual probe's own; its optics are another block's, scattered by
-another law, in a chapter of their own.
+The same presses are answered by the design's bundle as it ships, by one that allows for a builder's tolerances, by the
+bundle that commissioning made of this probe's own phantoms, and by the probe as if it were known exactly. Mechanics are
+always the virtual probe's own; its optics are another block's, scattered by another law, in a chapter of their own.
+There the probe that is known exactly has the design's optics: what lies between both is all that the light costs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
-from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe
-from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, STD, RowDerivatives
-from device.measurement.ramp_modes.model import RampModel
+from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD, RowDerivatives
+from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
-from host_tools.commissioning.joint_fit import PROBE, Design, ProbeFit, fit_probe
+from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design, ProbeFit, fit_probe
 from host_tools.commissioning.left_out import answers_of, left_out
 from host_tools.optics.other_light import other_optics
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
+from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.scenes.phantom_set import PhantomSet
 from host_tools.scores.foreign_presses import foreign_phantoms, foreign_presses, probe_part
 from host_tools.scores.foreign_probes import foreign_world
-from host_tools.scores.scored_presses import ScoredPresses, joined, scored, tolerant
+from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, joined, paired, scored, tolerant
 
-PROBES, PRESSES, MOST_KNOWN = 20, 60, 300
-TOLERANT = 10
-"""Presses of each probe that are also answered by its tolerances alone."""
-NEGLIGIBLE = 1e-6
-HEADER = (
-    "answered by", "refused", "size covered", "depth covered", "both covered", "size, depth determined", "E determined",
-    "size RMSE (mm)", "depth RMSE (mm)", "median misfit",
-)  # fmt: skip
+PROBES, PRESSES, OF_DESIGN = 20, 60, 200
+"""Foreign probes, presses of each, and at most so many presses of the design's own probe."""
+FEW = 10
+"""Presses of each probe that are also answered by its tolerances alone, and as the design ships."""
+SOFT_KPA = 15.0
+GROUPS = f"{SOFT_KPA:g} kPa and more", f"below {SOFT_KPA:g} kPa"
+"""Hard and soft inclusions are scored apart: the soft ones are hardly stiffer than tissue may be."""
+SHIPPED, TOLERANCES, COMMISSIONED, KNOWN = "as it ships", "with tolerances", "commissioned", "known exactly"
 GOALS = {"pooled": 0.86, "each probe": 0.80, "joint": 0.84, "answered": 0.95, "rmse": 1.3}
 OTHER_GOALS = {"pooled": 0.83, "answered": 0.90, "rmse": 1.6}
 """Of other optics nothing is asked of each probe, nor of both at once."""
 OTHER_PROBES = 4
+LEAST_MM = 1e-9
+"""Errors below are none: nothing is divided by them."""
+
+
+class TrialSetup(NamedTuple):
+    """What all probes of a chapter share: the design's model, derivatives and tables, phantoms, a seed, and jobs."""
+
+    model: RampModel
+    derivatives: RowDerivatives
+    tables: ProbeTables
+    phantoms: PhantomSet
+    seed: int
+    jobs: int
+
+    @property
+    def design(self) -> Design:
+        """What commissioning starts from."""
+        return Design(self.model.answers, self.derivatives)
 
 
 def robustness_chapter(
@@ -56,22 +77,16 @@ def robustness_chapter(
     presses: int = PRESSES,
     seed: int = 1,
     jobs: int = -1,
-    say: Callable[[str], None] = lambda step: None,
 ) -> Chapter:
     """Return how presses of foreign probes are answered, before and after commissioning on phantoms."""
-    design = Design(model.answers, derivatives)
-    trials = []
-    for number in range(1, probes + 1):
-        say(f"probe {number} of {probes}")
-        trials.append(_tried(design, model, tables, phantoms, number, presses, seed, jobs))
-    known = _of_known(design, model, tables, min(probes * presses, MOST_KNOWN), seed, jobs)
-    return Chapter(
-        title="Probes of random tolerances",
-        claim=f"{probes} probes, {presses} random presses each, everything at once; phantoms as {phantoms.serial}.",
-        source="host_tools/scores/robustness.py; probes: scenarios/worlds, their cameras undone by a grid target",
-        benchmarks=tuple(_benchmarks([trial.scores["commissioned"] for trial in trials], known, GOALS)),
-        tables=(_table_of_all(trials, known), _table_of_each(trials)),
-        facts={"probes": probes, "presses": presses},
+    setup = TrialSetup(model, derivatives, tables, phantoms, seed, jobs)
+    return _chapter(
+        "Probes of random tolerances",
+        f"{probes} probes, {presses} random presses each, everything at once; phantoms as {phantoms.serial}.",
+        "host_tools/scores/robustness.py; probes: scenarios/worlds, their cameras undone by a grid target",
+        _trials(setup, tables, probes, presses),
+        _of_design(setup, min(probes * presses, OF_DESIGN)),
+        GOALS,
     )
 
 
@@ -85,138 +100,253 @@ def other_optics_chapter(
     presses: int = PRESSES,
     seed: int = 1,
     jobs: int = -1,
-    say: Callable[[str], None] = lambda step: None,
 ) -> Chapter:
     """Return the same of probes whose light is another block's, scattered by another law than the models'."""
-    say("light of another block")
-    design, foreign = Design(model.answers, derivatives), replace(tables, light=other_optics())
-    trials = []
-    for number in range(1, probes + 1):
-        say(f"probe {number} of {probes} with other optics")
-        own = derived_seed(seed, "other optics")
-        trials.append(_tried(design, model, foreign, phantoms, number, presses, own, jobs))
-    known = _of_known(design, model, tables, min(probes * presses, MOST_KNOWN), seed, jobs)
-    commissioned = [trial.scores["commissioned"] for trial in trials]
-    return Chapter(
-        title="Probes of other optics",
-        claim=f"{probes} probes of random tolerances, {presses} random presses each; phantoms as {phantoms.serial}.",
-        source="host_tools/scores/robustness.py; light: host_tools/optics/other_light.py",
-        benchmarks=tuple(_benchmarks(commissioned, known, OTHER_GOALS)),
-        tables=(_table_of_all(trials, known), _table_of_each(trials)),
-        facts={"probes": probes, "presses": presses},
+    setup = TrialSetup(model, derivatives, tables, phantoms, derived_seed(seed, "other optics"), jobs)
+    foreign = replace(tables, light=other_optics())
+    return _chapter(
+        "Probes of other optics",
+        f"{probes} probes of random tolerances, {presses} random presses each; phantoms as {phantoms.serial}.",
+        "host_tools/scores/robustness.py; light: host_tools/optics/other_light.py",
+        _trials(setup, foreign, probes, presses),
+        _of_design(setup, min(probes * presses, OF_DESIGN)),
+        OTHER_GOALS,
     )
 
 
-class _TriedProbe(NamedTuple):
+class TriedProbe(NamedTuple):
     """Answers to presses of one probe, by who answers them, and what commissioning found."""
 
     number: int
     scores: dict[str, ScoredPresses]
     fit: ProbeFit
 
+    def of_group(self, group: str) -> TriedProbe:
+        """Return the same with inclusions of one of `GROUPS` alone."""
+        return self._replace(scores={name: of_group(one, group) for name, one in self.scores.items()})
 
-def _tried(
-    design: Design,
-    model: RampModel,
-    tables: ProbeTables,
-    phantoms: PhantomSet,
-    number: int,
-    presses: int,
-    seed: int,
-    jobs: int,
-) -> _TriedProbe:
-    """Return how presses of one foreign probe are answered, before and after commissioning on its phantoms."""
-    probe = probe_part(foreign_world(seed, number))
-    noise, own = model.answers.noise, derived_seed(seed, f"probe {number}")
-    taken = foreign_presses(tables, probe, noise, presses, seed=own, jobs=jobs)
-    ramps = foreign_phantoms(tables, probe, noise, phantoms, seed=own, jobs=jobs)
+
+def of_group(found: ScoredPresses, group: str) -> ScoredPresses:
+    """Return the presses on inclusions of one of `GROUPS`."""
+    return found.part((found.youngs_modulus_kpa() < SOFT_KPA) == (group == GROUPS[1]))
+
+
+def _trials(setup: TrialSetup, lit: ProbeTables, probes: int, presses: int) -> list[TriedProbe]:
+    """Return how presses of foreign probes are answered, each probe on a core of its own."""
+    return in_parallel(lambda one: _tried(setup, lit, one + 1, presses), probes, setup.jobs, smallest_batch=1)
+
+
+def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> TriedProbe:
+    """Return how presses of one foreign probe, `lit` as its tables say, are answered by all who may."""
+    model, design, jobs = setup.model, setup.design, 1
+    probe = probe_part(foreign_world(setup.seed, number))
+    noise, own = model.answers.noise, derived_seed(setup.seed, f"probe {number}")
+    taken = foreign_presses(lit, probe, noise, presses, seed=own, jobs=jobs)
+    of_design = (
+        taken if lit is setup.tables else foreign_presses(setup.tables, probe, noise, presses, seed=own, jobs=jobs)
+    )
+    ramps = foreign_phantoms(lit, probe, noise, setup.phantoms, seed=own, jobs=jobs)
     fit = fit_probe(ramps, design)
-    answers = answers_of(design, fit)
-    critical = limits(answers, model, left_out(ramps, design, model.first_guesses, fit, jobs), seed)
+    answers, known = answers_of(design, fit), known_probe(design, probe)
+    critical = limits(answers, model, left_out(ramps, design, model.first_guesses, fit, jobs), setup.seed)
+    few = taken.first(FEW)
     scores = {
-        "as it ships": scored(model.answers, model, model.critical["standard"], taken, jobs),
-        "with tolerances": scored(tolerant(design), model, critical, taken.first(TOLERANT), jobs),
-        "commissioned": scored(answers, model, critical, taken, jobs),
+        SHIPPED: scored(model.answers, model, model.critical["standard"], few, jobs),
+        TOLERANCES: scored(tolerant(design), model, critical, few, jobs),
+        COMMISSIONED: scored(answers, model, critical, taken, jobs),
+        KNOWN: scored(known, model, known_limits(known, model, setup.seed), of_design, jobs),
     }
-    return _TriedProbe(number, scores, fit)
+    return TriedProbe(number, scores, fit)
 
 
-def _table_of_all(trials: Sequence[_TriedProbe], known: ScoredPresses) -> Table:
-    names = tuple(trials[0].scores)
-    rows = [(name, *_row(joined([trial.scores[name] for trial in trials]))) for name in names]
-    return Table("All probes together", HEADER, (*rows, ("known exactly", *_row(known))))
+def true_directions(world: World) -> Array:
+    """Return what a world's probe is along the directions of `PROBE` [D], in their units."""
+    layers = world.layers
+    of_probe = {
+        "contact_exponent": world.contact.exponent - 1,
+        "face_modulus_log_ratio": math.log(layers.face_modulus_ratio),
+        "middle_modulus_log_ratio": math.log(layers.middle_modulus_ratio),
+        "backing_modulus_log_ratio": math.log(layers.backing_modulus_ratio),
+        "cell_span_ratio": world.cell_span_ratio - 1,
+        "face_motion_ratio": world.face_motion_ratio,
+    }
+    return np.array([of_probe[NAMES[number]] for number in PROBE])
 
 
-def _table_of_each(trials: Sequence[_TriedProbe]) -> Table:
+def known_probe(design: Design, world: World) -> OwnAnswers:
+    """Return what answers presses of a world's probe that is known exactly, whoever presses it on whomever.
+
+    Its directions are believed as closely as after commissioning, for linear terms do not carry them whole. What has no
+    direction - the largest contact, light of single sides, texture - this probe does not know either.
+    """
+    believed = tolerant(design)
+    mean, covariance = np.array(believed.own.mean), np.array(believed.own.covariance)
+    mean[PROBE] = true_directions(world)
+    covariance[np.ix_(PROBE, PROBE)] = np.diag((FLOOR * STD[PROBE]) ** 2)
+    return OwnAnswers(believed.surrogate, believed.noise, replace(believed.own, mean=mean, covariance=covariance))
+
+
+def known_limits(answers: OwnAnswers, model: RampModel, seed: int) -> CriticalValues:
+    """Return above what its presses are refused; of the misfit the largest that commissioning allows any probe."""
+    return replace(limits(answers, model, [], seed), misfit_ratio=LARGEST_MISFIT_RATIO)
+
+
+def _of_design(setup: TrialSetup, count: int) -> ScoredPresses:
+    """Return presses of the design's own probe, known exactly, by the same hands on the same patients."""
+    probe = replace(AS_BELIEVED, texture=probe_part(foreign_world(setup.seed, 1)).texture)
+    own = derived_seed(setup.seed, "presses of a known probe")
+    taken = foreign_presses(setup.tables, probe, setup.model.answers.noise, count, seed=own, jobs=setup.jobs)
+    known = known_probe(setup.design, probe)
+    return scored(known, setup.model, known_limits(known, setup.model, setup.seed), taken, setup.jobs)
+
+
+def _chapter(
+    title: str,
+    claim: str,
+    source: str,
+    trials: Sequence[TriedProbe],
+    of_design: ScoredPresses,
+    goals: Mapping[str, float],
+) -> Chapter:
+    of_groups = {group: [trial.of_group(group) for trial in trials] for group in GROUPS}
+    pressed = {group: of_one for group, of_one in of_groups.items() if _count(of_one)}
+    tables = [
+        table
+        for group, of_one in pressed.items()
+        for table in (_table_of_all(group, of_one, of_group(of_design, group)), _table_of_each(group, of_one))
+    ]
+    return Chapter(
+        title=title,
+        claim=claim,
+        source=source,
+        benchmarks=tuple(
+            one
+            for group, of_one in pressed.items()
+            for one in benchmarks(group, of_one, goals if group == GROUPS[0] else _of_soft(goals))
+        ),
+        tables=tuple(tables),
+        facts={
+            "probes": len(trials),
+            "presses": [len(one.scores[COMMISSIONED].is_answered) for one in trials],
+            "refused_as_it_ships": round(1 - float(_whole(trials, SHIPPED).is_answered.mean()), 3),
+            "groups": {group: _facts(of_one) for group, of_one in pressed.items()},
+        },
+    )
+
+
+def _of_soft(goals: Mapping[str, float]) -> dict[str, float]:
+    """Return what is asked of soft inclusions: of each probe nothing, for so few of its presses are on them."""
+    return {name: goal for name, goal in goals.items() if name != "each probe"}
+
+
+def _count(trials: Sequence[TriedProbe]) -> int:
+    return sum(len(trial.scores[COMMISSIONED].is_answered) for trial in trials)
+
+
+def _whole(trials: Sequence[TriedProbe], name: str) -> ScoredPresses:
+    return joined([trial.scores[name] for trial in trials])
+
+
+def _table_of_all(group: str, trials: Sequence[TriedProbe], of_design: ScoredPresses) -> Table:
+    rows = [(name, *figures_of(_whole(trials, name))) for name in trials[0].scores]
+    rows.append(("the design's own probe", *figures_of(of_design)))
+    return Table(f"All probes together, inclusions of {group}", ("answered by", *FIGURES), tuple(rows))
+
+
+def _table_of_each(group: str, trials: Sequence[TriedProbe]) -> Table:
     rows = [
         (
             f"{trial.number}",
-            *_row(trial.scores["commissioned"]),
+            *figures_of(trial.scores[COMMISSIONED]),
+            *("" if np.isnan(ratio) else f"{ratio:.2f}" for ratio in rmse_ratio([trial])),
             f"{trial.fit.levels.model_ratio:.1%}",
             f"{trial.fit.believed.discrepancy_ratio:.0%}",
         )
         for trial in trials
     ]
-    return Table("Each probe, commissioned", ("probe", *HEADER[1:], "model error", "lacking"), tuple(rows))
+    header = ("probe", *FIGURES, "size RMSE over known", "depth RMSE over known", "model error", "lacking")
+    return Table(f"Each probe, commissioned, inclusions of {group}", header, tuple(rows))
 
 
-def _benchmarks(
-    commissioned: Sequence[ScoredPresses], known: ScoredPresses, goals: Mapping[str, float]
-) -> list[Benchmark]:
-    whole = joined(commissioned)
-    covered, names = whole.covered(), UNKNOWNS[:2]
-    rms, of_known = (np.sqrt((one.error_mm() ** 2).mean(axis=0)) for one in (whole, known))
-    each = np.array([one.covered().mean(axis=0) for one in commissioned])
+class Pairs(NamedTuple):
+    """The same presses, of all probes, by the commissioned probe and by the one known exactly."""
+
+    found: ScoredPresses
+    known: ScoredPresses
+
+    def answered_ratio(self) -> float:
+        """Return the share of what the known probe answers that the commissioned one answers; NaN of nothing."""
+        return _share(self.found.is_answered, self.known.is_answered)
+
+    def determined_ratio(self) -> float:
+        """Return the same of presses whose size and depth are determined."""
+        found, known = (one.is_answered & one.evaluated.is_known[:, :2].all(axis=1) for one in (self.found, self.known))
+        return _share(found, known)
+
+    def rmse_ratio(self) -> Array:
+        """Return errors of size and depth [2] over the known probe's, of what both answer; NaN of nothing."""
+        both = self.found.is_answered & self.known.is_answered
+        if not both.any():
+            return np.full(2, np.nan)
+        of_found, of_known = (np.sqrt((one.part(both).error_mm() ** 2).mean(axis=0)) for one in self)
+        return np.asarray(of_found / np.maximum(of_known, LEAST_MM))
+
+
+def _share(found: NDArray[np.bool_], known: NDArray[np.bool_]) -> float:
+    return float(found[known].mean()) if known.any() else np.nan
+
+
+def pairs_of(trials: Sequence[TriedProbe]) -> Pairs:
+    """Return the pairs of all probes."""
+    found, known = zip(*(paired(one.scores[COMMISSIONED], one.scores[KNOWN]) for one in trials), strict=True)
+    return Pairs(joined(found), joined(known))
+
+
+def rmse_ratio(trials: Sequence[TriedProbe]) -> Array:
+    """Return errors of size and depth [2] of probes over those of the same probes known exactly."""
+    return pairs_of(trials).rmse_ratio()
+
+
+def benchmarks(group: str, trials: Sequence[TriedProbe], goals: Mapping[str, float]) -> list[Benchmark]:
+    """Return what commissioned probes reach of what is asked for, of inclusions of one group."""
+    whole, names, pairs = _whole(trials, COMMISSIONED), UNKNOWNS[:2], pairs_of(trials)
+    each = np.array([_covered(trial.scores[COMMISSIONED]) for trial in trials])
+    covered, ratio = _covered(whole), pairs.rmse_ratio()
     least = {
-        "answered": [("answered over those of a known probe", whole.is_answered.mean() / known.is_answered.mean())],
-        "pooled": [(f"{name} covered, pooled", covered[:, i].mean()) for i, name in enumerate(names)],
+        "answered": [
+            ("answered, of what the probe known exactly answers", pairs.answered_ratio()),
+            ("size and depth determined, of where the probe known exactly has both", pairs.determined_ratio()),
+        ],
+        "pooled": [(f"{name} covered, pooled", covered[i]) for i, name in enumerate(names)],
         "each probe": [(f"{name} covered, worst probe", each[:, i].min()) for i, name in enumerate(names)],
-        "joint": [("size and depth covered", covered.all(axis=1).mean())],
+        "joint": [("joint region of size and depth holds", whole.region_holds())],
     }
     return [
         *(
-            at_least("commissioned", what, float(found), goals[goal])
+            at_least(f"{COMMISSIONED}, {group}", what, float(found), goals[goal])
             for goal, figures in least.items()
             if goal in goals
             for what, found in figures
         ),
         *(
-            at_most("commissioned", f"{name} RMSE over a known probe's", float(rms[i] / of_known[i]), goals["rmse"])
-            for i, name in enumerate(names)
+            at_most(f"{COMMISSIONED}, {group}", f"{name} RMSE over the same probe's known exactly", one, goals["rmse"])
+            for name, one in zip(names, map(float, ratio), strict=True)
         ),
     ]
 
 
-def _of_known(design: Design, model: RampModel, tables: ProbeTables, count: int, seed: int, jobs: int) -> ScoredPresses:
-    """Return presses of the design's own probe, known exactly, by the same hand on the same patients."""
-    probe: World = AS_BELIEVED
-    probe = replace(probe, texture=probe_part(foreign_world(seed, 1)).texture)
-    taken = foreign_presses(
-        tables, probe, model.answers.noise, count, seed=derived_seed(seed, "presses of a known probe"), jobs=jobs
-    )
-    mean, std = np.array(MEAN), np.array(STD)
-    mean[PROBE], std[PROBE] = 0.0, NEGLIGIBLE
-    believed = tolerant(design)
-    own = OwnProbe(design.derivatives, mean, np.diag(std**2), believed.own.levels)
-    answers = OwnAnswers(believed.surrogate, believed.noise, own)
-    critical = replace(limits(answers, model, [], seed), misfit_ratio=LARGEST_MISFIT_RATIO)
-    return scored(answers, model, critical, taken, jobs)
+def _covered(found: ScoredPresses) -> Array:
+    """Return how often intervals of size and depth [2] hold; NaN without answers."""
+    return np.asarray(found.covered().mean(axis=0)) if found.is_answered.any() else np.full(2, np.nan)
 
 
-def _row(found: ScoredPresses) -> tuple[str, ...]:
-    known, covered = found.evaluated.is_known[found.is_answered], found.covered()
-    if not len(known):
-        return ("100 %", *[""] * 7, f"{np.median(found.misfit_ratio):.2f}")
-    rms = np.sqrt((found.error_mm() ** 2).mean(axis=0))
-    shares = (
-        1 - found.is_answered.mean(),
-        *covered.mean(axis=0),
-        covered.all(axis=1).mean(),
-        known[:, :2].all(axis=1).mean(),
-        known[:, 2].mean(),
-    )
-    return (
-        *(f"{100 * share:.0f} %" for share in shares),
-        *(f"{one:.2f}" for one in rms),
-        f"{np.median(found.misfit_ratio):.2f}",
-    )
+def _facts(trials: Sequence[TriedProbe]) -> dict[str, dict[str, float | None]]:
+    """Return the shares of one group that the page's prose quotes; None without answers."""
+
+    def of(found: ScoredPresses) -> dict[str, float | None]:
+        size, depth = _covered(found)
+        both = found.covered().all(axis=1).mean() if found.is_answered.any() else np.nan
+        shares = {"size": size, "depth": depth, "both": both, "region": found.region_holds()}
+        return {name: None if np.isnan(one) else round(float(one), 3) for name, one in shares.items()}
+
+    return {name: of(_whole(trials, name)) for name in (COMMISSIONED, KNOWN)}

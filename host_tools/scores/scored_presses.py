@@ -6,7 +6,8 @@ Only presses in which something stands out count: where nothing does, every mode
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,23 +15,39 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import denormalise_unknowns, normalise
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.answers import RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
+from device.measurement.ramp_modes.radial_profile import SeenPresses
 from host_tools.commissioning.joint_fit import FLAT_FIELD_RATIO, MODEL_RATIOS, Design, tolerances_only
-from host_tools.commissioning.left_out import answers_to_seen
+from host_tools.commissioning.left_out import answer_to_seen
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
+from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.scores.foreign_presses import ForeignPresses
+
+FIGURES = (
+    "stand out", "answered", "refused", "size covered", "depth covered", "determined size covered",
+    "determined depth covered", "both covered", "joint region holds", "size, depth determined", "E determined",
+    "size RMSE (mm)", "depth RMSE (mm)", "size bias (mm)", "depth bias (mm)", "median misfit",
+)  # fmt: skip
+"""An unknown that is not determined has its whole range as an interval, which covers; so those determined stand apart.
+
+"Both covered" is the rectangle of the two intervals; the joint region is that of `joint_region`.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredPresses:
-    """Answers to presses in which something stands out: in coordinates, misfit [n], and which are not refused [n]."""
+    """Answers to presses in which something stands out: in coordinates, misfit [n], and which are not refused [n].
+
+    `number` [n]: which of the presses that were taken.
+    """
 
     evaluated: EvaluatedPresses
     misfit_ratio: Array
     is_answered: NDArray[np.bool_]
+    number: NDArray[np.intp]
 
     def error_mm(self) -> Array:
         """Return errors of size and depth [n, 2] of what is answered (mm)."""
@@ -41,21 +58,62 @@ class ScoredPresses:
         """Return whether intervals of size and depth hold [n, 2] of what is answered."""
         return self.evaluated.is_covered[self.is_answered, :2]
 
+    def determined(self) -> NDArray[np.bool_]:
+        """Return which unknowns are determined [n, 3] of what is answered."""
+        return self.evaluated.is_known[self.is_answered]
+
+    def determined_covered(self) -> Array:
+        """Return the share of determined sizes and depths [2] whose intervals hold; NaN where none is determined."""
+        known, covered = self.determined()[:, :2], self.covered()
+        count = known.sum(axis=0)
+        return np.where(count > 0, (known & covered).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+    def region_holds(self) -> float:
+        """Return the share of joint regions that hold, of what is answered; NaN in a mode without a posterior."""
+        held = self.evaluated.in_region
+        return float(np.mean(held[self.is_answered, 0])) if held is not None and self.is_answered.any() else np.nan
+
+    def youngs_modulus_kpa(self) -> Array:
+        """Return the true modulus [n] of each press."""
+        return np.asarray(denormalise_unknowns(self.evaluated.truth)[:, UNKNOWNS.index("youngs_modulus_kpa")])
+
+    def part(self, chosen: NDArray[Any]) -> ScoredPresses:
+        """Return some of the presses, by a mask or by places."""
+        others = [field.name for field in fields(self)][1:]
+        return ScoredPresses(self.evaluated.part(chosen), *(getattr(self, name)[chosen] for name in others))
+
 
 def scored(
     answers: RampAnswers, model: RampModel, critical: CriticalValues, taken: ForeignPresses, jobs: int
 ) -> ScoredPresses:
     """Return the answers to presses or scans; `critical` says what is refused."""
     noise = model.answers.noise
-    shown = [number for number, one in enumerate(taken.seen) if any(stands_out(row, noise) for row in one.rows)]
-    seen = [taken.seen[number] for number in shown]
-    found = answers_to_seen(answers, model.first_guesses, seen, jobs)
-    values = [found_values(*pair, answers, model.ranges.log_odds) for pair in zip(found, seen, strict=True)]
+    shown = np.array([i for i, one in enumerate(taken.seen) if any(stands_out(row, noise) for row in one.rows)], int)
+    truth = normalise(taken.parameters[shown])[:, : len(UNKNOWNS)]
+
+    def one(place: int) -> _PressScore:
+        return _score_of(answers, model, critical, taken.seen[shown[place]])
+
+    found = in_parallel(one, len(shown), jobs)
     return ScoredPresses(
-        evaluated(normalise(taken.parameters[shown])[:, : len(UNKNOWNS)], found),
-        np.array([one.misfit_ratio for one in found]),
-        np.array([not rejections(one, critical) for one in values]),
+        evaluated(truth, [one.answer for one in found]),
+        np.array([one.answer.misfit_ratio for one in found]),
+        np.array([one.is_answered for one in found], bool),
+        shown,
     )
+
+
+class _PressScore(NamedTuple):
+    """An answer to one press or scan, and whether it is given."""
+
+    answer: RampAnswer
+    is_answered: bool
+
+
+def _score_of(answers: RampAnswers, model: RampModel, critical: CriticalValues, seen: SeenPresses) -> _PressScore:
+    answer = answer_to_seen(answers, model.first_guesses, seen)
+    values = found_values(answer, seen, answers, model.ranges.log_odds)
+    return _PressScore(answer, not rejections(values, critical))
 
 
 def tolerant(design: Design) -> OwnAnswers:
@@ -66,11 +124,40 @@ def tolerant(design: Design) -> OwnAnswers:
 
 
 def joined(parts: Sequence[ScoredPresses]) -> ScoredPresses:
-    """Return the answers of several probes as one."""
-    of_all = [one.evaluated for one in parts]
-    names = ("truth", "mean", "low", "high", "is_known")
+    """Return the answers of several probes as one; numbers stay those of each."""
+    names = [field.name for field in fields(EvaluatedPresses) if parts[0].evaluated.in_region is not None]
+    names = names or [field.name for field in fields(EvaluatedPresses)][:-1]
+    whole = (np.concatenate([getattr(one.evaluated, name) for one in parts]) for name in names)
+    others = [field.name for field in fields(ScoredPresses)][1:]
     return ScoredPresses(
-        EvaluatedPresses(*(np.concatenate([getattr(one, name) for one in of_all]) for name in names)),
-        np.concatenate([one.misfit_ratio for one in parts]),
-        np.concatenate([one.is_answered for one in parts]),
+        EvaluatedPresses(*whole), *(np.concatenate([getattr(one, name) for one in parts]) for name in others)
+    )
+
+
+def paired(found: ScoredPresses, others: ScoredPresses) -> tuple[ScoredPresses, ScoredPresses]:
+    """Return the presses that stand out in both, in one order: the same number is the same press."""
+    _, mine, theirs = np.intersect1d(found.number, others.number, return_indices=True)
+    return found.part(mine), others.part(theirs)
+
+
+def figures_of(found: ScoredPresses) -> tuple[str, ...]:
+    """Return the cells under `FIGURES`, empty where nothing is answered."""
+    shown, answered = len(found.is_answered), int(found.is_answered.sum())
+    if not shown:
+        return ("0", *[""] * (len(FIGURES) - 1))
+    misfit = "" if np.isnan(found.misfit_ratio).all() else f"{np.median(found.misfit_ratio):.2f}"
+    counts = (f"{shown}", f"{answered}", f"{100 * (1 - answered / shown):.0f} %")
+    if not answered:
+        return (*counts, *[""] * (len(FIGURES) - len(counts) - 1), misfit)
+    error, covered, known = found.error_mm(), found.covered(), found.determined()
+    shares = (
+        *covered.mean(axis=0), *found.determined_covered(), covered.all(axis=1).mean(), found.region_holds(),
+        known[:, :2].all(axis=1).mean(), known[:, 2].mean(),
+    )  # fmt: skip
+    return (
+        *counts,
+        *("" if np.isnan(share) else f"{100 * share:.0f} %" for share in shares),
+        *(f"{one:.2f}" for one in np.sqrt((error**2).mean(axis=0))),
+        *(f"{one:+.2f}" for one in error.mean(axis=0)),
+        misfit,
     )

@@ -11,28 +11,28 @@ from itertools import groupby
 
 import numpy as np
 
+from device.measurement.mode import Mode
+from device.measurement.quantities import UNKNOWNS
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_least
 from host_tools.scenes.phantom_set import PhantomSet
 from host_tools.scores.one_thing.causes import Cause, CauseOwner, causes
 from host_tools.scores.one_thing.cost_figure import cost_figure
 from host_tools.scores.one_thing.press_answers import (
     COMMISSIONED,
-    FIGURES,
     SHIPPED,
     TOLERANT,
     DesignToTry,
     OwnLimits,
     commissioned,
-    figures_of,
     quick_scores,
     ramp_scores,
     with_tolerances,
 )
-from host_tools.scores.one_thing.tried_presses import Setting, TruthDesign, random_design, tried_presses
-from host_tools.scores.scored_presses import ScoredPresses, joined
+from host_tools.scores.one_thing.tried_presses import Setting, TruthDesign, random_design, scans_of, tried_presses
+from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of
 
-PRESSES, SCANS = 40, 12
-"""Presses of each thing, and how many of them are scans of two in mode precise."""
+PRESSES = 40
+"""Presses of each thing; `tried_presses.scans_of` says how many of them are scans of two in mode precise."""
 COVERED, ANSWERED = 0.86, 0.95
 """What is asked for: of what is answered, how often an interval holds; of what stands out, how much is answered."""
 TITLES = {
@@ -42,8 +42,8 @@ TITLES = {
     "precise after": "Mode precise, a scan of two, after",
     "quick": "Mode quick, as it ships",
 }
-AFTER = {"quick": "quick", "standard": "standard after", "precise": "precise after"}
-"""Modes to what they are judged by; nothing commissions mode quick."""
+AFTER: dict[Mode, str] = {"quick": "quick", "standard": "standard after", "precise": "precise after"}
+"""Modes to the answers that have bounds; nothing commissions mode quick."""
 HOLDS: dict[CauseOwner, str] = {
     "probe": "builder; phantoms tell it",
     "camera": "builder; a grid target undoes it",
@@ -51,6 +51,13 @@ HOLDS: dict[CauseOwner, str] = {
     "patient": "nobody",
     "nobody": "",
 }
+OF_RAMPS: tuple[CauseOwner, ...] = ("nobody", "probe", "press", "patient")
+BOUNDED_OWNERS: dict[Mode, tuple[CauseOwner, ...]] = {
+    "quick": ("nobody", "press", "patient"),
+    "standard": OF_RAMPS,
+    "precise": OF_RAMPS,
+}
+"""Whose things have bounds in each mode: a grid undoes a camera, and mode quick refuses every probe but its own."""
 Found = dict[str, list[ScoredPresses]]
 """Each of `TITLES` to its answers, cause by cause."""
 
@@ -60,7 +67,7 @@ def one_at_a_time_chapter(
     phantoms: PhantomSet,
     *,
     presses: int = PRESSES,
-    scans: int = SCANS,
+    scans: int | None = None,
     tried: Sequence[Cause] | None = None,
     seed: int = 1,
     jobs: int = -1,
@@ -69,6 +76,7 @@ def one_at_a_time_chapter(
     all_of_them = list(tried or causes())
     of_probe = [cause for cause in all_of_them if cause.owner == "probe"]
     own = dict(zip((one.name for one in of_probe), commissioned(design, of_probe, phantoms, seed, jobs), strict=True))
+    scans = scans_of(presses) if scans is None else scans
     unknown, truths = with_tolerances(design, seed), random_design(presses, scans, seed)
     found: Found = {name: [] for name in TITLES}
     for cause in all_of_them:
@@ -81,7 +89,12 @@ def one_at_a_time_chapter(
         benchmarks=tuple(_benchmarks(all_of_them, found)),
         tables=(_tightness(all_of_them, found), *(_table(name, all_of_them, found[name]) for name in TITLES)),
         figures=(_figure(all_of_them, found),),
-        facts={"presses": presses, "scans": scans, "phantoms": phantoms.serial},
+        facts={
+            "presses": presses,
+            "scans": scans,
+            "phantoms": phantoms.serial,
+            "rows": {mode: _rows_held(mode, all_of_them, found[name]) for mode, name in AFTER.items()},
+        },
     )
 
 
@@ -98,17 +111,25 @@ def _answered(
 
 
 def _benchmarks(tried: Sequence[Cause], found: Mapping[str, Sequence[ScoredPresses]]) -> list[Benchmark]:
-    """Return what all rows together reach in each mode, and how many rows hold what is asked for."""
-    benchmarks = []
-    for mode, name in AFTER.items():
-        whole = joined(found[name])
-        covered = whole.covered().mean(axis=0) if whole.is_answered.any() else (np.nan, np.nan)
-        case = f"{mode}, all {len(tried)} rows"
-        if mode != "quick":  # which may refuse
-            benchmarks.append(at_least(case, "answered", float(whole.is_answered.mean()), ANSWERED))
-        benchmarks.append(at_least(case, "size covered", float(covered[0]), COVERED))
-        benchmarks.append(at_least(case, "depth covered", float(covered[1]), COVERED))
-    return benchmarks
+    """Return what each row reaches of what is asked for, in each mode that has to do with it."""
+    return [
+        one
+        for mode, name in AFTER.items()
+        for cause, of_cause in zip(tried, found[name], strict=True)
+        if cause.owner in BOUNDED_OWNERS[mode]
+        for one in _of_row(mode, cause, of_cause)
+    ]
+
+
+def _of_row(mode: Mode, cause: Cause, found: ScoredPresses) -> list[Benchmark]:
+    """Return what one row reaches; mode quick may refuse, and then has nothing to cover."""
+    case, is_answered = f"{mode}, {cause.name}", bool(found.is_answered.any())
+    if mode == "quick" and not is_answered:
+        return []
+    covered = found.covered().mean(axis=0) if is_answered else np.full(2, np.nan)
+    shares = [] if mode == "quick" else [at_least(case, "answered", float(found.is_answered.mean()), ANSWERED)]
+    names = zip(UNKNOWNS[:2], map(float, covered), strict=True)
+    return [*shares, *(at_least(case, f"{name} covered", share, COVERED) for name, share in names)]
 
 
 def _table(name: str, tried: Sequence[Cause], found: Sequence[ScoredPresses]) -> Table:
@@ -133,6 +154,14 @@ def holds(found: ScoredPresses, *, may_refuse: bool = False) -> bool:
         return may_refuse
     covers = bool((found.covered().mean(axis=0) >= _but_for_chance(COVERED, answered)).all())
     return covers and (may_refuse or answered / count >= _but_for_chance(ANSWERED, count))
+
+
+def _rows_held(mode: Mode, tried: Sequence[Cause], found: Sequence[ScoredPresses]) -> dict[str, int]:
+    """Return how many rows have bounds in a mode, how many reach all bounds, and how many do but for chance."""
+    bounded = [(cause, one) for cause, one in zip(tried, found, strict=True) if cause.owner in BOUNDED_OWNERS[mode]]
+    reached = [all(one.passed for one in _of_row(mode, *row)) for row in bounded]
+    but_for_chance = [holds(one, may_refuse=mode == "quick") for _, one in bounded]
+    return {"bounded": len(bounded), "reached": sum(reached), "but_for_chance": sum(but_for_chance)}
 
 
 def _but_for_chance(share: float, count: int) -> float:

@@ -33,10 +33,8 @@ from host_tools.scores.one_thing.tried_presses import TriedPresses
 from host_tools.scores.scored_presses import ScoredPresses, scored, tolerant
 
 SHIPPED, TOLERANT, COMMISSIONED = "as it ships", "tolerances", "commissioned"
-FEWER = 2
-"""As it ships most is refused, which fewer presses show: one in so many are answered."""
-FIGURES = ("stand out", "answered", "refused", "size covered", "depth covered", "both covered", "size RMSE (mm)",
-           "depth RMSE (mm)", "size bias (mm)", "depth bias (mm)", "median misfit")  # fmt: skip
+FEW = {"standard": 10, "precise": 4}
+"""As it ships most is refused, which so many presses and scans show."""
 
 
 class DesignToTry(NamedTuple):
@@ -90,7 +88,7 @@ def ramp_scores(tried: TriedPresses, design: DesignToTry, own: OwnLimits, jobs: 
     """Return standard and precise, "... as it ships" of the first presses and "... after" of all."""
     found, model = {}, design.model
     for mode, taken in zip(RAMP_MODES, (tried.single, tried.scans), strict=True):
-        few = taken.first(max(len(taken.seen) // FEWER, 1))
+        few = taken.first(FEW[mode])
         found[f"{mode} {SHIPPED}"] = scored(model.answers, model, model.critical[mode], few, jobs)
         found[f"{mode} after"] = scored(own.answers, model, own.critical, taken, jobs)
     return found
@@ -109,29 +107,10 @@ def quick_scores(parameters: Array, held: Sequence[QuickPress], model: QuickMode
         held[number].elongation_ratio <= model.elongation_ratio and not outside_training(model.bundle, held[number].row)
         for number in shown
     ]
-    nothing = np.full(len(shown), np.nan)
-    return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), nothing, np.array(answered))
+    nothing, number = np.full(len(shown), np.nan), np.array(shown, int)
+    return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), nothing, np.array(answered), number)
 
 
 def _shows(row: Array, model: QuickModel) -> bool:
     seen = visible_contrast(row[:RINGS])
     return any(seen[name] > model.faintest_contrast[name] for name in SEEN_BY)
-
-
-def figures_of(found: ScoredPresses) -> tuple[str, ...]:
-    """Return the cells under `FIGURES`, empty where nothing is answered."""
-    shown, answered = len(found.is_answered), int(found.is_answered.sum())
-    if not shown:
-        return ("0", *[""] * (len(FIGURES) - 1))
-    misfit = "" if np.isnan(found.misfit_ratio).all() else f"{np.median(found.misfit_ratio):.2f}"
-    counts = (f"{shown}", f"{answered}", f"{100 * (1 - answered / shown):.0f} %")
-    if not answered:
-        return (*counts, *[""] * 7, misfit)
-    error, covered = found.error_mm(), found.covered()
-    return (
-        *counts,
-        *(f"{100 * share:.0f} %" for share in (*covered.mean(axis=0), covered.all(axis=1).mean())),
-        *(f"{one:.2f}" for one in np.sqrt((error**2).mean(axis=0))),
-        *(f"{one:+.2f}" for one in error.mean(axis=0)),
-        misfit,
-    )

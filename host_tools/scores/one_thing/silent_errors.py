@@ -26,11 +26,9 @@ from host_tools.probe_tables.ellipsoid import stretched_inclusion
 from host_tools.scenes.scene import Placement, Scene
 from host_tools.scores.one_thing.causes import FOUR_TIMES_SLOWER_N_PER_S, NOTHING, Cause, relaxing, stiff_below
 from host_tools.scores.one_thing.press_answers import (
-    FIGURES,
     SHIPPED,
     TOLERANT,
     DesignToTry,
-    figures_of,
     quick_scores,
     ramp_scores,
     with_tolerances,
@@ -41,12 +39,13 @@ from host_tools.scores.one_thing.tried_presses import (
     SettingsOf,
     TruthDesign,
     random_design,
+    scans_of,
     tried_presses,
 )
 from host_tools.scores.outside import clear_inclusions
-from host_tools.scores.scored_presses import ScoredPresses
+from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, paired
 
-PRESSES, SCANS = 40, 12
+PRESSES = 40
 INCLUSIONS, SKINS = 4, 9
 """Prolate inclusions of each kind that are solved, and presses of each."""
 TIMES_AS_HIGH = 1.25, 1.5
@@ -71,12 +70,13 @@ def silent_errors_chapter(
     design: DesignToTry,
     *,
     presses: int = PRESSES,
-    scans: int = SCANS,
+    scans: int | None = None,
     inclusions: int = INCLUSIONS,
     seed: int = 1,
     jobs: int = -1,
 ) -> Chapter:
     """Return what each silent error leaves in sizes and depths, and how little of it is refused."""
+    scans = scans_of(presses) if scans is None else scans
     own, truths = with_tolerances(design, seed), random_design(presses, scans, seed)
 
     def answered(of_design: TruthDesign, settings_of: SettingsOf) -> Scores:
@@ -108,6 +108,7 @@ def silent_errors_chapter(
             "bound_mm": BOUND_MM,
             "largest": _largest(further_off_mm, found, without),
             "largest_moved": _largest(moved_mm, found, without),
+            "standard": {name: _facts(of_one["standard after"]) for name, of_one in found.items()},
         },
     )
 
@@ -160,27 +161,21 @@ def solved_prolate(
 
 def further_off_mm(found: ScoredPresses, without: ScoredPresses) -> Array:
     """Return by how much more the mean errors of size and depth [2] are than without a thing; NaN without answers."""
-    if not (found.is_answered.any() and without.is_answered.any()):
-        return np.full(2, np.nan)
-    return np.asarray(found.error_mm().mean(axis=0) - without.error_mm().mean(axis=0))
+    moves = _moves_mm(found, without)
+    return np.asarray(moves.mean(axis=0)) if len(moves) else np.full(2, np.nan)
 
 
 def moved_mm(found: ScoredPresses, without: ScoredPresses) -> Array:
-    """Return by how much a thing moves answers of size and depth [2], root mean square over presses that have both.
-
-    Presses are told by their truths: noise is the same in both. NaN without any.
-    """
-    without_it = dict(zip(map(tuple, _answered_truths(without)), without.error_mm(), strict=True))
-    moved = [
-        error - without_it[truth]
-        for truth, error in zip(map(tuple, _answered_truths(found)), found.error_mm(), strict=True)
-        if truth in without_it
-    ]
-    return np.sqrt(np.mean(np.square(moved), axis=0)) if moved else np.full(2, np.nan)
+    """Return by how much a thing moves answers of size and depth [2], root mean square; NaN without any."""
+    moves = _moves_mm(found, without)
+    return np.asarray(np.sqrt(np.mean(moves**2, axis=0))) if len(moves) else np.full(2, np.nan)
 
 
-def _answered_truths(found: ScoredPresses) -> Array:
-    return found.evaluated.truth[found.is_answered]
+def _moves_mm(found: ScoredPresses, without: ScoredPresses) -> Array:
+    """Return by how much a thing moves size and depth [n, 2] of presses that are answered with and without it."""
+    found, without = paired(found, without)
+    both = found.is_answered & without.is_answered
+    return found.part(both).error_mm() - without.part(both).error_mm()
 
 
 def _rows(found: Mapping[str, Scores], without: Mapping[str, Scores]) -> list[tuple[str, ...]]:
@@ -203,6 +198,15 @@ def _benchmarks(found: Mapping[str, Scores], without: Mapping[str, Scores]) -> l
         for kind in BOUNDED
         for unknown, one in zip(UNKNOWNS[:2], further_off_mm(of_one[kind], without[name][kind]), strict=True)
     ]
+
+
+def _facts(found: ScoredPresses) -> dict[str, float | list[float]]:
+    """Return what is refused of presses, and how often sizes and depths of the others are covered."""
+    covered = found.covered().mean(axis=0) if found.is_answered.any() else np.zeros(0)
+    return {
+        "refused": round(1 - float(found.is_answered.mean()), 3),
+        "covered": [round(float(one), 3) for one in covered],
+    }
 
 
 def _largest(

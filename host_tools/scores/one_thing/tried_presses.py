@@ -28,6 +28,7 @@ from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.scores.foreign_presses import ForeignPresses, seen_columns
 
+SCANS_IN_TEN = 3
 FURTHER_MM = 2.0, 5.0
 """Offsets of the second press of a scan."""
 
@@ -62,6 +63,11 @@ class TriedPresses(NamedTuple):
     single: ForeignPresses
     scans: ForeignPresses
     held: list[QuickPress]
+
+
+def scans_of(presses: int) -> int:
+    """Return how many of so many presses are pressed twice: a scan takes three times as long to answer."""
+    return max(presses * SCANS_IN_TEN // 10, 1)
 
 
 def random_design(presses: int, scans: int, seed: int) -> TruthDesign:

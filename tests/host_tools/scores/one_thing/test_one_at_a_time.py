@@ -15,8 +15,17 @@ from host_tools.pages.page import Results, Timed, write_page
 from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
 from host_tools.scores.one_thing.causes import causes
-from host_tools.scores.one_thing.one_at_a_time import TITLES, _largest_held, holds, one_at_a_time_chapter
-from host_tools.scores.one_thing.press_answers import FIGURES, DesignToTry
+from host_tools.scores.one_thing.one_at_a_time import (
+    AFTER,
+    TITLES,
+    _benchmarks,
+    _largest_held,
+    _rows_held,
+    holds,
+    one_at_a_time_chapter,
+)
+from host_tools.scores.one_thing.press_answers import DesignToTry
+from host_tools.scores.scored_presses import FIGURES
 
 
 def test_a_row_holds_but_for_one_deviation_of_chance():
@@ -48,6 +57,31 @@ def test_a_chapter_that_is_not_one_is_refused() -> None:
     assert done.exit_code == 1
     assert isinstance(done.exception, InvalidQuantity)
     assert "one of tolerances, other optics, one at a time, silent errors, named" in str(done.exception)
+
+
+def test_each_row_has_bounds_of_its_own_in_the_modes_that_have_to_do_with_it():
+    tried = [
+        one for one in causes() if one.name in ("nothing", "load cell's span +2 %", "optical axis, not undone 0.5 mm")
+    ]
+    of_mode = [told_presses(40), told_presses(33, wrong=7), told_presses(0, refused=40)]
+    found = dict.fromkeys(AFTER.values(), of_mode)
+    judged = {(one.case, one.quantity.removesuffix(" (at least)")): one for one in _benchmarks(tried, found)}
+    assert {case for case, _ in judged} == {
+        "quick, nothing", "standard, nothing", "standard, load cell's span +2 %", "precise, nothing",
+        "precise, load cell's span +2 %",
+    }  # fmt: skip
+    assert ("quick, nothing", "answered") not in judged
+    missed = [key for key, one in judged.items() if not one.passed]
+    assert missed == [(f"{mode}, load cell's span +2 %", "size_mm covered") for mode in ("standard", "precise")]
+    assert _rows_held("standard", tried, of_mode) == {"bounded": 2, "reached": 1, "but_for_chance": 2}
+
+
+def test_mode_quick_may_refuse_a_row():
+    (tilted,) = [one for one in causes() if one.name == "tilt on the lesion 0.5 degrees"]
+    ramps = {name: [told_presses(40)] for name in AFTER.values()}
+    cases = {one.case for one in _benchmarks([tilted], ramps | {"quick": [told_presses(0, refused=40)]})}
+    assert cases == {f"{mode}, {tilted.name}" for mode in ("standard", "precise")}
+    assert _rows_held("quick", [tilted], [told_presses(0, refused=40)])["reached"] == 1
 
 
 @pytest.mark.long

@@ -8,8 +8,9 @@ from device.files.bundle_file import read_quick_model, read_ramp_model
 from device.files.shipped import MODELS
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.world import AS_BELIEVED
-from host_tools.scores.one_thing.press_answers import FIGURES, figures_of, quick_scores
+from host_tools.scores.one_thing.press_answers import quick_scores
 from host_tools.scores.one_thing.tried_presses import Setting, random_design, tried_presses
+from host_tools.scores.scored_presses import FIGURES, figures_of
 
 DESIGN = random_design(16, 0, seed=4)
 

@@ -29,11 +29,14 @@ def test_further_off_is_beyond_what_the_same_presses_are_without_it():
 
 
 def test_moved_is_of_the_same_presses_and_hides_no_sign():
-    truth = [(8.0, 6.0), (9.0, 5.0), (10.0, 7.0)]
+    """The same number is the same press, in any order: truths alone may be those of a ball on several skins."""
+    truth = [(8.0, 6.0), (8.0, 6.0), (10.0, 7.0)]
     without = scored_presses(truth, truth)
     found = scored_presses(np.add(truth, [(0.3, 0.0), (-0.3, 0.1), (0.3, 0.0)])[::-1], truth[::-1])
+    found = replace(found, number=np.arange(3)[::-1])
     assert moved_mm(found, without) == pytest.approx([0.3, 0.1 / np.sqrt(3)], abs=1e-9)
-    assert np.isnan(moved_mm(found, scored_presses([(4.0, 5.0)], [(4.0, 5.0)]))).all()
+    assert further_off_mm(found, without) == pytest.approx([0.1, 0.1 / 3], abs=1e-9)
+    assert np.isnan(moved_mm(found, replace(without, number=np.arange(3) + 7))).all()
 
 
 def test_the_bound_is_on_every_thing_but_what_it_is_compared_with():

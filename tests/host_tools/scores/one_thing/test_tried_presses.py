@@ -10,7 +10,7 @@ from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.world import AS_BELIEVED, OverLesion, World
 from host_tools.press_models.press_samples import profile_rows
 from host_tools.press_models.quick_training import quick_rows
-from host_tools.scores.one_thing.tried_presses import FURTHER_MM, Setting, random_design, tried_presses
+from host_tools.scores.one_thing.tried_presses import FURTHER_MM, Setting, random_design, scans_of, tried_presses
 
 DESIGN = random_design(4, 2, seed=3)
 
@@ -36,6 +36,10 @@ def test_a_scan_begins_with_the_single_press_and_keeps_its_reference(believed):
         np.testing.assert_array_equal(single.rows[0], scan.rows[0])
         np.testing.assert_array_equal(scan.rows[0, RESPONSE], scan.rows[1, RESPONSE])
     assert ((FURTHER_MM[0] <= DESIGN.further_mm) & (DESIGN.further_mm <= FURTHER_MM[1])).all()
+
+
+def test_three_in_ten_are_scans_and_at_least_one():
+    assert [scans_of(presses) for presses in (3, 10, 40)] == [1, 3, 12]
 
 
 def test_a_single_press_has_the_noise_of_one_whether_it_is_pressed_again_or_not(tables, noise, believed):

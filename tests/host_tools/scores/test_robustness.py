@@ -1,0 +1,157 @@
+"""What is asked of commissioned probes: press by press beside the same probe known exactly, soft inclusions apart."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from told_answers import scored_presses, told_presses
+
+from device.files.bundle_file import read_ramp_model
+from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.ramp_modes.commissioned.row_derivatives import DIRECTIONS, MEAN, NAMES, STD
+from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design
+from host_tools.press_models.press_derivatives import load_derivatives, world_changed
+from host_tools.scores.foreign_presses import foreign_presses, probe_part
+from host_tools.scores.foreign_probes import foreign_world
+from host_tools.scores.robustness import (
+    COMMISSIONED,
+    GOALS,
+    GROUPS,
+    KNOWN,
+    OTHER_GOALS,
+    SHIPPED,
+    TriedProbe,
+    _chapter,
+    benchmarks,
+    known_limits,
+    known_probe,
+    of_group,
+    pairs_of,
+    true_directions,
+)
+from host_tools.scores.scored_presses import FIGURES, joined, scored
+
+FIT = SimpleNamespace(levels=SimpleNamespace(model_ratio=0.003), believed=SimpleNamespace(discrepancy_ratio=0.02))
+
+
+def tried(found, known, number=1):
+    shipped = replace(found, is_answered=np.zeros(len(found.number), bool))
+    return TriedProbe(number, {SHIPPED: shipped, COMMISSIONED: found, KNOWN: known}, FIT)
+
+
+def by_quantity(trials, goals=GOALS, group=GROUPS[0]):
+    return {one.quantity.removesuffix(" (at least)"): one for one in benchmarks(group, trials, goals)}
+
+
+def test_errors_are_compared_on_the_presses_that_both_answer():
+    truth = [(8.0, 6.0)] * 4
+    found = scored_presses([(9.0, 6.0), (7.0, 7.0), (14.0, 6.0), (8.0, 6.0)], truth)
+    known = scored_presses([(8.5, 6.0), (7.5, 6.5), (8.0, 6.0), (8.0, 6.0)], truth)
+    known = replace(known, is_answered=np.array([True, True, False, True]))
+    assert pairs_of([tried(found, known)]).rmse_ratio() == pytest.approx([2.0, 2.0])
+    nothing = replace(found, is_answered=np.zeros(4, bool))
+    assert np.isnan(pairs_of([tried(nothing, known)]).rmse_ratio()).all()
+
+
+def test_answers_are_counted_of_what_the_known_probe_answers():
+    found, known = (scored_presses([(8.0, 6.0)] * 4, [(8.0, 6.0)] * 4) for _ in range(2))
+    found = replace(found, is_answered=np.array([True, False, True, True]))
+    known = replace(known, is_answered=np.array([True, True, False, False]))
+    pairs = pairs_of([tried(found, known)])
+    assert pairs.answered_ratio() == 0.5
+    found.evaluated.is_known[0, 1] = False
+    assert pairs_of([tried(found, known)]).determined_ratio() == 0.0
+
+
+def test_a_press_is_paired_by_its_number_within_its_own_probe():
+    first, second = (scored_presses([(8.0 + off, 6.0)] * 2, [(8.0, 6.0)] * 2) for off in (1.0, 0.5))
+    swapped = replace(second, number=np.array([1, 7]))
+    pairs = pairs_of([tried(first, swapped), tried(second, first, number=2)])
+    assert pairs.found.number.tolist() == [1, 0, 1]
+    assert pairs.known.error_mm()[:, 0] == pytest.approx([0.5, 1.0, 1.0])
+
+
+def test_each_bound_is_named_and_missed_by_what_misses_it():
+    good, worse = told_presses(20), told_presses(14, wrong=6)
+    found = by_quantity([tried(good, good), tried(worse, good, number=2)])
+    assert found["size_mm covered, pooled"].measured == pytest.approx(34 / 40)
+    assert found["size_mm covered, worst probe"].measured == pytest.approx(0.7)
+    assert found["joint region of size and depth holds"].measured == pytest.approx(34 / 40)
+    missed = {name for name, one in found.items() if not one.passed}
+    of_size = "covered, pooled", "covered, worst probe", "RMSE over the same probe's known exactly"
+    assert missed == {f"size_mm {what}" for what in of_size}
+
+
+def test_of_other_optics_neither_each_probe_nor_the_region_is_asked():
+    names = set(by_quantity([tried(told_presses(5), told_presses(5))], OTHER_GOALS))
+    assert not any("worst" in name or "region" in name for name in names)
+    assert len(names) == 6
+
+
+def test_soft_inclusions_stand_apart_in_tables_and_bounds():
+    hard, soft = (scored_presses([(8.2, 6.1)] * 3, [(8.0, 6.0)] * 3, kpa=kpa) for kpa in (60.0, 12.0))
+    both = replace(joined([hard, soft]), number=np.arange(6))
+    assert [of_group(both, group).youngs_modulus_kpa() == pytest.approx(kpa)
+            for group, kpa in zip(GROUPS, (60.0, 12.0), strict=True)] == [True, True]  # fmt: skip
+    chapter = _chapter("Probes", "Claim.", "source", [tried(both, both)], both, GOALS)
+    cases = [one.case for one in chapter.benchmarks]
+    assert cases.count(f"commissioned, {GROUPS[0]}") == 9
+    assert cases.count(f"commissioned, {GROUPS[1]}") == 7
+    assert [table.caption for table in chapter.tables] == [
+        f"{what}, inclusions of {group}"
+        for group in GROUPS
+        for what in ("All probes together", "Each probe, commissioned")
+    ]
+    stand_out = 1 + FIGURES.index("stand out")
+    assert {row[stand_out] for table in chapter.tables for row in table.rows} == {"3"}
+
+
+def test_a_group_that_nobody_pressed_has_no_bound():
+    hard = told_presses(4)
+    chapter = _chapter("Probes", "Claim.", "source", [tried(hard, hard)], hard, GOALS)
+    assert {one.case for one in chapter.benchmarks} == {f"commissioned, {GROUPS[0]}"}
+    assert list(chapter.facts["groups"]) == [GROUPS[0]]
+    assert chapter.facts["groups"][GROUPS[0]][KNOWN] == {"size": 1.0, "depth": 1.0, "both": 1.0, "region": 1.0}
+    assert chapter.facts["refused_as_it_ships"] == 1.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    return read_ramp_model(MODELS / "standard")
+
+
+@pytest.fixture(scope="module")
+def design(model):
+    return Design(model.answers, load_derivatives(SIMULATED_PROBE))
+
+
+@pytest.mark.parametrize("place", range(len(PROBE)), ids=[NAMES[number] for number in PROBE])
+def test_a_world_moved_along_one_direction_lies_there_and_nowhere_else(place):
+    name = NAMES[PROBE[place]]
+    step = DIRECTIONS[name].step
+    expected = np.where(np.arange(len(PROBE)) == place, step, 0.0)
+    np.testing.assert_allclose(true_directions(world_changed(name, step, 0.0)), expected, atol=1e-12)
+
+
+def test_it_believes_its_own_directions_as_closely_as_after_commissioning_and_a_hand_as_before(design):
+    world = probe_part(foreign_world(1, 3))
+    own = known_probe(design, world).own
+    np.testing.assert_allclose(own.mean[PROBE], true_directions(world))
+    spread = np.sqrt(np.diag(own.covariance))
+    np.testing.assert_allclose(spread[PROBE], FLOOR * STD[PROBE])
+    others = np.setdiff1d(np.arange(len(NAMES)), PROBE)
+    np.testing.assert_allclose(own.mean[others], MEAN[others])
+    np.testing.assert_allclose(spread[others], STD[others])
+
+
+@pytest.mark.long
+def test_presses_of_its_own_fit_it_better_than_the_probe_beside_it(model, design, tables):
+    world = probe_part(foreign_world(1, 3))
+    taken = foreign_presses(tables, world, model.answers.noise, 6, seed=2, jobs=1)
+    own = known_probe(design, world)
+    other = known_probe(design, replace(world, contact=probe_part(foreign_world(1, 4)).contact, cell_span_ratio=1.02))
+    critical = known_limits(own, model, seed=1)
+    misfits = [scored(answers, model, critical, taken, 1).misfit_ratio.mean() for answers in (own, other)]
+    assert misfits[0] < misfits[1]
+    assert misfits[0] == pytest.approx(1.0, abs=0.5)
