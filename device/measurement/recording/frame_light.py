@@ -19,14 +19,12 @@ from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.reference_light import Image
-from device.measurement.recording.tactile_image import Frame
+from device.measurement.recording.tactile_image import Frame, brightness_of
 
 BINNED_MM = 0.125
 """Pixels are put together to about this width: light spreads eight times as far in the skin."""
 TOUCHED_N = 0.07
 """Below this force a reference frame shows an untouched face."""
-LED_STEP = 1 / 255
-"""One step of the LED chip's brightness: sides may be off so much by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +60,7 @@ class FrameLight:
         return RampLights(force_n, [self._light(frame) for frame in frames], self.scale, seen)
 
     def _light(self, frame: Frame) -> Image:
-        ratio = np.float32(self.per_count / _brightness(frame.led_ratio, self.first or frame.led_ratio))
+        ratio = np.float32(self.per_count / brightness_of(frame.led_ratio, self.first or frame.led_ratio))
         image = (_binned(frame, self.factor) - self.dark) * ratio
         return self.on_face(image) if self.on_face else image
 
@@ -93,17 +91,6 @@ def lights_of(recording: Recording) -> tuple[RampLights, RampLights]:
 def touched(recording: Recording, role: str) -> list[Frame]:
     """Return the frames of a role; of the reference those of a touched face."""
     return [frame for frame in recording.with_role(role) if role == "press" or frame.force_n > TOUCHED_N]
-
-
-def _brightness(led_ratio: LedRatio, first: LedRatio) -> float:
-    """Return how many times as bright a frame is lit as the first one; raises unless every side is so many times."""
-    times = sum(led_ratio) / sum(first) if sum(first) > 0 else 0.0
-    if times <= 0 or any(
-        abs(side - times * of_first) > LED_STEP for side, of_first in zip(led_ratio, first, strict=True)
-    ):
-        action = "press beside the lesion and on it under one light"
-        raise InvalidQuantity("led_ratio of a frame", led_ratio, f"above 0 and in the proportion of {first}", action)
-    return times
 
 
 def _binning(scale: PixelScale) -> tuple[int, int]:

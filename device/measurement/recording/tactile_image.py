@@ -24,6 +24,8 @@ Role = Literal["dark", "reference", "press"]
 LAST_RAMP = 7
 """The largest number that a ramp on the lesion may have."""
 
+LED_STEP = 1 / 255
+"""One step of the LED chip's brightness: sides may be off so much by rounding."""
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
 
@@ -64,10 +66,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class Reference:
-    """The inclusion-free press: dark, and its light above dark at any force."""
+    """The inclusion-free press: dark, and its light above dark at any force, as bright as it was lit at first."""
 
     dark: Image
     light: HeldLight | RampLight
+    led_ratio: LedRatio
 
     def above_dark(self, force_n: float) -> Image:
         """Return reference minus dark at a force (counts)."""
@@ -95,7 +98,7 @@ def _mean(frames: Sequence[Frame]) -> Image:
 def reference(frames: Sequence[Frame]) -> Reference:
     """Return the reference of a recording's dark and reference frames.
 
-    Raises `InvalidQuantity` when a role is missing or shapes differ.
+    Raises `InvalidQuantity` when a role is missing, shapes differ, or sides are not lit in the first one's proportion.
     """
     by_role = {role: [f for f in frames if f.role == role] for role in ("dark", "reference")}
     for role, found in by_role.items():
@@ -103,8 +106,20 @@ def reference(frames: Sequence[Frame]) -> Reference:
             raise InvalidQuantity(f"{role} frames", 0, "at least one", f"record {role} frames before the press")
     require_one_shape(frames)
     dark, lit = _mean(by_role["dark"]), by_role["reference"]
-    above = [np.asarray(frame.counts - dark, dtype=np.float32) for frame in lit]
-    return Reference(dark, reference_light([frame.force_n for frame in lit], above, _floor(lit[0].counts)))
+    first = lit[0].led_ratio
+    above = [np.asarray((frame.counts - dark) / np.float32(brightness_of(frame.led_ratio, first))) for frame in lit]
+    return Reference(dark, reference_light([frame.force_n for frame in lit], above, _floor(lit[0].counts)), first)
+
+
+def brightness_of(led_ratio: LedRatio, first: LedRatio) -> float:
+    """Return how many times as bright a frame is lit as the first one; raises unless every side is so many times."""
+    times = sum(led_ratio) / sum(first) if sum(first) > 0 else 0.0
+    if times <= 0 or any(
+        abs(side - times * of_first) > LED_STEP for side, of_first in zip(led_ratio, first, strict=True)
+    ):
+        action = "press beside the lesion and on it under one light"
+        raise InvalidQuantity("led_ratio of a frame", led_ratio, f"above 0 and in the proportion of {first}", action)
+    return times
 
 
 def require_one_shape(frames: Sequence[Frame]) -> None:
@@ -116,13 +131,17 @@ def require_one_shape(frames: Sequence[Frame]) -> None:
 
 
 def tactile_image(frame: Frame, reference: Reference, scale: PixelScale) -> TactileImage:
-    """Return the corrected image of a press frame; refuses a frame of another shape than the reference."""
+    """Return the corrected image of a press frame, as if it were lit as brightly as the reference.
+
+    Refuses a frame of another shape than the reference, or whose sides are lit in another proportion.
+    """
     if frame.counts.shape != reference.dark.shape:
         found, expected = ("{1} x {0} px".format(*shape) for shape in (frame.counts.shape, reference.dark.shape))
         raise InvalidQuantity("frame shape", found, f"{expected} like the reference", "use one camera mode")
     base = reference.above_dark(frame.force_n)
     valid = base >= _floor(frame.counts)
     lit = frame.counts.astype(np.float32) - reference.dark
+    lit /= np.float32(brightness_of(frame.led_ratio, reference.led_ratio))
     contrast = np.divide(lit, base, out=np.ones_like(base), where=valid) - np.float32(1.0)
     return TactileImage(contrast=contrast, valid=valid, scale=scale, force_n=frame.force_n)
 

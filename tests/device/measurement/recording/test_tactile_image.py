@@ -1,5 +1,7 @@
 """Frames to contrast, with answers worked out on paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,27 @@ def test_half_again_the_light_of_the_reference_is_a_contrast_of_one_half():
 def test_a_press_that_looks_like_the_reference_has_no_contrast():
     image = image_of(frame("press", 104), frame("reference", 104))
     assert not image.contrast.any()
+
+
+def test_a_press_under_half_the_light_is_read_as_if_under_the_whole():
+    """(79 - 4) / 0.5 / (104 - 4) - 1 = 0.5."""
+    dimmed = replace(frame("press", 79, 0.5), led_ratio=(0.3, 0.3, 0.3, 0.3))
+    image = image_of(dimmed, frame("reference", 104, 0.5))
+    np.testing.assert_allclose(image.contrast, 0.5, atol=1e-6)
+
+
+def test_reference_frames_of_two_brightnesses_are_one_light():
+    """(54 - 4) / 0.5 is the 100 counts of the other one."""
+    dimmed = replace(frame("reference", 54), led_ratio=(0.3, 0.3, 0.3, 0.3))
+    assert not image_of(frame("press", 104), frame("reference", 104), dimmed).contrast.any()
+
+
+@pytest.mark.parametrize("sides", [(0.6, 0.6, 0.6, 0.3), (0.0, 0.0, 0.0, 0.0)])
+def test_sides_in_another_proportion_than_the_references_are_refused(sides):
+    with pytest.raises(
+        InvalidQuantity, match="^led_ratio of a frame is .* press beside the lesion and on it under one"
+    ):
+        image_of(replace(frame("press", 104), led_ratio=sides), frame("reference", 104))
 
 
 def test_sixteen_bit_frames_have_the_same_contrast():
