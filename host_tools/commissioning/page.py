@@ -37,6 +37,7 @@ def commissioning_page(
 
     Every text of a file, names above all, is escaped.
     """
+    inclusions = {one.name for one in done.phantoms}
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -52,8 +53,8 @@ def commissioning_page(
         is_simulated=is_simulated,
         gates=[gate.as_record() for gate in done.gates],
         ranges={name: RANGES[name] for name in (*UNKNOWNS, "tissue_modulus_kpa", "slab_thickness_mm")},
-        inclusions=len(done.phantoms),
-        blocks=len(done.names) - len(done.phantoms),
+        inclusions=len(inclusions),
+        blocks=len(set(done.names) - inclusions),
         covered=_covered(done),
         ramps=list(_ramps(done)),
         directions=list(_directions(done.fit)),
@@ -82,7 +83,7 @@ def _pictures(done: CommissionedProbe) -> Iterator[tuple[str, str]]:
 
 
 def _covered(done: CommissionedProbe) -> list[dict[str, Any]]:
-    """Return of each unknown how many phantoms left out are determined, and how many of these cover their truth."""
+    """Return of each unknown in how many phantoms left out it is determined, and in how many of these covered."""
     known = np.array([one.is_determined for one in done.phantoms])
     held = np.array([one.is_covered for one in done.phantoms]) & known
     columns = zip(pictures.UNKNOWN_LABELS.values(), held.sum(axis=0), known.sum(axis=0), strict=True)
@@ -104,16 +105,17 @@ def _ramps(done: CommissionedProbe) -> Iterator[dict[str, Any]]:
 
 
 def _directions(fit: ProbeFit) -> Iterator[dict[str, Any]]:
-    """Yield each direction of the probe, with half the 90 % intervals of what is found and of its tolerance."""
-    std = np.sqrt(np.diag(fit.covariance))
-    for number, mean, own in zip(PROBE, fit.mean, std, strict=True):
+    """Yield each direction of the probe with half of the 90 % interval of what is found, and of its tolerance."""
+    half, prior = pictures.HALF_WIDTH_STD, fit.prior
+    columns = zip(PROBE, fit.mean, np.sqrt(np.diag(fit.covariance)), np.abs(fit.tolerances_away), strict=True)
+    for number, mean, std, away in columns:
         yield {
             "label": pictures.LABELS[NAMES[number]],
-            "expected": fit.prior.mean[number],
+            "expected": prior.mean[number],
             "mean": mean,
-            "half": pictures.HALF_WIDTH_STD * own,
-            "tolerance": pictures.HALF_WIDTH_STD * fit.prior.std[number],
-            "away": abs(mean - fit.prior.mean[number]) / fit.prior.std[number],
+            "half": half * std,
+            "tolerance": half * prior.std[number],
+            "away": away,
         }
 
 

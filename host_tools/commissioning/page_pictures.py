@@ -94,8 +94,8 @@ def _panel(canvas: Any, line: int, column: int, below: bool) -> Any:
     return canvas.add_axes(np.divide(place, (WIDTH_IN, height_in, WIDTH_IN, height_in)))
 
 
-def _map(panel: Any, cells: Array, end: float, what: str) -> Any:
-    """Draw one map of cells [forces x rings], and how large they are; return what a colour bar needs."""
+def _map(panel: Any, cells: Array, end: float, what: str = "") -> Any:
+    """Draw one map of cells [forces x rings], and how large `what` is; return what a colour bar needs."""
     of_force = cells.reshape(-1, RINGS)
     rings = np.append(RING_RADII_MM, RING_RADII_MM[-1] + RING_MM) - RING_MM / 2
     shown = panel.pcolormesh(
@@ -114,9 +114,9 @@ def _map(panel: Any, cells: Array, end: float, what: str) -> Any:
     if np.isnan(of_force).all():
         panel.set_facecolor("0.94")
         panel.text(0.5, 0.5, "bare block: no contrast", transform=panel.transAxes, ha="center", va="center", fontsize=7)
-    else:
+    elif what:
         rms = float(np.sqrt(np.mean(of_force**2)))
-        panel.set_title(f"{what} {rms:.1f} rms", fontsize=7, loc="right", pad=2)
+        panel.set_title(f"{what} {rms:.1f} rms", fontsize=7, loc="right", pad=3.5)
     return shown
 
 
@@ -125,15 +125,14 @@ def lacking_maps(discrepancy: Discrepancy) -> str:
 
     def draw(canvas: Any) -> None:
         for panel, columns, factor, title in zip(
-            canvas.subplots(1, 2, width_ratios=(4, 4)),
+            canvas.subplots(1, 2),
             (CONTRAST, RESPONSE),
             (100, 1000),
             ("contrast: % of what an inclusion does", "reference force response: permille of the light"),
             strict=True,
         ):
             cells = factor * discrepancy.mean[0, columns]
-            shown = _map(panel, cells, max(0.1, float(np.abs(cells).max())), "")
-            panel.set_title("")
+            shown = _map(panel, cells, max(0.1, float(np.abs(cells).max())))
             panel.set_title(title, fontsize=8, loc="left")
             panel.set_xlabel("ring (mm from the middle)")
             canvas.colorbar(shown, ax=panel)
@@ -145,7 +144,7 @@ def lacking_maps(discrepancy: Discrepancy) -> str:
 def probe_posterior(fit: ProbeFit) -> str:
     """Return each direction of the probe, its mean and 90 % interval beside its tolerance, in tolerances."""
     std, tolerance = np.sqrt(np.diag(fit.covariance)), fit.prior.std[PROBE]
-    at, mean = np.arange(len(PROBE)), (fit.mean - fit.prior.mean[PROBE]) / tolerance
+    at, mean = np.arange(len(PROBE)), fit.tolerances_away
 
     def draw(canvas: Any) -> None:
         panel = canvas.subplots()
@@ -159,7 +158,7 @@ def probe_posterior(fit: ProbeFit) -> str:
         panel.set_ylim(len(at) - 0.5, -0.5)
         farthest = max(3.0, float(np.max(np.abs(mean) + believed)) * 1.05)
         panel.set_xlim(-farthest, farthest)
-        panel.set_xlabel("from what was expected, in standard deviations of its tolerance")
+        panel.set_xlabel("found less expected, in standard deviations of the tolerance")
         canvas.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=7.5)
 
     return svg("posterior", 1.0 + 0.28 * len(PROBE), draw)
@@ -246,7 +245,7 @@ def believed_coverage(modes: Sequence[tuple[str, EvaluatedPresses]]) -> str:
         determined.set_xlabel("determined (%)")
         covered.set_xlim(40, 100)
         covered.axvline(100 * COVERAGE, color="0.3", lw=1, ls="--")
-        covered.set_xlabel("of these covered (%); dashed: what an interval promises")
+        covered.set_xlabel("of these covered (%)")
 
     return svg("coverage", 2.1, draw)
 

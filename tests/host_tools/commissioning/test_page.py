@@ -109,7 +109,7 @@ def test_the_verdict_comes_first_in_plain_words():
     verdict = shown.words["verdict"]
     assert "Probe TSIS-0007 may answer presses until 24 November 2027: all 1 gates are passed." in verdict
     assert "2 phantoms with an inclusion and 1 bare blocks" in verdict
-    assert "1 of 2 size intervals" in verdict
+    assert "Of 2 answers, size is determined in 2, and 1 of these hold the truth;" in verdict
     assert "modes standard and precise of serial number TSIS-0007" in verdict
     assert shown.words["all"].index("may answer presses") < shown.words["all"].index("Phantoms left out")
 
