@@ -55,6 +55,7 @@ def write_own_bundle(
     """Write the bundle of a probe to a new folder, from the design's in `design`; whole or not at all.
 
     With a certificate the bundle holds as long as that, else for `valid_days` from `made_at`.
+    `origin` names `phantoms` and `design`.
     Beside it stands `PAGE_FILE`, which also says what more would buy, `advice`, and whether ramps were simulated.
     Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
     """

@@ -235,7 +235,7 @@ def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives,
         made_at=made_at,
         valid_days=365,
         command="host_tools commission",
-        origin={"phantoms": "PH-7"},
+        origin={"phantoms": "PH-7", "design": "standard"},
     )
     own = read_ramp_model(out)
     own.prove()
