@@ -21,7 +21,7 @@ from host_tools.scenes.phantom_set import BLOCKS_NEEDED, PhantomSet, read_phanto
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.probe_file import read_probe
 
-Read = TypeVar("Read")
+OfFile = TypeVar("OfFile")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def read_bench(recordings: Sequence[Path], probe: Path, phantoms: Path, design: 
     return StatedBench(made_by, stated, taken, taken_on, ramps, prior_of(made_by, design, counts_per_n_of(taken)))
 
 
-def _told(read: Callable[[], Read], problems: list[InvalidQuantity], above: str = "") -> Read | None:
+def _told(read: Callable[[], OfFile], problems: list[InvalidQuantity], above: str = "") -> OfFile | None:
     """Return what is read; or None, and add what is wrong with it to the problems, `above` before each quantity."""
     try:
         return read()

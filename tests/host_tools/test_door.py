@@ -90,7 +90,7 @@ def test_without_a_tolerance_the_best_is_returned_with_a_warning():
 @pytest.mark.long
 def test_strain_follows_the_tolerance_unless_it_is_asked_for(solution):
     assert solution.plan.strain == "small"
-    assert tsis.solve(SCENE, tolerance=0.2).plan.strain == "small"
+    assert tsis.solve(SCENE, tolerance=0.5).plan.strain == "small"  # at 0.5 N it is said to depart by more than 0.2
     assert tsis.solve(SCENE, tolerance=0.05).plan.strain == "finite"
 
 

@@ -88,7 +88,9 @@ def test_each_is_a_command_line_that_the_toolkit_takes(command):
 
 
 def test_make_train_is_this_chain():
-    told = subprocess.run(["make", "-n", "train"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    told = subprocess.run(
+        ["make", "--no-print-directory", "-n", "train"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
     assert told.splitlines()[-1].endswith("host_tools train --mode all")
 
 

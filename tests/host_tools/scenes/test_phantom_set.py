@@ -136,7 +136,7 @@ def test_the_set_of_the_simulated_probe_is_what_host_tools_phantom_records():
 
 def test_the_phantom_of_the_page_is_one(tmp_path):
     page = (Path(__file__).parents[3] / "docs" / "own_probe.md").read_text(encoding="utf-8")
-    [example] = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    [example] = re.findall(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     table = good()
     table["phantoms"][1:2] = tomllib.loads(example)["phantoms"]
     assert read_phantoms(written(tmp_path, table)).phantoms[1].inclusion == Inclusion(10.0, 6.1, 82.0)
