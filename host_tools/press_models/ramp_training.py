@@ -155,7 +155,8 @@ class ModeEvaluation:
         rng = np.random.default_rng(seed)
         at = normalise(draw_parameters(simulated, rng))
         further = further_offsets_mm(simulated, rng) if mode == "precise" else [np.zeros(0)] * simulated
-        drawn = in_parallel(lambda i: self._simulated(at[i], further[i], [seed, i]), simulated, self.jobs)
+        answers = self.answers  # what says what begins may hold a lock, which no process takes along
+        drawn = in_parallel(lambda i: _simulated(answers, at[i], further[i], [seed, i]), simulated, self.jobs)
         rows, directions = zip(*drawn, strict=True)
         answered = evaluated(at[:, :THREE], answers_to(self.answers, self.guess, rows, directions, self.jobs))
         recording = derived_seed(self.seed, "judged recordings" if mode == "standard" else "judged recorded scans")
@@ -175,9 +176,11 @@ class ModeEvaluation:
         ramps = np.array([1 + len(offsets_mm) for offsets_mm in further])
         return outcome_of(answered, recorded, found, self.answers, self.log_odds, ramps)
 
-    def _simulated(self, at: Array, further_mm: Array, seed: list[int]) -> tuple[Array, Array]:
-        offsets_mm = np.append(at[OFFSET] + 1, further_mm)
-        return random_scan(self.answers.surrogate, self.answers.noise, at, offsets_mm, np.random.default_rng(seed))
+
+def _simulated(answers: RampAnswers, at: Array, further_mm: Array, seed: list[int]) -> tuple[Array, Array]:
+    """Return rows and directions of a press or scan with noise."""
+    offsets_mm = np.append(at[OFFSET] + 1, further_mm)
+    return random_scan(answers.surrogate, answers.noise, at, offsets_mm, np.random.default_rng(seed))
 
 
 def further_offsets_mm(count: int, rng: np.random.Generator) -> list[Array]:

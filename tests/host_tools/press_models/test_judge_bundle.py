@@ -6,6 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from threading import Lock
 
 import pytest
 
@@ -23,7 +24,13 @@ def judged(tables, tmp_path_factory) -> Path:
     """Return the shipped bundle after a few presses and recordings have judged it."""
     folder = tmp_path_factory.mktemp("judged") / "standard"
     shutil.copytree(MODELS / "standard", folder)
-    judge_bundle(folder, tables, budget=FEW, seed=5, jobs=1)
+    lock = Lock()  # as a terminal's printing has: no other process can take it along
+
+    def say(step: str) -> None:
+        with lock:
+            print(step)
+
+    judge_bundle(folder, tables, budget=FEW, seed=5, jobs=2, say=say)
     return folder
 
 

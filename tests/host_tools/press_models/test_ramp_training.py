@@ -78,13 +78,12 @@ def slopes_of_offset() -> LinearRows:
 def test_a_simulated_press_lies_where_it_was_drawn_and_further_ones_where_they_are_meant(further_mm):
     """Coordinates of 0 to 2 mm run from -1 to 1; noise is next to none."""
     answers = RampAnswers(slopes_of_offset(), white_noise(1e-6))
-    evaluation = ModeEvaluation(None, answers, lambda rows: rows, lambda rows: rows)
     at = normalise(draw_parameters(1, np.random.default_rng(2)))[0]
-    rows, direction_rad = evaluation._simulated(at, further_mm, [1, 2])
+    rows, direction_rad = ramp_training._simulated(answers, at, further_mm, [1, 2])
     assert len(np.unique(direction_rad)) == len(rows) == 1 + len(further_mm)
     seen_mm = rows[:, FIRST].mean(axis=1) + HIGH[OFFSET] / 2
     np.testing.assert_allclose(seen_mm, [at[OFFSET] + 1, *further_mm], atol=1e-4)
-    again, other = (evaluation._simulated(at, further_mm, [1, number]) for number in (2, 3))
+    again, other = (ramp_training._simulated(answers, at, further_mm, [1, number]) for number in (2, 3))
     np.testing.assert_array_equal(again[0], rows)
     np.testing.assert_array_equal(again[1], direction_rad)
     assert (other[0] != rows).any()
