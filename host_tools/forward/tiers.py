@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from netgen.meshing import NgException
 
 from host_tools.forward.face_state import Rays
+from host_tools.forward.materials import baseline
 from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
 from host_tools.forward.meshes.morph import morphed_mesh
 from host_tools.forward.meshes.solid_mesh import COARSE, FINE, LAYERED, SolidResolution, solid_mesh
@@ -97,7 +98,7 @@ def _without_inclusion(scene: Scene) -> RoundBody:
     """Return the body of a scene in axisymmetry, which it has but for the inclusion."""
     plain = replace(scene, inclusion=None, placement=Placement())
     mesh = axisymmetric_mesh(plain, order=ROUND_ORDER, resolution=AXISYMMETRIC_SIZES[GRADED])
-    return RoundBody(mesh, FaceSampler(mesh, Rays.over(scene.waveguide), "axisymmetric"))
+    return RoundBody(mesh, baseline(scene), FaceSampler(mesh, Rays.over(scene.waveguide), "axisymmetric"))
 
 
 def _mesh(scene: Scene, plan: ModelPlan) -> Any:

@@ -125,12 +125,11 @@ def tolerant(design: Design) -> OwnAnswers:
 
 def joined(parts: Sequence[ScoredPresses]) -> ScoredPresses:
     """Return the answers of several probes as one; numbers stay those of each."""
-    names = [field.name for field in fields(EvaluatedPresses) if parts[0].evaluated.in_region is not None]
-    names = names or [field.name for field in fields(EvaluatedPresses)][:-1]
-    whole = (np.concatenate([getattr(one.evaluated, name) for one in parts]) for name in names)
+    names = [field.name for field in fields(EvaluatedPresses) if getattr(parts[0].evaluated, field.name) is not None]
+    whole = {name: np.concatenate([getattr(one.evaluated, name) for one in parts]) for name in names}
     others = [field.name for field in fields(ScoredPresses)][1:]
     return ScoredPresses(
-        EvaluatedPresses(*whole), *(np.concatenate([getattr(one, name) for one in parts]) for name in others)
+        EvaluatedPresses(**whole), *(np.concatenate([getattr(one, name) for one in parts]) for name in others)
     )
 
 

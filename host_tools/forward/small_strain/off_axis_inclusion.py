@@ -49,9 +49,10 @@ def is_round_but_for_inclusion(scene: Scene) -> bool:
 
 
 class RoundBody(NamedTuple):
-    """The half plane of the body without its inclusion, and what samples its face."""
+    """The half plane of the body without its inclusion, what it is made of, and what samples its face."""
 
     mesh: Any
+    elasticity: Elasticity
     sampler: FaceSampler
 
 
@@ -65,54 +66,31 @@ class OffAxisModel:
 
     def press(self, elasticity: Elasticity, presses: Sequence[Press], *, estimate_error: bool) -> tuple[Loaded, ...]:
         """Return the face at every press, at the model's order and at the other; raise `PressFailed` where it folds."""
-        plain = without_inclusion(elasticity)
-        unit = self._unit(elasticity, plain, self.order)
-        require_reach(presses, unit, self._folding(elasticity, plain))
-        other = self._unit(elasticity, plain, self.other_order) if estimate_error else None
+        unit = self._unit(elasticity, self.order)
+        require_reach(presses, unit, self._folding(elasticity))
+        other = self._unit(elasticity, self.other_order) if estimate_error else None
         return tuple(
             Loaded(at_press(press, unit), None if other is None else at_press(press, other)) for press in presses
         )
 
-    def _unit(self, elasticity: Elasticity, plain: Elasticity, order: int) -> FaceState:
+    def _unit(self, elasticity: Elasticity, order: int) -> FaceState:
         """Return the face under the unit press; the round body's order follows that of the inclusion's."""
-        pressed = self._pressed_without(_Constants.of(plain), ROUND_ORDER + order - self.order)
-        state = on_all_rays(pressed.press.face_state(pressed.u, plain, self.without.sampler), self.sampler)
-        if elasticity == plain:
+        pressed = self._pressed_without(ROUND_ORDER + order - self.order)
+        plain = pressed.press.face_state(pressed.u, pressed.elasticity, self.without.sampler)
+        state = on_all_rays(plain, self.sampler)
+        if elasticity == pressed.elasticity:
             return state
         return _sum(state, Difference(self.mesh, order, elasticity, pressed).face_state(self.sampler))
 
-    def _solved_without(self, constants: _Constants, order: int) -> SolvedPress:
-        return SolvedPress(LinearPress(self.without.mesh, AXISYMMETRIC, order), constants.elasticity())
+    def _solved_without(self, order: int) -> SolvedPress:
+        return SolvedPress(LinearPress(self.without.mesh, AXISYMMETRIC, order), self.without.elasticity)
 
-    def _folding(self, elasticity: Elasticity, plain: Elasticity) -> Folding:
-        if elasticity == plain:
-            solved = self._pressed_without(_Constants.of(plain), ROUND_ORDER)
+    def _folding(self, elasticity: Elasticity) -> Folding:
+        if elasticity == self.without.elasticity:
+            solved = self._pressed_without(ROUND_ORDER)
         else:
             solved = SolvedPress(LinearPress(self.mesh, SOLID, FOLDING_ORDER), elasticity)
         return Folding(solved.press.contact, solved.u)
-
-
-class _Constants(NamedTuple):
-    """The constants of an `Elasticity` as what can be looked up."""
-
-    modulus_kpa: tuple[tuple[str, float], ...]
-    poisson_ratio: tuple[tuple[str, float], ...]
-
-    @classmethod
-    def of(cls, elasticity: Elasticity) -> _Constants:
-        return cls(tuple(elasticity.modulus_kpa.items()), tuple(elasticity.poisson_ratio.items()))
-
-    def elasticity(self) -> Elasticity:
-        return Elasticity(dict(self.modulus_kpa), dict(self.poisson_ratio))
-
-
-def without_inclusion(elasticity: Elasticity) -> Elasticity:
-    """Return the materials with each part of the inclusion made of the tissue around it."""
-
-    def around(values: dict[str, float]) -> dict[str, float]:
-        return {name: values[name.replace("inclusion", "tissue")] for name in values}
-
-    return Elasticity(around(elasticity.modulus_kpa), around(elasticity.poisson_ratio))
 
 
 class Difference:
