@@ -39,10 +39,14 @@ FURTHER_MM, STRAY_MM, NEAREST_MM = (3.0, 4.0, 2.0, 5.0), 1.0, 0.5
 
 @dataclass(frozen=True)
 class TrainingBudget:
-    """How many presses go into each step; the defaults take some ninety minutes on two cores."""
+    """How many presses go into each step; the defaults take some two hours on two cores.
 
-    presses: int = 10_000
-    beside: int = 12_700
+    `presses` and `beside` are many times the polynomials' terms: with a third of them those miss large, shallow and
+    soft inclusions by far more than a scan's noise, and its intervals hold too seldom.
+    """
+
+    presses: int = 30_000
+    beside: int = 36_000
     held_out: int = 600
     noise_recordings: int = 1_200
     noise_recordings_beside: int = 1_000
