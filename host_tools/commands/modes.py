@@ -23,7 +23,7 @@ def modes(
     only: Annotated[
         list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it. The page keeps the others.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of chapters dial, posterior, scan and noise-free.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of chapters dial, posterior, scan, missed and noise-free.")] = 1,
     scheduler: Scheduler = None,
 ) -> None:
     """Measure error, time, coverage and refusals of the modes against bounds; some hours on two cores.
@@ -42,7 +42,7 @@ def modes(
     from host_tools.scores.dial import dial_chapter
     from host_tools.scores.ellipsoids import oblong_chapter
     from host_tools.scores.just_outside import just_outside_chapter
-    from host_tools.scores.noise_free import noise_free_chapter
+    from host_tools.scores.noise_free import missed_chapter, noise_free_chapter
     from host_tools.scores.outside import kinds, outside_chapter
     from host_tools.scores.posterior import posterior_chapter
     from host_tools.scores.rank_histograms import rank_chapter
@@ -62,6 +62,7 @@ def modes(
         "posterior": lambda: posterior_chapter(trained, seed=seed),
         "ranks": lambda: rank_chapter(trained, seed=seed),
         "scan": lambda: scan_chapter(trained, seed=seed),
+        "missed": lambda: missed_chapter(trained, tables, seed=seed),
         "noise-free": lambda: noise_free_chapter(trained.answers, tables, seed=seed),
         "span": lambda: span_chapter(trained, tables),
         "outside": lambda: outside_chapter(
