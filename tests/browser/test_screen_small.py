@@ -113,7 +113,7 @@ def test_each_mode_says_its_worth_and_leaves_the_figures_whole(
     probe.procedure.board.update(measurement_id=None)
     page, wrong = opened(browser, probe, size, locale=language), {}
     for who in ("nobody", "A-17"):
-        for index, error in enumerate(["±5 %", "±3 %", "±2 %", ""]):
+        for index, error in enumerate(["±5 %", "±4 %", "±2 %", ""]):
             page.locator("#modes label").nth(index).click()
             worth = page.locator("#mode-trade" if size == SMALLEST else "#modes input:checked + .mode-words")
             expect(worth).to_contain_text(error.replace(" ", "\u00a0"))

@@ -64,4 +64,4 @@ def test_the_card_says_how_many_presses_judged(judged: Path) -> None:
         4,
         4,
     )
-    assert effort["presses"] == 10_000  # of the training, which nothing repeats
+    assert effort["presses"] == 30_000  # of the training, which nothing repeats
