@@ -34,7 +34,7 @@ from host_tools.press_models.mode_statistics import reachable_half_width, statis
 VALID_DAYS = Bound(1.0, 730.0, "days")
 """How long a commissioning may hold: silicone stiffens, LEDs fade."""
 CERTIFICATE_FILE = "calibration.json"
-OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width"
+OF_DESIGN = "dial", "recorded", "simulated", "reachable_half_width", "half_width_by_ramps"
 """What a card says of the design's own probe, and of no other."""
 
 

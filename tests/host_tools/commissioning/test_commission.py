@@ -256,6 +256,7 @@ def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives,
     assert answer.mean == pytest.approx(before.mean, abs=1e-3)
     card = json.loads((out / "model.json").read_text())
     assert "dial" not in card["modes"]["standard"]
+    assert "half_width_by_ramps" not in card["modes"]["precise"]  # that is of the design's scans
     of_layer = card["commissioned"]["probe"][LAYERS[0]]
     assert (of_layer["expected"], of_layer["tolerance"]) == (0.0, 0.1)
     (out / "model.json").write_text(json.dumps(card | {"serials": ["TSIS-0008"]}))
