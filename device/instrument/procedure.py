@@ -204,7 +204,7 @@ class Procedure:
         """
         mode = mode or self.config.press.mode
         if wanted:
-            wanted.require_for(mode, self._worth.get(mode))
+            wanted.require_for(mode, self._worth.get(mode), press_cost(mode, self.config).seconds)
         return self._requests.ask(mode, wanted, once=once, exam=exam)
 
     def request_once(

@@ -278,6 +278,7 @@ class ModelBundle:
             median_percent={name: fields.of(f"{path}.median_percent.{name}", float) for name in UNKNOWNS},
             determined_ratio={name: fields.of(f"{path}.determined.{name}", float) for name in UNKNOWNS},
             reachable_half_width=self._reachable(f"modes.{mode}"),
+            half_width_by_ramps=self._by_ramps(f"modes.{mode}"),
         )
 
     def _reachable(self, path: str) -> dict[str, float] | None:
@@ -286,6 +287,18 @@ class ModelBundle:
             return None
         path = f"{path}.reachable_half_width"
         return {name: self.fields.of(f"{path}.{name}", float) for name in self.fields.of(path, dict)}
+
+    def _by_ramps(self, path: str) -> dict[int, dict[str, tuple[float, ...]]]:
+        """Return the half widths that the card states of scans of so many ramps; {} when it states none."""
+        if "half_width_by_ramps" not in self.fields.of(path, dict):
+            return {}
+        path, by_ramps = f"{path}.half_width_by_ramps", {}
+        for ramps in self.fields.of(path, dict):
+            if not ramps.isdecimal():
+                self.fields.refuse(path, repr(ramps), "by numbers of ramps")
+            columns = {name: self.fields.table(f"{path}.{ramps}.{name}", 1)[:, 0] for name in UNKNOWNS}
+            by_ramps[int(ramps)] = {name: tuple(column.tolist()) for name, column in columns.items()}
+        return by_ramps
 
     def estimate(self, features: NDArray[np.floating[Any]]) -> Raw:
         """Return the raw estimate of features [n, F], in the order and units of `feature_names`.

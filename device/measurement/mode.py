@@ -8,7 +8,7 @@ Measured error and time of each: the model cards, and docs/modes.md.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from device.measurement.quantities import InvalidQuantity
@@ -55,7 +55,8 @@ class ModeWorth:
     `compute_s`: the time of an answer on the machine that measured. `answered_ratio`: the share of presses that got
     numbers; of those, by unknown, the median error in percent and the share that was called determined.
     `reachable_half_width`: half of the narrowest 90 % interval that can be had, by unknown in its own unit; None where
-    nothing is known.
+    nothing is known. `half_width_by_ramps`: of scans of so many ramps, those that 5, 10, ... 95 % of the inclusions
+    have at most; {} where nothing is known.
     """
 
     compute_s: float
@@ -63,6 +64,7 @@ class ModeWorth:
     median_percent: Mapping[str, float]
     determined_ratio: Mapping[str, float]
     reachable_half_width: Mapping[str, float] | None = None
+    half_width_by_ramps: Mapping[int, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
 
 
 def mode_of(force_n: Sequence[float], ramps: int = 1) -> Mode:

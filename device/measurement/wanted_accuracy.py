@@ -43,20 +43,37 @@ class WantedAccuracy:
         """Whether anything is asked for."""
         return bool(self.until) or self.within_s is not None
 
-    def require_for(self, mode: Mode, worth: ModeWorth | None) -> None:
+    def require_for(self, mode: Mode, worth: ModeWorth | None, press_s: float = 0.0) -> None:
         """Raise `InvalidQuantity` for a mode that is no scan, or an accuracy that it cannot reach, with the nearest.
 
-        A mode whose worth does not say what it reaches takes everything.
+        `press_s`: what one press takes, which says how many there is time for. A mode whose worth does not say what it
+        reaches takes everything.
         """
         if self.is_asked and not FRAMES[mode].is_scan:
             name, scan = "until" if self.until else "within_s", "asked for in mode precise"
             raise InvalidQuantity(name, f"asked for in mode {mode}", scan, "choose mode precise")
-        reachable = worth.reachable_half_width if worth and worth.reachable_half_width else {}
+        reachable = self._reachable(mode, worth, press_s) if worth else {}
         for name, value in self.until.items():
             if value < reachable.get(name, 0.0):
                 bound = Bound(reachable[name], UNTIL_BOUNDS[name].high, UNTIL_BOUNDS[name].unit)
-                nearest = f"the nearest that can be had is {bound.low:g} {bound.unit}"
+                nearest = f"the nearest that can be had{self._in_time()} is {bound.low:g} {bound.unit}"
                 raise InvalidQuantity(f"until.{name}", value, str(bound), nearest)
+
+    def _in_time(self) -> str:
+        return "" if self.within_s is None else f" within {self.within_s:g} s"
+
+    def _reachable(self, mode: Mode, worth: ModeWorth, press_s: float) -> dict[str, float]:
+        """Return the narrowest half widths of scans, of as many presses as there is time for.
+
+        The one that is under way when the time is over still counts.
+        """
+        reachable = dict(worth.reachable_half_width or {})
+        if self.within_s is None or press_s <= 0.0:
+            return reachable
+        fewest, most = FRAMES[mode].fewest_ramps, FRAMES[mode].most_ramps
+        ramps = min(max(1 + int(self.within_s / press_s), fewest), most)
+        of_ramps = worth.half_width_by_ramps.get(ramps, {})
+        return reachable | {name: max(widths[0], reachable.get(name, 0.0)) for name, widths in of_ramps.items()}
 
     def is_reached(self, half_width: Mapping[str, float]) -> bool | None:
         """Return whether intervals are as narrow as was asked for; None when nothing was asked."""

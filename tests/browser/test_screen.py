@@ -153,11 +153,13 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
 def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     """To be asked for before the probe: each further press on the lesion makes the intervals narrower.
 
-    Size and depth cannot be surer than 0.8 mm, and the modulus is not known by the first press.
+    Size and depth cannot be surer than 0.8 mm, the size is that sure in four inclusions of five, and the modulus is not
+    known by the first press.
     """
     reachable = {"size_mm": 0.8, "depth_mm": 0.8, "youngs_modulus_kpa": 9.0}
     errors = {"size_mm": 2.0, "depth_mm": 2.2, "youngs_modulus_kpa": 19.0}
-    worth = {"precise": ModeWorth(0.4, 0.9, errors, {}, reachable)}
+    widths = {"size_mm": (0.8,) * 16 + (5.2,) * 3, "depth_mm": (0.8,) * 19, "youngs_modulus_kpa": (9.0,) * 19}
+    worth = {"precise": ModeWorth(0.4, 0.9, errors, {}, reachable, {5: widths})}
 
     def advise(recording: Recording) -> ScanAdvice:
         ramps = len(recording.ramps())
@@ -287,10 +289,13 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
     expect(page.locator("#until")).to_be_hidden()
     page.locator("#modes label").filter(has_text="precise").click()
     steps = page.locator("#until label")
-    expect(steps).to_have_text(["possible", "± 2 mm", "± 1 mm", "± 0.5 mm"])
+    expect(steps).to_have_text(["possible", "± 1 mm8 of 10", "± 0.5 mm", "± 0.2 mm"])
+    expect(steps.nth(2).locator("input")).to_be_disabled()
     expect(steps.nth(3).locator("input")).to_be_disabled()
-    expect(page.locator("#status-reason")).to_have_text(re.compile("^A scan: one press beside the lesion, then two to"))
-    steps.nth(2).click()
+    expect(page.locator("#status-reason")).to_have_text(
+        "A scan: one press beside the lesion, then two to five on it. Below: how many in ten get that sure."
+    )
+    steps.nth(1).click()
     shoot(page, "scan-asked")
     _require_fits(page)
     page.locator("#press-button").click()

@@ -83,6 +83,7 @@ class ModeOffer:
             "answered_ratio": worth and worth.answered_ratio,
             "determined_ratio": worth and dict(worth.determined_ratio),
             "reachable_half_width": _as_record(worth.reachable_half_width) if worth else None,
+            "half_width_by_ramps": {f"{n}": dict(row) for n, row in worth.half_width_by_ramps.items()} if worth else {},
         }
 
 

@@ -6,7 +6,7 @@ from device.files.bundle_file import read_models
 from device.measurement.bundle import BundleRefused
 from device.measurement.mode import MODES
 from device.measurement.mode_models import ModeModels, analysed, mode_of_recording
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.quick_mode.model import estimate_quick
 from device.measurement.ramp_modes.estimate import advise_scan, estimate_ramp
 
@@ -33,6 +33,22 @@ def test_what_cannot_be_surpassed_is_known_where_the_card_says_so(models, ramp_m
     monkeypatch.setitem(entry, "reachable_half_width", {"size_mm": "small"})
     with pytest.raises(BundleRefused, match=r"modes\.precise\.reachable_half_width\.size_mm is 'small'"):
         models.worth("precise")
+
+
+def test_how_sure_scans_become_press_by_press_is_known_where_the_card_says_so(models, ramp_model, monkeypatch):
+    entry, rows = ramp_model.bundle.card["modes"]["precise"], {key: [0.5, 1] for key in UNKNOWNS}
+    monkeypatch.delitem(entry, "half_width_by_ramps", raising=False)
+    assert models.worth("precise").half_width_by_ramps == {}
+    monkeypatch.setitem(entry, "half_width_by_ramps", {"2": rows})
+    assert models.worth("precise").half_width_by_ramps == {2: dict.fromkeys(UNKNOWNS, (0.5, 1.0))}
+    for wrong, said in (
+        ({"two": rows}, "'two'"),
+        ({"2": {}}, "size_mm is missing"),
+        ({"2": rows | {"depth_mm": ["a"]}}, "depth_mm is no"),
+    ):
+        monkeypatch.setitem(entry, "half_width_by_ramps", wrong)
+        with pytest.raises(BundleRefused, match=rf"half_width_by_ramps.*{said}"):
+            models.worth("precise")
 
 
 def test_a_scan_is_advised_by_the_ramps_model_and_by_no_other(models, bundle, ramp_model, calibration, pressed):

@@ -1,6 +1,7 @@
 """What a scan may be asked for, what it cannot have, and when it is there."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -53,6 +54,22 @@ def test_what_cannot_be_reached_is_refused_with_the_nearest_and_what_nobody_know
     WantedAccuracy({"size_mm": 0.001}).require_for("precise", ModeWorth(0.1, 0.9, {}, {}))
     with pytest.raises(InvalidQuantity, match=r"until\.size_mm is 0\.79, .* at least 0\.8 .* be had is 0\.8 mm"):
         WantedAccuracy({"size_mm": 0.79}).require_for("precise", WORTH)
+
+
+def test_with_a_time_it_must_be_there_in_as_many_presses_as_there_is_time_for():
+    """Presses of 10 s: the third is under way when 25 s are over, and a fourth when 30 s are."""
+    widths = {2: {"size_mm": (2.0, 3.0)}, 3: {"size_mm": (1.5, 2.0)}, 4: {"size_mm": (0.7, 1.0)}}
+    worth = replace(WORTH, half_width_by_ramps=widths)
+    WantedAccuracy({"size_mm": 1.5, "depth_mm": 0.5}, 25.0).require_for("precise", worth, 10.0)
+    WantedAccuracy({"size_mm": 0.8}, 30.0).require_for("precise", worth, 10.0)
+    WantedAccuracy({"size_mm": 0.8}, 300.0).require_for("precise", worth, 10.0)
+    WantedAccuracy({"size_mm": 0.8}).require_for("precise", worth, 10.0)
+    with pytest.raises(InvalidQuantity, match=r"is 1\.49, .* at least 1\.5 .* be had within 25 s is 1\.5 mm"):
+        WantedAccuracy({"size_mm": 1.49}, 25.0).require_for("precise", worth, 10.0)
+    with pytest.raises(InvalidQuantity, match=r"at least 2 and .* within 5 s is 2 mm"):
+        WantedAccuracy({"size_mm": 1.9}, 5.0).require_for("precise", worth, 10.0)
+    with pytest.raises(InvalidQuantity, match=r"at least 0\.8 and .* within 30 s is 0\.8 mm"):
+        WantedAccuracy({"size_mm": 0.79}, 30.0).require_for("precise", worth, 10.0)
 
 
 def test_it_is_reached_when_all_that_was_asked_for_is_and_nothing_is_not_reached_by_anything():

@@ -237,10 +237,11 @@ def test_the_device_says_how_long_its_leds_were_on_and_in_which_modes_it_measure
     assert device["modes"] == [
         {"mode": "paper", "frames": 10, "kind": "hold", "from_n": 0.5, "to_n": 0.5, "seconds": 0.5}
         | {"answer_s": None, "answer_presses": 0, "fewest_ramps": 1, "most_ramps": 1, "band_n": [0.475, 0.525]}
-        | dict.fromkeys(("typical_error_percent", "answered_ratio", "determined_ratio", "reachable_half_width")),
+        | dict.fromkeys(("typical_error_percent", "answered_ratio", "determined_ratio", "reachable_half_width"))
+        | {"half_width_by_ramps": {}},
         {"mode": "standard", "frames": 10, "kind": "ramp", "from_n": 0.08, "to_n": 0.6, "seconds": 3.0}
         | {"answer_s": 0.412, "answer_presses": 3, "answered_ratio": 0.9, "reachable_half_width": None}
-        | {"fewest_ramps": 1, "most_ramps": 1, "band_n": [0.08, 0.6]}
+        | {"fewest_ramps": 1, "most_ramps": 1, "band_n": [0.08, 0.6], "half_width_by_ramps": {}}
         | {"typical_error_percent": WORTH.median_percent, "determined_ratio": WORTH.determined_ratio},
     ]
 

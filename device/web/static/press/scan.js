@@ -3,7 +3,8 @@
 import { byId, element, setAttribute, setText } from "../base/dom.js";
 import { figure, say, understand } from "../base/words.js";
 
-const STEPS_MM = [2, 1, 0.5];
+const STEPS_MM = [1, 0.5, 0.2];
+const ASKED = ["size_mm", "depth_mm"];
 const ROWS = [
   { key: "size_mm", name: "size", unit: "mm", full: 4 },
   { key: "depth_mm", name: "depth", unit: "mm", full: 4 },
@@ -23,15 +24,25 @@ const width = (halfWidth) => figure(halfWidth, halfWidth < 0.995 ? 2 : halfWidth
 /** Whether a scan can be as sure as that, as far as the probe knows; only the sizes in mm are asked for here. */
 function canReach(offer, step) {
   const reachable = offer.reachable_half_width ?? {};
-  return ["size_mm", "depth_mm"].every((key) => !(step < reachable[key]));
+  return ASKED.every((key) => !(step < reachable[key]));
 }
 
-function choice(step, isPossible) {
+/** In how many of ten inclusions a scan of all its presses is as sure as that at most; null where nobody knows. */
+function reachedOfTen({ half_width_by_ramps: byRamps, most_ramps: most }, step) {
+  const widths = byRamps?.[most];
+  if (!widths) return null;
+  const shares = ASKED.map((key) => widths[key].filter((one) => one <= step).length / (widths[key].length + 1));
+  return Math.floor(10 * Math.min(...shares));
+}
+
+function choice(step, isPossible, ofTen = null) {
   const label = element("label", "until-step");
   const input = element("input", "");
   const words = step === null ? say("until.any") : say("until.mm", { mm: figure(step, step < 1 ? 1 : 0) });
   Object.assign(input, { type: "radio", name: "until", value: step ?? "", checked: step === null, disabled: !isPossible });
-  label.append(input, element("span", "", words));
+  const shown = element("span", "", words);
+  if (isPossible && ofTen !== null) shown.append(element("small", "", say("until.of_ten", { n: ofTen })));
+  label.append(input, shown);
   if (!isPossible) setAttribute(label, "title", say("until.not"));
   return label;
 }
@@ -44,7 +55,7 @@ export function offerAccuracy(modes) {
   box.querySelectorAll("label, .until-words").forEach((one) => one.remove());
   if (!offer) return;
   box.append(element("span", "until-words", say("until.words")));
-  box.append(choice(null, true), ...STEPS_MM.map((step) => choice(step, canReach(offer, step))));
+  box.append(choice(null, true), ...STEPS_MM.map((step) => choice(step, canReach(offer, step), reachedOfTen(offer, step))));
   const again = [...box.querySelectorAll("input")].find(({ value, disabled }) => value === chosen && !disabled);
   if (again) again.checked = true;
 }
@@ -62,8 +73,9 @@ export function chosenAccuracy(mode) {
 
 /** What a scan is doing, in words; "" when there is no scan, or nothing that differs from any other press. */
 export function scanHint({ step, scan, press_state: state }, mode) {
-  if (!offerOf(mode)) return "";
-  if (step === "ready") return say("hint.scan_ready");
+  const offer = offerOf(mode);
+  if (!offer) return "";
+  if (step === "ready") return say(reachedOfTen(offer, 0) === null ? "hint.scan_ready" : "hint.scan_told");
   if (step === "lesion" && state === "releasing") return say("hint.scan_answering");
   if (step !== "lesion" || !scan) return "";
   return say("hint.scan_next", { n: scan.ramps + 1, mm: figure(scan.next_offset_mm, 0) });

@@ -42,6 +42,14 @@ def test_an_offer_says_what_cannot_be_surpassed_where_the_card_does(path):
     assert told["reachable_half_width"] == reachable
 
 
+def test_an_offer_says_how_sure_scans_become_where_the_card_does(path):
+    times, widths = AnswerTimes(path), {2: {"size_mm": (0.8, 1.6)}}
+    assert offer(times, WORTH).as_record()["half_width_by_ramps"] == {}
+    assert offer(times, None).as_record()["half_width_by_ramps"] == {}
+    told = offer(times, replace(WORTH, half_width_by_ramps=widths)).as_record()
+    assert told["half_width_by_ramps"] == {"2": {"size_mm": (0.8, 1.6)}}
+
+
 WORTH = ModeWorth(0.1033, 0.9, {"size_mm": 3.3}, {"size_mm": 1.0})
 COST = press_cost("standard", Config())
 
