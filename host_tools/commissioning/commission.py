@@ -28,7 +28,7 @@ from host_tools.calibration.gates import Gate, require_all
 from host_tools.commissioning.joint_fit import PROBE, Design, ProbeFit, fit_probe
 from host_tools.commissioning.left_out import LeftOut, answers_of, answers_to_seen, left_out
 from host_tools.commissioning.phantom_ramps import PhantomRamp
-from host_tools.commissioning.probe_prior import OF_DESIGN, ProbePrior
+from host_tools.commissioning.probe_prior import LABELS, OF_DESIGN, ProbePrior
 from host_tools.press_models.mode_outcome import CRITICAL_RATIO, EvaluatedPresses, evaluated
 from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.ramp_training import further_offsets_mm
@@ -111,7 +111,7 @@ def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
             "measure the phantoms again, or state larger tolerances",
         ),
         Gate(
-            f"tolerances between {NAMES[PROBE[farthest]]} and what was expected of it",
+            f"tolerances from what was expected of {LABELS[NAMES[PROBE[farthest]]]}",
             float(away[farthest]),
             Bound(0.0, MOST_TOLERANCES, ""),
             "measure what its file states; if that holds, the probe is not of this design",

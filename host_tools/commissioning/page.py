@@ -21,6 +21,7 @@ from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE
 from host_tools.commissioning import page_pictures as pictures
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, CommissionedProbe
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
+from host_tools.commissioning.probe_prior import LABELS
 from host_tools.commissioning.report import SILICONE
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.mode_statistics import statistics
@@ -110,7 +111,7 @@ def _directions(fit: ProbeFit) -> Iterator[dict[str, Any]]:
     columns = zip(PROBE, fit.mean, np.sqrt(np.diag(fit.covariance)), np.abs(fit.tolerances_away), strict=True)
     for number, mean, std, away in columns:
         yield {
-            "label": pictures.LABELS[NAMES[number]],
+            "label": LABELS[NAMES[number]],
             "expected": prior.mean[number],
             "mean": mean,
             "half": half * std,

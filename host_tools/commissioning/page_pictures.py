@@ -24,6 +24,7 @@ from device.measurement.ramp_modes.radial_profile import CONTRAST, PROFILE_FORCE
 from device.measurement.recording.ring_means import RING_MM, RING_RADII_MM, RINGS
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
 from host_tools.commissioning.left_out import LeftOut
+from host_tools.commissioning.probe_prior import LABELS
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 
 WIDTH_IN = 7.6
@@ -36,15 +37,6 @@ MAPS_LEFT_IN, MAPS_LINE_IN, FORCE_IN = 0.55, 1.65, 0.14
 """Left of the maps, from one line of them to the next, and the height of one force."""
 SCALE_QUANTILE = 0.99
 """The scale of the maps holds so many of their cells; ends beyond it are drawn as the ends."""
-LABELS = {
-    "contact_exponent": "contact law: exponent less 1",
-    "face_modulus_log_ratio": "face layer: ln of modulus over design",
-    "middle_modulus_log_ratio": "middle layer: ln of modulus over design",
-    "backing_modulus_log_ratio": "backing layer: ln of modulus over design",
-    "cell_span_ratio": "load cell: force over reading, less 1",
-    "face_motion_ratio": "face motion seen, part of its own",
-}
-"""Directions of the probe in words."""
 UNKNOWN_LABELS = dict(zip(UNKNOWNS, ("size (mm)", "depth (mm)", "Young's modulus (kPa)"), strict=True))
 
 

@@ -21,6 +21,15 @@ from host_tools.scenes.stated import SIGMAS, declared_name, numbers_of
 LAYERS = "face_modulus_log_ratio", "middle_modulus_log_ratio", "backing_modulus_log_ratio"
 """Directions of the layers' moduli, in the order of a probe's file."""
 SPAN = "cell_span_ratio"
+LABELS = {
+    "contact_exponent": "contact law: exponent less 1",
+    "face_modulus_log_ratio": "face layer: ln of modulus over design",
+    "middle_modulus_log_ratio": "middle layer: ln of modulus over design",
+    "backing_modulus_log_ratio": "backing layer: ln of modulus over design",
+    "cell_span_ratio": "load cell: force over reading, less 1",
+    "face_motion_ratio": "face motion seen, part of its own",
+}
+"""Directions of the probe in words."""
 MODULUS_OVER_DESIGN = Bound(0.8, 1.25, "")
 """Where derivatives hold: the ends of what the table of layers is solved for.
 

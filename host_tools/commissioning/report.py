@@ -11,19 +11,22 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from host_tools.commissioning.joint_fit import ProbeFit
 from host_tools.commissioning.left_out import LeftOut
+from host_tools.commissioning.probe_prior import LABELS
 
+WIDTH = max(map(len, LABELS.values()))
 SILICONE = "Fitted layers carry what the model lacks, and are never a measurement of the silicone."
 
 
 def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
     """Yield what is known of the probe, beside what was expected, and what its layers are not."""
-    yield f"{'of the probe':28} {'found':>8} {'1 sd':>8} {'expected':>9} {'tolerance':>10}"
+    yield f"{'of the probe':{WIDTH}} {'found':>8} {'1 sd':>8} {'expected':>9} {'tolerance':>10}"
     std, prior = np.sqrt(np.diag(fit.covariance)), fit.prior
     for number, mean, own in zip(directions, fit.mean, std, strict=True):
-        yield f"{NAMES[number]:28} {mean:8.4f} {own:8.4f} {prior.mean[number]:9.4f} {prior.std[number]:10.3g}"
-    yield f"{'lacking of an inclusion':28} {fit.believed.discrepancy_ratio:8.2%}"
-    yield f"{'model error of a press':28} {fit.levels.model_ratio:8.2%}"
-    yield f"{'skin and flat field':28} {fit.levels.flat_field_ratio:8.2%}"
+        name, expected, tolerance = LABELS[NAMES[number]], prior.mean[number], prior.std[number]
+        yield f"{name:{WIDTH}} {mean:8.4f} {own:8.4f} {expected:9.4f} {tolerance:10.3g}"
+    yield f"{'lacking of an inclusion':{WIDTH}} {fit.believed.discrepancy_ratio:8.2%}"
+    yield f"{'model error of a press':{WIDTH}} {fit.levels.model_ratio:8.2%}"
+    yield f"{'skin and flat field':{WIDTH}} {fit.levels.flat_field_ratio:8.2%}"
     yield SILICONE
 
 

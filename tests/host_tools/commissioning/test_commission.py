@@ -162,7 +162,7 @@ def test_probe_and_phantoms_are_reported_in_words(fit):
     lines = list(probe_lines(fit, PROBE))
     assert len(lines) == len(PROBE) + 5
     assert lines[-1] == SILICONE
-    assert lines[1].startswith("contact_exponent")
+    assert lines[1].startswith("contact law: exponent less 1")
 
 
 def test_layers_that_are_expected_to_be_stiffer_are_found_stiffer(fit, ramps, model, derivatives):
@@ -186,8 +186,8 @@ def test_a_probe_is_held_against_its_own_file(fit):
     assert gates_of(fit, [answered])[2].problem is None
     stated = replace(fit, prior=OF_DESIGN._replace(mean=OF_DESIGN.mean + 0.7, std=OF_DESIGN.std))
     problem = gates_of(stated, [answered])[2].problem
-    assert "what was expected of it" in problem.quantity
-    assert list(probe_lines(stated, PROBE))[2].split()[3:] == ["0.7000", "0.1"]
+    assert problem.quantity == "tolerances from what was expected of load cell: force over reading, less 1"
+    assert list(probe_lines(stated, PROBE))[2].split()[-2:] == ["0.7000", "0.1"]
 
 
 def test_a_second_ramp_of_a_phantom_is_left_out_with_it(ramps, model, derivatives, fit, monkeypatch):

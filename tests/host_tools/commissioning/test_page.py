@@ -19,8 +19,9 @@ from host_tools.commissioning.joint_fit import PROBE, BelievedErrors, ProbeFit
 from host_tools.commissioning.left_out import LeftOut
 from host_tools.commissioning.own_bundle import commissioned_record
 from host_tools.commissioning.page import NOTHING_MORE, commissioning_page
-from host_tools.commissioning.page_pictures import LABELS, shares
+from host_tools.commissioning.page_pictures import shares
 from host_tools.commissioning.prior_discrepancy import prior_discrepancy
+from host_tools.commissioning.probe_prior import LABELS
 from host_tools.commissioning.report import SILICONE
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 
