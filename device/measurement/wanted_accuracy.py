@@ -43,7 +43,7 @@ class WantedAccuracy:
         """Whether anything is asked for."""
         return bool(self.until) or self.within_s is not None
 
-    def require_for(self, mode: Mode, worth: ModeWorth | None, press_s: float = 0.0) -> None:
+    def require_for(self, mode: Mode, worth: ModeWorth | None, press_s: float) -> None:
         """Raise `InvalidQuantity` for a mode that is no scan, or an accuracy that it cannot reach, with the nearest.
 
         `press_s`: what one press takes, which says how many there is time for. A mode whose worth does not say what it
@@ -68,7 +68,7 @@ class WantedAccuracy:
         The one that is under way when the time is over still counts.
         """
         reachable = dict(worth.reachable_half_width or {})
-        if self.within_s is None or press_s <= 0.0:
+        if self.within_s is None:
             return reachable
         fewest, most = FRAMES[mode].fewest_ramps, FRAMES[mode].most_ramps
         ramps = min(max(1 + int(self.within_s / press_s), fewest), most)

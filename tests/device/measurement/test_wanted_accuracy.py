@@ -43,17 +43,17 @@ def test_a_time_is_five_to_three_hundred_seconds(seconds):
 @pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "precise"])
 @pytest.mark.parametrize("wanted", [WantedAccuracy({"size_mm": 1.0}), WantedAccuracy({}, 30.0)])
 def test_only_a_scan_can_be_asked_for_it(mode, wanted):
-    NOTHING.require_for(mode, None)
+    NOTHING.require_for(mode, None, 3.0)
     with pytest.raises(InvalidQuantity, match=f"asked for in mode {mode}, but must be asked for in mode precise"):
-        wanted.require_for(mode, None)
+        wanted.require_for(mode, None, 3.0)
 
 
 def test_what_cannot_be_reached_is_refused_with_the_nearest_and_what_nobody_knows_is_taken():
-    WantedAccuracy({"size_mm": 0.8, "youngs_modulus_kpa": 0.001}).require_for("precise", WORTH)
-    WantedAccuracy({"size_mm": 0.001}).require_for("precise", None)
-    WantedAccuracy({"size_mm": 0.001}).require_for("precise", ModeWorth(0.1, 0.9, {}, {}))
+    WantedAccuracy({"size_mm": 0.8, "youngs_modulus_kpa": 0.001}).require_for("precise", WORTH, 3.0)
+    WantedAccuracy({"size_mm": 0.001}).require_for("precise", None, 3.0)
+    WantedAccuracy({"size_mm": 0.001}).require_for("precise", ModeWorth(0.1, 0.9, {}, {}), 3.0)
     with pytest.raises(InvalidQuantity, match=r"until\.size_mm is 0\.79, .* at least 0\.8 .* be had is 0\.8 mm"):
-        WantedAccuracy({"size_mm": 0.79}).require_for("precise", WORTH)
+        WantedAccuracy({"size_mm": 0.79}).require_for("precise", WORTH, 3.0)
 
 
 def test_with_a_time_it_must_be_there_in_as_many_presses_as_there_is_time_for():
