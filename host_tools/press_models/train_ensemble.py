@@ -114,10 +114,11 @@ def train_members(
     jobs: int = -1,
 ) -> tuple[InputScaling, tuple[list[DenseLayer], ...]]:
     """Return the scaling that networks share and the layers of each, trained on a task; as `train_ensemble`."""
-    require("presses", len(training_set.rows), Bound(FEWEST_PRESSES, np.inf, "presses"), "draw more random presses")
+    presses = len(training_set.normalised)  # not of the rows: a set may make these anew whenever it is asked
+    require("presses", presses, Bound(FEWEST_PRESSES, np.inf, "presses"), "draw more random presses")
     require("members", members, Bound(1, 100, "networks"), "train at least one")
     rng = np.random.default_rng([seed, 0])
-    some = training_set.noisy(rng.integers(len(training_set.rows), size=min(SCALED_ON, len(training_set.rows))), rng)
+    some = training_set.noisy(rng.integers(presses, size=min(SCALED_ON, presses)), rng)
     typical = training_set.typical_noise()[columns, columns]
     scaling = InputScaling.fit(some[:, columns].astype(np.float64), typical)
     with one_core_each():
@@ -143,7 +144,7 @@ def _member(
     layers = initial_layers(2 * scaling.projection.shape[1], rng, task.outputs, hidden)
     adam = Adam(layers, rate=RATE, steps=steps)
     for _ in range(steps):
-        index = rng.integers(len(training_set.rows), size=BATCH)
+        index = rng.integers(len(training_set.normalised), size=BATCH)
         inputs = scaling.inputs(training_set.noisy(index, rng)[:, columns])
         adam.step(task.loss_and_gradient(layers, inputs, task.target[index])[1])
     return layers

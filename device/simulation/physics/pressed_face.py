@@ -85,8 +85,9 @@ class PressedFace:
         """Return w and p for 1 N of an inclusion at -(x, y) from the axis, but for the centred inclusion's share."""
         modes = self._off_axis.modes(self._equivalent, float(np.hypot(x_mm, y_mm)))
         angle = np.arctan2(self._y_mm, self._x_mm) - np.arctan2(-y_mm, -x_mm)
+        cosines = [np.cos(k * angle) for k in range(len(modes[0]))]
         return [
-            np.asarray(sum(self._solid(mode) * np.cos(k * angle) for k, mode in enumerate(field)), np.float32)
+            np.asarray(sum(self._solid(mode) * cosine for mode, cosine in zip(field, cosines, strict=True)), np.float32)
             for field in modes
         ]
 

@@ -71,6 +71,19 @@ def test_the_same_seed_gives_the_same_ensemble_and_the_members_differ(press_set)
     assert np.abs(first.members[0][0].weights - first.members[1][0].weights).max() > 0.01
 
 
+class NoisyOnly:
+    """Presses whose rows nobody may ask for: `NetworkPresses` makes all of them anew each time."""
+
+    def __init__(self, of: PressSet) -> None:
+        self.normalised, self.noisy, self.typical_noise = of.normalised, of.noisy, of.typical_noise
+
+
+def test_a_step_makes_no_other_rows_than_its_own(press_set):
+    sets = NoisyOnly(press_set), press_set
+    found, expected = (train_ensemble(one, seed=3, members=1, steps=2, columns=RESPONSE, jobs=1) for one in sets)
+    np.testing.assert_array_equal(found.members[0][0].weights, expected.members[0][0].weights)
+
+
 def test_too_few_presses_or_no_network_are_refused_by_name(press_set):
     few = PressSet(press_set.normalised[:999], press_set.rows[:999], press_set.direction_rad[:999], press_set.sampler)
     with pytest.raises(InvalidQuantity, match="^presses is 999"):
