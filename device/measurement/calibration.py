@@ -29,11 +29,11 @@ from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import CameraSettings, RecordedCell
 from device.measurement.recording.untouched_face import UntouchedFace
 
-ACTION = "calibrate the probe again"
 VALID_DAYS = Bound(1, 36_500, "days")
 """A hundred years are for simulated probes, which do not age."""
 SCHEMA = "tsis.calibration/2"
-RENEW = "calibrate the probe again"
+RENEW = "calibrate or commission the probe again"
+"""Commissioning writes a certificate, too."""
 SCALE_TOLERANCE = 1e-3
 GEOMETRY_TOLERANCES = {"axis_x_mm": 0.05, "axis_y_mm": 0.05, "rim_distortion_percent": 0.3}
 """Some three times as far as a grid target is found apart from another (docs/own_probe.md, the twenty worlds)."""
@@ -52,7 +52,7 @@ class Validity:
     def __post_init__(self) -> None:
         measured, expires = (moment(getattr(self, name), name) for name in ("measured_at", "expires_at"))
         if not expires > measured:
-            raise InvalidQuantity("expires_at", self.expires_at, f"after {self.measured_at}", ACTION)
+            raise InvalidQuantity("expires_at", self.expires_at, f"after {self.measured_at}", RENEW)
 
     @classmethod
     def of(cls, measured_at: str, valid_days: float) -> Validity:
@@ -75,9 +75,9 @@ def moment(text: str, name: str) -> datetime:
     try:
         parsed = datetime.fromisoformat(text)
     except (TypeError, ValueError) as error:
-        raise InvalidQuantity(name, repr(text), "a time of RFC 3339", ACTION) from error
+        raise InvalidQuantity(name, repr(text), "a time of RFC 3339", RENEW) from error
     if parsed.tzinfo is None:
-        raise InvalidQuantity(name, repr(text), "a time with its zone, as 2027-01-31T12:00:00Z", ACTION)
+        raise InvalidQuantity(name, repr(text), "a time with its zone, as 2027-01-31T12:00:00Z", RENEW)
     return parsed
 
 

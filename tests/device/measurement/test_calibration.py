@@ -212,7 +212,7 @@ def test_what_is_no_certificate_is_refused_by_its_path(path, text):
 
 
 def test_a_missing_certificate_is_refused_by_its_path(tmp_path):
-    with pytest.raises(InvalidQuantity, match=r"none\.json.*calibrate the probe again"):
+    with pytest.raises(InvalidQuantity, match=r"none\.json.*calibrate or commission the probe again"):
         read_calibration(tmp_path / "none.json")
 
 
