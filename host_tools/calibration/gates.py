@@ -72,6 +72,10 @@ class CalibrationRejected(InvalidQuantity):
         self.problems = tuple(problems)
         self.args = ("\n".join(str(problem) for problem in problems),)
 
+    def __reduce__(self) -> tuple[type[CalibrationRejected], tuple[tuple[InvalidQuantity, ...]]]:  # type: ignore[override]
+        """Carry the error to another process."""
+        return type(self), (self.problems,)
+
 
 def require_all(gates: Iterable[Gate], problems: Iterable[InvalidQuantity] = ()) -> None:
     """Raise `CalibrationRejected` with the gates that are not passed and the problems beside them, if any."""

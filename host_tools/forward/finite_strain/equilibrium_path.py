@@ -49,11 +49,15 @@ class PathEnded(PressFailed):
     """A load that cannot be reached; says how far the press got (`reached_mm`, `reached_n`) and what to do."""
 
     def __init__(self, asked: str, reached_mm: float, reached_n: float, why: str) -> None:
-        self.reached_mm, self.reached_n = reached_mm, reached_n
+        self.asked, self.reached_mm, self.reached_n, self.why = asked, reached_mm, reached_n, why
         super().__init__(
             f"{asked}, but the press could be followed only to {reached_mm:.4g} mm and {reached_n:.4g} N ({why}): "
             "press less."
         )
+
+    def __reduce__(self) -> tuple[type[PathEnded], tuple[str, float, float, str]]:
+        """Carry the error to another process: an exception alone forgets what it was made of."""
+        return type(self), (self.asked, self.reached_mm, self.reached_n, self.why)
 
 
 class EquilibriumPath:

@@ -1,5 +1,7 @@
 """What a calibration must measure: each gate says its quantity, value, bound and what to do."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,8 @@ def test_a_rejection_tells_every_gate_with_value_bound_and_action():
         "dark level is 13, but must be at least 0 and at most 12 counts: shade the probe.",
         "R2 of O1 is 0.5, but must be at least 0.95 and at most 1: press again.",
     ]
+    carried = pickle.loads(pickle.dumps(rejection.value))
+    assert (str(carried), len(carried.problems)) == (str(rejection.value), 3)
 
 
 def test_what_passes_is_not_rejected():

@@ -1,11 +1,13 @@
 """Sliding is a relabelling of the tissue: labels are no physics inside it, and are physics on the face only."""
 
+import pickle
+
 import pytest
 from ngsolve import GridFunction, exp, x, y
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.finite_strain.closed_contact import AXIAL, RADIAL
-from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath
+from host_tools.forward.finite_strain.equilibrium_path import EquilibriumPath, PathEnded
 from host_tools.forward.finite_strain.newton import NewtonStatus
 from host_tools.forward.finite_strain.sliding import SLIP, SlidingContact
 from host_tools.forward.materials import baseline, with_inclusion
@@ -110,3 +112,11 @@ def test_without_the_force_of_the_edge_the_rim_slips_in_proportion_and_more_forc
     assert rims[True, 1.0] < rims[False, 1.0]
     assert forces[True, 0.01] == pytest.approx(forces[False, 0.01], rel=1e-4)
     assert 1.001 * forces[True, 1.0] < forces[False, 1.0] < 1.02 * forces[True, 1.0]
+
+
+def test_a_load_out_of_reach_tells_another_process_how_far_the_press_got():
+    """Joblib carries errors so; one that could not be carried ended a table with words about pickles."""
+    ended = PathEnded("0.55 N are asked for", 4.875, 0.549, "Newton's method: stalled")
+    carried = pickle.loads(pickle.dumps(ended))
+    assert str(carried) == str(ended)
+    assert (carried.reached_mm, carried.reached_n) == (4.875, 0.549)
