@@ -17,12 +17,15 @@ from screen_layout import wrong_in
 pytestmark = [pytest.mark.browser, pytest.mark.real_time, pytest.mark.long]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
 NO_START = {"bundle_tampered", "calibration_foreign", "calibration_missing", "enable_busy"}
+SHORT_PRESS = "\n[settings.press]\ntimeout_s = 20.0\n"
+"""A hand that never gets there is given up sooner than after a minute, beside the lesion and on it."""
 ENDED = "#panel:is([data-view='result'], [data-step='fault'], [data-step='rejected']), .fault, #status-word:not(:empty)"
 
 
 def scene_of(path: Path) -> str:
-    """Return a scenario whose hand does not take its time, unless the hand is what it is about."""
+    """Return a scenario whose hand and daemon do not take their time, unless the hand is what it is about."""
     text = path.read_text(encoding="utf-8")
+    text += "" if "[settings.press]" in text else SHORT_PRESS
     return text if "[hand]" in text else text + "\n" + QUICK_HAND
 
 
