@@ -44,7 +44,6 @@ GAP_MM, WET_RATIO = (0.5, 4.0), (0.1, 0.6)
 LARGE_MM, SHALLOW_MM = (17.5, 20.0), (2.5, 3.2)
 SUNK_MM = (1.5, 3.0)
 """So much deeper does an inclusion lie after the first ramp that gives way."""
-ORDINARY_SCANS = 120
 RecordPress = Callable[[Mode, int], Recording]
 SHARE = "share refused"
 REFUSED_AT_LEAST, FALSE_AT_MOST = 0.95, 0.05
@@ -83,8 +82,7 @@ def kinds(tables: ProbeTables, seed: int, jobs: int = -1) -> list[Kind]:
         return lambda mode, i: record(tables, parameters[i], mode, i)
 
     return [
-        Kind(ORDINARY_KIND, ORDINARY, simple(ordinary)),
-        Kind(ORDINARY_KIND, ORDINARY_SCANS, simple(ordinary), ("precise",)),
+        Kind(ORDINARY_KIND, ORDINARY, simple(ordinary), ALL_MODES),
         Kind("no inclusion", PRESSES, simple(none), ALL_MODES),
         Kind(
             "two inclusions",
