@@ -146,7 +146,7 @@ def of_presses(album: Album) -> None:
     first.locator("#press-button").click()
     album.sees("#image-title", "Measurement 2, Quick")
     album.sees("#instruction", "Measured in part")
-    album.shoot("result-in-part", "A result that leaves something open, and what would be surer")
+    album.shoot("result-in-part", "A result that leaves something open, and which tissue it takes for granted")
     album.tap("#act-mode")
     album.each(lambda page: page.locator("#modes label").filter(has_text="Precise").click())
     album.shoot("scan-asked", "How sure a scan is to be")

@@ -196,11 +196,17 @@ def numbers_in(mean: Array, spread: Array, ends: IntervalEnds) -> Numbers:
     return Numbers(denormalise_unknowns(mean), (above - below) / 2, low, high, known, LOW[:COUNT], HIGH[:COUNT])
 
 
-def with_numbers(numbers: Numbers, features: Mapping[str, float], origin: Origin) -> Estimate:
-    """Return the estimate of numbers; it says which of the unknowns the press does not determine."""
+def with_numbers(
+    numbers: Numbers, features: Mapping[str, float], origin: Origin, taken_for_granted: str = ""
+) -> Estimate:
+    """Return the estimate of numbers; it says which of the unknowns the press does not determine.
+
+    `taken_for_granted`: a sentence on what the numbers rest on and the press does not tell.
+    """
     quantities: dict[str, Any] = numbers.quantities()
     unknown = [SPOKEN[name] for name, one in quantities.items() if not one.identifiable]
-    reason = f"This press does not determine {' and '.join(unknown)}." if unknown else ""
+    undetermined = f"This press does not determine {' and '.join(unknown)}." if unknown else ""
+    reason = " ".join(filter(None, (undetermined, taken_for_granted)))
     of_unknown: dict[int, EstimateStatus] = {0: "ok", len(UNKNOWNS): "not_identifiable"}
     status = of_unknown.get(len(unknown), "partly_identifiable")
     return Estimate(**quantities, status=status, reason=reason, features=dict(features), **asdict(origin))

@@ -128,7 +128,8 @@ def limits(answers: OwnAnswers, model: RampModel, phantoms: Sequence[LeftOut], s
     rows = np.concatenate([one.rows for one in seen if stands_out(one.rows[0], answers.noise)])
     odds = model.ranges.log_odds(rows - answers.ordinary_shift(rows))
     misfit = min(max(believed, own), LARGEST_MISFIT_RATIO)
-    return CriticalValues(misfit, elongation, float(np.quantile(odds, CRITICAL_RATIO)))
+    tissue = max(critical.tissue_from_middle_ratio for critical in model.critical.values())
+    return CriticalValues(misfit, elongation, float(np.quantile(odds, CRITICAL_RATIO)), tissue)
 
 
 def believed_presses(

@@ -22,11 +22,11 @@ from device.measurement.ramp_modes.model import CriticalValues, found_values
 from device.measurement.ramp_modes.posterior import TOGETHER
 from host_tools.press_models.recorded_presses import RecordedPresses, in_parallel
 
-CRITICAL_RATIO = 0.9875
+CRITICAL_RATIO = 0.99
 """Share of all recorded presses inside the trained ranges whose misfit is below its critical value, and likewise the
-elongation; of the nine in ten in which an inclusion stands out, share of those whose odds of a size or depth outside
-do. What is left of the 5 % of false flags is for chance: with so many recordings their share is known to half a
-per cent."""
+elongation and how far the tissue lies from the middle of its range; of the nine in ten in which an inclusion stands
+out, share of those whose odds of a size or depth outside do. What is left of the 5 % of false flags is for chance: with
+so many recordings their share is known to half a per cent."""
 THREE = len(UNKNOWNS)
 Guess = Callable[[Array], Array]
 """Rows [N, P] to first guesses [n, 3] of the unknowns' coordinates."""

@@ -44,7 +44,8 @@ SLAB_THICKNESSES_MM = (27.5, 30.0, 36.0)
 RIGID_KPA = 1e6
 """Modulus of what stands in for the base."""
 SMALLEST_SIZE_MM = 1.0
-FORCES_N = points_inside(0.0, 0.8, 5)
+LARGEST_N = 0.8
+FORCES_N = points_inside(0.0, LARGEST_N, 5)
 """Up to some 4 mm of indentation; no solve at 0 N, where a field over the force has no value."""
 EVERY = 2
 """Every which of the face's radii is kept: 0.1 mm apart."""
@@ -96,11 +97,17 @@ def _per_n(solutions: Sequence[Solution], forces_n: Array = FORCES_N) -> tuple[A
     return np.stack(baseline, axis=1) / over, np.stack(inclusion_field, axis=1) / over
 
 
-def press_ramps(scene: Scene) -> PressRamps:
-    """Return the ramps of one scene, solved for it alone: for what the table does not hold."""
-    baseline, inclusion_field = _per_n(ramp(scene))
+def press_ramps(scene: Scene, largest_n: float = LARGEST_N) -> PressRamps:
+    """Return the ramps of one scene up to a force, solved for it alone: for what the table does not hold.
+
+    That without the inclusion is on the level of the table's: on the mesh of an inclusion the light beside it would
+    tell another tissue, by half a kPa.
+    """
+    forces_n = points_inside(0.0, largest_n, len(FORCES_N))
+    _, inclusion_field = _per_n(ramp(scene, forces_n), forces_n)
+    baseline = bare_per_n(replace(scene, inclusion=None), forces_n)
     r_mm = np.linspace(0.0, scene.waveguide.radius_mm, baseline.shape[-1])
-    return PressRamps(r_mm, Ramp(FORCES_N, baseline), Ramp(FORCES_N, inclusion_field))
+    return PressRamps(r_mm, Ramp(forces_n, baseline), Ramp(forces_n, inclusion_field))
 
 
 def scene_in(slab: Slab, inclusion: Inclusion | None = None, *, waveguide: Waveguide | None = None) -> Scene:
@@ -149,8 +156,12 @@ SceneOf = Callable[[Slab, Inclusion | None], Scene]
 
 def baseline_per_n(scene_of: SceneOf, slab: Slab, level: Level | None = BASELINE) -> Array:
     """Return the fields [2, F, R] without an inclusion over the force, at forces that indent alike in every slab."""
-    forces_n = FORCES_N * slab.stiffness_ratio
-    return _per_n(ramp(scene_of(slab, None), forces_n, level), forces_n)[0]
+    return bare_per_n(scene_of(slab, None), FORCES_N * slab.stiffness_ratio, level)
+
+
+def bare_per_n(scene: Scene, forces_n: Array, level: Level | None = BASELINE) -> Array:
+    """Return the fields [2, F, R] of a scene without an inclusion over ascending forces."""
+    return _per_n(ramp(scene, forces_n, level), forces_n)[0]
 
 
 def inclusions_per_n_mm3(

@@ -26,7 +26,7 @@ from device.measurement.estimate import (
     without_numbers,
 )
 from device.measurement.feature_definitions import QUICK_FEATURES, units_of
-from device.measurement.parameters import normalise_unknowns
+from device.measurement.parameters import RANGES, normalise_unknowns
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.quick_mode.profile import QUICK_NAMES, quick_press
 from device.measurement.recording.recording import Recording
@@ -36,6 +36,8 @@ QUICK_UNITS = units_of(QUICK_NAMES, QUICK_FEATURES)
 """The features of a network that reads one held press."""
 SEEN_BY = {"middle_contrast": MIDDLE, "middle_less_rim_contrast": MIDDLE_LESS_RIM}
 """Where an inclusion shows: in the middle by itself, or in the middle against the rim; weights of the rings [J]."""
+_LOW_KPA, _HIGH_KPA, _ = RANGES["tissue_modulus_kpa"]
+TISSUE_TAKEN = f"The tissue is taken to have {_LOW_KPA:g} to {_HIGH_KPA:g} kPa: one force does not tell it."
 
 
 class QuickModel:
@@ -89,4 +91,4 @@ def estimate_quick(recording: Recording, model: QuickModel, calibration: Calibra
     raw = model.bundle.estimate(row[None])
     mean, spread = normalise_unknowns(raw.estimate[0]), raw.spread[0]
     numbers = numbers_in(mean, spread, ends_in_belts(mean, spread, model.belts))
-    return with_numbers(numbers, features, origin)
+    return with_numbers(numbers, features, origin, TISSUE_TAKEN)

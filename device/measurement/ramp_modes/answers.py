@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import COUNT, HIGH, denormalise, slope_of_normalised
+from device.measurement.parameters import COUNT, HIGH, LOW, denormalise, slope_of_normalised
 from device.measurement.ramp_modes.fit import PressPosterior, best_fits
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
 from device.measurement.ramp_modes.misfit_blocks import Departure
@@ -62,6 +62,15 @@ class RampAnswer:
     def mean(self) -> Array:
         """Mean of the unknowns' coordinates [3]."""
         return self.fit.mean[:COUNT]
+
+    @property
+    def tissue_from_middle_ratio(self) -> float:
+        """How far the tissue's modulus lies from the middle of its range, over half the range; below 1.
+
+        Of tissue outside the range the posterior crowds at the end, nearer than that of any tissue inside.
+        """
+        low_kpa, high_kpa = LOW[TISSUE], HIGH[TISSUE]
+        return float(abs(2 * (self.tissue_kpa[0] - low_kpa) / (high_kpa - low_kpa) - 1))
 
     @property
     def spread(self) -> Array:

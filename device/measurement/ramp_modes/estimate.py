@@ -130,7 +130,7 @@ def _judged(
     if departure:
         features |= _figures_of(departure)
     if reasons := rejections(found, critical, block):
-        action = CAUSES[block].action if block else NO_NUMBERS
+        action = CAUSES[block].action if block else ACTIONS.get(tuple(exceeded(found, critical)), NO_NUMBERS)
         return without_numbers("outside_range", " ".join([*reasons, action]), origin, features)
     return with_numbers(numbers_in(answer.mean, answer.spread, answer.intervals), features, origin)
 
@@ -158,8 +158,17 @@ REASONS = {
     "misfit_ratio": "This does not look like one single inclusion that is round.",
     "elongation_deviations": NOT_ROUND,
     "outside_log_odds": "The inclusion may be too large, too small, too deep or too shallow for the probe.",
+    "tissue_from_middle_ratio": "The tissue may be softer, stiffer or thinner than any that the probe measures in.",
 }
 """What the operator reads when a figure is above its critical value; both are among the features."""
+
+
+AWAY_FROM_BONE = (
+    "No numbers are given. Begin again beside the lesion, away from bone; if the message stays, note the finding "
+    "without numbers."
+)
+ACTIONS: dict[tuple[str, ...], str] = {("tissue_from_middle_ratio",): AWAY_FROM_BONE}
+"""What to do where these figures alone are above their critical values, instead of `NO_NUMBERS`."""
 
 
 class MisfitCause(NamedTuple):
@@ -204,11 +213,16 @@ def _figures_of(departure: Departure) -> dict[str, float]:
     return with_critical(found, critical)
 
 
+def exceeded(found: CriticalValues, critical: CriticalValues) -> list[str]:
+    """Return the names of the figures above their critical values; one that is no number counts among them."""
+    limits = asdict(critical)
+    return [name for name, value in asdict(found).items() if not value <= limits[name]]
+
+
 def rejections(found: CriticalValues, critical: CriticalValues, block: RowBlock | None = None) -> list[str]:
     """Return a sentence for every reason why this is not one round inclusion inside the trained ranges; [] is good.
 
-    A figure that is no number rejects, too. `block`: which part of the row makes the misfit, where one does.
+    `block`: which part of the row makes the misfit, where one does.
     """
-    limits = asdict(critical)
     sentences = REASONS | ({"misfit_ratio": CAUSES[block].sentence} if block else {})
-    return [sentences[name] for name, value in asdict(found).items() if not value <= limits[name]]
+    return [sentences[name] for name in exceeded(found, critical)]

@@ -40,12 +40,13 @@ NOT_TOLD_LOG_ODDS = -100.0
 class CriticalValues:
     """Of a mode: above any of these a press is not of one round inclusion inside the trained ranges.
 
-    Held-out presses that are exceed each of them in 1.25 % of cases.
+    Held-out presses that are exceed each of them in 1 % of cases.
     """
 
     misfit_ratio: float
     elongation_deviations: float
     outside_log_odds: float
+    tissue_from_middle_ratio: float
 
 
 SURROGATE_ARRAYS = (
@@ -104,16 +105,18 @@ def found_values(
     """
     at = answer.best
     if denormalise(at)[OFFSET] > HIGH[OFFSET]:
-        return CriticalValues(answer.misfit_ratio, 0.0, NOT_TOLD_LOG_ODDS)
+        return CriticalValues(answer.misfit_ratio, 0.0, NOT_TOLD_LOG_ODDS, answer.tissue_from_middle_ratio)
     nearest = slice(answer.nearest, answer.nearest + 1)
     second, rows, unlike = seen.second_harmonics[answer.nearest], seen.rows[nearest], answer.unlike
     if unlike:
         left = np.stack([second[0], second[1] - unlike.second_across.reshape(second[1].shape)])
         elongation = elongation_deviations(left, unlike.row + unlike.shift, answers.noise, unlike.factor)
-        return CriticalValues(answer.misfit_ratio, elongation, float(log_odds(rows - unlike.shift)[0]))
+        odds = float(log_odds(rows - unlike.shift)[0])
+        return CriticalValues(answer.misfit_ratio, elongation, odds, answer.tissue_from_middle_ratio)
     (round_row,) = answers.surrogate.rows(at[None], seen.direction_rad[nearest])
     elongation = elongation_deviations(second, round_row, answers.noise)
-    return CriticalValues(answer.misfit_ratio, elongation, float(log_odds(rows)[0]))
+    odds = float(log_odds(rows)[0])
+    return CriticalValues(answer.misfit_ratio, elongation, odds, answer.tissue_from_middle_ratio)
 
 
 class RampModel:

@@ -15,6 +15,7 @@ from device.measurement.quick_mode.model import QuickModel
 from device.measurement.ramp_modes.model import RampModel
 from device.measurement.recording.recording import Recording
 from device.simulation.physics.neighbour import Neighbour
+from device.simulation.physics.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.recorded_presses import recorded_press
 
@@ -35,7 +36,7 @@ def quick_model() -> QuickModel:
 def pressed(tables: ProbeTables) -> Press:
     """A press on the nominal tissue in a mode: 12 mm, 6 mm deep, 60 kPa unless told otherwise.
 
-    `further_mm` are the offsets of the further ramps of a scan.
+    `ramps` say how the face deforms where the tables do not; `further_mm` are the offsets of a scan's further ramps.
     """
 
     def press(
@@ -44,12 +45,20 @@ def pressed(tables: ProbeTables) -> Press:
         *,
         neighbour: Neighbour | None = None,
         wet_ratio: float = 0.0,
+        ramps: PressRamps | None = None,
         further_mm: Sequence[float] = (),
         **nuisances: float,
     ) -> Recording:
         parameters = np.array([*unknowns, *(NOMINAL | nuisances).values()])
         return recorded_press(
-            tables, parameters, mode, 5, neighbour=neighbour, wet_ratio=wet_ratio, further_mm=further_mm
+            tables,
+            parameters,
+            mode,
+            5,
+            neighbour=neighbour,
+            wet_ratio=wet_ratio,
+            ramps=ramps,
+            further_mm=further_mm,
         )
 
     return press

@@ -57,7 +57,7 @@ def made_ensemble(read: np.ndarray, log_variance: float = -2.0) -> DenseEnsemble
 def made_outcome(misfit_ratio: float) -> ModeOutcome:
     truth = np.random.default_rng(7).uniform(-1, 1, (64, 3))
     seen = EvaluatedPresses(truth, truth + 0.05, truth - 0.1, truth + 0.2, np.ones((64, 3), bool))
-    return ModeOutcome(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3), seen, seen, np.repeat([2, 3], 32))
+    return ModeOutcome(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3, 0.9), seen, seen, np.repeat([2, 3], 32))
 
 
 def made_ranges(read: np.ndarray) -> TrainedRange:
@@ -205,7 +205,7 @@ def test_networks_of_the_ranges_that_differ_from_numpy_are_refused(trained, tmp_
 def test_the_device_gets_back_the_critical_values_of_each_mode(trained: TrainedRamp, model: RampModel) -> None:
     assert set(model.critical) == set(RAMP_MODES)
     for mode, misfit_ratio in (("standard", 1.3), ("precise", 1.2)):
-        assert asdict(model.critical[mode]) == asdict(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3))
+        assert asdict(model.critical[mode]) == asdict(CriticalValues(misfit_ratio, 2.0 + misfit_ratio, 0.3, 0.9))
 
 
 def test_the_card_tells_for_which_probes_and_ranges_and_where_it_comes_from(trained, folder, model) -> None:

@@ -93,6 +93,7 @@ export function asChosen(status) {
 
 /** What would tell more than a measurement did: the mode that determines the modulus most often, or a press beside. */
 export function surerWords({ mode, estimate }) {
+  if (mode === "quick") return ""; // its own sentence names the mode that checks the tissue
   const isWhole = ["size_mm", "depth_mm", "youngs_modulus_kpa"].every((key) => estimate[key].identifiable);
   const often = (offer) => offer?.determined_ratio?.youngs_modulus_kpa ?? 0;
   const best = offers.reduce((one, other) => (often(other) > often(one) ? other : one), offerOf(mode));

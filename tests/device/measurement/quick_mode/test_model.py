@@ -28,6 +28,7 @@ def test_one_frame_is_answered_and_each_truth_lies_in_its_interval(held, quick_m
         quantity = getattr(estimate, name)
         assert quantity.low <= quantity.value <= quantity.high
         assert quantity.low <= truth <= quantity.high
+    assert estimate.reason.endswith(" The tissue is taken to have 4 to 6 kPa: one force does not tell it.")
     evidence = "elongation_ratio", "middle_contrast", "middle_less_rim_contrast"
     assert tuple(estimate.features) == (*QUICK_NAMES, *evidence, *(f"critical_{name}" for name in evidence))
 

@@ -8,10 +8,11 @@ import pytest
 
 from device.measurement.estimate import NO_NUMBERS, NOTHING_STANDS_OUT
 from device.measurement.mode import FRAMES
-from device.measurement.quantities import UNKNOWNS, InvalidQuantity
+from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.ramp_modes import answers as answers_module
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.estimate import (
+    AWAY_FROM_BONE,
     CAUSES,
     PLACES_MM,
     REASONS,
@@ -28,10 +29,12 @@ from device.measurement.ramp_modes.radial_profile import COLUMNS, press_profile,
 from device.measurement.recording.ring_means import RINGS
 from device.measurement.scan_advice import half_widths
 from device.simulation.physics.neighbour import Neighbour
+from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.scenes.scene import Scene, Tissue
 
 FIGURES = r"\d|odds|misfit|usual|harmonic|contrast|response"
 """What no sentence for an operator has."""
-CRITICAL = CriticalValues(misfit_ratio=1.2, elongation_deviations=3.0, outside_log_odds=0.5)
+CRITICAL = CriticalValues(1.2, elongation_deviations=3.0, outside_log_odds=0.5, tissue_from_middle_ratio=0.85)
 
 
 @pytest.fixture(scope="module")
@@ -141,16 +144,30 @@ def test_gel_on_the_face_gets_no_numbers(pressed, ramp_model, calibration):
     assert estimate_ramp(wet, "standard", ramp_model, calibration).size_mm.value is None
 
 
+@pytest.mark.parametrize("tissue_kpa", [2.5, 8.0])
+def test_tissue_softer_or_stiffer_than_trained_gets_no_numbers(pressed, ramp_model, calibration, tissue_kpa):
+    """By finite elements: the tables hold no such tissue. Another place is asked for where it alone is in doubt."""
+    scene = Scene(Inclusion(10.0, 5.0, 60.0), tissue=Tissue(youngs_modulus_kpa=tissue_kpa))
+    press = pressed("standard", (10.0, 5.0, 60.0), ramps=press_ramps(scene, 0.65))
+    estimate = estimate_ramp(press, "standard", ramp_model, calibration)
+    assert estimate.status == "outside_range"
+    assert REASONS["tissue_from_middle_ratio"] in estimate.reason
+    assert estimate.features["tissue_from_middle_ratio"] > estimate.features["critical_tissue_from_middle_ratio"]
+    is_alone = estimate.features["misfit_ratio"] <= estimate.features["critical_misfit_ratio"]
+    assert estimate.reason.endswith(AWAY_FROM_BONE) is is_alone
+
+
 def test_what_is_at_its_critical_value_is_not_rejected():
-    assert rejections(CriticalValues(1.2, 3.0, 0.5), CRITICAL) == []
+    assert rejections(CRITICAL, CRITICAL) == []
 
 
 @pytest.mark.parametrize(
     ("found", "name"),
     [
-        (CriticalValues(1.31, 3.0, 0.5), "misfit_ratio"),
-        (CriticalValues(1.2, 4.26, 0.5), "elongation_deviations"),
-        (CriticalValues(1.2, 3.0, 0.6), "outside_log_odds"),
+        (CriticalValues(1.31, 3.0, 0.5, 0.85), "misfit_ratio"),
+        (CriticalValues(1.2, 4.26, 0.5, 0.85), "elongation_deviations"),
+        (CriticalValues(1.2, 3.0, 0.6, 0.85), "outside_log_odds"),
+        (CriticalValues(1.2, 3.0, 0.5, 0.86), "tissue_from_middle_ratio"),
     ],
 )
 def test_every_rejection_is_said_in_its_own_sentence_without_figures(found, name):
@@ -160,15 +177,15 @@ def test_every_rejection_is_said_in_its_own_sentence_without_figures(found, name
 
 @pytest.mark.parametrize("block", BLOCKS)
 def test_a_misfit_of_one_block_is_said_in_a_sentence_of_its_own_without_figures(block):
-    outside = CriticalValues(1.31, 3.0, 0.6)
+    outside = CriticalValues(1.31, 3.0, 0.6, 0.85)
     assert rejections(outside, CRITICAL, block) == [CAUSES[block].sentence, REASONS["outside_log_odds"]]
-    assert rejections(CriticalValues(1.2, 3.0, 0.6), CRITICAL, block) == [REASONS["outside_log_odds"]]
+    assert rejections(CriticalValues(1.2, 3.0, 0.6, 0.85), CRITICAL, block) == [REASONS["outside_log_odds"]]
     assert not re.search(FIGURES, " ".join(CAUSES[block]))
     assert CAUSES[block].action.startswith("No numbers are given. ")
 
 
 def test_all_rejections_are_said_and_what_is_no_number_is_rejected_too():
-    for everything in (CriticalValues(2.0, 9.0, 1.0), CriticalValues(*[float("nan")] * 3)):
+    for everything in (CriticalValues(2.0, 9.0, 1.0, 0.99), CriticalValues(*[float("nan")] * 4)):
         assert rejections(everything, CRITICAL) == list(REASONS.values())
 
 
@@ -178,7 +195,7 @@ def test_a_press_that_is_refused_keeps_the_figures_and_their_critical_values(pre
     refused = estimate_ramp(pressed(mode, wet_ratio=0.4), mode, ramp_model, calibration)
     assert refused.status == "outside_range"
     critical = ramp_model.critical[mode]
-    for name in ("misfit_ratio", "elongation_deviations", "outside_log_odds"):
+    for name in REASONS:
         assert refused.features[f"critical_{name}"] == getattr(critical, name)
     above = [name for name in REASONS if refused.features[name] > refused.features[f"critical_{name}"]]
     assert above[0] == "misfit_ratio"

@@ -112,7 +112,7 @@ def test_a_scans_fit_begins_where_its_presses_are_explained_in_their_own_directi
 
 def answer_at(offset_mm: float, nearest: int) -> RampAnswer:
     at = np.append(SHARED, 2 * offset_mm / HIGH[OFFSET] - 1)
-    return RampAnswer(None, None, 1.25, nearest, at, (5.0, 0.1))
+    return RampAnswer(None, None, 1.25, nearest, at, (5.85, 0.1))
 
 
 def test_round_and_inside_are_told_by_the_nearest_press():
@@ -122,6 +122,7 @@ def test_round_and_inside_are_told_by_the_nearest_press():
     answer, direction_rad = answer_at(1.5, nearest=2), np.array([0.3, -1.0, 0.8])
     found = found_values(answer, SeenPresses(rows, seconds, direction_rad), answers, lambda of: of[:, 7])
     assert (found.misfit_ratio, found.outside_log_odds) == (1.25, rows[2, 7])
+    assert found.tissue_from_middle_ratio == pytest.approx(0.85)
     (of_round,) = answers.surrogate.rows(answer.best[None], direction_rad[2:])
     expected = elongation_deviations(seconds[2], of_round, answers.noise)
     assert found.elongation_deviations == expected > 0
@@ -148,3 +149,4 @@ def test_presses_that_all_lie_beside_tell_neither_round_nor_inside():
     found = found_values(answer_at(2.1, nearest=0), seen, answers, lambda of: of[:, 0] + 9)
     assert found.misfit_ratio == 1.25
     assert (found.elongation_deviations, found.outside_log_odds) == (0.0, NOT_TOLD_LOG_ODDS)
+    assert found.tissue_from_middle_ratio == pytest.approx(0.85)

@@ -19,7 +19,8 @@ from device.instrument.press.states import Guidance, PressState, off_centre, too
 from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OUT, SHADE, UNKNOWN_IMAGE
 from device.measurement.mode import MODES
 from device.measurement.quantities import Bound
-from device.measurement.ramp_modes.estimate import CAUSES, REASONS
+from device.measurement.quick_mode.model import TISSUE_TAKEN
+from device.measurement.ramp_modes.estimate import AWAY_FROM_BONE, CAUSES, REASONS
 from device.web.screen.screen_words import LANGUAGES, page, words_of
 
 STATIC = ROOT / "device" / "web" / "static"
@@ -39,6 +40,8 @@ ELSEWHERE = {
     "tare_wipe",
     "press_straight",
     "turn_probe",
+    "away_from_bone",
+    "tissue_taken",
 }
 """Said where a whole daemon or a recording is needed, or never alone."""
 SAID_BY_FAULTS = {"is", "do"}
@@ -112,7 +115,8 @@ def daemon_sentences() -> list[str]:
     estimates.append(" ".join([*REASONS.values(), NO_NUMBERS]))
     estimates += [f"{cause.sentence} {NOT_ROUND} {cause.action}" for cause in CAUSES.values()]
     estimates.append(f"The image is too bright: 1.2% of its pixels are saturated, above 0.1%. {SHADE}")
-    estimates.append("This press does not determine size and depth and Young's modulus.")
+    estimates.append(f"{REASONS['tissue_from_middle_ratio']} {AWAY_FROM_BONE}")
+    estimates.append(f"This press does not determine size and depth and Young's modulus. {TISSUE_TAKEN}")
     return by_code + estimates
 
 
