@@ -23,7 +23,7 @@ def modes(
     only: Annotated[
         list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it. The page keeps the others.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of chapters dial, posterior, scan, missed and noise-free.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of dial, posterior, ranks, scan, missed, noise-free and tissue.")] = 1,
     scheduler: Scheduler = None,
 ) -> None:
     """Measure error, time, coverage and refusals of the modes against bounds; some hours on two cores.
@@ -43,6 +43,7 @@ def modes(
     from host_tools.scores.ellipsoids import oblong_chapter
     from host_tools.scores.just_outside import just_outside_chapter
     from host_tools.scores.noise_free import missed_chapter, noise_free_chapter
+    from host_tools.scores.one_thing.other_tissue import other_tissue_chapter
     from host_tools.scores.outside import kinds, outside_chapter
     from host_tools.scores.posterior import posterior_chapter
     from host_tools.scores.rank_histograms import rank_chapter
@@ -68,6 +69,7 @@ def modes(
         "outside": lambda: outside_chapter(
             partial(models.estimate, calibration=calibration), kinds(tables, derived_seed(1, "outside"))
         ),
+        "tissue": lambda: other_tissue_chapter(partial(models.estimate, calibration=calibration), tables, seed=seed),
         "oblong": lambda: oblong_chapter(partial(models.estimate, calibration=calibration), trained.answers, tables),
         "just-outside": lambda: just_outside_chapter(trained, calibration, tables),
         "breast-imager": lambda: breast_imager_chapter(trained, calibration, tables),
