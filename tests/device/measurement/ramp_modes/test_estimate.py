@@ -146,7 +146,7 @@ def test_gel_on_the_face_gets_no_numbers(pressed, ramp_model, calibration):
 
 @pytest.mark.parametrize("tissue_kpa", [2.5, 8.0])
 def test_tissue_softer_or_stiffer_than_trained_gets_no_numbers(pressed, ramp_model, calibration, tissue_kpa):
-    """By finite elements: the tables hold no such tissue. Another place is asked for where it alone is in doubt."""
+    """By finite elements: the tables hold no such tissue. Refused for it alone, another place is asked for."""
     scene = Scene(Inclusion(10.0, 5.0, 60.0), tissue=Tissue(youngs_modulus_kpa=tissue_kpa))
     press = pressed("standard", (10.0, 5.0, 60.0), ramps=press_ramps(scene, 0.65))
     estimate = estimate_ramp(press, "standard", ramp_model, calibration)
