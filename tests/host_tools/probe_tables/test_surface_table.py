@@ -49,6 +49,17 @@ def test_the_table_is_within_half_a_percent_of_the_inclusions_deformation_and_on
             assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
 
 
+@pytest.mark.parametrize("truth", [(7.13, 5.51, 100.0), (7.0, 6.5, 57.0)])
+@pytest.mark.long
+def test_finer_elements_move_an_inclusions_pressure_by_three_percent_of_its_peak_at_most(table, truth):
+    """The table is of coarse elements: between its points it is nearer to them than they are to the truth."""
+    inclusion, inside, forces_n = Inclusion(*truth), table.r_mm <= 9.9, np.array([0.12, 0.55])
+    for force_n, solution in zip(forces_n, ramp(scene_in(NOMINAL, inclusion), forces_n, BASELINE), strict=True):
+        finer, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
+        for name, value, bound in (("w_mm", 0, 0.007), ("p_kpa", 1, 0.03)):
+            assert worst_over_peak(found[value], finer[value], inside) < bound, (name, force_n)
+
+
 @pytest.mark.parametrize(("truth", "slab"), IN_SLABS)
 @pytest.mark.long
 def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, truth, slab):
