@@ -379,7 +379,7 @@ def test_the_answer_is_on_the_screen_before_the_disk_has_it(
 @pytest.mark.parametrize(
     ("no_numbers_in_any_mode", "words"),
     [
-        ((REASONS["misfit_ratio"], NO_NUMBERS), "note the finding without numbers."),
+        ((REASONS["misfit_ratio"], NO_NUMBERS), "note it without numbers."),
         (CAUSES["contrast"], "Wipe, press a little beside it"),
         (CAUSES["reference_response"], "have the probe commissioned again. Wipe, tare, begin beside it"),
         (CAUSES["first_harmonic"], "The probe was tilted, or one side's light has changed."),
@@ -389,7 +389,7 @@ def test_the_answer_is_on_the_screen_before_the_disk_has_it(
     indirect=["no_numbers_in_any_mode"],
 )
 def test_a_press_without_numbers_says_why_and_what_to_do(page: Page, probe: Served, words: str):
-    """All three reasons at once are the longest there is: they fit above the tiles, without a figure."""
+    """All four reasons at once are the longest there is: they fit above the tiles, without a figure."""
     page.goto(probe.url)
     _press_freely(page)
     page.locator("#press-button").click()
