@@ -103,11 +103,16 @@ def press_ramps(scene: Scene, largest_n: float = LARGEST_N) -> PressRamps:
     That without the inclusion is on the level of the table's: on the mesh of an inclusion the light beside it would
     tell another tissue, by half a kPa.
     """
-    forces_n = points_inside(0.0, largest_n, len(FORCES_N))
-    _, inclusion_field = _per_n(ramp(scene, forces_n), forces_n)
-    baseline = bare_per_n(replace(scene, inclusion=None), forces_n)
+    inclusion_field = inclusion_ramp(scene, largest_n)
+    baseline = bare_per_n(replace(scene, inclusion=None), inclusion_field.force_n)
     r_mm = np.linspace(0.0, scene.waveguide.radius_mm, baseline.shape[-1])
-    return PressRamps(r_mm, Ramp(forces_n, baseline), Ramp(forces_n, inclusion_field))
+    return PressRamps(r_mm, Ramp(inclusion_field.force_n, baseline), inclusion_field)
+
+
+def inclusion_ramp(scene: Scene, largest_n: float = LARGEST_N) -> Ramp:
+    """Return what the inclusion of one scene adds up to a force, solved for it alone."""
+    forces_n = points_inside(0.0, largest_n, len(FORCES_N))
+    return Ramp(forces_n, _per_n(ramp(scene, forces_n), forces_n)[1])
 
 
 def scene_in(slab: Slab, inclusion: Inclusion | None = None, *, waveguide: Waveguide | None = None) -> Scene:

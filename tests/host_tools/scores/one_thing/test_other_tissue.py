@@ -8,7 +8,7 @@ import pytest
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate, Quantity
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import NOMINAL, Slab
-from device.simulation.physics.surface_table import PressRamps, Ramp
+from device.simulation.physics.surface_table import Ramp
 from host_tools.forward.press_model import PressFailed
 from host_tools.probe_tables.surface_table import FORCES_N
 from host_tools.scenes.scene import Tissue
@@ -66,19 +66,33 @@ def test_every_solve_is_pressed_on_several_skins_in_the_middle_and_what_folds_is
 
     monkeypatch.setattr(other_tissue, "press_ramps", solved)
     monkeypatch.setattr(other_tissue, "in_parallel", lambda work, count, jobs, **_: [work(i) for i in range(count)])
-    kind = TissueKind("firm", (10.0, 12.0), is_meshed_anew=True)
+    kind = TissueKind("firm", (10.0, 12.0), truth="meshed anew")
     parameters, scenes = presses_in(kind, None, 2, 1, jobs=1)
     assert len(parameters) == 2 * SKINS
     assert [tuple(one) for one in parameters[::SKINS, :3]] == [scene.inclusion.as_tuple() for scene in scenes]
     assert folded[0] not in scenes
     assert (parameters[:, -1] == 0).all()
     assert len(np.unique(parameters[:, 5])) == 2 * SKINS
+    assert (parameters[:, 3:5] == (5.0, 30.0)).all()
+
+
+def test_presses_of_the_tables_are_those_that_are_solved_beside_them(monkeypatch):
+    """The same inclusions on the same skins, in the tissue that was drawn."""
+    monkeypatch.setattr(other_tissue, "press_ramps", lambda scene, largest_n: scene)
+    monkeypatch.setattr(other_tissue, "in_parallel", lambda work, count, jobs, **_: [work(i) for i in range(count)])
+    anew, of_tables = (
+        presses_in(TissueKind("", truth=truth), None, 2, 1, jobs=1) for truth in ("meshed anew", "tables")
+    )
+    assert of_tables.ramps == [None] * 2
+    tissue = [one.tissue for one in anew.ramps]
+    assert of_tables.parameters[::SKINS, 3].tolist() == [one.youngs_modulus_kpa for one in tissue]
+    np.testing.assert_array_equal(np.delete(anew.parameters, (3, 4), 1), np.delete(of_tables.parameters, (3, 4), 1))
 
 
 @pytest.mark.long
 def test_in_nominal_tissue_the_press_beside_is_the_tables_own(table):
     """A slab of 30 mm and 5 kPa changes nothing; of 5.5 kPa what the table's star says, within 0.1 % of the peak."""
-    nothing = PressRamps(table.r_mm, Ramp(FORCES_N, None), Ramp(FORCES_N, None))
+    nothing = Ramp(FORCES_N, None)
     for kpa, slab in ((5.0, NOMINAL), (5.5, Slab(5.5))):
         found = on_the_tables_mesh(nothing, Tissue(youngs_modulus_kpa=kpa), table).baseline.at(0.4)
         own, inside = table.ramps(Inclusion(0.0, 6.0, 80.0), slab).baseline.at(0.4), table.r_mm <= 9.9
