@@ -40,12 +40,12 @@ from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.probe_tables.surface_table import bare_per_n, inclusion_ramp, press_ramps, scene_on_one_mesh
 from host_tools.scenes.scene import Scene, Tissue
-from host_tools.scores.outside import EstimateOf
+from host_tools.scores.just_outside import holds
+from host_tools.scores.outside import CLEAR_DEPTH_MM, CLEAR_KPA, CLEAR_SIZE_MM, EstimateOf
 
 TISSUE_KPA, SLAB_MM = (RANGES[name][:2] for name in ("tissue_modulus_kpa", "slab_thickness_mm"))
 SOLVED, SKINS = 6, 6
 """Inclusions of each kind that are solved, and presses of each."""
-SIZES_MM, DEPTHS_MM, MODULUS_KPA = (5.0, 10.0), (4.0, 7.0), (30.0, 150.0)
 LEAST_CONTRAST = 2.5
 """Inclusions are so many times as stiff as their tissue, or more."""
 LARGEST_N = 0.65
@@ -213,7 +213,7 @@ def on_the_tables_mesh(inclusion_field: Ramp, tissue: Tissue, table: SurfaceTabl
     slabs = ChangedSlab(tissue.youngs_modulus_kpa, tissue.thickness_mm), NOMINAL_SLAB
     thicknesses_mm = sorted({slab.thickness_mm for slab in slabs})
     other, nominal = (bare_per_n(scene_on_one_mesh(slab, None, thicknesses_mm), forces_n) for slab in slabs)
-    own = table.ramps(Inclusion(0.0, DEPTHS_MM[0], MODULUS_KPA[0])).baseline
+    own = table.ramps(Inclusion(0.0, CLEAR_DEPTH_MM[0], CLEAR_KPA[0])).baseline
     tables_per_n = np.stack([np.array(own.at(float(force_n))) / force_n for force_n in forces_n], axis=1)
     return PressRamps(table.r_mm, Ramp(forces_n, tables_per_n + other - nominal), inclusion_field)
 
@@ -224,10 +224,10 @@ def random_scene(kind: TissueKind, rng: np.random.Generator) -> Scene:
         youngs_modulus_kpa=float(np.exp(rng.uniform(*np.log(kind.modulus_kpa)))),
         thickness_mm=float(rng.uniform(*kind.thickness_mm)),
     )
-    least_kpa = max(MODULUS_KPA[0], LEAST_CONTRAST * tissue.youngs_modulus_kpa)
-    modulus_kpa = float(np.exp(rng.uniform(*np.log((least_kpa, MODULUS_KPA[1])))))
+    least_kpa = max(CLEAR_KPA[0], LEAST_CONTRAST * tissue.youngs_modulus_kpa)
+    modulus_kpa = float(np.exp(rng.uniform(*np.log((least_kpa, CLEAR_KPA[1])))))
     while True:
-        size_mm, depth_mm = (float(rng.uniform(*ends)) for ends in (SIZES_MM, DEPTHS_MM))
+        size_mm, depth_mm = (float(rng.uniform(*ends)) for ends in (CLEAR_SIZE_MM, CLEAR_DEPTH_MM))
         if size_mm + depth_mm <= tissue.thickness_mm - NEAREST_MM:
             return Scene(Inclusion(size_mm, depth_mm, modulus_kpa), tissue=tissue)
 
@@ -246,17 +246,17 @@ def _answered(
     return in_parallel(answered, len(presses.parameters), jobs)
 
 
-def holds(found: Sequence[Estimate], truths: Array) -> Array:
+def held_by(found: Sequence[Estimate], truths: Array) -> Array:
     """Return whether each interval [n, 3] holds; NaN of a press without numbers."""
     return np.array([
-        [float(one.low <= truth <= one.high) if one.low is not None and one.high is not None else np.nan
-         for one, truth in zip((getattr(answer, name) for name in UNKNOWNS), of_press, strict=True)]
+        [np.nan if answer.size_mm.value is None else float(holds(getattr(answer, name), truth))
+         for name, truth in zip(UNKNOWNS, of_press, strict=True)]
         for answer, of_press in zip(found, truths, strict=True)
     ])  # fmt: skip
 
 
 def _benchmarks(kind: TissueKind, found: Sequence[Estimate], truths: Array) -> list[Benchmark]:
-    held = holds(found, truths)
+    held = held_by(found, truths)
     return [
         at_most(f"standard, {kind.name}", f"share of all presses in which {name} is wrong", float(wrong), WRONG_AT_MOST)
         for name, wrong in zip(UNKNOWNS, np.mean(held == 0, axis=0), strict=True)
@@ -264,7 +264,7 @@ def _benchmarks(kind: TissueKind, found: Sequence[Estimate], truths: Array) -> l
 
 
 def _figures(found: Sequence[Estimate], truths: Array) -> tuple[str, ...]:
-    held = holds(found, truths)
+    held = held_by(found, truths)
     is_answered = ~np.isnan(held[:, 0])
     refused = f"{1 - is_answered.mean():.0%}"
     if not is_answered.any():

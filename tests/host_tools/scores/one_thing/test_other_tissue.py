@@ -21,7 +21,7 @@ from host_tools.scores.one_thing.other_tissue import (
     SKINS,
     WRONG_AT_MOST,
     TissueKind,
-    holds,
+    held_by,
     known_at_best,
     on_the_tables_mesh,
     other_tissue_chapter,
@@ -102,7 +102,7 @@ def test_in_nominal_tissue_the_press_beside_is_the_tables_own(table):
 
 def test_an_interval_holds_or_does_not_and_a_refused_press_has_none():
     np.testing.assert_array_equal(
-        holds([RIGHT, WRONG, REFUSED], np.tile(TRUTH, (3, 1))), [[1, 1, 1], [0, 1, 1], [np.nan] * 3]
+        held_by([RIGHT, WRONG, REFUSED], np.tile(TRUTH, (3, 1))), [[1, 1, 1], [0, 1, 1], [np.nan] * 3]
     )
 
 
