@@ -27,6 +27,7 @@ IDEALISATIONS = {
     "half_width_departure": "a slab twice as wide",
     "dome_departure": "a first layer as much thicker as the dome is on average",
 }
+CANCELS = "not compared with the tolerance: what the centre gains under a force the rim loses"
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
 
 
@@ -242,7 +243,12 @@ def _print_plan(plan: dict[str, Any]) -> None:
         print(f"{choice:12} {value:20} {reason}")
     for name, words in IDEALISATIONS.items():
         if name in plan:
-            print(f"{name:26} {100 * plan[name]:12.2g} %    from {words}; in no error below")
+            print(f"{name:26} {_percent(plan[name]):>12} %    from {words}; in no error below")
+
+
+def _percent(ratio: float) -> str:
+    """Return two digits, but all before the point."""
+    return f"{100 * ratio:.2g}" if ratio < 1 else f"{100 * ratio:.0f}"
 
 
 def _print_solution(record: dict[str, Any]) -> None:
@@ -251,10 +257,11 @@ def _print_solution(record: dict[str, Any]) -> None:
         if unit and isinstance(value, float):
             error = record["stated_error"].get(name, 0.0)
             known = " +- unknown" if error is None else f" +- {100 * error:.3f} %" if error else ""
-            print(f"{name:26} {value:12.6g} {unit:4}{known}")
+            excused = f"   {CANCELS}" if name in record["tolerance"]["not_compared"] else ""
+            print(f"{name:26} {value:12.6g} {unit:4}{known}{excused}")
     print(f"{'pressure_is_positive':26} {record['pressure_is_positive']!s:>12}")
     departure = record["tolerance"]["small_strain_departure"]
     if departure != 0:
-        shown = "unknown" if departure is None else f"{100 * departure:12.2g} %   "
+        shown = "unknown" if departure is None else f"{_percent(departure):>12} %   "
         counted = "counted in every error above" if record["tolerance"]["departure_is_stated"] else "in no error above"
         print(f"{'small_strain_departure':26} {shown} from finite strain, at most; {counted}")

@@ -67,7 +67,8 @@ def _first_solved(journal: Journal) -> Row:
         if not row["reason"]:
             return row
         reason = reason or row["reason"]
-    raise InvalidQuantity("scenes solved", 0, "at least one", f"the first reason was: {reason}")
+    action = f"the first reason was: {reason.removesuffix('.')}; all reasons stand in {journal.path}"
+    raise InvalidQuantity("scenes solved", 0, "at least one", action)
 
 
 def _lay_out(file: h5netcdf.File, journal: Journal, solved: Row) -> dict[str, NDArray[np.float64]]:

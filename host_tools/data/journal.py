@@ -20,10 +20,12 @@ Row = dict[str, Any]
 class Journal:
     """Append-only record of finished rows beside the file that they will become; `index in journal` tells which."""
 
-    def __init__(self, path: Path, plan: Row) -> None:
-        """Open or continue; raise `InvalidQuantity` when the file was begun with another plan."""
+    def __init__(self, path: Path, plan: Row, *, replace: bool = False) -> None:
+        """Open or continue; raise `InvalidQuantity` for one begun with another plan, unless told to replace that."""
         self.path, self.plan = path, plan
         self._offset_of: dict[int, int] = {}
+        if replace and path.exists() and not _is_begun_with(plan, path):
+            path.unlink()
         if path.exists():
             os.truncate(path, self._read_whole_lines())
         self._file = path.open("ab")
@@ -53,7 +55,7 @@ class Journal:
                 "sweep",
                 f"another one than {self.path} was begun with",
                 "the same scenes, seed and press",
-                "repeat the first command, or delete that file to begin anew",
+                "repeat the first command, or add --force to begin anew",
             )
 
     def __len__(self) -> int:
@@ -92,3 +94,12 @@ class Journal:
         """Delete the journal once its rows stand in the data set."""
         self.close()
         self.path.unlink()
+
+
+def _is_begun_with(plan: Row, path: Path) -> bool:
+    """Return whether a file's first line says a plan."""
+    with path.open("rb") as file:
+        try:
+            return bool(json.loads(file.readline()) == json.loads(json.dumps(plan)))
+        except ValueError:
+            return False

@@ -9,11 +9,12 @@ import numpy as np
 from netgen.meshing import NgException
 from numpy.typing import NDArray
 
-from device.measurement.quantities import UNKNOWNS
+from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.journal import Row
 from host_tools.data.plan import SweepPlan
 from host_tools.forward.ladder import worst_error
 from host_tools.forward.plan import StrainModel, model_plan
+from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
 from host_tools.scenes.scene import Press, Scene
@@ -27,6 +28,8 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
     """Solve one scene under the plan's loads; a scene that fails under any of them becomes a row with its reason."""
     try:
         solutions = _solve_loads(plan.scene(truth), plan.forces_n, plan.strain)
+    except (PressFailed, InvalidQuantity) as refused:
+        return empty_row(index, truth, reason=str(refused))
     except (NgException, ValueError, ArithmeticError, RuntimeError) as error:
         return empty_row(index, truth, reason=f"{type(error).__name__}: {error}")
     if reason := _missed(solutions, plan.tolerance):

@@ -44,7 +44,7 @@ def sweep(
         return out
     with executor(jobs=jobs, scheduler=scheduler) as rows_of, _remembered_interrupt() as interrupted:
         out.parent.mkdir(parents=True, exist_ok=True)
-        journal = Journal(out.with_suffix(out.suffix + ".partial"), plan.as_record())
+        journal = Journal(out.with_suffix(out.suffix + ".partial"), plan.as_record(), replace=replace)
         truths = plan.truths()
         missing = [index for index in range(plan.scenes) if index not in journal]
         try:

@@ -69,6 +69,8 @@ class Climb:
     """Whether small strain was chosen here, and not asked for: its departure is then part of every stated error."""
     ended: str = ""
     """Why the climb ended without the tolerance."""
+    advice: str = "allow a larger tolerance"
+    """What to do about that."""
 
     def as_record(self) -> dict[str, Any]:
         """Return what was asked and reached, as the JSON object in `host_tools simulate --json`."""
@@ -77,6 +79,7 @@ class Climb:
             "reached": self.reached,
             "feature": self.feature,
             "held": not self.missed,
+            "not_compared": [CANCELLING_UNDER_FORCE] if self.solutions[-1].scene.press.force_n is not None else [],
             "small_strain_departure": self.departure,
             "departure_is_stated": self.was_chosen,
             "missed": self.missed,
@@ -97,7 +100,7 @@ class Climb:
             return ""
         return (
             f"tolerance is {100 * self.tolerance:.3g} %, but {self.feature} is only good to {100 * self.reached:.3g} % "
-            f"({self.ended}): allow a larger tolerance or more time (--within-s), or {TAKE_THE_BEST}."
+            f"({self.ended}): {self.advice}."
         )
 
 
@@ -144,7 +147,8 @@ def climb(
         told = f"{level.grading}, order {level.order} stated {100 * found.reached:.2g} %"
         now = time.perf_counter()
         if now + NEXT_RUNG * (now - took) > began + within_s:
-            reached = replace(reached, ended=f"the next level would take longer than the {within_s:g} s allowed")
+            ended = f"the next level would take longer than the {within_s:g} s allowed"
+            reached = replace(reached, ended=ended, advice=f"{reached.advice} or more time (--within-s)")
             break
     else:
         reached = replace(reached, ended="no level holds more") if reached else None
@@ -240,7 +244,8 @@ class _Rung:
                 break
         if best is None:
             raise furthest
-        return replace(best, ended=f"the next level gives way: {furthest}")
+        ended = f"the next level gives way: {str(furthest).removesuffix('.')}"
+        return replace(best, ended=ended, advice=f"{best.advice} or press less")
 
     def _wider(self, best: Climb | None) -> list[Level]:
         """Return the levels of the widest rim that are left to try; none where a finer rim has an answer."""
@@ -310,5 +315,5 @@ def worst_error(solution: Solution) -> tuple[str, float]:
 def held(climbed: Climb, *, best: bool) -> Climb:
     """Return a climb that holds its tolerance, or with `best` any; raise `ToleranceMissed` otherwise."""
     if climbed.missed and not best:
-        raise ToleranceMissed(climbed.missed, climbed)
+        raise ToleranceMissed(f"{climbed.missed.removesuffix('.')}, or {TAKE_THE_BEST}.", climbed)
     return climbed

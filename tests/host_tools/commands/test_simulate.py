@@ -27,6 +27,14 @@ def test_explain_prints_each_choice_with_its_reason_and_the_error_of_each_number
     assert re.search(r"max_deformation_mm +0\.0216\d* +mm +\+- 0\.\d+ %", done.stdout)
 
 
+def test_what_is_not_compared_with_the_tolerance_is_marked_and_large_departures_have_all_digits():
+    done = run_toolkit("simulate", *INCLUSION, "--indentation-mm", "14", "--strain", "small")
+    assert re.search(r"small_strain_departure +\d{2,4} % ", done.stdout)
+    by_force = run_toolkit("simulate", *INCLUSION, "--force-n", "0.1", "--strain", "small", "--tolerance", "5%")
+    [marked] = [line for line in by_force.stdout.splitlines() if "not compared with the tolerance" in line]
+    assert marked.startswith("total_deformation_mm3")
+
+
 def test_a_scene_file_is_solved_and_options_change_it(tmp_path):
     write_scene(Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2)), tmp_path / "scene.toml")
     asked = ("simulate", "--scene", str(tmp_path / "scene.toml"), "--strain", "small", "--json")

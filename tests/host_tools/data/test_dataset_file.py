@@ -48,8 +48,8 @@ def test_stated_errors_are_relative_and_a_failed_row_is_nan(tmp_path):
 
 def test_a_sweep_that_solved_nothing_writes_no_file(tmp_path):
     plan = SweepPlan(1, 1)
-    with pytest.raises(InvalidQuantity, match="the first reason was: no mesh"):
-        _written(tmp_path, plan, [empty_row(0, plan.truths()[0], reason="no mesh")])
+    with pytest.raises(InvalidQuantity, match="the first reason was: no mesh; all reasons stand in "):
+        _written(tmp_path, plan, [empty_row(0, plan.truths()[0], reason="no mesh.")])
     assert not (tmp_path / "s.nc").exists()
 
 

@@ -15,6 +15,18 @@ def test_a_journal_of_another_sweep_is_not_continued(tmp_path):
         Journal(tmp_path / "j", SweepPlan(5, 2).as_record())
 
 
+def test_a_journal_of_another_sweep_is_given_up_where_that_was_asked_for_and_its_own_goes_on(tmp_path):
+    other = SweepPlan(5, 2).as_record()
+    for plan in (PLAN, other):
+        journal = Journal(tmp_path / "j", plan, replace=True)
+        assert len(journal) == 0
+        journal.append({"index": 3})
+        journal.close()
+    again = Journal(tmp_path / "j", other, replace=True)
+    assert 3 in again
+    again.close()
+
+
 def test_a_garbled_journal_is_refused_and_left_as_it_is(tmp_path):
     (tmp_path / "j").write_bytes(b"no journal\nat all\n")
     with pytest.raises(InvalidQuantity, match="lines of JSON"):

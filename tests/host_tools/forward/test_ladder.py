@@ -3,6 +3,7 @@
 import pytest
 
 from device.measurement.quantities import Inclusion
+from host_tools.forward import ladder as module
 from host_tools.forward.accuracy import Level
 from host_tools.forward.ladder import ToleranceMissed, climb, held
 from host_tools.forward.press_model import PressFailed
@@ -41,11 +42,30 @@ def test_a_tolerance_beyond_all_rungs_ends_with_the_best_and_one_sentence():
     climbed = _climbed(tolerance=1e-9, within_s=1.0)
     assert "tolerance is 1e-07 %, but " in climbed.missed
     assert "only good to" in climbed.missed
-    assert "1 s allowed" in climbed.missed
+    assert "1 s allowed): allow a larger tolerance or more time (--within-s)." in climbed.missed
     assert held(climbed, best=True) is climbed
-    with pytest.raises(ToleranceMissed, match="only good to") as refused:
+    with pytest.raises(ToleranceMissed, match=r"only good to .*, or take the best as it is \(--best\)\.$") as refused:
         held(climbed, best=False)
     assert refused.value.climb is climbed
+
+
+def test_where_the_levels_are_used_up_or_give_way_more_time_is_no_advice(monkeypatch):
+    monkeypatch.setattr(module, "FLAT_ORDERS", range(3, 4))
+    climbed = _climbed(tolerance=1e-9)
+    assert climbed.missed.endswith("(no level holds more): allow a larger tolerance.")
+    deep = Scene(SCENE.inclusion, Press(indentation_mm=1.0))
+    rung = module._Rung(deep, [deep.press], climbed.solutions[0].plan, 1e-9)
+    gave_way = rung.at_widest_rim(climbed, PressFailed("the contact folded: press less."))
+    assert gave_way.missed.endswith("the contact folded: press less): allow a larger tolerance or press less.")
+
+
+def test_under_a_force_the_total_deformation_is_named_as_not_compared():
+    pressed = Scene(SCENE.inclusion, Press(force_n=0.02))
+    climbed = climb(pressed, [pressed.press], tolerance=0.05, strain="small")
+    assert climbed.as_record()["not_compared"] == ["total_deformation_mm3"]
+    indented = Scene(SCENE.inclusion, Press(indentation_mm=0.2))
+    held_there = climb(indented, [indented.press], tolerance=0.05, strain="small")
+    assert held_there.as_record()["not_compared"] == []
 
 
 def test_the_departure_of_small_strain_is_an_error_unless_small_strain_was_asked_for():
