@@ -180,8 +180,8 @@ def percent(ratio: float | None) -> str:
 
 
 def _nearest(benchmarks: Sequence[Benchmark]) -> Benchmark:
-    """Return the benchmark that uses up most of its bound."""
-    return max(benchmarks, key=_share)
+    """Return the benchmark that uses up most of its bound; of several that miss a bound of 0, the farthest."""
+    return max(benchmarks, key=lambda one: (_share(one), one.error))
 
 
 def _share(benchmark: Benchmark) -> float:

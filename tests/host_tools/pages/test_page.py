@@ -6,7 +6,7 @@ from math import nan
 import pytest
 
 from device import __version__
-from host_tools.pages.benchmark import Chapter, Figure, Table, at_most, relative
+from host_tools.pages.benchmark import Chapter, Figure, Table, at_least, at_most, relative
 from host_tools.pages.page import DOCS, RESULTS, TEMPLATES, Results, Timed, dumps, percent, render, write_page
 
 FIGURE = Figure("line.svg", "A line", lambda figure: figure.subplots().plot([0, 1]))
@@ -54,6 +54,14 @@ def test_it_shows_failures_and_what_was_skipped(page):
     assert "| three | no number | nan |  | nan | 1 | **fails** |" in text
     assert "| one | force (N) | 1.01 | 1 | 1.0e-02 | 0.1 | holds |" in text
     assert "**Skipped**: the program is not installed." in text
+
+
+def test_of_several_that_fall_short_the_farthest_is_told(tmp_path):
+    """Misses of a bound of 0 use up the same share of it: all that there is."""
+    short = Chapter("Short", "", "", tuple(at_least("one", name, got, 0.9) for name, got in (("a", 0.8), ("b", 0.3))))
+    path = tmp_path / "verification.md"
+    write_page(path, Results("verification", "host_tools verify", {"patch": Timed(short, 1.0)}))
+    assert "b (at least): 6.0e-01 of 0" in path.read_text(encoding="utf-8")
 
 
 def test_claim_prose_and_source_stand_above_the_numbers(page):
