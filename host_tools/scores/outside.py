@@ -174,10 +174,11 @@ def outside_chapter(answer: EstimateOf, kinds: Sequence[Kind], *, jobs: int = -1
     return Chapter(
         title="What is not one round inclusion gets no numbers",
         claim=(
-            "Each press is refused for its misfit, its elongation, the odds of a size or depth outside its range, or "
-            "because nothing stands out."
+            "Each press is refused for its misfit, its elongation, its tissue, the odds of a size or depth outside its "
+            "range, or because nothing stands out; mode quick has two tests of its own."
         ),
-        source="device/measurement/ramp_modes/estimate.py, held_estimate.py; host_tools/scores/outside.py",
+        source="device/measurement/ramp_modes/estimate.py, device/measurement/quick_mode/model.py; "
+        "host_tools/scores/outside.py",
         benchmarks=tuple(benchmarks),
         tables=(Table("Mode quick", ("presses", SHARE), quick),),
     )
