@@ -210,6 +210,8 @@ def _record_grid(
 def _require_room(recordings: list[Path]) -> None:
     """Refuse to record where a recording is, before any is made."""
     for path in recordings:
+        if path.parent.exists() and not path.parent.is_dir():
+            raise InvalidQuantity("out", path.parent, "a folder", "name another one with --out")
         if path.exists():
             raise InvalidQuantity("recording", path, "a new folder", "name another one with --out, or delete it first")
 

@@ -15,20 +15,25 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, RANGES, normalise, slope_of_normalised
-from device.measurement.quantities import Bound, InvalidQuantity
+from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from device.measurement.recording.recording import Recording
 from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.known_bench import another_set, truth_contradiction
-from host_tools.scenes.phantom_set import BLOCKS_NEEDED, INCLUSION, INCLUSIONS_NEEDED, PhantomSet, StatedPhantom
+from host_tools.scenes.phantom_set import (
+    BLOCKS_NEEDED,
+    INCLUSION,
+    INCLUSIONS_NEEDED,
+    TISSUE_OF,
+    PhantomSet,
+    StatedPhantom,
+)
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.stated import SIGMAS, SUFFIX
 
 OTHER_PROBE = "name the file of the probe that made it"
 UNKNOWN_STD = 1.0
 """Of skin's coordinates, whose trained ranges end at 1."""
-TISSUE_OF = {"tissue_modulus_kpa": "tissue_modulus_kpa", "slab_thickness_mm": "tissue_thickness_mm"}
-"""Parameters of a press that a phantom states, by the names in its file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +77,7 @@ def phantom_ramps(
             problems.append(InvalidQuantity(f"{name}: {error.quantity}", error.value, error.bound, error.action))
             continue
         phantom = _named(name, phantoms)
-        if phantom and not list(_outside(phantom)):
+        if phantom and not list(phantom.outside()):
             ramps.append(PhantomRamp(phantom.name, seen, *stated_coordinates(phantom)))
     if problems:
         raise CalibrationRejected(problems)
@@ -142,7 +147,7 @@ def _of_phantoms(
             yield contradiction
     stated = [one for name in dict.fromkeys((*names, *unread)) if (one := _named(name, phantoms))]
     for phantom in stated:
-        yield from _outside(phantom)
+        yield from phantom.outside()
     inclusions = sum(one.inclusion is not None for one in stated)
     for what, count, needed in (
         ("phantoms with an inclusion", inclusions, INCLUSIONS_NEEDED),
@@ -150,15 +155,6 @@ def _of_phantoms(
     ):
         if count < needed:
             yield InvalidQuantity(f"recorded {what}", count, f"at least {needed}", "record more of them")
-
-
-def _outside(phantom: StatedPhantom) -> Iterator[InvalidQuantity]:
-    """Yield what a phantom states beyond the ranges of the design's model."""
-    for name, (low, high, _) in RANGES.items():
-        stated = getattr(phantom, TISSUE_OF.get(name, name), None)
-        if stated is not None and not low <= stated <= high:
-            action = "cast one inside: the model knows no other"
-            yield InvalidQuantity(f"{name} of {phantom.name}", stated, str(Bound(low, high, "")), action)
 
 
 def _named(name: str, phantoms: PhantomSet | None) -> StatedPhantom | None:

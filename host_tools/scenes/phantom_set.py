@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from device.measurement.parameters import RANGES
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity
 from host_tools.scenes.scene import NEAREST_MM, Tissue
 from host_tools.scenes.stated import SIGMAS, SUFFIX, StatedNumbers, Tolerance, read_stated, require_fitting
@@ -28,6 +29,10 @@ INCLUSION = ("size_mm", "depth_mm", "youngs_modulus_kpa")
 """What a phantom with an inclusion states; a bare block states none of it."""
 KPA = Bound(0.0, 1e6, "kPa", low_included=False)
 Text = Annotated[str, Field(min_length=1)]
+
+
+TISSUE_OF = {"tissue_modulus_kpa": "tissue_modulus_kpa", "slab_thickness_mm": "tissue_thickness_mm"}
+"""What a phantom calls a parameter of the tissue."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,14 @@ class StatedPhantom:
             return None
         return Inclusion(self.size_mm, self.depth_mm, self.youngs_modulus_kpa)
 
+    def outside(self) -> Iterator[InvalidQuantity]:
+        """Yield what it states beyond the ranges of the design's model: commissioning refuses that."""
+        for name, (low, high, _) in RANGES.items():
+            stated = getattr(self, TISSUE_OF.get(name, name), None)
+            if stated is not None and not low <= stated <= high:
+                action = "cast one inside: commissioning knows no other"
+                yield InvalidQuantity(f"{name} of {self.name}", stated, str(Bound(low, high, "")), action)
+
     def agrees_with(self, truth: Inclusion) -> bool:
         """Return whether a recording's truth is its own, within three standard deviations of each number."""
         if self.inclusion is None:
@@ -90,7 +103,9 @@ class PhantomSet:
         return tuple(phantom for phantom in self.phantoms if phantom.inclusion)
 
     def advice(self) -> Iterator[str]:
-        """Yield what would tell more about a probe than the set does, in words."""
+        """Yield what commissioning refuses, and what would tell more about a probe than the set does, in words."""
+        for phantom in self.phantoms:
+            yield from map(str, phantom.outside())
         tissues = {(phantom.tissue_modulus_kpa, phantom.tissue_thickness_mm) for phantom in self.phantoms}
         if len({phantom.surface for phantom in self.phantoms}) < 2:
             yield "All phantoms have one surface: a second one, oiled or dusted, tells more than more sizes."

@@ -162,6 +162,9 @@ def test_phantom_records_over_nothing(tmp_path):
     assert done.returncode == 1
     assert "phantom3, but must be a new folder" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["phantom3"]
+    (tmp_path / "a file").touch()
+    done = run_toolkit("phantom", "--out", tmp_path / "a file")
+    assert "a file, but must be a folder" in done.stderr
 
 
 def test_the_first_solve_waits_for_nothing_that_it_does_not_need():

@@ -79,6 +79,18 @@ def test_a_set_of_one_surface_and_tissue_is_taken_and_told_what_would_tell_more(
     assert len(list(read_phantoms(written(tmp_path, table)).advice())) == 2
 
 
+def test_what_commissioning_will_refuse_is_told_when_the_set_is_checked(tmp_path):
+    """A set is taken before anything is cast from it: other uses know more tissue."""
+    table = good()
+    table["phantoms"][0]["size_mm"], table["phantoms"][1]["tissue_modulus_kpa"] = 1.5, 6.2
+    told = list(read_phantoms(written(tmp_path, table)).advice())
+    assert len(told) == 2
+    assert told[0].startswith("size_mm of ")
+    assert "is 1.5, but must be at least 2 and at most 15" in told[0]
+    assert "tissue_modulus_kpa of " in told[1]
+    assert "cast one inside" in told[1]
+
+
 def test_everything_that_is_wrong_is_told_at_once(tmp_path):
     table = good()
     first, second, third, fourth, *_ = table["phantoms"]
