@@ -263,5 +263,6 @@ def _print_solution(record: dict[str, Any]) -> None:
     departure = record["tolerance"]["small_strain_departure"]
     if departure != 0:
         shown = "unknown" if departure is None else f"{_percent(departure):>12} %   "
-        counted = "counted in every error above" if record["tolerance"]["departure_is_stated"] else "in no error above"
-        print(f"{'small_strain_departure':26} {shown} from finite strain, at most; {counted}")
+        is_stated = record["tolerance"]["departure_is_stated"]
+        counted = "every error above has its own part in it" if is_stated else "in no error above"
+        print(f"{'small_strain_departure':26} {shown} from finite strain, of any number at most; {counted}")

@@ -53,6 +53,8 @@ CONVERGED = Level(GRADED, 5)
 """Small strain, as good as true, by which it is told what a mesh of finite strain errs."""
 LIGHT_RATIO = 0.01
 """Share of a press at which small strain foretells: its relative errors are of any press, and none folds at this."""
+MESH_SHARE = 0.25
+"""Where small strain departs by more than was asked for, a mesh that errs by so much of that adds little to it."""
 SMALL_IS_ENOUGH = "ask for small strain (--strain small), which then states its own errors alone"
 TAKE_THE_BEST = "take the best as it is (--best)"
 
@@ -132,9 +134,10 @@ def climb(
         raise ToleranceMissed(_departs_by_more(tolerance, departure))
     reached, told = None, ""
     rung = _Rung(scene, presses, plan, tolerance, was_chosen=strain == "auto")
-    is_out_of_reach = departure > tolerance  # then the mesh alone is to hold the tolerance
-    aim = tolerance + departure if is_out_of_reach else tolerance
-    for level in _rungs(plan, tolerance if is_out_of_reach else tolerance - departure):
+    is_out_of_reach = departure > tolerance
+    of_mesh = max(tolerance, MESH_SHARE * departure) if is_out_of_reach else tolerance - departure
+    aim = of_mesh + departure
+    for level in _rungs(plan, of_mesh):
         took = time.perf_counter()
         try:
             found = rung.solved(level, told)

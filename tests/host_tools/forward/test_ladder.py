@@ -1,5 +1,7 @@
 """A tolerance that was asked for is held by what is stated, or it is said what was reached."""
 
+from dataclasses import replace
+
 import pytest
 
 from device.measurement.quantities import Inclusion
@@ -76,6 +78,17 @@ def test_the_departure_of_small_strain_is_an_error_unless_small_strain_was_asked
     assert chosen.solutions[0].plan.order == 3
     assert "small strain may depart" in chosen.missed
     assert not chosen.as_record()["held"]
+
+
+def test_a_mesh_is_no_finer_than_what_the_model_departs_by_is_worth(monkeypatch):
+    """8 % of departure: a mesh of 2 % will do, of order 3, where 0.5 % would begin at order 4."""
+    locking = replace(SCENE, tissue=replace(SCENE.tissue, poisson_ratio=0.4995))
+    orders = {}
+    for departure in (0.08, 0.0):
+        monkeypatch.setattr(module, "largest_departure", lambda scene, departure=departure: departure)
+        climbed = climb(locking, [locking.press], tolerance=0.005, within_s=0.01)
+        orders[departure] = climbed.solutions[0].plan.order
+    assert orders == {0.08: 3, 0.0: 4}
 
 
 def test_where_the_model_alone_misses_the_tolerance_nothing_is_solved_unless_the_best_is_taken():
