@@ -181,14 +181,18 @@ def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within
 
 
 def _record(climbed: Climb, *, explain: bool) -> dict[str, Any]:
-    """Return what was reached as a JSON object; to explain it, with what idealisations of the scene depart by."""
+    """Return what was reached as a JSON object; to explain it, with what idealisations of the scene depart by.
+
+    So also of a thick slab: that it ends aside is then worth more than most errors, and nobody would ask.
+    """
     solution = climbed.solutions[0]
     record = solution.as_record() | {"tolerance": climbed.as_record()}
     for errors in (record["stated_error"], record["tolerance"]):
         errors.update(
             {name: None for name, error in errors.items() if isinstance(error, float) and not isfinite(error)}
         )
-    if explain:
+    tissue = solution.scene.tissue
+    if explain or tissue.thickness_mm > tissue.half_width_mm / 2:
         from host_tools.forward.model_departures import idealisation_departures
 
         record["plan"] |= idealisation_departures(solution.scene)
@@ -235,15 +239,19 @@ def _print(record: dict[str, Any], *, as_json: bool, explain: bool) -> None:
     if explain:
         _print_plan(record["plan"])
     _print_solution(record)
+    _print_idealisations(record["plan"])
 
 
 def _print_plan(plan: dict[str, Any]) -> None:
     for choice, reason in plan["reasons"].items():
         value = f"{plan['grading']}, order {plan['order']}" if choice == "level" else plan[choice]
         print(f"{choice:12} {value:20} {reason}")
+
+
+def _print_idealisations(plan: dict[str, Any]) -> None:
     for name, words in IDEALISATIONS.items():
         if name in plan:
-            print(f"{name:26} {_percent(plan[name]):>12} %    from {words}; in no error below")
+            print(f"{name:26} {_percent(plan[name]):>12} %    from {words}; in no error above")
 
 
 def _percent(ratio: float) -> str:

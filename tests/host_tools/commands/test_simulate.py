@@ -35,6 +35,15 @@ def test_what_is_not_compared_with_the_tolerance_is_marked_and_large_departures_
     assert marked.startswith("total_deformation_mm3")
 
 
+def test_what_the_end_of_a_thick_slab_departs_by_is_told_unasked(tmp_path):
+    path = tmp_path / "thick.toml"
+    for thickness_mm, is_told in ((60.0, True), (30.0, False)):
+        write_scene(Scene(Inclusion(10.0, 6.0, 80.0), tissue=Tissue(thickness_mm=thickness_mm)), path)
+        done = run_toolkit("simulate", "--scene", str(path), "--strain", "small", "--tolerance", "5%")
+        told = re.search(r"half_width_departure +4\.\d % +from a slab twice as wide; in no error above", done.stdout)
+        assert bool(told) == is_told
+
+
 def test_a_scene_file_is_solved_and_options_change_it(tmp_path):
     write_scene(Scene(Inclusion(10.0, 6.0, 80.0), Press(force_n=0.2)), tmp_path / "scene.toml")
     asked = ("simulate", "--scene", str(tmp_path / "scene.toml"), "--strain", "small", "--json")
