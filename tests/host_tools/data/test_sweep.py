@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -267,6 +268,16 @@ def test_a_row_that_states_more_than_the_tolerance_says_which_number_and_how_muc
     row = solve_row(plan, 0, plan.truths()[0])
     assert "under 0.5 N is only good to 0." in row["reason"]
     assert "0.0001 % was asked for" in row["reason"]
-    held = SweepPlan(1, 4, tolerance=0.05)
+    held = SweepPlan(1, 4, forces_n=(0.02,), tolerance=0.05)
     assert solve_row(held, 0, held.truths()[0])["reason"] == ""
     assert (held.as_record()["tolerance"], "tolerance" in SweepPlan(1, 4).as_record()) == (0.05, False)
+
+
+def test_a_row_in_small_strain_has_failed_where_that_departs_by_more_than_the_tolerance():
+    """0.5 N presses some 2 mm deep: the mesh is within a per cent, small strain is not."""
+    reasons = []
+    for strain in ("small", "finite"):
+        plan = SweepPlan(1, 4, strain=strain, tolerance=0.1)
+        reasons.append(solve_row(plan, 0, plan.truths()[0])["reason"])
+    assert re.match(r"small strain may depart from finite strain by \d+ % under 0\.5 N, but 10 % was asked", reasons[0])
+    assert reasons[1] == ""
