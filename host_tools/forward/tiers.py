@@ -36,10 +36,11 @@ AXISYMMETRIC_SIZES = {
         bulk_mm=3.0, face_mm=0.8, contact_rim_mm=0.1, back_rim_mm=0.01, per_inclusion=12.0, grading=0.5
     ),
     "blunt": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.5, per_inclusion=10.0, grading=0.5),
+    "blunt_rim": Resolution(bulk_mm=4.0, contact_rim_mm=0.3, back_rim_mm=0.3, per_inclusion=10.0, grading=0.5),
     "blunt_fine": Resolution(bulk_mm=2.0, face_mm=0.5, contact_rim_mm=0.3, back_rim_mm=0.3, grading=0.4),
 }
 """Element sizes by the name of the level. Those of finite strain keep the contact's rim coarser than its slip: "blunt"
-ones, of data sets, both rims, "sliding" ones of a climb only that, since the bonded rim does not slip."""
+ones, of data sets and tables, both rims, "sliding" ones of a climb only that, since the bonded rim does not slip."""
 
 SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE, GRADED: LAYERED}
 SOLID_ANGLES = 48

@@ -1,7 +1,7 @@
 """The models of modes quick, standard and precise: random presses to a surrogate, networks and confidence belts.
 
-Modules in reading order: `seeds`, `press_samples`, `recorded_presses`, `camera_noise`, `noisy_presses`,
-`fit_surrogate`, `dense_network`, `train_ensemble`, `train_range`, `mode_outcome`, `mode_statistics`,
+Modules in reading order: `seeds`, `press_samples`, `recorded_presses`, `fit_surrogate`, `measured_noise`,
+`noisy_presses`, `dense_network`, `train_ensemble`, `train_range`, `mode_outcome`, `mode_statistics`,
 `confidence_belts`, `ramp_training`, `quick_training`, `onnx_networks`, `export`, `judge_bundle`,
 `press_derivatives`.
 

@@ -15,7 +15,6 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import HIGH, LOW, NUISANCES, PARAMETERS, normalise
 from device.measurement.quantities import UNKNOWNS, Bound, require
 from device.measurement.ramp_modes.legendre import LegendreSum, LegendreTerms
-from device.measurement.ramp_modes.noise import light_ratio, rms_contrast
 from device.measurement.ramp_modes.radial_profile import RESPONSE
 from device.measurement.ramp_modes.surrogate import (
     HARMONICS,
@@ -29,7 +28,6 @@ from device.measurement.ramp_modes.surrogate import (
     offsets_in_range,
     polynomial_coordinates,
 )
-from host_tools.press_models.camera_noise import shrunk_covariance
 from host_tools.press_models.press_samples import BESIDE_TO_MM, PressSamples
 
 INCLUSION_REACH = {
@@ -192,20 +190,9 @@ def _weighted(design: Array, weight: Array, rows: Array) -> Array:
 
 def held_out_error(surrogate: PressRows, samples: PressSamples) -> Array:
     """Return the root mean square error [P] of the profile's columns on presses that were kept apart."""
-    return np.asarray(np.sqrt(np.mean(_missed(surrogate, samples) ** 2, axis=0)))
+    return np.asarray(np.sqrt(np.mean(missed_rows(surrogate, samples) ** 2, axis=0)))
 
 
-def forward_error(surrogate: PressRows, *kept: PressSamples) -> Array:
-    """Return the covariance [P, P] of what a surrogate misses of presses kept apart, as `PressNoise.forward`.
-
-    Errors of large and shallow inclusions are the largest: about as the root of the contrast.
-    """
-    missed = [
-        _missed(surrogate, samples) / light_ratio(samples.rows) / np.sqrt(rms_contrast(samples.rows))[:, None]
-        for samples in kept
-    ]
-    return shrunk_covariance(np.concatenate(missed))
-
-
-def _missed(surrogate: PressRows, samples: PressSamples) -> Array:
+def missed_rows(surrogate: PressRows, samples: PressSamples) -> Array:
+    """Return by how much a surrogate's rows [n, P] differ from those of presses."""
     return surrogate.rows(normalise(samples.parameters), samples.direction_rad) - samples.rows

@@ -25,8 +25,8 @@ from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, P
 from device.measurement.recording.reference_light import EXPONENT
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.press_models.camera_noise import exact_rows, shrunk_covariance
 from host_tools.press_models.confidence_belts import SpreadAnswers, confidence_belts, widened
+from host_tools.press_models.measured_noise import exact_rows, shrunk_covariance
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.noisy_presses import Index, PressSet, random_press_set
 from host_tools.press_models.press_samples import draw_parameters

@@ -1,10 +1,10 @@
 """Everything behind modes standard and precise, from the virtual probe's tables to what the bundle holds.
 
 Random presses, near the inclusion and beside it, make the surrogate; recordings of random presses the camera's noise;
-surrogate and noise endless training presses for the networks that say where a fit begins. Inclusions around the trained
-ranges make the networks that tell what lies outside. Presses that nobody has learned from tell how often intervals
-hold; recordings with every drift give the critical values of misfit, elongation and odds, and the errors that the card
-states.
+presses kept apart and inclusions solved anew what polynomials and tables miss; surrogate and noise endless training
+presses for the networks that say where a fit begins. Inclusions around the trained ranges make the networks that tell
+what lies outside. Presses that nobody has learned from tell how often intervals hold; recordings with every drift give
+the critical values of misfit, elongation and odds, and the errors that the card states.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.radial_profile import network_rows
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.press_models.camera_noise import camera_noise
-from host_tools.press_models.fit_surrogate import fit_surrogate, forward_error, held_out_error
+from host_tools.press_models.fit_surrogate import fit_surrogate, held_out_error
+from host_tools.press_models.measured_noise import camera_noise, surrogate_error, table_error
 from host_tools.press_models.mode_outcome import THREE, Guess, ModeOutcome, answers_to, evaluated, outcome_of
 from host_tools.press_models.noisy_presses import NetworkPresses, random_press_set, random_scan
 from host_tools.press_models.press_samples import PressSamples, draw_beside, draw_parameters, sample_presses
@@ -50,6 +50,7 @@ class TrainingBudget:
     held_out: int = 600
     noise_recordings: int = 1_200
     noise_recordings_beside: int = 1_000
+    solved_anew: int = 120
     trained_on: int = 120_000
     members: int = 4
     steps: int = 9_000
@@ -63,7 +64,7 @@ class TrainingBudget:
 
 
 DRY_RUN = TrainingBudget(
-    500, 620, 60, 40, 40, 20_000, 1, 400, 60, 10, 20, 8, RangeBudget(600, 40, 20_000, 1, 400, 0.5), 0.5
+    500, 620, 60, 40, 40, 2, 20_000, 1, 400, 60, 10, 20, 8, RangeBudget(600, 40, 20_000, 1, 400, 0.5), 0.5
 )
 """Enough to try the chain; the model is a poor one."""
 
@@ -110,7 +111,10 @@ def train_ramp(
     surrogate = fit_surrogate(learned, learned_beside, asked.detail_ratio)
     say(f"{asked.noise_recordings + asked.noise_recordings_beside} recordings for the noise")
     camera = camera_noise(tables, asked.noise_recordings, asked.noise_recordings_beside, seed=seed, jobs=jobs)
-    answers = RampAnswers(surrogate, PressNoise(camera, forward=forward_error(surrogate, kept, kept_beside)))
+    say(f"{asked.solved_anew} inclusions solved anew, for what the tables miss")
+    missed = table_error(tables, asked.solved_anew, seed=derived_seed(seed, "inclusions solved anew"), jobs=jobs)
+    forward = surrogate_error(surrogate, kept, kept_beside) + missed
+    answers = RampAnswers(surrogate, PressNoise(camera, forward=forward))
     say(f"{asked.members} networks")
     training_set = random_press_set(surrogate, answers.noise, asked.trained_on, derived_seed(seed, "training presses"))
     ensemble = train_ensemble(

@@ -71,7 +71,9 @@ def build_face_motion(
     axes = InclusionAxes(fine.size_mm[COARSE], fine.depth_mm[COARSE], fine.elastic_mismatch[[0, -1]])
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     without = (
-        np.array([outward_mm(solution)[0] for solution in ramp(scene_in(NOMINAL, waveguide=waveguide), level=BASELINE)])
+        np.array(
+            [outward_mm(solution)[0] for solution in ramp(scene_in(NOMINAL, waveguide=waveguide), levels=BASELINE)]
+        )
         / FORCES_N[:, None]
     )
     places = [tuple(map(float, place)) for place in product(*axes)]

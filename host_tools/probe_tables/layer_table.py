@@ -29,6 +29,7 @@ from device.simulation.physics.layer_table import (
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import COARSE
 from host_tools.probe_tables.surface_table import (
+    CHANGES,
     POINTS,
     SMALLEST_SIZE_MM,
     baseline_per_n,
@@ -99,8 +100,8 @@ def build_layer_table(
     usual, others = solved_scenes(waveguide)
     scenes = [*usual, *others]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    baseline = Parallel(n_jobs=jobs)(delayed(baseline_per_n)(scene, NOMINAL, None) for scene in scenes)
-    places = [(scene, NOMINAL, *place) for scene in scenes for place in product(axes.size_mm, axes.depth_mm)]
+    baseline = Parallel(n_jobs=jobs)(delayed(baseline_per_n)(scene, NOMINAL, CHANGES) for scene in scenes)
+    places = [(scene, NOMINAL, CHANGES, *place) for scene in scenes for place in product(axes.size_mm, axes.depth_mm)]
     solving = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(inclusions_per_n_mm3)(*place, axes.elastic_mismatch) for place in places
     )

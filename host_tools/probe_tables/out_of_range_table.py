@@ -31,7 +31,7 @@ from device.simulation.physics.surface_table import Ramp, SurfaceTable
 from device.simulation.physics.table_file import load_table, save_table
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.probe_tables.off_axis_table import OFFSETS_MM, inclusions_per_n_mm3
-from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES, scene_in
+from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES, INCLUSIONS, scene_in
 from host_tools.probe_tables.surface_table import inclusions_per_n_mm3 as centred_per_n_mm3
 from host_tools.scenes.scene import Press, Scene
 
@@ -208,7 +208,7 @@ def build_wide_table(
 def _centred(size_mm: float, share: float, mismatches: Array) -> Array:
     """Return what an inclusion adds at all mismatches [M, 2, F, R] over force, strength and mismatch."""
     place = float(size_mm), depth_at(size_mm, share)
-    return centred_per_n_mm3(scene_in, NOMINAL, *place, mismatches) * _volume_over_strength(*place)
+    return centred_per_n_mm3(scene_in, NOMINAL, INCLUSIONS, *place, mismatches) * _volume_over_strength(*place)
 
 
 def _aside(size_mm: float, share: float, mismatches: Array) -> Array:

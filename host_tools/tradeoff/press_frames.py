@@ -33,7 +33,7 @@ from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom import TARGET_N, PhantomProtocol, phantom_recording
 from host_tools.pages.benchmark import Chapter
-from host_tools.press_models.camera_noise import exact_rows
+from host_tools.press_models.measured_noise import exact_rows
 from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.recorded_presses import HELD_STRAY_N, drifted, in_parallel, scenario_of
 from host_tools.press_models.seeds import derived_seed, press_seed

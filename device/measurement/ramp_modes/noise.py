@@ -63,8 +63,8 @@ class ErrorLevels:
 class PressNoise:
     """`camera` [P, P]: covariance of repeated recordings over the light ratio; `levels` of drift and smooth errors.
 
-    `forward` [P, P]: what the forward model's polynomials miss of presses kept apart, over the light ratio, for a root
-    mean square contrast of 1; it grows with that contrast. None where they miss nothing.
+    `forward` [P, P]: what the forward model's polynomials miss of presses kept apart and its tables of inclusions
+    solved anew, over the light ratio, for a root mean square contrast of 1; it grows with that contrast. None: nothing.
     """
 
     camera: Array

@@ -10,7 +10,6 @@ import pytest
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
-from device.measurement.ramp_modes.noise import light_ratio, rms_contrast
 from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE
 from device.measurement.ramp_modes.surrogate import (
     CONTRAST_COLUMNS,
@@ -22,7 +21,7 @@ from device.measurement.ramp_modes.surrogate import (
     ScanSurrogate,
 )
 from host_tools.press_models import fit_surrogate as module
-from host_tools.press_models.fit_surrogate import degrees, fit_surrogate, forward_error, held_out_error
+from host_tools.press_models.fit_surrogate import degrees, fit_surrogate, held_out_error
 from host_tools.press_models.press_samples import BESIDE_TO_MM, PressSamples, draw_beside, draw_parameters
 
 NONE = dict.fromkeys(PARAMETERS, 0.5)
@@ -176,18 +175,6 @@ def test_presses_that_are_not_finite_are_refused_and_counted(truth, value, part)
     samples[part].rows[[4, 17], [3, 60]] = value
     with pytest.raises(InvalidQuantity, match="^presses that are not finite is 2, .* leave them out"):
         fit_surrogate(*samples)
-
-
-def test_what_polynomials_miss_is_a_covariance_for_a_contrast_of_one(truth):
-    """Errors drawn as the root of the contrast, the same in all columns: their variance comes back."""
-    near, beside = samples_of(truth, 300, seed=2)
-    parts, rng, level = [], np.random.default_rng(3), 0.02
-    for samples in (near, beside):
-        size = np.sqrt(rms_contrast(samples.rows))[:, None] * light_ratio(samples.rows)
-        parts.append(replace(samples, rows=samples.rows + 1e-6 * level * size * rng.standard_normal((300, 1))))
-    found = forward_error(truth, *parts)
-    np.testing.assert_allclose(np.diag(found), (1e-6 * level) ** 2, rtol=0.2)
-    assert found[0, 1] == pytest.approx(found[0, 0], rel=0.05)
 
 
 def test_on_the_axis_no_direction_matters_though_no_press_lies_there(truth):

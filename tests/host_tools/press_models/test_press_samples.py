@@ -128,14 +128,14 @@ def aside(tables) -> np.ndarray:
 
 
 def test_an_inclusion_on_the_axis_has_no_harmonics_and_one_beside_it_has(aside):
-    """A second one is bright towards both sides where the spot falls off, and across them nearer to its middle.
+    """A second one is bright towards both sides, nearer to its middle too: a solve in three dimensions says so.
 
     Single precision of the images and the tables' own steps leave 1e-5.
     """
     np.testing.assert_allclose(aside[0, FIRST.start :], 0.0, atol=1e-5)
     assert aside[2, FIRST].max() > 1e-2
     assert aside[2, SECOND].max() > 1e-2
-    assert aside[2, SECOND].min() < -5e-3
+    assert aside[2, SECOND].min() > 5e-4
 
 
 def test_near_the_axis_the_second_harmonic_is_one_of_the_square_of_the_offset(aside):

@@ -10,7 +10,7 @@ from device.measurement.parameters import PARAMETERS, denormalise
 from device.measurement.quick_mode.profile import quick_press
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.recording.ring_means import RINGS
-from host_tools.press_models import camera_noise, quick_training
+from host_tools.press_models import measured_noise, quick_training
 from host_tools.press_models.confidence_belts import SpreadAnswers
 from host_tools.press_models.press_samples import profile_rows
 from host_tools.press_models.quick_training import CRITICAL_RATIO, RecordedHolds, recorded_holds
@@ -79,7 +79,7 @@ def test_the_cameras_part_of_the_noise_is_that_of_recordings_without_drift(table
         pressed.append(direction_rad)
         return profile_rows(tables, parameters, direction_rad)
 
-    monkeypatch.setattr(camera_noise, "profile_rows", exact)
+    monkeypatch.setattr(measured_noise, "profile_rows", exact)
     std = np.sqrt(np.diag(quick_training._camera(tables, 3, 5, 1)))
     assert std.shape == (RINGS,)
     assert (std > 1e-4).all()

@@ -8,7 +8,7 @@ from device.simulation.physics.layer_table import SOLVED_RATIOS, LayerRatios
 from device.simulation.physics.slab import NOMINAL
 from device.simulation.physics.world import World
 from host_tools.probe_tables.layer_table import WAVEGUIDE_LAYERS, LayeredScene
-from host_tools.probe_tables.surface_table import fields, ramp
+from host_tools.probe_tables.surface_table import CHANGES, fields, ramp
 
 INCLUSION = Inclusion(10.5, 6.7, 55.0)
 """Between the table's sizes, depths and mismatches."""
@@ -32,7 +32,7 @@ those of the skin 2-6 and 4-17 %."""
 
 def solved(scene_of):
     """The fields [F, baseline or inclusion, w or p, R] of a scene."""
-    return np.array([fields(solution) for solution in ramp(scene_of(NOMINAL, INCLUSION), FORCES_N)])
+    return np.array([fields(solution) for solution in ramp(scene_of(NOMINAL, INCLUSION), FORCES_N, CHANGES)])
 
 
 def tabulated(tables, layers):

@@ -6,33 +6,42 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
+from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solve import solve
-from host_tools.probe_tables.off_axis_table import MODES, cosine_modes, off_axis_scene
-from host_tools.probe_tables.surface_table import ring_means
+from host_tools.probe_tables.off_axis_table import (
+    MODES,
+    OFFSETS_MM,
+    POINTS,
+    SMALLEST_SIZE_MM,
+    cosine_modes,
+    off_axis_scene,
+)
+from host_tools.probe_tables.surface_table import inclusion_axes, ring_means
 
 FORCE_N = 0.02
 """Small strain: the solve's, and the table's smallest."""
 
 
 TRUTHS = [
-    ((7.0, 7.0, 100.0), 9.0, 0.05),
+    ((7.0, 7.0, 100.0), 9.0),
     *(
         pytest.param(*one, marks=pytest.mark.long)
         for one in (
-            ((10.0, 5.0, 80.0), 1.5, 0.05),
-            ((12.0, 6.0, 10.0), 5.0, 0.10),
-            ((12.0, 6.0, 60.0), 10.0, 0.15),
+            ((10.0, 5.0, 80.0), 1.5),
+            ((12.0, 6.0, 10.0), 5.0),
+            ((12.0, 6.0, 60.0), 10.0),
+            ((5.4, 5.7, 46.0), 2.7),
         )
     ),
 ]
-"""Inclusion, offset (mm) and the share of the peak that is held: less for soft inclusions, and at the face's rim."""
+"""Inclusion and offset (mm)."""
 
 
-@pytest.mark.parametrize(("truth", "offset_mm", "bound_ratio"), TRUTHS)
-def test_the_face_off_the_axis_is_within_a_few_percent_of_the_inclusions_peak(tables, truth, offset_mm, bound_ratio):
-    """Deformation within the bound anywhere in the central window; ring means of pressure within 6 % rms, no better."""
+@pytest.mark.parametrize(("truth", "offset_mm"), TRUTHS)
+def test_the_face_off_the_axis_is_within_two_percent_of_the_inclusions_peak(tables, truth, offset_mm):
+    """Deformation anywhere in the central window; ring means of pressure, which jump from mesh to mesh, 4 % rms."""
     inclusion = Inclusion(*truth)
     scene = off_axis_scene(inclusion, offset_mm, force_n=FORCE_N)
     solution = solve(scene, replace(model_plan(scene), grading="coarse"))
@@ -54,9 +63,16 @@ def test_the_face_off_the_axis_is_within_a_few_percent_of_the_inclusions_peak(ta
             strict=True,
         )
     )
-    assert np.abs(found_mm - inclusion_mm)[:, inside].max() < bound_ratio * inclusion_mm[:, inside].max()
+    assert np.abs(found_mm - inclusion_mm)[:, inside].max() < 0.02 * inclusion_mm[:, inside].max()
     error_kpa = (found_kpa - inclusion_kpa)[:, inside]
-    assert np.sqrt((error_kpa**2).mean()) < 0.06 * inclusion_kpa[:, inside].max()
+    assert np.sqrt((error_kpa**2).mean()) < 0.04 * inclusion_kpa[:, inside].max()
+
+
+def test_the_committed_table_is_of_the_points_that_are_solved_now(tables):
+    """One of fewer sizes was kept for long: between them pressures were a tenth off."""
+    of_inclusions, offsets_mm = inclusion_axes(POINTS[:3], SMALLEST_SIZE_MM), points_with_ends(*OFFSETS_MM, POINTS[3])
+    for name, points in (*of_inclusions._asdict().items(), ("offset_mm", offsets_mm)):
+        np.testing.assert_allclose(getattr(tables.off_axis, name), points, rtol=1e-6, err_msg=name)
 
 
 def test_cosine_modes_of_a_cosine_series_are_its_coefficients():

@@ -45,7 +45,7 @@ def built(monkeypatch, tables) -> WideTable:
     forces, radii = tables.centred.lump_per_n_mm3.shape[-2:]
     modes, aside_radii = tables.off_axis.lump_per_n_mm3.shape[-2:]
 
-    def centred(scene_of, slab, size_mm, depth_mm, mismatches):
+    def centred(scene_of, slab, levels, size_mm, depth_mm, mismatches):
         assert slab == NOMINAL
         ones = np.multiply.outer([1.0, 2.0], np.ones((forces, radii)))
         return np.array([over_volume(size_mm, depth_mm, mismatch) * ones for mismatch in mismatches])

@@ -8,10 +8,16 @@ import pytest
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import COARSE
+from host_tools.forward.press_model import PressFailed
+from host_tools.press_models.measured_noise import FINER
+from host_tools.probe_tables import surface_table as module
 from host_tools.probe_tables.surface_table import (
     BASELINE,
     FORCES_N,
+    INCLUSIONS,
+    POINTS,
     RING_MM,
+    SMALLEST_SIZE_MM,
     SOLVED,
     assembled,
     fields,
@@ -39,24 +45,52 @@ def worst_over_peak(found, fresh, inside):
     return np.abs(found - fresh)[inside].max() / np.abs(fresh[inside]).max()
 
 
+def test_the_committed_table_is_of_the_points_that_are_solved_now(table):
+    for name, points in inclusion_axes(POINTS, SMALLEST_SIZE_MM)._asdict().items():
+        np.testing.assert_allclose(getattr(table, name), points, rtol=1e-6, err_msg=name)
+    np.testing.assert_allclose(table.force_n, FORCES_N, rtol=1e-6)
+
+
 @pytest.mark.parametrize("truth", TRUTHS)
-def test_the_table_is_within_half_a_percent_of_the_inclusions_deformation_and_one_of_its_pressure(table, truth):
-    """What the inclusion adds, over its own peak in the window: deformation 0.5 %, ring means of pressure 1 %."""
+def test_the_table_is_within_a_fifth_of_a_percent_of_an_inclusions_deformation_and_twice_that_of_pressure(table, truth):
+    """What the inclusion adds, over its own peak in the window: deformation 0.2 %, ring means of pressure 0.4 %."""
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
     for force_n, solution in zip(FORCES_SEEN_N, ramp(scene_in(NOMINAL, inclusion), FORCES_SEEN_N), strict=True):
         fresh, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
-        for name, value, bound in (("w_mm", 0, 0.005), ("p_kpa", 1, 0.01)):
+        for name, value, bound in (("w_mm", 0, 0.002), ("p_kpa", 1, 0.004)):
             assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
 
 
-@pytest.mark.parametrize("truth", [(7.13, 5.51, 100.0), (7.0, 6.5, 57.0)])
+def test_both_terms_of_a_change_are_on_one_level():
+    """Levels differ by more than a slab changes: where one term fell back alone, it was four per cent of a peak off."""
+    assert len({levels for _, _, levels in SOLVED[1:]}) == 1
+    assert all(len(levels) == 1 for _, _, levels in SOLVED[1:])
+
+
+def test_a_press_that_folds_on_one_level_is_solved_on_the_next_and_on_none_is_refused(monkeypatch):
+    tried = []
+
+    def folds(scenes, presses, plan):
+        tried.append((plan.grading, plan.order))
+        if len(tried) != len(INCLUSIONS):
+            raise PressFailed("the contact folded")
+        return (("solved",),)
+
+    monkeypatch.setattr(module, "solve_ramps", folds)
+    assert ramp(scene_in(NOMINAL), np.array([0.1])) == ("solved",)
+    assert tried == [(level.grading, level.order) for level in INCLUSIONS]
+    with pytest.raises(PressFailed, match="folded"):
+        ramp(scene_in(NOMINAL), np.array([0.1]))
+
+
+@pytest.mark.parametrize("truth", [(7.13, 5.51, 100.0), (7.0, 6.5, 57.0), (6.0, 5.0, 150.0)])
 @pytest.mark.long
-def test_finer_elements_move_an_inclusions_pressure_by_three_percent_of_its_peak_at_most(table, truth):
-    """The table is of coarse elements: between its points it is nearer to them than they are to the truth."""
+def test_finer_elements_move_an_inclusions_deformation_and_pressure_by_half_a_percent_of_a_peak_at_most(table, truth):
+    """The table is of quick elements: what they miss comes on top of what lies between its points."""
     inclusion, inside, forces_n = Inclusion(*truth), table.r_mm <= 9.9, np.array([0.12, 0.55])
-    for force_n, solution in zip(forces_n, ramp(scene_in(NOMINAL, inclusion), forces_n, BASELINE), strict=True):
+    for force_n, solution in zip(forces_n, ramp(scene_in(NOMINAL, inclusion), forces_n, FINER), strict=True):
         finer, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
-        for name, value, bound in (("w_mm", 0, 0.007), ("p_kpa", 1, 0.03)):
+        for name, value, bound in (("w_mm", 0, 0.005), ("p_kpa", 1, 0.005)):
             assert worst_over_peak(found[value], finer[value], inside) < bound, (name, force_n)
 
 
@@ -83,7 +117,7 @@ def test_in_softer_tissue_than_the_tables_an_inclusion_is_as_good_as_inside(tabl
     forces_n = np.array([0.1, 0.55])
     for force_n, solution in zip(forces_n, ramp(scene_in(slab, inclusion), forces_n), strict=True):
         fresh, found = fields(solution)[1], table.inclusion_field(inclusion, slab).at(force_n)
-        for name, value, bound in (("w_mm", 0, 0.005), ("p_kpa", 1, 0.01)):
+        for name, value, bound in (("w_mm", 0, 0.002), ("p_kpa", 1, 0.004)):
             assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
 
 
@@ -140,11 +174,11 @@ def test_solves_are_assembled_on_their_axes():
 
     grids = [axes, *[coarse] * (len(SOLVED) - 1)]
     inclusion_field = [
-        field(slab, *place) for (_, slab), grid in zip(SOLVED, grids, strict=True) for place in product(*grid)
+        field(slab, *place) for (_, slab, _), grid in zip(SOLVED, grids, strict=True) for place in product(*grid)
     ]
-    table = assembled(axes, [field(slab, 0.0, 0.0, 0.0) for _, slab in SOLVED], inclusion_field, radius_mm=11.0)
+    table = assembled(axes, [field(slab, 0.0, 0.0, 0.0) for _, slab, _ in SOLVED], inclusion_field, radius_mm=11.0)
     assert table.r_mm[-1] == 11.0
-    for _, slab in SOLVED:
+    for _, slab, _ in SOLVED:
         place = float(coarse[0][1]), float(coarse[1][0]), 0.96
         ramps = table.ramps(Inclusion(*place[:2], slab.modulus_kpa(0.96 - 1e-12)), slab)
         expected = place[0] ** 3 * 0.96 * field(slab, *place)
