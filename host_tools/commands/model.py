@@ -43,7 +43,7 @@ def table(
     axis, what other layers of waveguide and tissue change, and how far the face moves outwards.
 
     The first hold tissue of 4-6.25 kPa and 27-36 mm, the others are carried over to it. Half an hour on two cores.
-    Part wide, some eight minutes of one core, is of inclusions around the trained ranges: `train --mode standard`
+    Part wide, some sixteen minutes of one core, is of inclusions around the trained ranges: `train --mode standard`
     needs it. Part derivatives, some ten minutes on two, says how presses change with what a commissioning finds out;
     it needs the others.
     """

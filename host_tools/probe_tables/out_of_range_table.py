@@ -188,7 +188,7 @@ def build_wide_table(
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> WideTable:
-    """Solve every point of the table (some eight minutes of one core); `on_point` hears done and total."""
+    """Solve every point of the table (some sixteen minutes of one core); `on_point` hears done and total."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     centred, aside = axes(points, SIZES_MM[0]), axes(aside_points, SMALLEST_ASIDE_MM)
     work = [delayed(_centred)(*place, centred.elastic_mismatch) for place in product(*centred[:2])]

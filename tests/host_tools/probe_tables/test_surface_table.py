@@ -111,13 +111,13 @@ def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, tr
 
 
 @pytest.mark.long
-def test_in_softer_tissue_than_the_tables_an_inclusion_is_as_good_as_inside(table):
-    """What a scene's world may make of the softest: 4 kPa by 0.9. Bounds and forces as of the nominal slab."""
+def test_in_softer_tissue_than_the_tables_an_inclusion_is_within_a_percent_of_its_peaks(table):
+    """What a scene's world may make of the softest: 4 kPa by 0.9."""
     inclusion, slab, inside = Inclusion(10.0, 6.0, 60.0), Slab(4.0).changed(0.9), table.r_mm <= 9.9
     forces_n = np.array([0.1, 0.55])
     for force_n, solution in zip(forces_n, ramp(scene_in(slab, inclusion), forces_n), strict=True):
         fresh, found = fields(solution)[1], table.inclusion_field(inclusion, slab).at(force_n)
-        for name, value, bound in (("w_mm", 0, 0.002), ("p_kpa", 1, 0.004)):
+        for name, value, bound in (("w_mm", 0, 0.01), ("p_kpa", 1, 0.01)):
             assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
 
 
