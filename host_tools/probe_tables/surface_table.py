@@ -236,7 +236,7 @@ def build_surface_table(
     solved = [(partial(scene_of, waveguide=waveguide), slab, levels) for scene_of, slab, levels in SOLVED]
     places = [(*one, *place) for one, grid in zip(solved, _grids(axes), strict=True) for place in product(*grid[:2])]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    baseline = Parallel(n_jobs=jobs)(delayed(baseline_per_n)(*one) for *one, _ in solved)
+    baseline = Parallel(n_jobs=jobs)(delayed(baseline_per_n)(*one) for *one, _ in solved[1:])
     solving = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(inclusions_per_n_mm3)(*place, mismatches) for place in places
     )
@@ -256,7 +256,10 @@ def _grids(axes: InclusionAxes) -> list[InclusionAxes]:
 def assembled(
     axes: InclusionAxes, bare_per_n: Sequence[Array], lump_per_n_mm3: Sequence[Array], *, radius_mm: float
 ) -> SurfaceTable:
-    """Return the table of the fields [2, F, R] in the order of `SOLVED`; each grid with the mismatch fastest."""
+    """Return the table of the fields [2, F, R] in the order of `SOLVED`; each grid with the mismatch fastest.
+
+    Those without an inclusion are of the star alone, whose first slab is the nominal one.
+    """
     remaining, inclusions = iter(lump_per_n_mm3), []
     for grid in _grids(axes):
         fields_on_grid = np.array([next(remaining) for _ in product(*grid)])
@@ -270,7 +273,7 @@ def assembled(
         r_mm=np.linspace(0.0, radius_mm, inclusions[0].shape[-1]),
         bare_per_n=bare_per_n[0],
         lump_per_n_mm3=inclusions[0],
-        bare_change_per_n=_changes(*bare_per_n[1:]),
+        bare_change_per_n=_changes(*bare_per_n),
         lump_change_per_n_mm3=_changes(*inclusions[1:]),
     )
 

@@ -176,7 +176,7 @@ def test_solves_are_assembled_on_their_axes():
     inclusion_field = [
         field(slab, *place) for (_, slab, _), grid in zip(SOLVED, grids, strict=True) for place in product(*grid)
     ]
-    table = assembled(axes, [field(slab, 0.0, 0.0, 0.0) for _, slab, _ in SOLVED], inclusion_field, radius_mm=11.0)
+    table = assembled(axes, [field(slab, 0.0, 0.0, 0.0) for _, slab, _ in SOLVED[1:]], inclusion_field, radius_mm=11.0)
     assert table.r_mm[-1] == 11.0
     for _, slab, _ in SOLVED:
         place = float(coarse[0][1]), float(coarse[1][0]), 0.96
