@@ -90,24 +90,28 @@ def sweep(
     *,
     seed: int = 1,
     forces_n: Sequence[float] = (0.5,),
-    strain: Literal["small", "finite"] = "small",
+    strain: StrainChoice | None = None,
     jobs: int = -1,
     scheduler: str | None = None,
     tolerance: float | None = None,
+    within_s: float = WITHIN_S,
     replace: bool = False,
 ) -> xr.Dataset:
     """Solve random scenes of the paper's box under rising forces into a netCDF file; return it as a data set.
 
     On all cores, or on a Dask cluster (`scheduler` "tcp://host:port"). Interrupted, the same call goes on. All scenes
-    are solved at one level, since features would jump where a plan changes its mind. A scene that fails is a row of
-    NaN with its `reason`; with a `tolerance` (a ratio) so is one that states more. A file that holds this sweep is read
-    as it is; raise `InvalidQuantity` for one that holds anything else, unless `replace`.
+    are solved in small strain at one level, since features would jump where a plan changes its mind. With a `tolerance`
+    (a ratio) each climbs as `solve` does, in the strain measure that this asks for, for `within_s` at most. A scene
+    that fails, or cannot hold it, is a row of NaN with its `reason`. A file that holds this sweep is read as it is;
+    raise `InvalidQuantity` for one that holds anything else, unless `replace`.
     """
     from host_tools.data.plan import SweepPlan
     from host_tools.data.sweep import sweep as solve_scenes
 
-    plan = SweepPlan(scenes, seed, tuple(forces_n), strain, tolerance=tolerance)
-    return read_sweep(solve_scenes(plan, Path(out), jobs=jobs, scheduler=scheduler, replace=replace))
+    measure = strain or ("small" if tolerance is None else "auto")
+    plan = SweepPlan(scenes, seed, tuple(forces_n), measure, tolerance=tolerance)
+    solved = solve_scenes(plan, Path(out), jobs=jobs, scheduler=scheduler, within_s=within_s, replace=replace)
+    return read_sweep(solved)
 
 
 def read_sweep(path: Path | str) -> xr.Dataset:

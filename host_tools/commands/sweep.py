@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from device.measurement.quantities import Bound, require
 from host_tools.commands.output import Scheduler, note, progress, ratio_of
 from host_tools.commands.probe import ProbeOption
 
-SweepStrain = Literal["small", "finite"]
+if TYPE_CHECKING:
+    from host_tools.data.plan import SweepPlan
+
+SweepStrain = Literal["small", "finite", "auto"]
 
 
 def sweep(
@@ -20,23 +24,33 @@ def sweep(
     force_n: Annotated[
         list[float] | None, typer.Option(help="Force of every press (0.5 N by default); repeat it for rising loads.")
     ] = None,
-    strain: Annotated[SweepStrain, typer.Option(help="small (linear) or finite.")] = "small",
+    strain: Annotated[
+        SweepStrain | None, typer.Option(help="Strain measure: auto with a tolerance, small without, unless told.")
+    ] = None,
     jobs: Annotated[int, typer.Option(help="Processes; -1 for all cores.")] = -1,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that holds something else.")] = False,
     tolerance: Annotated[
-        str | None, typer.Option(help="A row that states more than this, such as 1%, has failed; any row counts else.")
+        str | None, typer.Option(help="Every scene climbs until it states no more, such as 1%, or has failed.")
     ] = None,
+    within_s: Annotated[float, typer.Option(help="Time of a scene to find a level that holds it, wall clock.")] = 120.0,
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """Solve random scenes of the paper's box on all cores or a cluster; interrupted, the same command goes on."""
+    """Solve random scenes of the paper's box on all cores or a cluster; interrupted, the same command goes on.
+
+    Without --tolerance all scenes share one level, and a row states what that level errs.
+
+    Example: host_tools sweep --scenes 20 --tolerance 2% --out build/sweep.nc
+    """
     from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan
     from host_tools.data.sweep import sweep as run_sweep
     from host_tools.scenes.probe_file import probe_of
 
     forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N
     allowed = None if tolerance is None else ratio_of(tolerance)
-    plan = SweepPlan(scenes, seed, forces_n, strain, probe_of(probe).waveguide, allowed)
+    require("within_s", within_s, Bound(0.0, 1e6, "s", low_included=False), "allow some time")
+    measure = strain or ("small" if allowed is None else "auto")
+    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed)
     failed = 0
     with progress("scenes") as bar:
         task = bar.add_task("", total=scenes)
@@ -47,11 +61,24 @@ def sweep(
             bar.update(task, completed=done)
 
         try:
-            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, on_row=on_row, replace=force)
+            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, within_s=within_s, on_row=on_row, replace=force)
         except KeyboardInterrupt:
             note.print(f"Interrupted. Solved scenes are kept in {out}.partial: run the same command to go on.")
             raise typer.Exit(1) from None
     note.print(f"{out}: {scenes} scenes, {failed} of those solved now failed.")
+    if measure == "small":
+        note.print(_departure(plan), soft_wrap=True)
+
+
+def _departure(plan: SweepPlan) -> str:
+    """Return a sentence on what no row of small strain states."""
+    from host_tools.forward.model_departures import largest_departure
+
+    departure = largest_departure(plan.middle_scene)
+    return (
+        f"In small strain, which may depart from finite strain by {100 * departure:.2g} % in the middle of the box: no "
+        "row states that. With --tolerance and no --strain it counts."
+    )
 
 
 def netcdf(

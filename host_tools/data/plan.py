@@ -13,35 +13,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.forward.plan import StrainModel
+from host_tools.forward.ladder import AskedStrain
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
 
 DEFAULT_FORCES_N = (0.5,)
 SCHEMA = "tsis.sweep/1"
 SCHEMA_OF_LOADS = "tsis.sweep/2"
 """Rows of /1 hold one load in small strain; rows of /2 hold a `load` axis, and the origin names loads and strain."""
+STRAINS = get_args(AskedStrain)
 
 
 @dataclass(frozen=True)
 class SweepPlan:
     """What is swept: `scenes` draws from the box with a seed, each pressed with every one of `forces_n`, rising.
 
-    By one probe's `waveguide`, the simulated one's unless given. With a `tolerance` (relative) a row that states more
-    of any feature has failed.
+    By one probe's `waveguide`, the simulated one's unless given. With a `tolerance` (relative) every scene climbs until
+    what it states of every feature is within it, or has failed; `strain` may then be "auto".
     """
 
     scenes: int
     seed: int
     forces_n: tuple[float, ...] = DEFAULT_FORCES_N
-    strain: StrainModel = "small"
+    strain: AskedStrain = "small"
     waveguide: Waveguide = field(default_factory=Waveguide)
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
         require("scenes", self.scenes, Bound(1, 1_000_000, "scenes"), "ask for at least one scene")
         require("seed", self.seed, Bound(0, 2**63, ""), "give a whole number from 0")
-        if self.strain not in get_args(StrainModel):
-            raise InvalidQuantity("strain", repr(self.strain), "'small' or 'finite'", "choose one of them")
+        if self.strain not in STRAINS:
+            raise InvalidQuantity("strain", repr(self.strain), f"one of {', '.join(STRAINS)}", "choose one of them")
+        if self.strain == "auto" and self.tolerance is None:
+            raise InvalidQuantity("strain", "auto", "small or finite without a tolerance", "give a tolerance, too")
         if not self.forces_n or any(b <= a for a, b in zip(self.forces_n, self.forces_n[1:], strict=False)):
             raise InvalidQuantity("forces_n", self.forces_n, "at least one force, rising", "order the loads")
         if self.tolerance is not None:
@@ -57,6 +60,11 @@ class SweepPlan:
     def truths(self) -> NDArray[np.float64]:
         """Return the drawn (size_mm, depth_mm, youngs_modulus_kpa) [scenes, 3]; prefix-stable."""
         return np.random.default_rng(self.seed).uniform(PAPER_BOX_LOW, PAPER_BOX_HIGH, (self.scenes, 3))
+
+    @property
+    def middle_scene(self) -> Scene:
+        """The scene of the middle of the box."""
+        return self.scene((np.array(PAPER_BOX_LOW) + PAPER_BOX_HIGH) / 2)
 
     def scene(self, truth: NDArray[np.float64]) -> Scene:
         """Return the scene of one draw, under the largest load."""

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.journal import Row
 from host_tools.data.plan import SweepPlan
-from host_tools.forward.ladder import worst_error
-from host_tools.forward.model_departures import largest_departure
-from host_tools.forward.plan import StrainModel, model_plan
+from host_tools.forward.ladder import WITHIN_S, ToleranceMissed, climb
+from host_tools.forward.plan import model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
@@ -25,16 +24,17 @@ NOT_COLUMNS = ("plan", "pressure_is_positive", "contact_force_n")
 """Entries of a solution's record that are the same in every row, or a check that the row has passed."""
 
 
-def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
-    """Solve one scene under the plan's loads; a scene that fails under any of them becomes a row with its reason."""
+def solve_row(plan: SweepPlan, index: int, truth: Truth, *, within_s: float = WITHIN_S) -> Row:
+    """Solve one scene under the plan's loads; a scene that fails under any of them becomes a row with its reason.
+
+    `within_s` is the time to find a level that holds the plan's tolerance, where it has one.
+    """
     try:
-        solutions = _solve_loads(plan.scene(truth), plan.forces_n, plan.strain)
+        solutions = _solve_loads(plan, plan.scene(truth), within_s)
     except (PressFailed, InvalidQuantity) as refused:
         return empty_row(index, truth, reason=str(refused))
     except (NgException, ValueError, ArithmeticError, RuntimeError) as error:
         return empty_row(index, truth, reason=f"{type(error).__name__}: {error}")
-    if reason := _missed(solutions, plan.tolerance):
-        return empty_row(index, truth, reason=reason)
     columns = [_columns(solution) for solution in solutions]
     if plan.has_load_axis:
         of_loads = {name: [column[name] for column in columns] for name in columns[0]}
@@ -42,34 +42,24 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
     return empty_row(index, truth) | columns[0]
 
 
-def _missed(solutions: tuple[Solution, ...], tolerance: float | None) -> str:
-    """Return what is worse than the tolerance: nothing when nothing is, or none was asked.
-
-    Which feature of which load states more; or what small strain departs from finite strain by at the largest load.
-    """
-    feature, error, force_n = max(((*worst_error(one), one.force_n) for one in solutions), key=lambda worst: worst[1])
-    if tolerance is None:
-        return ""
-    asked = f"but {100 * tolerance:g} % was asked for"
-    if error > tolerance:
-        return f"{feature} under {force_n:g} N is only good to {100 * error:.2g} %, {asked}"
-    largest = solutions[-1]
-    departure = largest_departure(largest.scene) if largest.plan.strain == "small" else 0.0
-    if error + departure <= tolerance:
-        return ""
-    departs = f"small strain may depart from finite strain by {100 * departure:.2g} % under {largest.force_n:g} N"
-    return f"{departs}, {asked}: press less, or sweep in finite strain (--strain finite)"
-
-
 def empty_row(index: int, truth: Truth, *, reason: str = "") -> Row:
     """Return what is known of a scene without a solution; `reason` says why there is none."""
     return {"index": index, **dict(zip(UNKNOWNS, map(float, truth), strict=True)), "reason": reason}
 
 
-def _solve_loads(scene: Scene, forces_n: tuple[float, ...], strain: StrainModel) -> tuple[Solution, ...]:
-    """Return one solution per force, with its stated errors, from one solve of the whole ramp."""
-    presses = [Press(force_n=force_n) for force_n in forces_n]
-    return solve_ramp(scene, presses, model_plan(scene, strain=strain), estimate_error=True)
+def _solve_loads(plan: SweepPlan, scene: Scene, within_s: float) -> tuple[Solution, ...]:
+    """Return one solution per force, with its stated errors, from one solve of the whole ramp.
+
+    Without a tolerance on the level that all scenes share.
+    """
+    presses = [Press(force_n=force_n) for force_n in plan.forces_n]
+    if plan.tolerance is not None:
+        climbed = climb(scene, presses, tolerance=plan.tolerance, strain=plan.strain, within_s=within_s, best=False)
+        if climbed.missed:
+            raise ToleranceMissed(climbed.missed, climbed)
+        return climbed.solutions
+    assert plan.strain != "auto"  # a plan without a tolerance refuses it
+    return solve_ramp(scene, presses, model_plan(scene, strain=plan.strain), estimate_error=True)
 
 
 def _columns(solution: Solution) -> Row:

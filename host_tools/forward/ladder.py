@@ -3,8 +3,8 @@
 Each kind of model has its rungs. In small strain they are orders on one mesh, which beats refining it and keeps
 features smooth in the scene; in finite strain, where the contact's rim must stay blunt, meshes and orders, whose errors
 the same meshes foretell in small strain. The first rung is what usually holds; the climb ends where the stated error is
-within the tolerance, or the rungs or the time are used up, and then what is missing is said. Sweeps do not climb: all
-their scenes share one level.
+within the tolerance, or the rungs or the time are used up, and then what is missing is said. Data sets to
+train from do not climb: all their scenes share one level.
 """
 
 from __future__ import annotations
