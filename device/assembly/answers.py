@@ -70,8 +70,8 @@ def _nothing_to_prove() -> None:
 
 class Answers(NamedTuple):
     """The modes in which this probe has a model, what answers in them, what advises on a scan, what proves that both
-    still do, what each mode's answers are worth by its model card, what reads a reference press before them, and until
-    when a commissioned model holds."""
+    still do, what each mode's answers are worth by its model card, what reads a reference press before them, until when
+    a commissioned model holds, and which level of the flat field the models of ramps believe in."""
 
     modes: tuple[Mode, ...]
     estimator: Estimator
@@ -80,6 +80,7 @@ class Answers(NamedTuple):
     worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
     look_ahead: LookAhead = look_at_nothing
     expires_at: str | None = None
+    flat_field_ratio: float | None = None
 
     def require(self, mode: Mode) -> None:
         """Raise `ConfigError` when the settings ask for a mode that is not among them."""
@@ -132,7 +133,16 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     has_lines = calibration is None or calibration.lines is not None
     modes = tuple(mode for mode in models.modes if has_lines or mode != "paper")
     worth = {mode: models.worth(mode) for mode in modes}
-    return Answers(modes, estimate, advise, lambda: _prove(models), worth, ramps.look_beside, models.expires_at)
+    return Answers(
+        modes,
+        estimate,
+        advise,
+        lambda: _prove(models),
+        worth,
+        ramps.look_beside,
+        models.expires_at,
+        models.flat_field_ratio,
+    )
 
 
 def _prove(models: ModeModels) -> None:

@@ -322,6 +322,7 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         progress=progress,
         simulated_truth=probe.simulated_truth,
         folder_of=probe.folder_of,
+        flat_field_ratio=answers.flat_field_ratio,
     )
 
 

@@ -90,11 +90,13 @@ class Procedure:
         progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
         folder_of: Callable[[Path], Path] = Path,
+        flat_field_ratio: float | None = None,
     ) -> None:
         """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
 
         `adviser` says what a scan tells so far, `worth` what their answers are worth by the model cards, `look_ahead`
-        reads the press beside the lesion before that on it, `folder_of` says where an installed model lies.
+        reads the press beside the lesion before that on it, `folder_of` says where an installed model lies,
+        `flat_field_ratio` which level of the flat field the models of ramps believe in.
         """
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self.calibration = modes, calibration
@@ -133,7 +135,8 @@ class Procedure:
         self._worth, self._answer_times = worth, AnswerTimes(config.data / "answer_times.json")
         self._written_s, self._used_s = -math.inf, time.monotonic()
         self.progress.exercise("storage", self._prove_store)
-        test = SelfTestRun(config, bench, store, self._clock, self.board, self._capture.stopping, folder_of)
+        stopping = self._capture.stopping
+        test = SelfTestRun(config, bench, store, self._clock, self.board, stopping, folder_of, flat_field_ratio)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
         self._darkening = threading.Thread(target=self._darken_at_stop, name="darkening", daemon=True)

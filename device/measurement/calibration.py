@@ -95,7 +95,8 @@ def written(at: datetime) -> str:
 class Calibration:
     """What holds for one probe: validity, camera, load cell, untouched face, and the `lines` of mode paper, or None.
 
-    `id` follows from all else but `made_at`; `software_sha256` is over the sources that computed it.
+    `flat_field_ratio`: by how much the light of two presses on one bare block differs smoothly; None where nobody
+    pressed any. `id` follows from all else but `made_at`; `software_sha256` is over the sources that computed it.
     """
 
     id: str
@@ -112,12 +113,15 @@ class Calibration:
     software_sha256: str
     simulated: bool
     lines: PaperLines | None = None
+    flat_field_ratio: float | None = None
 
     def __post_init__(self) -> None:
         for name in TEXTS:
             value = getattr(self, name)
             if not isinstance(value, str):
                 raise InvalidQuantity(name, repr(value), "text", RENEW)
+        if self.flat_field_ratio is not None:
+            require("flat_field_ratio", self.flat_field_ratio, Bound(0.0, 1.0, ""), RENEW)
 
     @property
     def paper_lines(self) -> PaperLines:
@@ -201,6 +205,8 @@ def _content(calibration: Calibration) -> dict[str, Any]:
     """Return all that a certificate says as JSON object; its lines stand beside the rest."""
     record = asdict(calibration) | {"camera": calibration.camera.as_record()}
     del record["lines"]
+    if calibration.flat_field_ratio is None:
+        del record["flat_field_ratio"]
     return record | (calibration.lines.as_record() if calibration.lines else {})
 
 

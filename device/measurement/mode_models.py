@@ -42,6 +42,11 @@ class ModeModels(NamedTuple):
         """Until when the model of force ramps holds (RFC 3339); None of one that was not commissioned, or none."""
         return self.ramp.bundle.card.get("expires_at") if self.ramp else None
 
+    @property
+    def flat_field_ratio(self) -> float | None:
+        """The level of the flat field that the model of force ramps believes in; None without one."""
+        return self.ramp.answers.flat_field_ratio if self.ramp else None
+
     def worth(self, mode: Mode) -> ModeWorth | None:
         """Return what the answers of a mode are worth by its model card, None when that does not say."""
         bundles = {"quick": self.quick and self.quick.bundle, "paper": self.paper}

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.calibration import moment, written
+from device.measurement.recording.flat_field_error import flat_field_error
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import Frame
 from device.measurement.recording.untouched_face import UntouchedFace, lit_counts, mean_led_ratio, side_levels, split
@@ -22,6 +23,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("device", "host_tools")
 UNTOUCHED_RATIO = 0.05
 """Reference frames at less than this part of the largest force are of the untouched probe."""
+PRESSED_RATIO = 0.4
+"""Frames from this part of the largest force on tell the flat field: below it a cell's light grows in another way."""
 
 
 def oldest_at(recordings: Sequence[Recording]) -> str:
@@ -79,3 +82,23 @@ def frames_beside(recording: Recording) -> FramesBeside:
     pressed = [frame for frame in lit if frame.force_n > UNTOUCHED_RATIO * highest_n]
     unloaded = [frame for frame in lit if frame.force_n <= UNTOUCHED_RATIO * highest_n]
     return FramesBeside(*split([*recording.with_role("dark"), *unloaded]), pressed)
+
+
+def flat_field_ratio(bare: Sequence[Recording]) -> float | None:
+    """Return by how much the light of two presses on one bare block differs smoothly, the root mean square over blocks.
+
+    None without a block. It holds what differs between two places of a skin, too.
+    Raises `InvalidQuantity` for a block that was pressed too shortly to tell.
+    """
+    levels = []
+    for recording in bare:
+        dark, _, beside = frames_beside(recording)
+        press = [frame for frame in recording.with_role("press") if frame.ramp == 0]
+        first, second = (_well_pressed(frames) for frames in (beside, press))
+        levels.append(flat_field_error(first, second, dark[0].counts, recording.camera.scale).level_ratio)
+    return round(float(np.sqrt(np.mean(np.square(levels)))), 6) if levels else None
+
+
+def _well_pressed(frames: Sequence[Frame]) -> list[Frame]:
+    largest_n = max((frame.force_n for frame in frames), default=0.0)
+    return [frame for frame in frames if frame.force_n >= PRESSED_RATIO * largest_n]

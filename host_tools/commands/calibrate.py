@@ -187,7 +187,14 @@ def commission(
             bench = read_bench(recordings, probe, phantoms, simulated_probe())
             said_by = {"phantom_serial": bench.phantoms.serial, "operator": operator, "made_at": written(made_at)}
             certificate = _or_why_not(
-                lambda: own_certificate(bench.recordings, bench.names, bench.probe, **said_by, valid_days=valid_days)
+                lambda: own_certificate(
+                    bench.recordings,
+                    bench.names,
+                    bench.probe,
+                    **said_by,
+                    valid_days=valid_days,
+                    bare_blocks=bench.bare_blocks,
+                )
             )
             done = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=seed, say=note.print)
     except CalibrationRejected as rejection:
@@ -236,6 +243,8 @@ def _show_commissioned(done: CommissionedProbe, out: Path, certificate: Calibrat
 
     for line in (*probe_lines(done.fit, PROBE), *phantom_lines(done.phantoms)):
         print(line)
+    if certificate and certificate.flat_field_ratio is not None:
+        print(f"two presses on a bare block differ smoothly by {certificate.flat_field_ratio:.2%} of the light")
     for gate in done.gates:
         print(_gate_line(gate))
     print(f"bundle in {out}: set standard_model to it, and serial to the probe's own; its page is {PAGE_FILE}")

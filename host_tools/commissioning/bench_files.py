@@ -35,6 +35,11 @@ class StatedBench:
     ramps: list[PhantomRamp]
     prior: ProbePrior
 
+    @property
+    def bare_blocks(self) -> list[str]:
+        """The names of the recordings on bare blocks."""
+        return [name for name, ramp in zip(self.names, self.ramps, strict=True) if not ramp.has_inclusion]
+
 
 def read_bench(recordings: Sequence[Path], probe: Path, phantoms: Path, design: Probe) -> StatedBench:
     """Return what files say of ramps on phantoms, made by a probe of a design.

@@ -6,7 +6,7 @@ probe within its tolerances does not have; the modes that are commissioned read 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from datetime import timedelta
 
@@ -14,7 +14,13 @@ from device import __version__
 from device.measurement.calibration import Calibration, Validity, certificate_id, moment, written
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
-from host_tools.calibration.certified_probe import frames_beside, oldest_at, source_sha256, untouched_face
+from host_tools.calibration.certified_probe import (
+    flat_field_ratio,
+    frames_beside,
+    oldest_at,
+    source_sha256,
+    untouched_face,
+)
 from host_tools.calibration.gates import age_gate, disagreements, light_gates, require_all
 from host_tools.scenes.probe import Probe
 
@@ -30,8 +36,9 @@ def own_certificate(
     operator: str,
     made_at: str,
     valid_days: float,
+    bare_blocks: Collection[str] = (),
 ) -> Calibration:
-    """Return the certificate of a probe by its recordings of phantoms of these names.
+    """Return the certificate of a probe by its recordings of phantoms of these names, some of them bare blocks.
 
     The camera's geometry is that of the probe's file. It holds for `valid_days` from the oldest recording, or from
     `made_at` (RFC 3339) where all are simulated. Raises `CalibrationRejected` with everything that the recordings lack.
@@ -53,6 +60,7 @@ def own_certificate(
         cell=first.cell,
         untouched=untouched,
         phantoms=len(seen),
+        flat_field_ratio=flat_field_ratio([one for one, name in zip(seen, names, strict=True) if name in bare_blocks]),
         software=__version__,
         software_sha256=source_sha256(),
         simulated=any(one.simulated for one in seen),

@@ -18,20 +18,26 @@ from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.press.states import Guidance
 from device.instrument.self_test.checks import (
+    FLAT_FIELD,
     camera_results,
     clock_results,
     disk_results,
+    flat_field_result,
     model_results,
     rest_results,
     side_results,
+    untested_flat_field,
     untested_sides,
     untested_weight,
     weight_result,
 )
 from device.instrument.self_test.report import CheckResult, SelfTestJob, broken, not_tested, overall
 from device.instrument.status import StatusBoard
+from device.instrument.watch.calibration_watch import UNTOUCHED_N
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.progress import ProgressBoard
+from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.flat_field_error import flat_field_error
 from device.measurement.recording.led_sides import SIDES, LedRatio
 from device.measurement.recording.tactile_image import Frame
 from device.records.store import Store
@@ -42,6 +48,8 @@ DARK_FRAMES = 8
 REST_S = 0.5
 FREE_TIMEOUT_S = 10.0
 OPERATOR_TIMEOUT_S = 30.0
+RISE_FROM_RATIO, HELD_FRAMES = 0.6, 8
+"""Frames of a press on the block count from this part of the target force on, while it rises and that many more."""
 HELD_RATIO = 0.7
 """Below this part of the target force a side lights the opposite half about as much as its own."""
 ZERO_FIRST = "The load cell's zero comes first: without it nobody knows how hard the probe is pressed."
@@ -88,7 +96,10 @@ class Operator:
 
 
 class SelfTestRun:
-    """Every check of this probe. `folder_of` says where an installed model lies."""
+    """Every check of this probe. `folder_of` says where an installed model lies.
+
+    `flat_field_ratio` is the level of the flat field that the models of ramps believe in, None without any.
+    """
 
     def __init__(
         self,
@@ -99,15 +110,18 @@ class SelfTestRun:
         board: StatusBoard,
         stopping: threading.Event,
         folder_of: Callable[[Path], Path] = Path,
+        flat_field_ratio: float | None = None,
     ) -> None:
         self._config, self._bench, self._store, self._clock = config, bench, store, clock
         self._board, self._operator = board, Operator(board, bench.force, bench.progress, stopping)
-        self._folder_of = folder_of
+        self._folder_of, self._flat_field_ratio = folder_of, flat_field_ratio
         self._offset_s, self._zero_holds = 0.0, False
+        self._first_press: list[Frame] = []
 
     def results(self, job: SelfTestJob) -> Iterator[list[CheckResult]]:
         """Yield the results of each check as it ends; a fault is a result, too."""
         self._offset_s, self._zero_holds = self._clock.offset_s, False
+        self._first_press = []
         checks: dict[str, CheckOf] = {
             "disk": self._disk,
             "models": self._models,
@@ -117,6 +131,7 @@ class SelfTestRun:
             "zero": self._rest,
             "known weight": self._weight,
             "LED sides": self._sides,
+            FLAT_FIELD: self._flat_field,
             "clock": self._time,
         }
         for name, check in checks.items():
@@ -178,15 +193,61 @@ class SelfTestRun:
             return untested_sides()
         if not self._zero_holds:
             return untested_sides(ZERO_FIRST)
-        low_n, high_n = self._config.press.band_n
-        if not self._operator.until(Guidance.HOLD_BLOCK, lambda force_n: low_n <= force_n, OPERATOR_TIMEOUT_S):
-            return untested_sides(f"It was not held with {low_n:g} to {high_n:g} N within {OPERATOR_TIMEOUT_S:g} s.")
-        self._board.update(guidance=Guidance.HOLD_STILL)
         try:
-            return self._held_sides()
+            self._first_press = self._pressed_on_block()
+            return self._held_sides() if self._first_press else untested_sides(self._not_held)
         finally:
             self._bench.light(DARK)
             self._board.update(guidance=Guidance.LIFT)
+
+    @property
+    def _not_held(self) -> str:
+        low_n, high_n = self._config.press.band_n
+        return f"It was not held with {low_n:g} to {high_n:g} N within {OPERATOR_TIMEOUT_S:g} s."
+
+    def _pressed_on_block(self) -> list[Frame]:
+        """Return the frames of a press on the block from `RISE_FROM_RATIO` on, and some held ones; none if none came.
+
+        It is held still then, for more to come.
+        """
+        frames: list[Frame] = []
+        press = self._config.press
+        low_n, _ = press.band_n
+
+        def is_held(force_n: float) -> bool:
+            if force_n >= press.contact_n:
+                self._bench.light(self._config.light.ratio)
+            if force_n >= RISE_FROM_RATIO * press.target_n:
+                frames.append(self._bench.take("reference"))
+            return force_n >= low_n
+
+        if not self._operator.until(Guidance.HOLD_BLOCK, is_held, OPERATOR_TIMEOUT_S):
+            return []
+        self._board.update(guidance=Guidance.HOLD_STILL)
+        return frames + [self._bench.take("reference") for _ in range(HELD_FRAMES)]
+
+    def _flat_field(self, job: SelfTestJob) -> list[CheckResult]:
+        if not job.on_block or not self._first_press:
+            return untested_flat_field()
+        if self._flat_field_ratio is None:
+            return untested_flat_field("It is not installed.")
+        self._until_lifted()
+        try:
+            if not (second := self._pressed_on_block()):
+                return untested_flat_field(self._not_held)
+            dark = self._view(DARK).counts
+        finally:
+            self._bench.light(DARK)
+            self._until_lifted()
+        try:
+            found = flat_field_error(self._first_press, second, dark, self._config.camera.scale)
+        except InvalidQuantity:  # too few frames of a press, or no light
+            return untested_flat_field()
+        return [flat_field_result(found.level_ratio, self._flat_field_ratio)]
+
+    def _until_lifted(self) -> None:
+        """Wait until nothing touches the probe, so that the next press finds its face untouched."""
+        self._operator.until(Guidance.LIFT, lambda force_n: force_n <= UNTOUCHED_N, FREE_TIMEOUT_S)
 
     def _held_sides(self) -> list[CheckResult]:
         light, least_n = self._config.light, HELD_RATIO * self._config.press.target_n

@@ -84,6 +84,11 @@ class RampAnswers:
     def __init__(self, surrogate: ScanSurrogate, noise: PressNoise) -> None:
         self.surrogate, self.noise = surrogate, noise
 
+    @property
+    def flat_field_ratio(self) -> float:
+        """The level of smooth errors that two presses of a flat field are believed to differ by."""
+        return self.noise.levels.flat_field_ratio
+
     def reach_mm(self, presses: int) -> float:
         """Return how far off the axis the inclusion may lie: further in a scan, whose presses are displaced."""
         return float(HIGH[OFFSET]) if presses == 1 else self.surrogate.to_mm

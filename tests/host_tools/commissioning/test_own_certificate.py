@@ -1,6 +1,7 @@
 """The certificate of a commissioned probe: its own face and camera, how long it holds, and what keeps it from being."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,12 +9,14 @@ from toolkit_process import run_toolkit
 
 from device.files.recording_file import write_recording
 from device.files.shipped import SIMULATED_PROBE
+from device.measurement.calibration import calibration_of
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.camera_geometry import CameraGeometry
 from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.commissioning import commission as commission_module
 from host_tools.commissioning.own_certificate import own_certificate
+from host_tools.press_models.recorded_presses import EXACT, drifted
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import NAME, simulated_probe
 
@@ -27,7 +30,7 @@ def recordings(tables):
     return [phantom_recording(one, tables, seed=7 + n, protocol=RAMP) for n, one in enumerate(inclusions)]
 
 
-def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365):
+def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365, bare_blocks=()):
     return own_certificate(
         recordings,
         names,
@@ -36,6 +39,7 @@ def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365):
         operator="N. N.",
         made_at=MADE_AT,
         valid_days=valid_days,
+        bare_blocks=bare_blocks,
     )
 
 
@@ -58,6 +62,25 @@ def test_drift_is_watched_by_the_untouched_frames_of_the_ramps(recordings):
     assert abs(drift.change_ratio) < 0.01
     brighter = [replace(one, counts=one.counts + np.uint8(30 * any(one.led_ratio))) for one in unloaded]
     assert untouched.drift(brighter).change_ratio > 0.25
+
+
+def test_bare_blocks_tell_by_how_much_two_presses_differ_and_without_one_it_says_nothing(recordings, tables):
+    """A smooth error of 0.4 % of the light; each block shows some eight spots of it."""
+    levels = replace(EXACT, flat_field_ratio=0.004)
+    bare = [
+        drifted(
+            phantom_recording(Inclusion(0.0, 6.0, 80.0), tables, seed=n, protocol=RAMP),
+            np.random.default_rng(n),
+            levels,
+        )
+        for n in range(6)
+    ]
+    names = ["A1", "A2", *(f"B{n}" for n in range(6))]
+    made = certified([*recordings, *bare], names, bare_blocks=names[2:])
+    assert made.flat_field_ratio == pytest.approx(0.004, rel=0.25)
+    assert calibration_of(made.to_json().encode(), Path("made.json")) == made
+    assert certified(recordings).flat_field_ratio is None
+    assert "flat_field_ratio" not in certified(recordings).summary()
 
 
 @pytest.mark.parametrize(

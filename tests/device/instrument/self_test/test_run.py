@@ -24,6 +24,7 @@ from device.records.store import Store
 
 CONFIG = replace(simulated_config(), light=LightSection(ratio=(0.1, 0.2, 0.3, 0.4), enable_line=17))
 ON_BLOCK = SelfTestJob("j", "2026-01-01T00:00:00Z", on_block=True, weight_n=1.0)
+ON_THE_BLOCK = {*(f"LED {side}" for side in SIDES), "flat field"}
 NOBODY = {Guidance.HOLD_BLOCK: 0.0, Guidance.PUT_WEIGHT: 0.0}
 
 
@@ -37,6 +38,8 @@ class PatientBench:
         self.board, self.force, self.zero_shift_n = board, self, 0.01
         self.forces_n = {Guidance.HOLD_BLOCK: 0.5, Guidance.HOLD_STILL: 0.5, Guidance.PUT_WEIGHT: 1.0}
         self.break_at, self.lights, self.now_s = {}, [], 0.0
+        self.presses, self.second_press = [], 1.0
+        board.on_guidance(lambda guidance: self.presses.append(guidance) if guidance == Guidance.HOLD_BLOCK else None)
         self.progress, self.has_shown_its_line = ProgressBoard(lambda: self.now_s), True
 
     def _at(self, part):
@@ -70,6 +73,7 @@ class PatientBench:
         self._at("camera")
         y, x = np.mgrid[-1:1:40j, -1:1:60j]
         light = sum(ratio * (1 + 0.4 * way) for ratio, way in zip(self.lights[-1], (x, y, -x, -y), strict=True))
+        light = light * (self.second_press if len(self.presses) > 1 else 1.0)
         return CameraFrame(np.rint(4 + 200 * light * np.ones((40, 60))).astype(np.uint8), 0.0, 4000.0, 1.0)
 
     def take(self, role):
@@ -99,8 +103,8 @@ def test_of(board, bench, tmp_path):
     store = Store(tmp_path)
     clock = types.SimpleNamespace(offset_s=100.0, now=lambda: "2026-01-01T00:00:00Z")
 
-    def run(job=ON_BLOCK, config: Config = CONFIG):
-        test = SelfTestRun(config, bench, store, clock, board, threading.Event())
+    def run(job=ON_BLOCK, config: Config = CONFIG, flat_field_ratio=0.002):
+        test = SelfTestRun(config, bench, store, clock, board, threading.Event(), flat_field_ratio=flat_field_ratio)
         return {result.check: result for results in test.results(job) for result in results}
 
     yield run
@@ -124,7 +128,7 @@ def test_a_sound_probe_passes_every_check_and_is_left_dark(test_of, bench):
 
 def test_each_side_is_lit_alone_at_its_own_brightness(test_of, bench):
     test_of()
-    alone = [ratio for ratio in bench.lights if any(ratio)]
+    alone = [ratio for ratio in bench.lights if any(ratio) and not all(ratio)]
     assert alone == [(0.1, 0, 0, 0), (0, 0.2, 0, 0), (0, 0, 0.3, 0), (0, 0, 0, 0.4)]
 
 
@@ -133,14 +137,14 @@ def test_without_block_and_weight_the_operator_is_asked_for_nothing_but_to_stay_
     board.on_guidance(told.append)
     results = test_of(replace(ON_BLOCK, on_block=False, weight_n=None))
     assert told == [Guidance.KEEP_FREE]
-    assert untested(results) == {"known weight", *(f"LED {side}" for side in SIDES)}
+    assert untested(results) == {"known weight", *ON_THE_BLOCK}
     assert failed(results) == {}
 
 
 def test_an_operator_who_does_not_come_leaves_checks_untested(test_of, bench):
     bench.forces_n = NOBODY
     results = test_of()
-    assert untested(results) == {"known weight", *(f"LED {side}" for side in SIDES)}
+    assert untested(results) == {"known weight", *ON_THE_BLOCK}
     assert "within 30 s" in results["known weight"].remedy
     assert "within 30 s" in results["LED +x"].remedy
 
@@ -162,7 +166,37 @@ def test_after_a_wrong_zero_no_force_is_believed(test_of, bench):
     bench.zero_shift_n = 0.3
     results = test_of()
     assert failed(results) == {"zero since commissioning": "Load cell"}
-    assert untested(results) == {"known weight", *(f"LED {side}" for side in SIDES)}
+    assert untested(results) == {"known weight", *ON_THE_BLOCK}
+
+
+def test_two_presses_on_the_block_that_differ_smoothly_fail_and_say_by_how_much(test_of, bench):
+    """A spot of 2 % that the second press does not have; twice 0.2 % of the light may differ."""
+    y, x = np.mgrid[-1:1:40j, -1:1:60j]
+    bench.second_press = 1 - 0.02 * np.exp(-((x - 0.3) ** 2 + y**2) / 0.05)
+    results = test_of()
+    assert failed(results) == {"flat field": "Light"}
+    found = results["flat field"]
+    assert (found.value > 0.4, found.bound, found.unit) == (True, "at most 0.4 %", "%")
+    assert "Wipe face and block" in found.remedy
+
+
+def test_the_operator_is_asked_to_press_the_block_twice_and_nobody_comes_again(test_of, bench, board):
+    told = []
+    board.on_guidance(told.append)
+    board.on_guidance(lambda guidance: bench.forces_n.update(NOBODY) if guidance == Guidance.LIFT else None)
+    results = test_of(replace(ON_BLOCK, weight_n=None))
+    assert [one for one in told if one != Guidance.HOLD_STILL] == [
+        Guidance.KEEP_FREE,
+        Guidance.HOLD_BLOCK,
+        Guidance.LIFT,
+        Guidance.HOLD_BLOCK,
+        Guidance.LIFT,
+    ]
+    assert (untested(results), "within 30 s" in results["flat field"].remedy) == ({"known weight", "flat field"}, True)
+
+
+def test_without_a_model_that_says_how_even_the_light_is_it_is_not_tested(test_of):
+    assert test_of(flat_field_ratio=None)["flat field"].verdict == "not_tested"
 
 
 @pytest.mark.parametrize(
