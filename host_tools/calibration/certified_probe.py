@@ -84,14 +84,14 @@ def frames_beside(recording: Recording) -> FramesBeside:
     return FramesBeside(*split([*recording.with_role("dark"), *unloaded]), pressed)
 
 
-def flat_field_ratio(bare: Sequence[Recording]) -> float | None:
+def flat_field_ratio(of_blocks: Sequence[Recording]) -> float | None:
     """Return by how much the light of two presses on one bare block differs smoothly, the root mean square over blocks.
 
     None without a block. It holds what differs between two places of a skin, too.
     Raises `InvalidQuantity` for a block that was pressed too shortly to tell.
     """
     levels = []
-    for recording in bare:
+    for recording in of_blocks:
         dark, _, beside = frames_beside(recording)
         press = [frame for frame in recording.with_role("press") if frame.ramp == 0]
         first, second = (_well_pressed(frames) for frames in (beside, press))

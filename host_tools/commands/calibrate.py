@@ -193,7 +193,7 @@ def commission(
                     bench.probe,
                     **said_by,
                     valid_days=valid_days,
-                    bare_blocks=bench.bare_blocks,
+                    block_names=bench.block_names,
                 )
             )
             done = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=seed, say=note.print)

@@ -36,7 +36,7 @@ class StatedBench:
     prior: ProbePrior
 
     @property
-    def bare_blocks(self) -> list[str]:
+    def block_names(self) -> list[str]:
         """The names of the recordings on bare blocks."""
         return [name for name, ramp in zip(self.names, self.ramps, strict=True) if not ramp.has_inclusion]
 

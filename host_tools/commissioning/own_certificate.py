@@ -36,7 +36,7 @@ def own_certificate(
     operator: str,
     made_at: str,
     valid_days: float,
-    bare_blocks: Collection[str] = (),
+    block_names: Collection[str] = (),
 ) -> Calibration:
     """Return the certificate of a probe by its recordings of phantoms of these names, some of them bare blocks.
 
@@ -60,7 +60,7 @@ def own_certificate(
         cell=first.cell,
         untouched=untouched,
         phantoms=len(seen),
-        flat_field_ratio=flat_field_ratio([one for one, name in zip(seen, names, strict=True) if name in bare_blocks]),
+        flat_field_ratio=flat_field_ratio([one for one, name in zip(seen, names, strict=True) if name in block_names]),
         software=__version__,
         software_sha256=source_sha256(),
         simulated=any(one.simulated for one in seen),

@@ -30,7 +30,7 @@ def recordings(tables):
     return [phantom_recording(one, tables, seed=7 + n, protocol=RAMP) for n, one in enumerate(inclusions)]
 
 
-def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365, bare_blocks=()):
+def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365, block_names=()):
     return own_certificate(
         recordings,
         names,
@@ -39,7 +39,7 @@ def certified(recordings, names=("A1", "A2"), probe=None, valid_days=365, bare_b
         operator="N. N.",
         made_at=MADE_AT,
         valid_days=valid_days,
-        bare_blocks=bare_blocks,
+        block_names=block_names,
     )
 
 
@@ -64,10 +64,10 @@ def test_drift_is_watched_by_the_untouched_frames_of_the_ramps(recordings):
     assert untouched.drift(brighter).change_ratio > 0.25
 
 
-def test_bare_blocks_tell_by_how_much_two_presses_differ_and_without_one_it_says_nothing(recordings, tables):
+def test_blocks_tell_by_how_much_two_presses_differ_and_without_one_it_says_nothing(recordings, tables):
     """A smooth error of 0.4 % of the light; each block shows some eight spots of it."""
     levels = replace(EXACT, flat_field_ratio=0.004)
-    bare = [
+    on_blocks = [
         drifted(
             phantom_recording(Inclusion(0.0, 6.0, 80.0), tables, seed=n, protocol=RAMP),
             np.random.default_rng(n),
@@ -76,7 +76,7 @@ def test_bare_blocks_tell_by_how_much_two_presses_differ_and_without_one_it_says
         for n in range(6)
     ]
     names = ["A1", "A2", *(f"B{n}" for n in range(6))]
-    made = certified([*recordings, *bare], names, bare_blocks=names[2:])
+    made = certified([*recordings, *on_blocks], names, block_names=names[2:])
     assert made.flat_field_ratio == pytest.approx(0.004, rel=0.25)
     assert calibration_of(made.to_json().encode(), Path("made.json")) == made
     assert certified(recordings).flat_field_ratio is None
