@@ -100,18 +100,18 @@ def sweep(
     """Solve random scenes of the paper's box under rising forces into a netCDF file; return it as a data set.
 
     On all cores, or on a Dask cluster (`scheduler` "tcp://host:port"). Interrupted, the same call goes on. All scenes
-    are solved in small strain at one level, since features would jump where a plan changes its mind. With a `tolerance`
-    (a ratio) each climbs as `solve` does, in the strain measure that this asks for, for `within_s` at most. A scene
-    that fails, or cannot hold it, is a row of NaN with its `reason`. A file that holds this sweep is read as it is;
-    raise `InvalidQuantity` for one that holds anything else, unless `replace`.
+    are solved at one level, since features would jump where a plan changes its mind, and in small strain unless told,
+    whose departure from finite strain no row states. With a `tolerance` (a ratio) each climbs as `solve` does, for
+    `within_s` at most, in the strain measure that the tolerance asks for unless told; its `level` says where it came
+    to. A scene that fails, or cannot hold it, is a row of NaN with its `reason`. A file that holds this sweep is read
+    as it is; raise `InvalidQuantity` for one that holds anything else, unless `replace`.
     """
-    from host_tools.data.plan import SweepPlan
+    from host_tools.data.plan import SweepPlan, asked_strain
     from host_tools.data.sweep import sweep as solve_scenes
 
-    measure = strain or ("small" if tolerance is None else "auto")
-    plan = SweepPlan(scenes, seed, tuple(forces_n), measure, tolerance=tolerance)
-    solved = solve_scenes(plan, Path(out), jobs=jobs, scheduler=scheduler, within_s=within_s, replace=replace)
-    return read_sweep(solved)
+    measure = asked_strain(strain, tolerance)
+    plan = SweepPlan(scenes, seed, tuple(forces_n), measure, tolerance=tolerance, within_s=within_s)
+    return read_sweep(solve_scenes(plan, Path(out), jobs=jobs, scheduler=scheduler, replace=replace))
 
 
 def read_sweep(path: Path | str) -> xr.Dataset:

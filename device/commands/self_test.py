@@ -19,7 +19,7 @@ from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import CheckResult, broken, overall
 
 EXAMPLES = """examples:
-  python -m device self-test --on-block            also each LED, the probe held on the reference block when asked to
+  python -m device self-test --on-block            also each LED and two presses, on the reference block when asked to
   python -m device self-test --weight-n 0.5        also a known weight
   python -m device self-test --simulate --json     the virtual probe, results as JSON
 A daemon that runs holds the hardware: ask it for its self-test on the screen or with POST /api/v1/self-test.
@@ -36,7 +36,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     # Also before the command: there they are for every command.
     parser.add_argument("--simulate", action="store_true", default=argparse.SUPPRESS, help="of the virtual probe")
     parser.add_argument("--scene", type=Path, default=argparse.SUPPRESS, metavar="FILE", help="its scene (TOML)")
-    parser.add_argument("--on-block", action="store_true", help="test the sides, held on the reference block")
+    parser.add_argument(
+        "--on-block", action="store_true", help="test sides and flat field, held on the reference block"
+    )
     parser.add_argument("--weight-n", type=float, metavar="N", help="test the load cell with a known weight")
     parser.add_argument("--json", action="store_true", help="as one JSON object")
 

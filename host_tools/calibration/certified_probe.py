@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from device.measurement.calibration import moment, written
+from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.flat_field_error import flat_field_error
 from device.measurement.recording.recording import Recording
 from device.measurement.recording.tactile_image import Frame
@@ -87,15 +89,16 @@ def frames_beside(recording: Recording) -> FramesBeside:
 def flat_field_ratio(of_blocks: Sequence[Recording]) -> float | None:
     """Return by how much the light of two presses on one bare block differs smoothly, the root mean square over blocks.
 
-    None without a block. It holds what differs between two places of a skin, too.
-    Raises `InvalidQuantity` for a block that was pressed too shortly to tell.
+    None where no block tells it, as one that was pressed too shortly. It holds what differs between two places of a
+    skin, too.
     """
     levels = []
     for recording in of_blocks:
         dark, _, beside = frames_beside(recording)
         press = [frame for frame in recording.with_role("press") if frame.ramp == 0]
         first, second = (_well_pressed(frames) for frames in (beside, press))
-        levels.append(flat_field_error(first, second, dark[0].counts, recording.camera.scale).level_ratio)
+        with suppress(InvalidQuantity):
+            levels.append(flat_field_error(first, second, dark[0].counts, recording.camera.scale).level_ratio)
     return round(float(np.sqrt(np.mean(np.square(levels)))), 6) if levels else None
 
 

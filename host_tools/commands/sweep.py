@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from device.measurement.quantities import Bound, require
 from host_tools.commands.output import Scheduler, note, progress, ratio_of
 from host_tools.commands.probe import ProbeOption
 
@@ -32,7 +32,9 @@ def sweep(
     tolerance: Annotated[
         str | None, typer.Option(help="Every scene climbs until it states no more, such as 1%, or has failed.")
     ] = None,
-    within_s: Annotated[float, typer.Option(help="Time of a scene to find a level that holds it, wall clock.")] = 120.0,
+    within_s: Annotated[
+        float, typer.Option(help="With --tolerance: time of a scene to find a level that holds it, wall clock.")
+    ] = 120.0,
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -42,15 +44,14 @@ def sweep(
 
     Example: host_tools sweep --scenes 20 --tolerance 2% --out build/sweep.nc
     """
-    from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan
+    from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan, asked_strain
     from host_tools.data.sweep import sweep as run_sweep
     from host_tools.scenes.probe_file import probe_of
 
     forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N
     allowed = None if tolerance is None else ratio_of(tolerance)
-    require("within_s", within_s, Bound(0.0, 1e6, "s", low_included=False), "allow some time")
-    measure = strain or ("small" if allowed is None else "auto")
-    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed)
+    measure = asked_strain(strain, allowed)
+    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed, within_s)
     failed = 0
     with progress("scenes") as bar:
         task = bar.add_task("", total=scenes)
@@ -61,7 +62,7 @@ def sweep(
             bar.update(task, completed=done)
 
         try:
-            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, within_s=within_s, on_row=on_row, replace=force)
+            run_sweep(plan, out, jobs=jobs, scheduler=scheduler, on_row=on_row, replace=force)
         except KeyboardInterrupt:
             note.print(f"Interrupted. Solved scenes are kept in {out}.partial: run the same command to go on.")
             raise typer.Exit(1) from None
@@ -73,11 +74,16 @@ def sweep(
 def _departure(plan: SweepPlan) -> str:
     """Return a sentence on what no row of small strain states."""
     from host_tools.forward.model_departures import largest_departure
+    from host_tools.forward.press_model import PressFailed
 
-    departure = largest_departure(plan.middle_scene)
+    try:
+        departure = largest_departure(plan.middle_scene)
+    except PressFailed:
+        departure = inf
+    much = f"{100 * departure:.0f} % in the middle of the box" if departure < inf else "more than could be found"
     return (
-        f"In small strain, which may depart from finite strain by {100 * departure:.2g} % in the middle of the box: no "
-        "row states that. With --tolerance and no --strain it counts."
+        f"In small strain, which may depart from finite strain by {much}: no row states that. With --tolerance and no "
+        "--strain it counts."
     )
 
 

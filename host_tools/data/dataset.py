@@ -48,13 +48,15 @@ def training_rows(path: Path) -> TrainingRows:
     """Return the usable rows of a sweep as features and truths, with the nine phantoms marked and the others counted.
 
     A row is left out when it gives a reason for having failed, or when a feature or a truth is not finite. Raise
-    `InvalidQuantity` for a data set of several loads or of finite strain, since the three features are of one load, and
-    for one without a column that training needs.
+    `InvalidQuantity` for a data set of several loads, of finite strain or with a tolerance, since the three features
+    are of one load and must not jump from level to level, and for one without a column that training needs.
     """
     dataset = read_dataset(path)
     if "load" in dataset.dims:
         bound = f"{SCHEMA}, of one load in small strain"
-        raise InvalidQuantity("schema", SCHEMA_OF_LOADS, bound, "sweep with one force and `--strain small`")
+        raise InvalidQuantity(
+            "schema", SCHEMA_OF_LOADS, bound, "sweep with one force, without --strain and --tolerance"
+        )
     _require_columns(dataset)
     truth = np.column_stack([dataset[name].values for name in UNKNOWNS])
     features = np.column_stack([dataset[name].values for name in FEATURES])

@@ -21,7 +21,9 @@ from device.measurement.quantities import InvalidQuantity
 from host_tools.data.journal import Journal, Row
 from host_tools.forward.solution_dataset import unit_of
 
-NOT_VARIABLES = ("index", "reason", "r_mm")
+WORDS = {"reason": "why the scene failed, or empty", "level": "on which level the scene was solved, or empty"}
+"""Columns of text; only scenes that climb have a level each."""
+NOT_VARIABLES = ("index", "r_mm", *WORDS)
 BLOCK_SCENES = 64
 """Some 10 MB of rows with five loads each."""
 
@@ -46,7 +48,8 @@ def _fill(temporary: Path, journal: Journal, solved: Row) -> None:
             stop = start + len(block)
             for name, empty in empty_of.items():
                 file[name][start:stop] = np.array([row.get(name, empty) for row in block], dtype=float)
-            file["reason"][start:stop] = np.array([row["reason"] for row in block], dtype=object)
+            for name in (name for name in WORDS if name in solved):
+                file[name][start:stop] = np.array([row.get(name, "") for row in block], dtype=object)
             start = stop
     with temporary.open("rb") as written:
         os.fsync(written.fileno())
@@ -84,8 +87,9 @@ def _lay_out(file: h5netcdf.File, journal: Journal, solved: Row) -> dict[str, ND
     for name in (name for name in solved if name not in NOT_VARIABLES):
         empty_of[name] = np.full_like(np.asarray(solved[name], dtype=float), np.nan)
         _create(file, name, ("scene", *list(coordinates)[: empty_of[name].ndim]), unit_of(name))
-    reason = file.create_variable("reason", ("scene",), h5py.string_dtype())
-    reason.attrs["long_name"] = "why the scene failed, or empty"
+    for name in (name for name in WORDS if name in solved):
+        words = file.create_variable(name, ("scene",), h5py.string_dtype())
+        words.attrs["long_name"] = WORDS[name]
     return empty_of
 
 

@@ -13,14 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.forward.ladder import AskedStrain
+from host_tools.forward.ladder import WITHIN_S, AskedStrain
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene, Waveguide
 
 DEFAULT_FORCES_N = (0.5,)
 SCHEMA = "tsis.sweep/1"
 SCHEMA_OF_LOADS = "tsis.sweep/2"
-"""Rows of /1 hold one load in small strain; rows of /2 hold a `load` axis, and the origin names loads and strain."""
+"""Rows of /1 hold one load in small strain, on one level; rows of /2 hold a `load` axis, and the origin names loads and
+strain."""
 STRAINS = get_args(AskedStrain)
+
+
+def asked_strain(strain: AskedStrain | None, tolerance: float | None) -> AskedStrain:
+    """Return the strain measure that was asked for: unless told, what a tolerance asks for, small strain without."""
+    return strain or ("small" if tolerance is None else "auto")
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,7 @@ class SweepPlan:
     """What is swept: `scenes` draws from the box with a seed, each pressed with every one of `forces_n`, rising.
 
     By one probe's `waveguide`, the simulated one's unless given. With a `tolerance` (relative) every scene climbs until
-    what it states of every feature is within it, or has failed; `strain` may then be "auto".
+    what it states of every feature is within it, for `within_s` at most, or has failed; `strain` may then be "auto".
     """
 
     scenes: int
@@ -37,6 +43,7 @@ class SweepPlan:
     strain: AskedStrain = "small"
     waveguide: Waveguide = field(default_factory=Waveguide)
     tolerance: float | None = None
+    within_s: float = WITHIN_S
 
     def __post_init__(self) -> None:
         require("scenes", self.scenes, Bound(1, 1_000_000, "scenes"), "ask for at least one scene")
@@ -49,13 +56,14 @@ class SweepPlan:
             raise InvalidQuantity("forces_n", self.forces_n, "at least one force, rising", "order the loads")
         if self.tolerance is not None:
             require("tolerance", self.tolerance, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
+        require("within_s", self.within_s, Bound(0.0, 1e6, "s", low_included=False), "allow some time")
         for force_n in self.forces_n:
             Press(force_n=force_n)
 
     @property
     def has_load_axis(self) -> bool:
-        """Whether rows hold a value for each load; one load in small strain is a row of plain values."""
-        return len(self.forces_n) > 1 or self.strain != "small"
+        """Whether rows hold a value for each load; one load in small strain on one level is a row of plain values."""
+        return len(self.forces_n) > 1 or self.strain != "small" or self.tolerance is not None
 
     def truths(self) -> NDArray[np.float64]:
         """Return the drawn (size_mm, depth_mm, youngs_modulus_kpa) [scenes, 3]; prefix-stable."""
@@ -84,5 +92,5 @@ class SweepPlan:
             **loads,
             "box": {"low": PAPER_BOX_LOW, "high": PAPER_BOX_HIGH},
             "scene_defaults": surroundings,
-            **({} if self.tolerance is None else {"tolerance": self.tolerance}),
+            **({} if self.tolerance is None else {"tolerance": self.tolerance, "within_s": self.within_s}),
         }

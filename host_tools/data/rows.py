@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from host_tools.data.journal import Row
 from host_tools.data.plan import SweepPlan
-from host_tools.forward.ladder import WITHIN_S, ToleranceMissed, climb
+from host_tools.forward.ladder import ToleranceMissed, climb
 from host_tools.forward.plan import model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
@@ -21,16 +21,13 @@ from host_tools.scenes.scene import Press, Scene
 
 Truth = NDArray[np.float64]
 NOT_COLUMNS = ("plan", "pressure_is_positive", "contact_force_n")
-"""Entries of a solution's record that are the same in every row, or a check that the row has passed."""
+"""Entries of a solution's record that are the same in every row, told as its level, or a check that it has passed."""
 
 
-def solve_row(plan: SweepPlan, index: int, truth: Truth, *, within_s: float = WITHIN_S) -> Row:
-    """Solve one scene under the plan's loads; a scene that fails under any of them becomes a row with its reason.
-
-    `within_s` is the time to find a level that holds the plan's tolerance, where it has one.
-    """
+def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
+    """Solve one scene under the plan's loads; a scene that fails under any of them becomes a row with its reason."""
     try:
-        solutions = _solve_loads(plan, plan.scene(truth), within_s)
+        solutions = _solve_loads(plan, plan.scene(truth))
     except (PressFailed, InvalidQuantity) as refused:
         return empty_row(index, truth, reason=str(refused))
     except (NgException, ValueError, ArithmeticError, RuntimeError) as error:
@@ -38,7 +35,8 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth, *, within_s: float = WI
     columns = [_columns(solution) for solution in solutions]
     if plan.has_load_axis:
         of_loads = {name: [column[name] for column in columns] for name in columns[0]}
-        return empty_row(index, truth) | of_loads | {"r_mm": columns[0]["r_mm"]}
+        told = {} if plan.tolerance is None else {"level": _level(solutions[-1])}
+        return empty_row(index, truth) | told | of_loads | {"r_mm": columns[0]["r_mm"]}
     return empty_row(index, truth) | columns[0]
 
 
@@ -47,14 +45,21 @@ def empty_row(index: int, truth: Truth, *, reason: str = "") -> Row:
     return {"index": index, **dict(zip(UNKNOWNS, map(float, truth), strict=True)), "reason": reason}
 
 
-def _solve_loads(plan: SweepPlan, scene: Scene, within_s: float) -> tuple[Solution, ...]:
+def _level(solution: Solution) -> str:
+    """Return on which level a scene that climbed was solved: each on its own."""
+    return f"{solution.plan.strain} strain, {solution.plan.grading} {solution.plan.order}"
+
+
+def _solve_loads(plan: SweepPlan, scene: Scene) -> tuple[Solution, ...]:
     """Return one solution per force, with its stated errors, from one solve of the whole ramp.
 
     Without a tolerance on the level that all scenes share.
     """
     presses = [Press(force_n=force_n) for force_n in plan.forces_n]
     if plan.tolerance is not None:
-        climbed = climb(scene, presses, tolerance=plan.tolerance, strain=plan.strain, within_s=within_s, best=False)
+        climbed = climb(
+            scene, presses, tolerance=plan.tolerance, strain=plan.strain, within_s=plan.within_s, best=False
+        )
         if climbed.missed:
             raise ToleranceMissed(climbed.missed, climbed)
         return climbed.solutions

@@ -21,7 +21,6 @@ from host_tools.data.executors import executor
 from host_tools.data.journal import Journal, Row
 from host_tools.data.plan import SweepPlan
 from host_tools.data.rows import solve_row
-from host_tools.forward.ladder import WITHIN_S
 
 
 def sweep(
@@ -30,7 +29,6 @@ def sweep(
     *,
     jobs: int = -1,
     scheduler: str | None = None,
-    within_s: float = WITHIN_S,
     on_row: Callable[[Row, int], None] = lambda row, done: None,
     replace: bool = False,
 ) -> Path:
@@ -40,7 +38,6 @@ def sweep(
     `replace` says to give it up, and for a folder; both before anything is solved.
 
     `scheduler` is the address tcp://host:port of a Dask cluster; without it `jobs` processes of this machine solve.
-    `within_s` is the time of a scene to find a level that holds the plan's tolerance.
     `on_row` hears each new row and how many there are. Interrupted, it leaves the journal and no `out`.
     """
     if _is_done(plan, out, replace=replace):
@@ -51,9 +48,7 @@ def sweep(
         truths = plan.truths()
         missing = [index for index in range(plan.scenes) if index not in journal]
         try:
-            for row in rows_of(
-                partial(solve_row, plan, within_s=within_s), ((index, truths[index]) for index in missing)
-            ):
+            for row in rows_of(partial(solve_row, plan), ((index, truths[index]) for index in missing)):
                 if interrupted.is_set():
                     raise KeyboardInterrupt
                 if journal.append(row):

@@ -96,9 +96,11 @@ def side_results(
 
 FLAT_FIELD = "flat field"
 FLAT_FIELD_RATIO = 2.0
-"""Above the level that is believed in: the face holds some eight spots of 2 mm, and their level is known to a quarter.
-Of the level itself more than twice is seen in one test of ten thousand (chi-square of eight).
+"""Of the level that is believed in. The face shows some 26 independent parts of a field of 2 mm, so one level is known
+to a seventh: twice as much is no chance.
 """
+NO_RAMP_MODEL = "No model of force ramps is installed, which says how alike presses must be."
+UNLIKE_PRESSES = "The two presses cannot be compared: press slowly, and hold it until the screen says so."
 WIPE = "Wipe face and block and repeat the test; if it stays, commission the probe again."
 
 

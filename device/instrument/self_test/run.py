@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +20,8 @@ from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.press.states import Guidance
 from device.instrument.self_test.checks import (
     FLAT_FIELD,
+    NO_RAMP_MODEL,
+    UNLIKE_PRESSES,
     camera_results,
     clock_results,
     disk_results,
@@ -39,17 +42,18 @@ from device.instrument.watch.progress import ProgressBoard
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.flat_field_error import flat_field_error
 from device.measurement.recording.led_sides import SIDES, LedRatio
-from device.measurement.recording.tactile_image import Frame
+from device.measurement.recording.tactile_image import Counts, Frame
 from device.records.store import Store
 
 POLL_S = 0.02
 SETTLED_S = 0.5
 DARK_FRAMES = 8
 REST_S = 0.5
-FREE_TIMEOUT_S = 10.0
+FREE_TIMEOUT_S, LIFTED_TIMEOUT_S = 10.0, 3.0
 OPERATOR_TIMEOUT_S = 30.0
-RISE_FROM_RATIO, HELD_FRAMES = 0.6, 8
-"""Frames of a press on the block count from this part of the target force on, while it rises and that many more."""
+RISE_FROM_RATIO, RISE_TO_RATIO, MOST_RISING, HELD_FRAMES = 0.6, 1.2, 24, 8
+"""Frames of a press on the block count between these parts of the target force: so many last ones while it rises, so
+many when it is held."""
 HELD_RATIO = 0.7
 """Below this part of the target force a side lights the opposite half about as much as its own."""
 ZERO_FIRST = "The load cell's zero comes first: without it nobody knows how hard the probe is pressed."
@@ -116,12 +120,13 @@ class SelfTestRun:
         self._board, self._operator = board, Operator(board, bench.force, bench.progress, stopping)
         self._folder_of, self._flat_field_ratio = folder_of, flat_field_ratio
         self._offset_s, self._zero_holds = 0.0, False
-        self._first_press: list[Frame] = []
+        self._first_press: list[Frame] | None = None
+        """Of the block, for the flat field: empty where it did not come, None where nobody was to hold it, or could."""
 
     def results(self, job: SelfTestJob) -> Iterator[list[CheckResult]]:
         """Yield the results of each check as it ends; a fault is a result, too."""
         self._offset_s, self._zero_holds = self._clock.offset_s, False
-        self._first_press = []
+        self._first_press = None
         checks: dict[str, CheckOf] = {
             "disk": self._disk,
             "models": self._models,
@@ -194,8 +199,10 @@ class SelfTestRun:
         if not self._zero_holds:
             return untested_sides(ZERO_FIRST)
         try:
-            self._first_press = self._pressed_on_block()
-            return self._held_sides() if self._first_press else untested_sides(self._not_held)
+            pressed = self._pressed_on_block()
+            found = self._held_sides() if pressed else untested_sides(self._not_held)
+            self._first_press = pressed
+            return found
         finally:
             self._bench.light(DARK)
             self._board.update(guidance=Guidance.LIFT)
@@ -206,48 +213,63 @@ class SelfTestRun:
         return f"It was not held with {low_n:g} to {high_n:g} N within {OPERATOR_TIMEOUT_S:g} s."
 
     def _pressed_on_block(self) -> list[Frame]:
-        """Return the frames of a press on the block from `RISE_FROM_RATIO` on, and some held ones; none if none came.
+        """Return the frames of a press on the block as it rises, and some held ones; none if it did not come.
 
-        It is held still then, for more to come.
+        There is light from `RISE_FROM_RATIO` of the target force on, within the light's budget. It is held still then,
+        for more to come.
         """
-        frames: list[Frame] = []
-        press = self._config.press
+        press, rising = self._config.press, deque[Frame](maxlen=MOST_RISING)
+        from_n, to_n = RISE_FROM_RATIO * press.target_n, RISE_TO_RATIO * press.target_n
         low_n, _ = press.band_n
 
         def is_held(force_n: float) -> bool:
-            if force_n >= press.contact_n:
-                self._bench.light(self._config.light.ratio)
-            if force_n >= RISE_FROM_RATIO * press.target_n:
-                frames.append(self._bench.take("reference"))
+            if force_n < from_n:
+                self._bench.light(DARK)
+                rising.clear()  # a touch that was broken off is no part of the press
+                return False
+            self._bench.budget.require_left()
+            self._bench.light(self._config.light.ratio)
+            rising.append(self._bench.take("reference"))
             return force_n >= low_n
 
         if not self._operator.until(Guidance.HOLD_BLOCK, is_held, OPERATOR_TIMEOUT_S):
             return []
         self._board.update(guidance=Guidance.HOLD_STILL)
-        return frames + [self._bench.take("reference") for _ in range(HELD_FRAMES)]
+        frames = [*rising, *(self._bench.take("reference") for _ in range(HELD_FRAMES))]
+        return [frame for frame in frames if from_n <= frame.force_n <= to_n]
 
     def _flat_field(self, job: SelfTestJob) -> list[CheckResult]:
-        if not job.on_block or not self._first_press:
+        first, self._first_press = self._first_press, None
+        if not job.on_block or (first is None and self._zero_holds):
             return untested_flat_field()
+        if first is None:
+            return untested_flat_field(ZERO_FIRST)
         if self._flat_field_ratio is None:
-            return untested_flat_field("It is not installed.")
-        self._until_lifted()
+            return untested_flat_field(NO_RAMP_MODEL)
+        if not first:
+            return untested_flat_field(self._not_held)
+        contact_n = self._config.press.contact_n
+        if not self._operator.until(Guidance.LIFT, lambda force_n: force_n < contact_n, FREE_TIMEOUT_S):
+            return untested_flat_field(f"It was not lifted within {FREE_TIMEOUT_S:g} s: repeat it.")
         try:
-            if not (second := self._pressed_on_block()):
-                return untested_flat_field(self._not_held)
+            second = self._pressed_on_block()
             dark = self._view(DARK).counts
         finally:
             self._bench.light(DARK)
-            self._until_lifted()
-        try:
-            found = flat_field_error(self._first_press, second, dark, self._config.camera.scale)
-        except InvalidQuantity:  # too few frames of a press, or no light
-            return untested_flat_field()
-        return [flat_field_result(found.level_ratio, self._flat_field_ratio)]
+            # So that the next press finds an untouched face; a zero that is off by a little takes the time.
+            self._operator.until(Guidance.LIFT, lambda force_n: force_n <= UNTOUCHED_N, LIFTED_TIMEOUT_S)
+        return self._compared(first, second, dark) if second else untested_flat_field(self._not_held)
 
-    def _until_lifted(self) -> None:
-        """Wait until nothing touches the probe, so that the next press finds its face untouched."""
-        self._operator.until(Guidance.LIFT, lambda force_n: force_n <= UNTOUCHED_N, FREE_TIMEOUT_S)
+    def _compared(self, first: list[Frame], second: list[Frame], dark: Counts) -> list[CheckResult]:
+        """Return what two presses on the block say; nothing where they were too short or too fast to compare."""
+        assert self._flat_field_ratio is not None  # `_flat_field` has asked
+        try:
+            found = flat_field_error(first, second, dark, self._config.camera.scale)
+        except InvalidQuantity:
+            return untested_flat_field(UNLIKE_PRESSES)
+        if found.noise_ratio > self._flat_field_ratio:
+            return untested_flat_field(UNLIKE_PRESSES)
+        return [flat_field_result(found.level_ratio, self._flat_field_ratio)]
 
     def _held_sides(self) -> list[CheckResult]:
         light, least_n = self._config.light, HELD_RATIO * self._config.press.target_n

@@ -49,7 +49,8 @@ def flat_field_error(
     """Return the level of two presses on one bare block, of frames under load in one light, and a dark one.
 
     The field's correlation is taken to be exp(-distance^2 / (2 length^2)).
-    Raises `InvalidQuantity` for fewer than 4 frames of a press, a force that is not positive, or a face without light.
+    Raises `InvalidQuantity` for fewer than 4 frames of a press, a force that is not positive, or a face without light
+    or with too much of it: cells with a saturated pixel tell nothing.
     """
     for frames in (first, second):
         require("frames of a press", len(frames), Bound(FEWEST_FRAMES, np.inf, ""), "press longer")
@@ -60,6 +61,7 @@ def flat_field_error(
     light = np.array([_cells(frame.counts) for frame in (*first, *second)]) - _cells(dark)
     mean = light.mean(axis=0)
     is_lit = (mean >= LIT_RATIO * mean.max()) & (light.min(axis=0) >= LEAST_COUNTS)
+    is_lit &= ~np.any([_is_saturated(frame.counts) for frame in (*first, *second)], axis=0)
     require("lit cells of the face", int(is_lit.sum()), Bound(FEWEST_CELLS, np.inf, ""), "press harder, on the block")
     log_light = np.log(light[:, is_lit] / light[:, is_lit].mean(axis=1, keepdims=True))
     difference, noise_square = _difference(log_light, force_n, len(first))
@@ -70,6 +72,12 @@ def flat_field_error(
     of_noise = noise_square * np.trace(flat) / len(flat)
     square = max(float(np.mean((flat @ difference) ** 2)) - of_noise, 0.0)
     return FlatFieldError(float(np.sqrt(square / seen)), float(np.sqrt(of_noise / seen)))
+
+
+def _is_saturated(counts: Counts) -> NDArray[np.bool_]:
+    """Return which cells [16, 24] have a pixel that takes no more light."""
+    full = np.asarray(counts == np.iinfo(counts.dtype).max, np.float32)
+    return np.asarray(cv2.resize(full, CELLS, interpolation=cv2.INTER_AREA) > 0)
 
 
 def _difference(log_light: Array, force_n: Array, of_first: int) -> tuple[Array, float]:

@@ -65,7 +65,7 @@ def test_drift_is_watched_by_the_untouched_frames_of_the_ramps(recordings):
 
 
 def test_blocks_tell_by_how_much_two_presses_differ_and_without_one_it_says_nothing(recordings, tables):
-    """A smooth error of 0.4 % of the light; each block shows some eight spots of it."""
+    """A smooth error of 0.4 % of the light; each block shows some thirty independent parts of it."""
     levels = replace(EXACT, flat_field_ratio=0.004)
     on_blocks = [
         drifted(

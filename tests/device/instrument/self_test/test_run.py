@@ -11,6 +11,7 @@ from device.config import CameraSection, Config, LightSection, simulated_config
 from device.errors import CameraError, LightError, LightLineError, LoadCellError
 from device.hardware.interfaces import CameraFrame
 from device.instrument.acquisition.bench import DARK
+from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press.states import Guidance
 from device.instrument.self_test import run as operator_module
 from device.instrument.self_test import run as run_module
@@ -40,6 +41,7 @@ class PatientBench:
         self.break_at, self.lights, self.now_s = {}, [], 0.0
         self.presses, self.second_press = [], 1.0
         board.on_guidance(lambda guidance: self.presses.append(guidance) if guidance == Guidance.HOLD_BLOCK else None)
+        self.budget = LightBudget(clock=lambda: self.now_s)
         self.progress, self.has_shown_its_line = ProgressBoard(lambda: self.now_s), True
 
     def _at(self, part):
@@ -193,6 +195,48 @@ def test_the_operator_is_asked_to_press_the_block_twice_and_nobody_comes_again(t
         Guidance.LIFT,
     ]
     assert (untested(results), "within 30 s" in results["flat field"].remedy) == ({"known weight", "flat field"}, True)
+
+
+def test_a_press_that_is_never_lifted_is_not_compared_with_itself(test_of, bench):
+    bench.forces_n[Guidance.LIFT] = 0.5
+    found = test_of()["flat field"]
+    assert (found.verdict, found.remedy) == ("not_tested", "It was not lifted within 10 s: repeat it.")
+
+
+def test_a_press_far_above_the_target_is_not_compared(test_of, bench, board):
+    """0.6 N is the most; the sides are judged, and the block was first held as it should be."""
+    heavy = {**bench.forces_n, Guidance.HOLD_BLOCK: 0.7, Guidance.HOLD_STILL: 0.7}
+    board.on_guidance(lambda guidance: bench.forces_n.update(heavy) if guidance == Guidance.LIFT else None)
+    found = test_of()["flat field"]
+    assert (found.verdict, "within 30 s" in found.remedy) == ("not_tested", True)
+
+
+def test_there_is_no_light_before_the_block_is_pressed_and_no_more_than_the_budget_allows(test_of, bench):
+    bench.forces_n |= {Guidance.HOLD_BLOCK: 0.25}
+    test_of()
+    assert [ratio for ratio in bench.lights if any(ratio)] == []
+    bench.forces_n |= {Guidance.HOLD_BLOCK: 0.4}  # on the way, and no further
+    bench.budget = LightBudget(1.0, clock=lambda: bench.now_s)
+    bench.light = lambda ratio: (bench.lights.append(ratio), bench.budget.note_lit() if any(ratio) else None)
+    results = test_of()
+    assert (results["LED sides"].code, bench.lights[-1]) == ("E209", DARK)
+    assert bench.budget.on_s < 1.2
+
+
+def test_a_wrong_zero_is_what_is_said_of_the_flat_field_too(test_of, bench):
+    bench.zero_shift_n = 0.3
+    results = test_of()
+    assert results["flat field"].remedy == results["LED +x"].remedy
+
+
+def test_a_fault_in_the_second_press_fails_the_flat_field_alone_and_ends_dark(test_of, bench, board):
+    def break_second(guidance):
+        if len(bench.presses) == 2:
+            bench.break_at = {"camera": CameraError("No frame.", "Check it.")}
+
+    board.on_guidance(break_second)
+    assert failed(test_of()) == {"flat field": "Camera"}
+    assert bench.lights[-1] == DARK
 
 
 def test_without_a_model_that_says_how_even_the_light_is_it_is_not_tested(test_of):

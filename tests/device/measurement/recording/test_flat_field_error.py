@@ -45,7 +45,7 @@ def level_of(second, first=None):
 
 
 def test_a_known_level_is_found_over_many_fields():
-    """Each has some eight spots, so one is known to a quarter, and thirty to a twentieth."""
+    """Each shows some thirty independent parts, so one is known to a seventh."""
     rng = np.random.default_rng(5)
     found = [level_of(press(0.003 * smooth_field(rng))) for _ in range(30)]
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.003, rel=0.12)
@@ -84,6 +84,15 @@ def test_frames_of_8_bits_say_the_same():
     error = 0.003 * smooth_field(np.random.default_rng(1))
     found = flat_field_error(of_8_bits(press()), of_8_bits(press(error)), (DARK >> 8).astype(np.uint8), SCALE)
     assert found.level_ratio == pytest.approx(level_of(press(error)), rel=0.1)
+
+
+def test_cells_that_take_no_more_light_are_left_out_and_tell_nothing():
+    error = 0.003 * smooth_field(np.random.default_rng(2))
+    shone_on = 4.0 * (X_MM > 0) * np.ones(SHAPE)
+    found = [level_of(press(shone_on + one), press(shone_on)) for one in (0.0, error)]
+    assert found[0] < 1e-5 < 1e-3 < found[1]
+    with pytest.raises(InvalidQuantity, match="lit cells of the face"):
+        level_of(press(50.0))
 
 
 @pytest.mark.parametrize(
