@@ -35,7 +35,7 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
     columns = [_columns(solution) for solution in solutions]
     if plan.has_load_axis:
         of_loads = {name: [column[name] for column in columns] for name in columns[0]}
-        told = {} if plan.tolerance is None else {"level": _level(solutions[-1])}
+        told = {} if plan.tolerance is None else {"level": solutions[-1].plan.level}
         return empty_row(index, truth) | told | of_loads | {"r_mm": columns[0]["r_mm"]}
     return empty_row(index, truth) | columns[0]
 
@@ -43,11 +43,6 @@ def solve_row(plan: SweepPlan, index: int, truth: Truth) -> Row:
 def empty_row(index: int, truth: Truth, *, reason: str = "") -> Row:
     """Return what is known of a scene without a solution; `reason` says why there is none."""
     return {"index": index, **dict(zip(UNKNOWNS, map(float, truth), strict=True)), "reason": reason}
-
-
-def _level(solution: Solution) -> str:
-    """Return on which level a scene that climbed was solved: each on its own."""
-    return f"{solution.plan.strain} strain, {solution.plan.grading} {solution.plan.order}"
 
 
 def _solve_loads(plan: SweepPlan, scene: Scene) -> tuple[Solution, ...]:

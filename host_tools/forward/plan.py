@@ -51,6 +51,11 @@ class ModelPlan:
     predicted_error: dict[str, float] = field(default_factory=dict)
     predicted_seconds: float | None = None
 
+    @property
+    def level(self) -> str:
+        """Strain measure, mesh and order in words."""
+        return f"{self.strain} strain, {self.grading} {self.order}"
+
     def as_record(self) -> dict[str, Any]:
         """Return the plan as the JSON object of `host_tools simulate --json`."""
         return asdict(self)

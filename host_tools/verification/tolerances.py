@@ -119,8 +119,7 @@ def _answer(scene: Scene, tolerance: float) -> tuple[Solution | None, ToleranceA
     except PressFailed as failed:
         return None, ToleranceAnswer(tolerance, place, "", time.perf_counter() - began, {}, str(failed))
     solution = climbed.solutions[0]
-    level = f"{solution.plan.strain} strain, {solution.plan.grading} {solution.plan.order}"
-    return solution, ToleranceAnswer(tolerance, place, level, time.perf_counter() - began, {})
+    return solution, ToleranceAnswer(tolerance, place, solution.plan.level, time.perf_counter() - began, {})
 
 
 def _truth(scene: Scene, order: int) -> dict[str, float]:

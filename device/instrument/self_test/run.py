@@ -223,6 +223,7 @@ class SelfTestRun:
         low_n, _ = press.band_n
 
         def is_held(force_n: float) -> bool:
+            """Take a frame if it is pressed, and return whether the press has come to its force."""
             if force_n < from_n:
                 self._bench.light(DARK)
                 rising.clear()  # a touch that was broken off is no part of the press

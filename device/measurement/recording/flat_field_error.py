@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, require
 from device.measurement.recording.pixel_scale import PixelScale
-from device.measurement.recording.tactile_image import Counts, Frame
+from device.measurement.recording.tactile_image import Counts, Frame, full_scale
 
 CELLS = 24, 16
 """Cells across and down the image: a millimetre each on the face."""
@@ -76,8 +76,8 @@ def flat_field_error(
 
 def _is_saturated(counts: Counts) -> NDArray[np.bool_]:
     """Return which cells [16, 24] have a pixel that takes no more light."""
-    full = np.asarray(counts == np.iinfo(counts.dtype).max, np.float32)
-    return np.asarray(cv2.resize(full, CELLS, interpolation=cv2.INTER_AREA) > 0)
+    is_full = np.asarray(counts >= full_scale(counts), np.float32)
+    return np.asarray(cv2.resize(is_full, CELLS, interpolation=cv2.INTER_AREA) > 0)
 
 
 def _difference(log_light: Array, force_n: Array, of_first: int) -> tuple[Array, float]:

@@ -146,9 +146,14 @@ def tactile_image(frame: Frame, reference: Reference, scale: PixelScale) -> Tact
     return TactileImage(contrast=contrast, valid=valid, scale=scale, force_n=frame.force_n)
 
 
+def full_scale(counts: Counts) -> int:
+    """Return the counts of a pixel that takes no more light: 255, or in 16 bits what 10 bits say at most, 1023 x 64."""
+    return 255 if counts.dtype == np.uint8 else 1023 << 6
+
+
 def saturated_ratio(counts: Counts) -> float:
-    """Return the part of the pixels at full scale: 255, or in 16 bits what 10 bits can say at most, 1023 x 64."""
-    full = 255 if counts.dtype == np.uint8 else 1023 << 6
+    """Return the part of the pixels at full scale."""
+    full = full_scale(counts)
     if counts.max(initial=0) < full:  # as almost every frame: a fifth of the time, and no image of answers is made
         return 0.0
     return float(np.count_nonzero(counts >= full) / counts.size)

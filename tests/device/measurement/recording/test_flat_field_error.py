@@ -26,7 +26,7 @@ def press(error=0.0, forces_n=FORCES_N, noise_counts=0.0, rng=None):
     for number, force_n in enumerate(forces_n):
         light = 120 * BLOCK * (force_n / 0.5) ** POWER * (1 + error)
         noise = rng.normal(0.0, noise_counts, SHAPE) if rng else 0.0
-        counts = np.clip(np.rint(DARK + 256 * (light + noise)), 0, 65535).astype(np.uint16)
+        counts = np.clip(np.rint(DARK + 256 * (light + noise)), 0, 1023 << 6).astype(np.uint16)
         frames.append(Frame(counts, "reference", float(number), float(force_n), LIT))
     return frames
 
