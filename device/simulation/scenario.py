@@ -50,7 +50,7 @@ class CellSettings:
 class Scenario:
     """What the virtual probe is made of and pressed on, what goes wrong, and how the device must tell.
 
-    An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 4-6.25 kPa, 27-36 mm.
+    An inclusion of 0 mm is none; a `neighbour` is a second one beside it. The tissue is a slab of 2-30 kPa, 15-60 mm.
     `expects` is the fault code it must raise, `self_test_fails` the check of its self-test that must fail.
     `light` is "physical" (skin, lens and the table of light) or "linear" (the paper's assumption, `optics`).
     On a `grid`, a printed plate in a cap, there is nothing else to press on.

@@ -75,16 +75,18 @@ class ProbeTables:
         """Return the ramps of one inclusion in a slab and a world, from those `solved` or else the table's.
 
         Raises `InvalidQuantity` for an inclusion outside the tables, and for what a world needs a table for that is not
-        there.
+        there or does not hold its tissue.
         """
         ramps = solved or self.centred.ramps(inclusion, slab)
         if world.layers != AS_TABULATED:
             if self.layers is None:
                 raise _no_table("world.layers", "layers")
+            slab.require_near_nominal("world.layers")
             ramps = self.layers.changed(ramps, world.layers, inclusion, slab)
         if world.face_motion_ratio:
             if self.motion is None:
                 raise _no_table("world.face_motion_ratio", "motion")
+            slab.require_near_nominal("world.face_motion_ratio")
             ramps = self.motion.moved(ramps, world.face_motion_ratio, inclusion, slab)
         return ramps
 

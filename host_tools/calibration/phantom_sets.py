@@ -14,7 +14,7 @@ import numpy as np
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.scenario import NO_INCLUSION, Scenario
-from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.probe_tables.force_ramps import press_ramps
 from host_tools.scenes.phantom_set import PhantomSet
 from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Scene, Tissue
 

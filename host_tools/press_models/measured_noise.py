@@ -30,7 +30,7 @@ from host_tools.press_models.fit_surrogate import missed_rows
 from host_tools.press_models.press_samples import PressSamples, draw_beside, draw_parameters, profile_rows
 from host_tools.press_models.recorded_presses import direction_of_press_rad, in_parallel, record_presses
 from host_tools.press_models.seeds import derived_seed, press_seed
-from host_tools.probe_tables.surface_table import inclusion_ramp, scene_in
+from host_tools.probe_tables.force_ramps import inclusion_ramp, scene_in
 
 PARTS = 5
 SHRINKAGES = np.geomspace(1e-4, 1.0, 33)

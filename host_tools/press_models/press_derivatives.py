@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.parameters import HIGH, LOW, PARAMETERS, normalise
 from device.measurement.quantities import Bound, require
@@ -33,7 +34,6 @@ from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE
 from device.measurement.ramp_modes.surrogate import DEPTH, OFFSET, SIZE, far_field_strength
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw
-from device.simulation.physics.table_file import load_table, save_table
 from device.simulation.physics.world import AS_BELIEVED, OverLesion, PressTilts, Relaxation, TrueLight, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.press_samples import (

@@ -27,7 +27,7 @@ from device.simulation.physics.image_formation import ScatteredImage
 from device.simulation.physics.lens import Lens
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.skin import Skin
-from device.simulation.physics.slab import Slab
+from device.simulation.physics.slab import NEAREST_MM, Slab
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.physics.world_face import WorldFace
@@ -42,8 +42,6 @@ INCLUSIONS_A_SKIN = 3
 CHUNK = 24
 BESIDE_TO_MM = 8.0
 """Largest offset of a press of a scan: three millimetres from the rim of the face."""
-NEAREST_MM = 1.0
-"""An inclusion ends at least this far above the slab's base."""
 
 
 class Draw(Protocol):

@@ -31,11 +31,12 @@ from device.measurement.ramp_modes.surrogate import (
     polynomial_coordinates,
     turned,
 )
+from device.simulation.physics.slab import NEAREST_MM
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, activations_of, backward
 from host_tools.press_models.fit_surrogate import INCLUSION_REACH, fit_polynomials
 from host_tools.press_models.noisy_presses import BLOCK, NetworkPresses, NoiseSampler, PressSet
-from host_tools.press_models.press_samples import NEAREST_MM, PressSamples, draw_parameters, sample_presses
+from host_tools.press_models.press_samples import PressSamples, draw_parameters, sample_presses
 from host_tools.press_models.seeds import derived_seed
 from host_tools.press_models.train_ensemble import Task, train_members
 from host_tools.probe_tables.out_of_range_table import SHALLOWEST_MM, SIZES_MM, WideTable, deepest_mm

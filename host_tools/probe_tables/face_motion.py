@@ -15,19 +15,15 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.face_motion import FaceMotion
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL
-from device.simulation.physics.surface_table import COARSE
 from host_tools.forward.face_state import FaceState
 from host_tools.forward.solution import Solution
+from host_tools.probe_tables.force_ramps import BASELINE, EVERY, FORCES_N, ramp, scene_in
 from host_tools.probe_tables.surface_table import (
-    BASELINE,
-    EVERY,
-    FORCES_N,
+    COARSE,
     POINTS,
     SMALLEST_SIZE_MM,
     inclusion_axes,
-    ramp,
     require_tabulated,
-    scene_in,
     solved_for,
 )
 from host_tools.scenes.probe import Probe

@@ -27,14 +27,12 @@ from device.simulation.physics.layer_table import (
     LayerTable,
 )
 from device.simulation.physics.slab import NOMINAL, Slab
-from device.simulation.physics.surface_table import COARSE
+from host_tools.probe_tables.force_ramps import CHANGES, FORCES_N, bare_per_n, inclusions_per_n_mm3
 from host_tools.probe_tables.surface_table import (
-    CHANGES,
+    COARSE,
     POINTS,
     SMALLEST_SIZE_MM,
-    baseline_per_n,
     inclusion_axes,
-    inclusions_per_n_mm3,
     require_tabulated,
     solved_for,
 )
@@ -100,7 +98,7 @@ def build_layer_table(
     usual, others = solved_scenes(waveguide)
     scenes = [*usual, *others]
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    baseline = Parallel(n_jobs=jobs)(delayed(baseline_per_n)(scene, NOMINAL, CHANGES) for scene in scenes)
+    baseline = Parallel(n_jobs=jobs)(delayed(bare_per_n)(scene(NOMINAL), FORCES_N, CHANGES) for scene in scenes)
     places = [(scene, NOMINAL, CHANGES, *place) for scene in scenes for place in product(axes.size_mm, axes.depth_mm)]
     solving = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(inclusions_per_n_mm3)(*place, axes.elastic_mismatch) for place in places

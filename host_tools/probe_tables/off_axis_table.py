@@ -26,7 +26,7 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.off_axis_table import OffAxisTable
-from device.simulation.physics.slab import NOMINAL
+from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.meshes.solid_mesh import SolidResolution, solid_mesh
@@ -36,7 +36,8 @@ from host_tools.forward.small_strain.contact import contact_pressure_kpa
 from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.symmetry import SOLID
 from host_tools.forward.tiers import build
-from host_tools.probe_tables.surface_table import inclusion_axes, require_tabulated, ring_means, solved_for
+from host_tools.probe_tables.force_ramps import ring_means, scene_in
+from host_tools.probe_tables.surface_table import inclusion_axes, require_tabulated, solved_for
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scenes.scene import Placement, Press, Scene, Waveguide
@@ -48,6 +49,8 @@ SMALLEST_SIZE_MM = 2.0
 OFFSETS_MM = (2.0, 16.0)
 MODES = 11
 """Cosines kept: the twelfth of the narrowest inclusion is below a thousandth of its peak."""
+TILT_MODULI_KPA, TILT_THICKNESSES_MM = (2.0, 5.0, 12.0, 30.0), (15.0, 20.0, 30.0, 60.0)
+"""Slabs that a tilted probe is pressed on, the nominal one among them."""
 EVERY = 4
 """Every which of the face's radii is kept: 0.2 mm apart."""
 
@@ -123,11 +126,10 @@ def build_off_axis_table(
     require_tabulated(waveguide)
     axes = inclusion_axes(points[:3], SMALLEST_SIZE_MM)
     offset = points_with_ends(*OFFSETS_MM, points[3])
-    r_mm, tilt_w_mm, tilt_p_kpa = tilt_per_degree(Scene(None, waveguide=waveguide))
-    tilt = np.stack([tilt_w_mm, ring_means(r_mm, tilt_p_kpa)])[:, ::EVERY]
-    inclusion_field = np.zeros((*points, 2, MODES, tilt.shape[-1]))
-    grid = list(product(range(points[0]), range(points[1]), range(points[3])))
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    r_mm, tilt = tilts(waveguide, jobs)
+    inclusion_field = np.zeros((*points, 2, MODES, len(r_mm)))
+    grid = list(product(range(points[0]), range(points[1]), range(points[3])))
     solved = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.elastic_mismatch, waveguide)
         for i, j, m in grid
@@ -135,7 +137,17 @@ def build_off_axis_table(
     for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
         inclusion_field[i, j, :, m] = modes
         on_point(done, len(grid))
-    return OffAxisTable(*axes, offset, r_mm[::EVERY], np.moveaxis(inclusion_field, 4, 0), tilt)
+    of_tilts = np.array(TILT_MODULI_KPA), np.array(TILT_THICKNESSES_MM), tilt
+    return OffAxisTable(*axes, offset, r_mm, np.moveaxis(inclusion_field, 4, 0), *of_tilts)
+
+
+def tilts(waveguide: Waveguide, jobs: int = -1) -> tuple[Array, Array]:
+    """Return the table's radii [R] and the fields [E, T, 2, R] of one degree in all of the slabs of tilts."""
+    scenes = [scene_in(Slab(*slab), waveguide=waveguide) for slab in product(TILT_MODULI_KPA, TILT_THICKNESSES_MM)]
+    solved = Parallel(n_jobs=jobs)(delayed(tilt_per_degree)(scene) for scene in scenes)
+    fields = np.array([(w_mm, ring_means(r_mm, p_kpa)) for r_mm, w_mm, p_kpa in solved])[..., ::EVERY]
+    shape = len(TILT_MODULI_KPA), len(TILT_THICKNESSES_MM)
+    return solved[0][0][::EVERY], fields.reshape(*shape, *fields.shape[1:])
 
 
 def write_off_axis_table(table: OffAxisTable, folder: Path, probe: Probe | None = None) -> None:

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.ramp_modes.surrogate import far_field_strength
@@ -28,11 +29,11 @@ from device.simulation.physics.inclusion_axes import ACTION as CHOOSE
 from device.simulation.physics.off_axis_table import OffAxisTable
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import Ramp, SurfaceTable
-from device.simulation.physics.table_file import load_table, save_table
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.probe_tables.force_ramps import INCLUSIONS, scene_in
+from host_tools.probe_tables.force_ramps import inclusions_per_n_mm3 as centred_per_n_mm3
 from host_tools.probe_tables.off_axis_table import OFFSETS_MM, inclusions_per_n_mm3
-from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES, INCLUSIONS, scene_in
-from host_tools.probe_tables.surface_table import inclusions_per_n_mm3 as centred_per_n_mm3
+from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES
 from host_tools.scenes.scene import Press, Scene
 
 NAME, SCHEMA = "wide_table", "tsis.wide_table/1"

@@ -36,7 +36,7 @@ from host_tools.press_models.mode_outcome import CRITICAL_RATIO
 from host_tools.press_models.press_samples import profile_rows
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
-from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.probe_tables.force_ramps import press_ramps
 from host_tools.scenes.scene import Scene
 from host_tools.scores.outside import FALSE_AT_MOST, REFUSED_AT_LEAST, SHARE
 

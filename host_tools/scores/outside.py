@@ -29,7 +29,7 @@ from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.ramp_training import further_offsets_mm
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import press_seed
-from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.probe_tables.force_ramps import press_ramps
 from host_tools.scenes.scene import Scene
 
 ALL_MODES: tuple[Mode, ...] = ("standard", "quick", "precise")

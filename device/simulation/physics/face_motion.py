@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps, Ramp
-from device.simulation.physics.table_file import load_table, save_table
 
 NAME, SCHEMA = "face_motion", "tsis.face_motion/1"
 ACTION = "run `host_tools table --part motion` to make it again"

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, Inclusion, require
-from device.simulation.physics.chebyshev import interpolated
+from device.simulation.physics.chebyshev import interpolated, interpolation_weights, slope_weights
 from device.simulation.physics.slab import Slab
 
 ACTION = "choose an inclusion inside the table's range"
@@ -27,11 +29,35 @@ class InclusionAxes(NamedTuple):
 
         Raises `InvalidQuantity` for an inclusion outside the axes, whose mismatch is that in the stated `slab`.
         """
+        self.require_held(inclusion, slab)
+        size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
+        mismatch = slab.elastic_mismatch(modulus_kpa)
+        place = max(size_mm, float(self.size_mm[0])), depth_mm, mismatch
+        return size_mm**3 * mismatch * interpolated(fields_per_n_mm3, self, place)
+
+    def growth_per_n(self, fields_per_n_mm3: Array, inclusion: Inclusion, slab: Slab) -> tuple[Array, Array]:
+        """Return how the same field grows with the size, per size itself, and with the depth, per mm.
+
+        Raises as `inclusion_per_n`.
+        """
+        self.require_held(inclusion, slab)
+        size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
+        mismatch, held_mm = slab.elastic_mismatch(modulus_kpa), max(size_mm, float(self.size_mm[0]))
+        of_mismatch = np.tensordot(interpolation_weights(self.elastic_mismatch, mismatch), fields_per_n_mm3, (0, 3))
+        at_size, at_depth = interpolation_weights(self.size_mm, held_mm), interpolation_weights(self.depth_mm, depth_mm)
+        with_size, with_depth = slope_weights(self.size_mm, held_mm), slope_weights(self.depth_mm, depth_mm)
+        grows = 3 * at_size + (size_mm * with_size if size_mm >= held_mm else 0.0)
+        by_size, by_depth = (
+            np.einsum("s,d,xsd...->x...", of_size, of_depth, of_mismatch)
+            for of_size, of_depth in ((grows, at_depth), (at_size, with_depth))
+        )
+        volume = size_mm**3 * mismatch
+        return volume * by_size, volume * by_depth
+
+    def require_held(self, inclusion: Inclusion, slab: Slab) -> None:
+        """Refuse an inclusion outside the axes, whose mismatch is that in the stated `slab`."""
         size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
         softest, stiffest = (slab.stated.modulus_kpa(float(end)) for end in self.elastic_mismatch[[0, -1]])
         require("size_mm", size_mm, Bound(0.0, float(self.size_mm[-1]), "mm"), ACTION)
         require("depth_mm", depth_mm, Bound(float(self.depth_mm[0]), float(self.depth_mm[-1]), "mm"), ACTION)
         require("youngs_modulus_kpa", modulus_kpa, Bound(softest, stiffest, "kPa"), ACTION)
-        mismatch = slab.elastic_mismatch(modulus_kpa)
-        place = max(size_mm, float(self.size_mm[0])), depth_mm, mismatch
-        return size_mm**3 * mismatch * interpolated(fields_per_n_mm3, self, place)

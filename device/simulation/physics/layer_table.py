@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, Inclusion, require
 from device.simulation.physics.chebyshev import interpolation_weights
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps
-from device.simulation.physics.table_file import load_table, save_table
 
 NAME, SCHEMA = "layer_table", "tsis.layer_table/1"
 ACTION = "run `host_tools table --part layers` to make it again"

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Single
 from device.measurement.quantities import Bound, require
-from device.simulation.physics.table_file import load_table, save_table
 
 NAME, SCHEMA = "light_table", "tsis.light_table/1"
 ACTION = "run `host_tools optics build` to make it again"

@@ -1,8 +1,9 @@
 """What an inclusion off the probe's axis adds to the face, and what a tilted probe does, for the virtual probe.
 
 Small strain in three dimensions: fields are proportional to the force (or the tilt) and depend on radius and on the
-angle from the direction of the inclusion, as a cosine series. All in the nominal slab; `PressedFace` carries them over
-to another one. Between the solved moduli the inclusion's mismatch counts (`slab.py`). Written by `host_tools table`.
+angle from the direction of the inclusion, as a cosine series. Inclusions are in the nominal slab, and `PressedFace`
+carries them over to another one; tilts are in slabs of any tissue, between which ln Et and 1/T count. Between the
+solved moduli the inclusion's mismatch counts (`slab.py`). Written by `host_tools table`.
 """
 
 from __future__ import annotations
@@ -12,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
-from device.simulation.physics.chebyshev import interpolated
+from device.simulation.physics.chebyshev import interpolated, interpolation_weights
 from device.simulation.physics.inclusion_axes import InclusionAxes
-from device.simulation.physics.slab import NOMINAL
-from device.simulation.physics.table_file import load_table, save_table
+from device.simulation.physics.slab import NOMINAL, Slab
 
-NAME, SCHEMA = "off_axis_table", "tsis.off_axis_table/2"
+NAME, SCHEMA = "off_axis_table", "tsis.off_axis_table/3"
 ACTION = "run `host_tools table` to make it again"
 FADING_MM = 2.5
 """Length over which an inclusion beyond the largest offset stops to count; assumed, it moves the rim at most."""
@@ -29,9 +30,9 @@ FORGOTTEN = 1e-3
 
 @dataclass(frozen=True)
 class OffAxisTable:
-    """`lump_per_n_mm3` [2, S, D, M, O, K, R], over the mismatch too; `tilt_per_deg` [2, R] times the angle's cosine.
+    """`lump_per_n_mm3` [2, S, D, M, O, K, R], over the mismatch too; w comes first, then p.
 
-    w comes first, then p.
+    `tilt_per_deg` [E, T, 2, R], times the angle's cosine, at `tilt_modulus_kpa` [E] and `tilt_thickness_mm` [T].
     """
 
     size_mm: Array
@@ -40,6 +41,8 @@ class OffAxisTable:
     offset_mm: Array
     r_mm: Array
     lump_per_n_mm3: Array
+    tilt_modulus_kpa: Array
+    tilt_thickness_mm: Array
     tilt_per_deg: Array
 
     def centred_share(self, offset_mm: float) -> float:
@@ -66,6 +69,12 @@ class OffAxisTable:
         axes = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch)
         at_offsets = axes.inclusion_per_n(self.lump_per_n_mm3, inclusion, NOMINAL)
         return interpolated(at_offsets, [self.offset_mm], [offset_mm])
+
+    def tilt_in(self, slab: Slab) -> Array:
+        """Return the field [2, R] of one degree in a slab, to be multiplied by the angle's cosine."""
+        modulus = interpolation_weights(np.log(self.tilt_modulus_kpa), float(np.log(slab.youngs_modulus_kpa)))
+        thickness = interpolation_weights(1 / self.tilt_thickness_mm, 1 / slab.thickness_mm)
+        return np.tensordot(np.multiply.outer(modulus, thickness), self.tilt_per_deg, 2)
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write off_axis_table.npz and its description with the hash."""

@@ -2,8 +2,8 @@
 
 An inclusion off the axis is solved in small strain in the nominal slab, and changes with force and slab as the centred
 one of its elastic mismatch does; moving the centred field instead would be wrong: a probe that cannot turn answers with
-a moment. A tilt adds its own fields, as stiff as the tissue; where the pressure would pull the face has lifted, and the
-rest carries the force. What each costs in accuracy: docs/simulated_probe.md.
+a moment. A tilt adds its own fields; where the pressure would pull the face has lifted, and the rest carries the force.
+What each costs in accuracy: docs/simulated_probe.md.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.measurement.recording.tactile_image import Image
 from device.simulation.physics.off_axis_table import OffAxisTable
@@ -53,7 +54,7 @@ class PressedFace:
         from_axis_mm = np.hypot(self._x_mm, self._y_mm)
         self._from_axis = RadialProfiles(ramps.r_mm, from_axis_mm)
         self._solid = RadialProfiles(off_axis.r_mm, from_axis_mm)
-        self._tilt = [self._tilt_field(axis, from_axis_mm, slab.stiffness_ratio) for axis in (self._x_mm, self._y_mm)]
+        self._tilt = [self._tilt_field(axis, from_axis_mm, off_axis.tilt_in(slab)) for axis in (self._x_mm, self._y_mm)]
         self._aside = lru_cache(maxsize=8)(self._aside_per_n)
 
     def at(self, force_n: float, place: ProbePlacement) -> tuple[Image, Image]:
@@ -92,11 +93,10 @@ class PressedFace:
         ]
 
     def _tilt_field(
-        self, along_mm: NDArray[np.floating], from_axis_mm: NDArray[np.floating], stiffness_ratio: float
+        self, along_mm: NDArray[np.floating], from_axis_mm: NDArray[np.floating], tilt_per_deg: Array
     ) -> list[Image]:
         cosine = np.divide(along_mm, from_axis_mm, out=np.zeros_like(from_axis_mm), where=from_axis_mm > 0)
-        fields = stiffness_ratio * self._off_axis.tilt_per_deg
-        return [np.asarray(self._solid(field) * cosine, np.float32) for field in fields]
+        return [np.asarray(self._solid(field) * cosine, np.float32) for field in tilt_per_deg]
 
     def _tilted(self, w_mm: Image, p_kpa: Image, place: ProbePlacement) -> tuple[Image, Image]:
         for degrees, field in zip((place.tilt_x_deg, place.tilt_y_deg), self._tilt, strict=True):

@@ -9,12 +9,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from device.measurement.quantities import Bound, Inclusion, require
+from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
+
+PEOPLES_KPA, PEOPLES_MM = (2.0, 30.0), (15.0, 60.0)
+"""Fat and gland of the breast, over bone and in its middle: 3 kPa in samples (Samani et al., Phys. Med. Biol. 52,
+2007), 2-3 kPa by magnetic resonance, 11 +- 6 kPa by shear waves."""
+NEAR_KPA, NEAR_MM = (4.0, 6.25), (27.0, 36.0)
+"""Around the nominal slab: what was solved in it alone is added as it is to a press in these."""
+NEAREST_MM = 1.0
+"""An inclusion ends at least this far above the slab's base."""
 
 
 @dataclass(frozen=True)
 class Slab:
-    """Homogeneous tissue on a rigid base: Young's modulus Et (4-6.25 kPa) and thickness (27-36 mm).
+    """Homogeneous tissue on a rigid base: Young's modulus Et (2-30 kPa) and thickness (15-60 mm).
 
     Raises `InvalidQuantity` outside these ranges, which are the virtual probe's tables'.
     """
@@ -24,12 +32,12 @@ class Slab:
 
     def __post_init__(self) -> None:
         action = "choose tissue inside the range of the virtual probe's tables"
-        require("tissue_modulus_kpa", self.youngs_modulus_kpa, Bound(4.0, 6.25, "kPa"), action)
-        require("slab_thickness_mm", self.thickness_mm, Bound(27.0, 36.0, "mm"), action)
+        require("tissue_modulus_kpa", self.youngs_modulus_kpa, Bound(*PEOPLES_KPA, "kPa"), action)
+        require("slab_thickness_mm", self.thickness_mm, Bound(*PEOPLES_MM, "mm"), action)
 
     @property
     def stiffness_ratio(self) -> float:
-        """Young's modulus over the nominal one: the force ratio at which this slab is indented as deeply."""
+        """Young's modulus over the nominal one."""
         return self.youngs_modulus_kpa / NOMINAL_KPA
 
     def elastic_mismatch(self, youngs_modulus_kpa: float) -> float:
@@ -44,13 +52,31 @@ class Slab:
         """Return the inclusion that has the same mismatch in the nominal slab: its modulus over `stiffness_ratio`."""
         return replace(inclusion, youngs_modulus_kpa=inclusion.youngs_modulus_kpa / self.stiffness_ratio)
 
+    def require_held(self, inclusion: Inclusion) -> None:
+        """Refuse an inclusion that touches the slab's base, or all but does."""
+        lowest_mm = inclusion.depth_mm + inclusion.size_mm
+        action = "choose a smaller or shallower inclusion, or a thicker slab"
+        require("depth_mm + size_mm", lowest_mm, Bound(0.0, self.thickness_mm - NEAREST_MM, "mm"), action)
+
+    def require_near_nominal(self, quantity: str) -> None:
+        """Refuse what is known in the nominal slab only, where this one is far from it."""
+        stated = self.stated
+        near = zip((stated.youngs_modulus_kpa, stated.thickness_mm), (NEAR_KPA, NEAR_MM), strict=True)
+        if not all(low <= value <= high for value, (low, high) in near):
+            tissue = f"given in tissue of {stated.youngs_modulus_kpa:g} kPa, {stated.thickness_mm:g} mm thick"
+            bound = "absent but in 4-6.25 kPa and 27-36 mm"
+            raise InvalidQuantity(quantity, tissue, bound, "choose such tissue, or leave it away")
+
     @property
     def stated(self) -> Slab:
         """The slab whose inclusions a table is asked for."""
         return self
 
     def changed(self, modulus_ratio: float) -> Slab:
-        """Return the slab where its tissue is so much stiffer or softer (0.8-1.1), with the inclusions of this one."""
+        """Return the slab where its tissue is so much stiffer or softer, with the inclusions of this one.
+
+        Raises `InvalidQuantity` where that is not tissue that the tables hold.
+        """
         if modulus_ratio == 1.0:
             return self
         return ChangedSlab(self.youngs_modulus_kpa * modulus_ratio, self.thickness_mm, self)
@@ -63,15 +89,21 @@ NOMINAL = Slab()
 
 @dataclass(frozen=True)
 class ChangedSlab(Slab):
-    """Tissue softer or stiffer than that of the slab it is part of: the tables' quadratics go on a little there.
+    """Tissue softer or stiffer than that of the slab it is part of.
 
     Which inclusions it may hold, and of which one the field off the axis has the shape, is as in that slab.
     """
 
     part_of: Slab = NOMINAL
 
-    def __post_init__(self) -> None:
-        """Leave the bounds to the slab that it is part of."""
+    def require_near_nominal(self, quantity: str) -> None:
+        """Refuse what is known in the nominal slab only, where this one is far from it."""
+        stated = self.stated
+        near = zip((stated.youngs_modulus_kpa, stated.thickness_mm), (NEAR_KPA, NEAR_MM), strict=True)
+        if not all(low <= value <= high for value, (low, high) in near):
+            tissue = f"given in tissue of {stated.youngs_modulus_kpa:g} kPa, {stated.thickness_mm:g} mm thick"
+            bound = "absent but in 4-6.25 kPa and 27-36 mm"
+            raise InvalidQuantity(quantity, tissue, bound, "choose such tissue, or leave it away")
 
     @property
     def stated(self) -> Slab:

@@ -1,11 +1,11 @@
 """The virtual probe's mechanics: a table of faces under a force ramp, so that no finite elements run on the device.
 
-For every inclusion (1-15 mm, 4-12 mm deep, 8-200 kPa), slab of tissue and force it gives deformation w(r) and contact
-pressure p(r) of the face: those without an inclusion, and what the inclusion adds. Finite strain with true sliding, so
-neither is proportional to the force; both are kept per newton, and what an inclusion adds also per mm3 of its size
-cubed and over its mismatch, because those are smooth. Chebyshev polynomials in size, depth, mismatch and force; a slab
-other than the nominal adds a change that is quadratic in ln Et and in 1/T. Written by `host_tools table`. Source:
-Trefethen, Approximation Theory and Approximation Practice, chapter 5 (barycentric interpolation).
+For every inclusion (1-15 mm, 4-12 mm deep, 8-200 kPa) in the nominal slab and every force it gives deformation w(r) and
+contact pressure p(r) of the face: those without an inclusion, and what the inclusion adds. Finite strain with true
+sliding, so neither is proportional to the force; both are kept per newton, and what an inclusion adds also per mm3 of
+its size cubed and over its mismatch, because those are smooth. Chebyshev polynomials in size, depth, mismatch and
+force. Another slab adds its change at the same force and mismatch (`slab_changes.py`). Written by `host_tools table`.
+Source: Trefethen, Approximation Theory and Approximation Practice, chapter 5 (barycentric interpolation).
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import interpolation_weights
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL, Slab
-from device.simulation.physics.table_file import load_table, save_table
+from device.simulation.physics.slab_changes import SlabChanges, field_shapes
 
-NAME, SCHEMA = "surface_table", "tsis.surface_table/3"
+NAME, SCHEMA = "surface_table", "tsis.surface_table/4"
 ACTION = "run `host_tools table` to make it again"
 COARSE = slice(None, None, 2)
 """The changes with the slab are kept at every second size and depth: of an odd number of Chebyshev points these are
@@ -73,56 +74,48 @@ class PressRamps(NamedTuple):
 class SurfaceTable:
     """`bare_per_n` [2, F, R] without an inclusion, `lump_per_n_mm3` [2, S, D, M, F, R] what one adds; w first, then p.
 
-    Both are of the nominal slab. `bare_change_per_n` [4, ...] and `lump_change_per_n_mm3` [4, ...] are what the first
-    and last of `slab_modulus_kpa` [3] and of `slab_thickness_mm` [3] change at the same mismatch and the same force
-    over the tissue's modulus, at `COARSE` sizes and depths; the middle ones are nominal.
+    Both are of the nominal slab; `slabs` is what others change.
     """
 
     size_mm: Array
     depth_mm: Array
     elastic_mismatch: Array
-    slab_modulus_kpa: Array
-    slab_thickness_mm: Array
     force_n: Array
     r_mm: Array
     bare_per_n: Array
     lump_per_n_mm3: Array
-    bare_change_per_n: Array
-    lump_change_per_n_mm3: Array
+    slabs: SlabChanges
 
     def ramps(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> PressRamps:
-        """Return the ramps of one inclusion in a slab; refuses one outside the table.
-
-        They reach to 0.78 N times the tissue's modulus over 5 kPa: as deep in every tissue.
-        """
+        """Return the ramps of one inclusion in a slab; refuses one outside the table, or at the slab's base."""
         inclusion_field = self.inclusion_field(inclusion, slab)
-        baseline = self._ramp(slab, self.bare_per_n + self._changed(self.bare_change_per_n, slab))
+        baseline = Ramp(self.force_n, self.bare_per_n + self.slabs.baseline_per_n(slab))
         nominal = None if slab == NOMINAL else self.inclusion_field(slab.nominal_equivalent(inclusion))
         return PressRamps(self.r_mm, baseline, inclusion_field, nominal)
 
     def inclusion_field(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
-        """Return what an inclusion adds to the ramp in a slab; refuses one outside the table."""
-        fine = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch)
-        coarse = InclusionAxes(self.size_mm[COARSE], self.depth_mm[COARSE], self.elastic_mismatch)
-        change = coarse.inclusion_per_n(self._changed(self.lump_change_per_n_mm3, slab), inclusion, slab)
-        return self._ramp(slab, fine.inclusion_per_n(self.lump_per_n_mm3, inclusion, slab) + change)
-
-    def _ramp(self, slab: Slab, fields_per_n: Array) -> Ramp:
-        return Ramp(self.force_n * slab.stiffness_ratio, fields_per_n)
-
-    def _changed(self, changes: Array, slab: Slab) -> Array:
-        """Return the sum of the changes [4, ...] that a slab makes: none in the nominal one."""
-        modulus = interpolation_weights(np.log(self.slab_modulus_kpa), np.log(slab.youngs_modulus_kpa))
-        thickness = interpolation_weights(1 / self.slab_thickness_mm, 1 / slab.thickness_mm)
-        return np.tensordot(np.concatenate([modulus[[0, 2]], thickness[[0, 2]]]), changes, (0, 0))
+        """Return what an inclusion adds to the ramp in a slab; refuses one outside the table, or at the slab's base."""
+        axes = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch)
+        axes.require_held(inclusion, slab)
+        slab.require_held(inclusion)
+        if slab == NOMINAL:
+            return Ramp(self.force_n, axes.inclusion_per_n(self.lump_per_n_mm3, inclusion, slab))
+        shapes = field_shapes(axes, self.lump_per_n_mm3, self.force_n, inclusion, slab)
+        return Ramp(self.force_n, shapes[0] + self.slabs.inclusion_per_n(shapes, self.force_n, inclusion, slab))
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write surface_table.npz and its description with the hash."""
-        arrays = {name: getattr(self, name).astype(np.float32) for name in self.__dataclass_fields__}
+        own = {name: getattr(self, name).astype(np.float32) for name in OWN}
+        arrays = own | {name: getattr(self.slabs, name) for name in OF_SLABS}
         save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table", **origin})
+
+
+OF_SLABS = tuple(SlabChanges.__dataclass_fields__)
+OWN = tuple(name for name in SurfaceTable.__dataclass_fields__ if name != "slabs")
 
 
 def load_surface_table(folder: Path) -> SurfaceTable:
     """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
-    arrays, _ = load_table(folder, NAME, SCHEMA, tuple(SurfaceTable.__dataclass_fields__), ACTION)
-    return SurfaceTable(**{name: values.astype(np.float64) for name, values in arrays.items()})
+    arrays, _ = load_table(folder, NAME, SCHEMA, (*OWN, *OF_SLABS), ACTION)
+    slabs = SlabChanges(**{name: arrays[name] for name in OF_SLABS})
+    return SurfaceTable(**{name: arrays[name].astype(np.float64) for name in OWN}, slabs=slabs)

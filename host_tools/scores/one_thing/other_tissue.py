@@ -26,8 +26,8 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.ramp_modes.noise import ErrorLevels
+from device.simulation.physics.slab import NEAREST_MM, PEOPLES_KPA, PEOPLES_MM, Slab
 from device.simulation.physics.slab import NOMINAL as NOMINAL_SLAB
-from device.simulation.physics.slab import ChangedSlab
 from device.simulation.physics.surface_table import PressRamps, Ramp, SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.cramer_rao.bounds import limit_of, std_of_box
@@ -35,10 +35,10 @@ from host_tools.cramer_rao.protocol import read_protocol
 from host_tools.forward.derivatives.sensitive_presses import sensitive_ramp
 from host_tools.forward.press_model import PressFailed
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
-from host_tools.press_models.press_samples import NEAREST_MM, draw_parameters
+from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
-from host_tools.probe_tables.surface_table import bare_per_n, inclusion_ramp, press_ramps, scene_on_one_mesh
+from host_tools.probe_tables.force_ramps import bare_per_n, inclusion_ramp, press_ramps, scene_on_one_mesh
 from host_tools.scenes.scene import Scene, Tissue
 from host_tools.scores.just_outside import holds
 from host_tools.scores.outside import CLEAR_DEPTH_MM, CLEAR_KPA, CLEAR_SIZE_MM, EstimateOf
@@ -55,9 +55,6 @@ WRONG_AT_MOST = 0.15
 """A 90 % interval may fail in a tenth of presses; in 36 of them a tenth is seen as 15 % by chance, of one in five."""
 HEADER = ("tissue", "mode", "refused", "size holds", "depth holds", "modulus determined", "modulus holds",
           "size off (mm)", "depth off (mm)")  # fmt: skip
-PEOPLES_KPA, PEOPLES_MM = (2.0, 30.0), (15.0, 60.0)
-"""Fat and gland of the breast, over bone and in its middle: 3 kPa in samples (Samani et al., Phys. Med. Biol. 52,
-2007), 2-3 kPa by magnetic resonance, 11 +- 6 kPa by shear waves."""
 AT_BEST = ((5.0, 30.0), (3.0, 30.0), (10.0, 30.0), (20.0, 30.0), (5.0, 20.0), (5.0, 60.0))
 """Tissue (kPa) and slab (mm) whose bounds are told."""
 BOUND_FOR = (Inclusion(10.0, 5.0, 60.0), Inclusion(8.0, 6.0, 120.0), Inclusion(12.0, 7.0, 40.0))
@@ -210,7 +207,7 @@ def on_the_tables_mesh(inclusion_field: Ramp, tissue: Tissue, table: SurfaceTabl
     Raises `PressFailed` where the tissue gives way before the largest force.
     """
     forces_n = inclusion_field.force_n
-    slabs = ChangedSlab(tissue.youngs_modulus_kpa, tissue.thickness_mm), NOMINAL_SLAB
+    slabs = Slab(tissue.youngs_modulus_kpa, tissue.thickness_mm), NOMINAL_SLAB
     thicknesses_mm = sorted({slab.thickness_mm for slab in slabs})
     other, nominal = (bare_per_n(scene_on_one_mesh(slab, None, thicknesses_mm), forces_n) for slab in slabs)
     own = table.ramps(Inclusion(0.0, CLEAR_DEPTH_MM[0], CLEAR_KPA[0])).baseline

@@ -123,10 +123,10 @@ def test_a_phantom_of_a_file_is_recorded_under_its_name_by_the_ramp_that_commiss
 
 
 def test_the_virtual_probe_is_pressed_on_the_tissue_of_the_file_or_refuses_it(run):
-    Path("phantoms.toml").write_text(f'serial = "PH-7"\n[[phantoms]]\nname = "B3"\n{tissue(9.0)}')
+    Path("phantoms.toml").write_text(f'serial = "PH-7"\n[[phantoms]]\nname = "B3"\n{tissue(39.0)}')
     code, _, told = run(command(*OF_FILE, "--name", "B3"))
     assert code == 1
-    assert "tissue_modulus_kpa is 9" in told[-1]
+    assert "tissue_modulus_kpa is 39" in told[-1]
 
 
 @pytest.mark.parametrize(

@@ -79,8 +79,8 @@ def test_an_unknown_key_is_refused_with_what_was_meant(read, text, key, action):
     [
         ("seed = -1", "seed"),
         ("seed = 1.5", "seed"),
-        ("tissue_modulus_kpa = 7", "tissue_modulus_kpa"),
-        ("slab_thickness_mm = 26", "slab_thickness_mm"),
+        ("tissue_modulus_kpa = 31", "tissue_modulus_kpa"),
+        ("slab_thickness_mm = 14", "slab_thickness_mm"),
         ("[inclusion]\nsize_mm = -1\ndepth_mm = 5\nyoungs_modulus_kpa = 80", "size_mm"),
         ("[inclusion]\nsize_mm = 10", "inclusion.depth_mm"),
         ("[hand]\nrate_n_per_s = 0", "hand.rate_n_per_s"),

@@ -7,7 +7,7 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL
 from host_tools.probe_tables.face_motion import outward_mm
-from host_tools.probe_tables.surface_table import FORCES_N, ramp, scene_in
+from host_tools.probe_tables.force_ramps import FORCES_N, ramp, scene_in
 
 TRUTHS = [(14.3, 11.2, 47.0), pytest.param((10.5, 5.1, 80.0), marks=pytest.mark.long)]
 

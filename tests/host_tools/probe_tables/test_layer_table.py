@@ -7,8 +7,8 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.layer_table import SOLVED_RATIOS, LayerRatios
 from device.simulation.physics.slab import NOMINAL
 from device.simulation.physics.world import World
+from host_tools.probe_tables.force_ramps import CHANGES, fields, ramp
 from host_tools.probe_tables.layer_table import WAVEGUIDE_LAYERS, LayeredScene
-from host_tools.probe_tables.surface_table import CHANGES, fields, ramp
 
 INCLUSION = Inclusion(10.5, 6.7, 55.0)
 """Between the table's sizes, depths and mismatches."""

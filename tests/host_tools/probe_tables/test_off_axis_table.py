@@ -8,8 +8,10 @@ import pytest
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
+from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solve import solve
+from host_tools.probe_tables.force_ramps import ring_means
 from host_tools.probe_tables.off_axis_table import (
     MODES,
     OFFSETS_MM,
@@ -18,32 +20,39 @@ from host_tools.probe_tables.off_axis_table import (
     cosine_modes,
     off_axis_scene,
 )
-from host_tools.probe_tables.surface_table import inclusion_axes, ring_means
+from host_tools.probe_tables.surface_table import inclusion_axes
+from host_tools.scenes.scene import Tissue
 
 FORCE_N = 0.02
 """Small strain: the solve's, and the table's smallest."""
 
 
 TRUTHS = [
-    ((7.0, 7.0, 100.0), 9.0),
+    ((7.0, 7.0, 100.0), 9.0, NOMINAL, 0.02),
     *(
         pytest.param(*one, marks=pytest.mark.long)
         for one in (
-            ((10.0, 5.0, 80.0), 1.5),
-            ((12.0, 6.0, 10.0), 5.0),
-            ((12.0, 6.0, 60.0), 10.0),
-            ((5.4, 5.7, 46.0), 2.7),
+            ((10.0, 5.0, 80.0), 1.5, NOMINAL, 0.02),
+            ((12.0, 6.0, 10.0), 5.0, NOMINAL, 0.02),
+            ((12.0, 6.0, 60.0), 10.0, NOMINAL, 0.02),
+            ((5.4, 5.7, 46.0), 2.7, NOMINAL, 0.02),
+            ((8.0, 5.0, 220.0), 4.0, Slab(20.0), 0.12),
+            ((8.0, 5.0, 55.0), 4.0, Slab(5.0, 17.0), 0.15),
         )
     ),
 ]
-"""Inclusion and offset (mm)."""
+"""Inclusion, offset (mm), slab, and how far off the peak a deformation may be: shapes are the nominal slab's."""
 
 
-@pytest.mark.parametrize(("truth", "offset_mm"), TRUTHS)
-def test_the_face_off_the_axis_is_within_two_percent_of_the_inclusions_peak(tables, truth, offset_mm):
-    """Deformation anywhere in the central window; ring means of pressure, which jump from mesh to mesh, 4 % rms."""
+@pytest.mark.parametrize(("truth", "offset_mm", "slab", "bound"), TRUTHS)
+def test_the_face_off_the_axis_is_within_two_percent_of_the_inclusions_peak(tables, truth, offset_mm, slab, bound):
+    """Deformation anywhere in the central window; ring means of pressure, which jump from mesh to mesh, 4 % rms.
+
+    Deformations in other slabs are up to 15 % off, for what a slab changes of the shape is left out.
+    """
     inclusion = Inclusion(*truth)
     scene = off_axis_scene(inclusion, offset_mm, force_n=FORCE_N)
+    scene = replace(scene, tissue=Tissue(slab.youngs_modulus_kpa, slab.thickness_mm))
     solution = solve(scene, replace(model_plan(scene), grading="coarse"))
     inclusion_mm = solution.pressed.w_mm - solution.baseline.w_mm
     rays_kpa = solution.pressed.p_kpa - solution.baseline.p_kpa
@@ -51,7 +60,7 @@ def test_the_face_off_the_axis_is_within_two_percent_of_the_inclusions_peak(tabl
     x_mm, y_mm = (axis.reshape(1, -1).astype(np.float32) for axis in solution.rays.xy_mm)
 
     def fields(one, place):
-        face = PressedFace(tables.centred.ramps(one), tables.off_axis, one, x_mm, y_mm)
+        face = PressedFace(tables.centred.ramps(one, slab), tables.off_axis, one, x_mm, y_mm, slab)
         return (field.reshape(inclusion_mm.shape) for field in face.at(FORCE_N, place))
 
     inside = solution.r_mm <= 9.9
@@ -59,11 +68,11 @@ def test_the_face_off_the_axis_is_within_two_percent_of_the_inclusions_peak(tabl
         one - none
         for one, none in zip(
             fields(inclusion, ProbePlacement(x_mm=-offset_mm)),
-            fields(Inclusion(0.0, 5.0, 80.0), ProbePlacement()),
+            fields(Inclusion(0.0, 5.0, 220.0), ProbePlacement()),
             strict=True,
         )
     )
-    assert np.abs(found_mm - inclusion_mm)[:, inside].max() < 0.02 * inclusion_mm[:, inside].max()
+    assert np.abs(found_mm - inclusion_mm)[:, inside].max() < bound * inclusion_mm[:, inside].max()
     error_kpa = (found_kpa - inclusion_kpa)[:, inside]
     assert np.sqrt((error_kpa**2).mean()) < 0.04 * inclusion_kpa[:, inside].max()
 

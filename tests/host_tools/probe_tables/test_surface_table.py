@@ -1,32 +1,25 @@
 """The virtual probe's committed table against fresh finite-element force ramps in finite strain."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import NOMINAL, Slab
-from device.simulation.physics.surface_table import COARSE
 from host_tools.forward.press_model import PressFailed
 from host_tools.press_models.measured_noise import FINER
-from host_tools.probe_tables import surface_table as module
-from host_tools.probe_tables.surface_table import (
+from host_tools.probe_tables import force_ramps as module
+from host_tools.probe_tables.force_ramps import (
     BASELINE,
     FORCES_N,
     INCLUSIONS,
-    POINTS,
     RING_MM,
-    SMALLEST_SIZE_MM,
-    SOLVED,
-    assembled,
     fields,
-    inclusion_axes,
     ramp,
     ring_means,
     scene_in,
     scene_on_one_mesh,
 )
+from host_tools.probe_tables.surface_table import POINTS, SMALLEST_SIZE_MM, inclusion_axes, on_axes
 
 TRUTHS = [
     (14.3, 11.2, 47.0),
@@ -35,9 +28,16 @@ TRUTHS = [
         for truth in ((10.0, 5.0, 80.0), (3.7, 6.6, 104.0), (12.0, 9.0, 20.0), (6.0, 5.0, 150.0))
     ),
 ]
-IN_SLABS = [((9.0, 7.0, 60.0), Slab(4.4, 27.6)), ((11.0, 5.0, 20.0), Slab(5.8, 33.0))]
-"""Between the points of the star and aside of its arms, the first in thinner tissue than any that was solved."""
-FORCES_SEEN_N = np.array([0.05, 0.6])
+IN_SLABS = [
+    ((9.0, 7.0, 60.0), Slab(4.4, 27.6), 0.01),
+    ((11.0, 5.0, 20.0), Slab(5.8, 33.0), 0.01),
+    ((9.0, 5.0, 60.0), Slab(2.7, 22.0), 0.02),
+    ((6.0, 6.0, 90.0), Slab(9.0, 45.0), 0.02),
+    ((8.0, 5.0, 120.0), Slab(18.0, 17.5), 0.02),
+    ((10.0, 6.0, 40.0), Slab(2.2, 50.0), 0.05),
+]
+"""As the models are trained, and as people are: softer, firmer, thinner and thicker. How far off the peaks may be."""
+FORCES_SEEN_N = np.array([0.05, 0.55])
 
 
 def worst_over_peak(found, fresh, inside):
@@ -59,12 +59,6 @@ def test_the_table_is_within_a_fifth_of_a_percent_of_an_inclusions_deformation_a
         fresh, found = fields(solution)[1], table.inclusion_field(inclusion).at(force_n)
         for name, value, bound in (("w_mm", 0, 0.002), ("p_kpa", 1, 0.004)):
             assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
-
-
-def test_both_terms_of_a_change_are_on_one_level():
-    """Levels differ by more than a slab changes: where one term fell back alone, it was four per cent of a peak off."""
-    assert len({levels for _, _, levels in SOLVED[1:]}) == 1
-    assert all(len(levels) == 1 for _, _, levels in SOLVED[1:])
 
 
 def test_a_press_that_folds_on_one_level_is_solved_on_the_next_and_on_none_is_refused(monkeypatch):
@@ -94,10 +88,13 @@ def test_finer_elements_move_an_inclusions_deformation_and_pressure_by_half_a_pe
             assert worst_over_peak(found[value], finer[value], inside) < bound, (name, force_n)
 
 
-@pytest.mark.parametrize(("truth", "slab"), IN_SLABS)
+@pytest.mark.parametrize(("truth", "slab", "bound"), IN_SLABS)
 @pytest.mark.long
-def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, truth, slab):
-    """What the slab changes in the inclusion's deformation and pressure, over their peaks, from solves on one mesh."""
+def test_in_another_slab_an_inclusion_is_within_a_few_percent_of_its_peaks(table, truth, slab, bound):
+    """What the slab changes in the inclusion's deformation and pressure, over their peaks, from solves on one mesh.
+
+    A percent near the nominal slab, two elsewhere, five where the softest tissue is pressed hard.
+    """
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
     thicknesses_mm = sorted([slab.thickness_mm, 30.0])
     solved, known = [], []
@@ -107,23 +104,12 @@ def test_in_another_slab_an_inclusion_is_within_a_percent_of_its_peaks(table, tr
         known.append([table.inclusion_field(inclusion, one).at(force_n) for force_n in FORCES_SEEN_N])
     change, expected = np.array(known[0]) - known[1], np.array(solved[0]) - solved[1]
     peaks = np.abs(solved[1])[..., inside].max(axis=-1)
-    assert (np.abs(change - expected)[..., inside].max(axis=-1) < 0.01 * peaks).all()
+    assert (np.abs(change - expected)[..., inside].max(axis=-1) < bound * peaks).all()
 
 
+@pytest.mark.parametrize(("truth", "slab", "_"), IN_SLABS[:1])
 @pytest.mark.long
-def test_in_softer_tissue_than_the_tables_an_inclusion_is_within_a_percent_of_its_peaks(table):
-    """What a scene's world may make of the softest: 4 kPa by 0.9."""
-    inclusion, slab, inside = Inclusion(10.0, 6.0, 60.0), Slab(4.0).changed(0.9), table.r_mm <= 9.9
-    forces_n = np.array([0.1, 0.55])
-    for force_n, solution in zip(forces_n, ramp(scene_in(slab, inclusion), forces_n), strict=True):
-        fresh, found = fields(solution)[1], table.inclusion_field(inclusion, slab).at(force_n)
-        for name, value, bound in (("w_mm", 0, 0.01), ("p_kpa", 1, 0.01)):
-            assert worst_over_peak(found[value], fresh[value], inside) < bound, (name, force_n)
-
-
-@pytest.mark.parametrize(("truth", "slab"), IN_SLABS[:1])
-@pytest.mark.long
-def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(table, truth, slab):
+def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(table, truth, slab, _):
     """Within 1 % of its peak; pressures near the rim differ by more from mesh to mesh."""
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
     for force_n, solution in zip(FORCES_SEEN_N, ramp(scene_in(slab, inclusion), FORCES_SEEN_N), strict=True):
@@ -145,7 +131,7 @@ def test_the_inclusion_free_face_changes_with_the_slab_as_the_models(table):
     """From solves on one mesh, over the peak in the central window: 0.3 %."""
     known, solved, inside, slab = [], [], table.r_mm <= 9.9, Slab(5.8, 33.0)
     for one in (slab, NOMINAL):
-        scene = scene_on_one_mesh(one, thicknesses_mm=sorted([slab.thickness_mm, 30.0]))
+        scene = scene_on_one_mesh(one, None, sorted([slab.thickness_mm, 30.0]))
         solved.append(fields(ramp(scene, np.array([0.3]), BASELINE)[0])[0])
         known.append(table.ramps(Inclusion(0.0, 6.0, 80.0), one).baseline.at(0.3))
     departure = (np.array(known[0]) - known[1]) - (solved[0] - solved[1])
@@ -163,27 +149,13 @@ def test_layers_that_stand_in_for_the_base_give_the_slabs_own_deformation():
     assert worst_over_peak(layered, own, inside) < 0.001
 
 
-def test_solves_are_assembled_on_their_axes():
-    """Fields that say size, depth, mismatch and slab: at a point that was solved the table gives back what it was."""
+def test_solves_are_put_on_their_axes():
+    """Fields that say size, depth and mismatch."""
     axes = inclusion_axes((5, 3, 2), 1.0)
-    coarse = (axes.size_mm[COARSE], axes.depth_mm[COARSE], axes.elastic_mismatch)
-
-    def field(slab, size_mm, depth_mm, mismatch):
-        said = size_mm + 100 * depth_mm + 1e4 * mismatch + slab.youngs_modulus_kpa * slab.thickness_mm
-        return np.full((2, len(FORCES_N), 4), said) * np.array([1.0, 3.0])[:, None, None]
-
-    grids = [axes, *[coarse] * (len(SOLVED) - 1)]
-    inclusion_field = [
-        field(slab, *place) for (_, slab, _), grid in zip(SOLVED, grids, strict=True) for place in product(*grid)
-    ]
-    table = assembled(axes, [field(slab, 0.0, 0.0, 0.0) for _, slab, _ in SOLVED[1:]], inclusion_field, radius_mm=11.0)
-    assert table.r_mm[-1] == 11.0
-    for _, slab, _ in SOLVED:
-        place = float(coarse[0][1]), float(coarse[1][0]), 0.96
-        ramps = table.ramps(Inclusion(*place[:2], slab.modulus_kpa(0.96 - 1e-12)), slab)
-        expected = place[0] ** 3 * 0.96 * field(slab, *place)
-        np.testing.assert_allclose(ramps.inclusion_field.fields_per_n, expected, rtol=1e-9)
-        np.testing.assert_allclose(ramps.baseline.fields_per_n, field(slab, 0.0, 0.0, 0.0), rtol=1e-9)
+    said = np.add.outer(axes.size_mm, np.add.outer(100 * axes.depth_mm, 1e4 * axes.elastic_mismatch))
+    of_fields = np.multiply.outer([1.0, 3.0], np.ones((len(FORCES_N), 4)))
+    found = on_axes(axes, [np.multiply.outer(of_place, of_fields) for of_size in said for of_place in of_size])
+    np.testing.assert_array_equal(found, np.moveaxis(np.multiply.outer(said, of_fields), 3, 0))
 
 
 def test_ring_means_keep_the_force_of_what_they_smooth():

@@ -15,7 +15,7 @@ from device.simulation.physics.off_axis_table import load_off_axis_table
 from device.simulation.physics.surface_table import load_surface_table
 from device.simulation.virtual_probe import SIMULATED_PROBE_SHA256, ProbeTables, probe_of_table, table_record
 from host_tools.optics.build_lookup import write_light_table
-from host_tools.probe_tables import off_axis_table, surface_table
+from host_tools.probe_tables import off_axis_table, slab_changes, surface_table
 from host_tools.scenes.probe_file import probe_text, simulated_probe
 
 OWN = simulated_probe()
@@ -42,9 +42,14 @@ def once(monkeypatch, module, name):
 @pytest.fixture
 def built(monkeypatch, tmp_path):
     """The folder of the stiffer probe's mechanical tables, cut down to a solve of each kind."""
-    for module, name in ((surface_table, "baseline_per_n"), (surface_table, "inclusions_per_n_mm3")):
+    for module, name in (
+        (surface_table, "inclusions_per_n_mm3"),
+        (slab_changes, "slab_change_per_n"),
+        (slab_changes, "inclusion_in_slabs"),
+        (off_axis_table, "inclusions_per_n_mm3"),
+        (off_axis_table, "tilt_per_degree"),
+    ):
         once(monkeypatch, module, name)
-    once(monkeypatch, off_axis_table, "inclusions_per_n_mm3")
     waveguide = STIFFER.waveguide
     centred = surface_table.build_surface_table(waveguide=waveguide, points=(2, 2, 2), jobs=1)
     aside = off_axis_table.build_off_axis_table(waveguide=waveguide, points=(2, 2, 2, 2), jobs=1)

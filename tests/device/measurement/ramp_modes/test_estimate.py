@@ -29,7 +29,7 @@ from device.measurement.ramp_modes.radial_profile import COLUMNS, press_profile,
 from device.measurement.recording.ring_means import RINGS
 from device.measurement.scan_advice import half_widths
 from device.simulation.physics.neighbour import Neighbour
-from host_tools.probe_tables.surface_table import press_ramps
+from host_tools.probe_tables.force_ramps import press_ramps
 from host_tools.scenes.scene import Scene, Tissue
 
 FIGURES = r"\d|odds|misfit|usual|harmonic|contrast|response"

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from device.simulation.physics.chebyshev import interpolated, interpolation_weights, points_inside, points_with_ends
+from device.simulation.physics.chebyshev import (
+    interpolated,
+    interpolation_weights,
+    points_inside,
+    points_with_ends,
+    slope_weights,
+)
 
 
 @pytest.mark.parametrize("points", [points_with_ends(2.0, 5.0, 6), points_inside(2.0, 5.0, 6)])
@@ -13,6 +19,13 @@ def test_a_polynomial_of_the_degree_is_exact(points):
 
     for x in (2.1, 3.3, 4.9, points[2]):
         assert interpolation_weights(points, x) @ quintic(points) == pytest.approx(quintic(x), rel=1e-12)
+
+
+@pytest.mark.parametrize("points", [points_with_ends(2.0, 5.0, 6), points_inside(2.0, 5.0, 6)])
+def test_the_slope_of_a_polynomial_is_its_derivative(points):
+    """Of 3 - x + x^5 / 2, at the ends and at a point as well."""
+    for x in (2.0, 3.3, 5.0, points[2]):
+        assert slope_weights(points, x) @ (3 - points + 0.5 * points**5) == pytest.approx(2.5 * x**4 - 1, rel=1e-7)
 
 
 def test_a_polynomial_in_two_variables_is_exact_and_the_other_axes_stay():

@@ -9,7 +9,7 @@ from daemon_process import ROOT
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.physics.face_motion import load_face_motion
-from device.simulation.physics.slab import NOMINAL
+from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import Ramp
 from device.simulation.physics.world import World
 from device.simulation.virtual_probe import ProbeTables
@@ -66,6 +66,11 @@ def test_the_motion_is_that_of_a_soft_block_pressed_flat(tables):
 def test_without_its_table_a_moving_face_is_refused(tables):
     with pytest.raises(InvalidQuantity, match=r"world\.face_motion_ratio is given.*host_tools table --part motion"):
         replace(tables, motion=None).ramps(INCLUSION, NOMINAL, MOVED)
+
+
+def test_far_from_the_nominal_slab_a_moving_face_is_refused(tables):
+    with pytest.raises(InvalidQuantity, match=r"^world\.face_motion_ratio is given in tissue of 9 kPa"):
+        tables.ramps(INCLUSION, Slab(9.0), MOVED)
 
 
 def test_a_table_of_motion_of_another_scene_is_refused(tmp_path):

@@ -34,6 +34,26 @@ def test_an_inclusion_smaller_than_the_smallest_shrinks_with_its_volume_to_none(
     assert not none.any()
 
 
+@pytest.mark.parametrize("place", [(9.3, 7.7), (15.0, 4.0), (1.0, 12.0)])
+def test_how_a_field_grows_with_size_and_depth_is_its_slope(place):
+    """The size itself times the slope by it, and the slope by the depth; ends of the axes included."""
+    inclusion, mismatch = Inclusion(*place, 55.0), NOMINAL.elastic_mismatch(55.0)
+
+    def field(size_mm, depth_mm):
+        return size_mm**3 * mismatch * polynomial(size_mm, depth_mm, mismatch)
+
+    size_mm, depth_mm = place
+    by_size = size_mm * (field(size_mm + 1e-5, depth_mm) - field(size_mm - 1e-5, depth_mm)) / 2e-5
+    by_depth = (field(size_mm, depth_mm + 1e-5) - field(size_mm, depth_mm - 1e-5)) / 2e-5
+    for found, expected in zip(AXES.growth_per_n(FIELDS, inclusion, NOMINAL), (by_size, by_depth), strict=True):
+        np.testing.assert_allclose(found, [expected, 3 * expected], rtol=1e-5)
+
+
+def test_an_inclusion_smaller_than_the_smallest_grows_with_its_volume():
+    by_size, _ = AXES.growth_per_n(FIELDS, Inclusion(0.5, 6.0, 80.0), NOMINAL)
+    np.testing.assert_allclose(by_size, 3 * AXES.inclusion_per_n(FIELDS, Inclusion(0.5, 6.0, 80.0), NOMINAL))
+
+
 @pytest.mark.parametrize(
     ("inclusion", "quantity"),
     [

@@ -72,6 +72,13 @@ def test_in_another_slab_the_same_is_added(tables):
     assert np.abs(changes[0][1] - changes[1][1]).max() < 0.1 * np.abs(changes[1][1]).max()
 
 
+@pytest.mark.parametrize("slab", [Slab(2.5), Slab(9.0), Slab(5.0, 20.0), Slab(5.0, 50.0)])
+def test_far_from_the_nominal_slab_other_layers_are_refused(tables, slab):
+    with pytest.raises(InvalidQuantity, match=r"^world\.layers is given in tissue of .*27-36 mm"):
+        tables.ramps(INCLUSION, slab, World(layers=LayerRatios(face_modulus_ratio=1.2)))
+    tables.ramps(INCLUSION, slab, World())
+
+
 def test_solved_ramps_get_the_same_change(tables):
     solved, layers = tables.centred.ramps(INCLUSION), LayerRatios(backing_modulus_ratio=0.85)
     known, found = (tables.ramps(INCLUSION, NOMINAL, World(layers=layers), solved=ramps) for ramps in (None, solved))

@@ -91,7 +91,7 @@ def test_a_small_offset_departs_from_the_centred_field_in_proportion(face):
     assert np.abs(twice - 2 * once)[ON_FACE].max() < 0.15 * np.abs(twice[ON_FACE]).max()
 
 
-@pytest.mark.parametrize("slab", [NOMINAL, Slab(4.4, 27.6), Slab(6.25, 36.0)])
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(4.4, 27.6), Slab(12.0, 20.0)])
 def test_off_the_axis_an_inclusion_changes_with_the_slab_as_the_centred_one_of_its_mismatch(tables, slab):
     """What it adds 4 mm aside is the nominal equivalent's, times the ratio of both on the axis (root mean square)."""
 
@@ -120,12 +120,14 @@ def test_a_tilt_presses_the_side_it_leans_to_and_lifts_the_other(face):
     assert not lifted[:, 49:].any()
 
 
-def test_stiffer_tissue_resists_a_tilt_as_much_more(tables):
-    """A small tilt beside the lesion adds a pressure in proportion to the tissue's modulus."""
+def test_stiffer_tissue_resists_a_tilt_more_but_for_what_the_waveguide_gives_way(tables):
+    """A small tilt beside the lesion adds a pressure that grows with the tissue's modulus, and by less than it."""
 
     def added_kpa(slab):
         beside = PressedFace(tables.centred.ramps(INCLUSION, slab), tables.off_axis, INCLUSION, X_MM, Y_MM, slab)
         tilted, straight = (beside.at(0.5, ProbePlacement(40.0, 0.0, tilt_x_deg=degrees))[1] for degrees in (0.1, 0.0))
         return (tilted - straight)[np.hypot(X_MM, Y_MM) < 9]
 
-    np.testing.assert_allclose(added_kpa(Slab(6.0)), 1.2 * added_kpa(NOMINAL), atol=1e-4)
+    soft, usual, firm = (np.abs(added_kpa(slab)).mean() for slab in (Slab(2.0), NOMINAL, Slab(30.0)))
+    assert 2.0 < usual / soft < 2.5
+    assert 2.0 < firm / usual < 6.0

@@ -10,7 +10,7 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import Ramp
 from host_tools.forward.press_model import PressFailed
-from host_tools.probe_tables.surface_table import FORCES_N
+from host_tools.probe_tables.force_ramps import FORCES_N
 from host_tools.scenes.scene import Tissue
 from host_tools.scores.one_thing import other_tissue
 from host_tools.scores.one_thing.other_tissue import (

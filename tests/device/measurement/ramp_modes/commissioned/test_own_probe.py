@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from device.files.shipped import SIMULATED_PROBE
+from device.files.table_file import load_table
 from device.measurement.parameters import HIGH, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
@@ -38,7 +39,6 @@ from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_array
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
 from device.measurement.ramp_modes.surrogate import OFFSET
-from device.simulation.physics.table_file import load_table
 
 TRUTH = np.array([10.0, 6.0, 80.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
 PROBE = owned_by("probe")

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from device.files.table_file import load_table, save_table
 from device.measurement.quantities import InvalidQuantity
-from device.simulation.physics.table_file import load_table, save_table
 
 SCHEMA = "tsis.example/1"
 ARRAYS = {"r_mm": np.linspace(0, 1, 5), "w_mm": np.arange(10.0).reshape(2, 5)}
