@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +27,13 @@ def verify(
     tolerances: Annotated[bool, typer.Option(help="Add whether tolerances that are asked for are held.")] = False,
     scenes: Annotated[int | None, typer.Option(min=1, help="How many random scenes of tolerances.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the scenes of tolerances.")] = None,
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder that keeps scenes of tolerances, so that an interrupted run goes on. "
+            "Empty it when the forward model changes."
+        ),
+    ] = None,
     tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
     scheduler: Scheduler = None,
 ) -> None:
@@ -37,10 +44,10 @@ def verify(
     require_writable(out, (".md",))
     longer = {"extremes": extremes, "effectivity": effectivity, "tolerances": tolerances}
     extra = [name for name, wanted in longer.items() if wanted]
-    drawn = {name: value for name, value in (("scenes", scenes), ("seed", seed)) if value is not None}
+    drawn = {name: value for name, value in (("scenes", scenes), ("seed", seed), ("keep", keep)) if value is not None}
     if drawn and not tolerances and "tolerances" not in (only or []):
         raise InvalidQuantity(f"--{next(iter(drawn))}", drawn, "given with --tolerances", "ask for that chapter")
-    chapters = _chapters(only or [], extra, short=short, **drawn)
+    chapters = _chapters(only or [], extra, short=short, drawn=drawn)
     with workers(scheduler):
         if tables:
             _measure_tables()
@@ -51,7 +58,7 @@ def verify(
 
         flags = [*(f"--only {name}" for name in only or []), *(f"--{name}" for name in extra)]
         flags += ["--short"] if short else []
-        flags += [f"--{name} {value}" for name, value in drawn.items()]
+        flags += [f"--{name} {value}" for name, value in drawn.items() if name != "keep"]
         results = Results("verification", " ".join(["host_tools verify", *flags, f"--out {shown(out)}"]), measured)
         write_page(out, results.in_chapters(out, _order()))
         note.print(f"{out} written.")
@@ -60,10 +67,12 @@ def verify(
         raise typer.Exit(1)
 
 
-def _chapters(only: list[str], extra: list[str], *, short: bool, **drawn: int) -> dict[str, Callable[[], Chapter]]:
+def _chapters(
+    only: list[str], extra: list[str], *, short: bool, drawn: Mapping[str, int | Path]
+) -> dict[str, Callable[[], Chapter]]:
     """Return the chapters asked for, all short ones without a name; refuse a name that is none.
 
-    `drawn` is how many scenes of tolerances to draw, and by which seed.
+    `drawn` is how many scenes of tolerances to draw, by which seed, and where they are kept.
     """
     from host_tools.verification.chapters import CHAPTERS, EXTRA_CHAPTERS
 

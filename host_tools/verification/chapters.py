@@ -6,6 +6,7 @@ The last ones take long or judge the model's promises: the ends of every range, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import host_tools.forward.solve  # noqa: F401 - sets the number of threads before the mesher starts any
 from host_tools.pages.benchmark import Chapter, Table, at_most
@@ -73,12 +74,15 @@ def effectivity_chapter() -> Chapter:
     return chapter_of(measure_effectivity(departed_scenes=DEPARTED_SCENES))
 
 
-def tolerances_chapter(scenes: int | None = None, seed: int | None = None) -> Chapter:
-    """Return the chapter on tolerances that are asked for, of so many random scenes; a minute a scene."""
+def tolerances_chapter(scenes: int | None = None, seed: int | None = None, keep: Path | None = None) -> Chapter:
+    """Return the chapter on tolerances that are asked for, of so many random scenes; a minute a scene.
+
+    A folder to `keep` scenes in lets an interrupted run go on.
+    """
     from host_tools.verification.tolerances import SCENES, SEED
     from host_tools.verification.tolerances import tolerances_chapter as measured_chapter
 
-    return measured_chapter(SCENES if scenes is None else scenes, SEED if seed is None else seed)
+    return measured_chapter(SCENES if scenes is None else scenes, SEED if seed is None else seed, keep=keep)
 
 
 EXTRA_CHAPTERS: dict[str, Callable[[], Chapter]] = {

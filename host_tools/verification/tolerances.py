@@ -10,9 +10,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import Memory, Parallel, delayed
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward.accuracy import Level
@@ -85,9 +86,15 @@ def moved(scene: Scene, rng: np.random.Generator) -> Scene:
     return replace(scene, placement=Placement(offset_x_mm=float(rng.uniform(1.0, FARTHEST_MM))))
 
 
-def measure(scenes: int = SCENES, seed: int = SEED, jobs: int = -1) -> list[list[ToleranceAnswer]]:
-    """Return every scene's answers, one a tolerance; a process a scene."""
-    return list(Parallel(n_jobs=jobs)(delayed(answers)(drawn_scene(seed, number)) for number in range(scenes)))
+def measure(
+    scenes: int = SCENES, seed: int = SEED, jobs: int = -1, keep: Path | None = None
+) -> list[list[ToleranceAnswer]]:
+    """Return every scene's answers, one a tolerance; a process a scene.
+
+    A folder to `keep` them in lets an interrupted run go on. It knows a scene again, not a change of the model.
+    """
+    answered = Memory(keep, verbose=0).cache(answers) if keep else answers
+    return list(Parallel(n_jobs=jobs)(delayed(answered)(drawn_scene(seed, number)) for number in range(scenes)))
 
 
 def drawn_scene(seed: int, number: int) -> Scene:
@@ -142,9 +149,9 @@ def _pairs(solution: Solution, truth: dict[str, float]) -> dict[str, tuple[float
     }
 
 
-def tolerances_chapter(scenes: int = SCENES, seed: int = SEED, jobs: int = -1) -> Chapter:
+def tolerances_chapter(scenes: int = SCENES, seed: int = SEED, jobs: int = -1, keep: Path | None = None) -> Chapter:
     """Return the chapter on tolerances asked for, held and refused, and on stated over true errors by level."""
-    return as_chapter(measure(scenes, seed, jobs))
+    return as_chapter(measure(scenes, seed, jobs, keep))
 
 
 def as_chapter(found: Sequence[Sequence[ToleranceAnswer]]) -> Chapter:

@@ -4,7 +4,16 @@ import pytest
 
 from device.measurement.quantities import Inclusion
 from host_tools.scenes.scene import Press, Scene
-from host_tools.verification.tolerances import TOLERANCES, ToleranceAnswer, answers, as_chapter, drawn_scene
+from host_tools.verification import tolerances
+from host_tools.verification.tolerances import (
+    SEED,
+    TOLERANCES,
+    ToleranceAnswer,
+    answers,
+    as_chapter,
+    drawn_scene,
+    measure,
+)
 
 GOOD = {"max_deformation_mm": (0.004, 0.001), "force_n": (0.003, 0.0)}
 BAD = {"max_deformation_mm": (0.001, 0.2)}
@@ -42,6 +51,20 @@ def test_what_is_refused_loosely_is_not_tried_tighter():
     assert [one.tolerance for one in found] == list(TOLERANCES)
     assert {one.refusal for one in found} == {found[0].refusal}
     assert "turn probe or tissue inside out" in found[0].refusal
+
+
+def test_scenes_that_were_kept_are_not_answered_again(monkeypatch, tmp_path):
+    """And a further one is."""
+    answered = []
+
+    def answer(scene):
+        answered.append(scene)
+        return [scene.inclusion.size_mm]
+
+    monkeypatch.setattr(tolerances, "answers", answer)
+    first = measure(2, jobs=1, keep=tmp_path)
+    assert measure(3, jobs=1, keep=tmp_path)[:2] == first
+    assert answered == [drawn_scene(SEED, number) for number in range(3)]
 
 
 def test_every_other_scene_may_lie_off_the_axis():
