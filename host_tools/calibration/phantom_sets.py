@@ -1,7 +1,7 @@
 """Named sets of phantoms to record: inclusions whose truth is published, and random ones.
 
 Source of the eight: Egorov & Sarvazyan, IEEE Trans. Medical Imaging 27 (2008), table II: models 35 mm thick of 5 kPa,
-spheres at 10 mm depth. They are solved each on its own, since the table is of a 30 mm slab and of other sizes.
+spheres at 10 mm depth. They are solved each on its own, since the table is of other sizes.
 """
 
 from __future__ import annotations
@@ -46,11 +46,13 @@ class Phantom:
         return self.inclusion if self.inclusion.size_mm else None
 
     def in_its_tissue(self, scenario: Scenario) -> Scenario:
-        """Return a scenario on its tissue; raise `InvalidQuantity` for one that the tables do not hold."""
+        """Return a scenario on its tissue; raise `InvalidQuantity` for one that the tables do not hold with it."""
         if self.tissue is None:
             return scenario
         modulus_kpa, thickness_mm = self.tissue.youngs_modulus_kpa, self.tissue.thickness_mm
-        return replace(scenario, tissue_modulus_kpa=modulus_kpa, slab_thickness_mm=thickness_mm)
+        in_tissue = replace(scenario, tissue_modulus_kpa=modulus_kpa, slab_thickness_mm=thickness_mm)
+        in_tissue.slab.require_held(self.inclusion)
+        return in_tissue
 
 
 def of_file(phantoms: PhantomSet) -> Iterator[Phantom]:

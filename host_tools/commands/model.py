@@ -43,7 +43,7 @@ def table(
     axis, what other layers of waveguide and tissue change, and how far the face moves outwards.
 
     The first hold tissue of 2-30 kPa and 15-60 mm. Inclusions off the axis are carried over to it, layers and motion
-    near the nominal slab only. An hour and a half on two cores, an hour of it for other slabs.
+    near the nominal slab only. An hour and a half on two cores, half of it for other slabs.
     Part wide, some sixteen minutes of one core, is of inclusions around the trained ranges: `train --mode standard`
     needs it. Part derivatives, some ten minutes on two, says how presses change with what a commissioning finds out;
     it needs the others.
@@ -138,14 +138,15 @@ def phantom(
         _record_grid(out, grid, pitch_mm, play_mm, made_of, tables, seed, made_by)
         return
     chosen = list(_phantom_set(which, model, scenes, seed, phantoms))
+    in_tissues = [one.in_its_tissue(made_of) for one in chosen]
     _require_room([out / one.name for one in chosen])
-    for i, one in enumerate(chosen):
+    for i, (one, scene) in enumerate(zip(chosen, in_tissues, strict=True)):
         recording = phantom_recording(
             one.inclusion,
             tables,
             seed=seed + i,
             protocol=protocol,
-            scenario=one.in_its_tissue(made_of),
+            scenario=scene,
             ramps=one.ramps(),
             probe=made_by,
         )

@@ -27,7 +27,7 @@ from device.simulation.physics.image_formation import ScatteredImage
 from device.simulation.physics.lens import Lens
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.skin import Skin
-from device.simulation.physics.slab import NEAREST_MM, Slab
+from device.simulation.physics.slab import ABOVE_BASE_MM, Slab
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.physics.world_face import WorldFace
@@ -78,7 +78,9 @@ def draw_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: 
     normalised[:, unknowns:] = np.repeat(normalised[::inclusions_a_skin, unknowns:], inclusions_a_skin, axis=0)[:count]
     normalised[:, -1] = 2 * np.sqrt(rng.uniform(0, 1, count)) - 1
     values = denormalise(normalised)
-    while (buried := values[:, 0] + values[:, 1] > values[:, PARAMETERS.index("slab_thickness_mm")] - NEAREST_MM).any():
+    while (
+        buried := values[:, 0] + values[:, 1] > values[:, PARAMETERS.index("slab_thickness_mm")] - ABOVE_BASE_MM
+    ).any():
         normalised[buried, :2] = rng.uniform(-1, 1, (buried.sum(), 2))
         values = denormalise(normalised)
     return values

@@ -31,7 +31,7 @@ from device.measurement.ramp_modes.surrogate import (
     polynomial_coordinates,
     turned,
 )
-from device.simulation.physics.slab import NEAREST_MM
+from device.simulation.physics.slab import ABOVE_BASE_MM
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, activations_of, backward
 from host_tools.press_models.fit_surrogate import INCLUSION_REACH, fit_polynomials
@@ -163,7 +163,7 @@ def draw_wide_parameters(count: int, rng: np.random.Generator, *, inclusions_a_s
     while again.any():
         values[again, PLACE] = rng.uniform(ENDS[:, 0], ENDS[:, 1], (int(again.sum()), 2))
         size_mm, depth_mm = values[:, PLACE].T
-        deepest = np.minimum([deepest_mm(size) for size in size_mm], values[:, THICKNESS] - NEAREST_MM - size_mm)
+        deepest = np.minimum([deepest_mm(size) for size in size_mm], values[:, THICKNESS] - ABOVE_BASE_MM - size_mm)
         again = depth_mm > deepest
     return values
 

@@ -118,7 +118,7 @@ def build_off_axis_table(
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> OffAxisTable:
-    """Solve every point of the table (some eight minutes on two cores); `on_point` hears done and total.
+    """Solve every point of the table (some ten minutes on two cores); `on_point` hears done and total.
 
     Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.
     """

@@ -96,7 +96,8 @@ class WideSurfaceTable(SurfaceTable):
         """Return what an inclusion adds to the ramp in a slab; refuses one that is not among the wide ones."""
         near = nearest(inclusion, self)
         own = super().inclusion_field(near, slab)
-        return Ramp(own.force_n, self.wide_axes.carried_on(own.fields_per_n, self.wide, inclusion, near, slab))
+        fields_per_n = self.wide_axes.carried_on(own.fields_per_n, self.wide, inclusion, near, slab)
+        return replace(own, fields_per_n=fields_per_n)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.legendre import LegendreTerms
 from device.simulation.physics.chebyshev import points_inside
 from device.simulation.physics.inclusion_axes import InclusionAxes
-from device.simulation.physics.slab import NEAREST_MM, NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
+from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
 from device.simulation.physics.slab_changes import (
     DEPTH_MM,
     SIZE_MM,
@@ -96,7 +96,7 @@ def scattered(places: int = PLACES) -> list[ScatteredInclusion]:
         size_mm, depth_mm = (
             float(low + share * (high - low)) for share, (low, high) in ((size, SIZE_MM), (depth, DEPTH_MM))
         )
-        thinnest_mm = max(PEOPLES_MM[0], size_mm + depth_mm + NEAREST_MM)
+        thinnest_mm = max(PEOPLES_MM[0], size_mm + depth_mm + ABOVE_BASE_MM)
         slabs = [NOMINAL]
         for modulus, thickness in zip(of_slabs[::2], of_slabs[1::2], strict=True):
             modulus_kpa = min(float(PEOPLES_KPA[0] * (PEOPLES_KPA[1] / PEOPLES_KPA[0]) ** modulus), PEOPLES_KPA[1])

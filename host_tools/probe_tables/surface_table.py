@@ -33,7 +33,7 @@ from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene,
 POINTS = (7, 7, 3)
 """Points in size, depth and mismatch."""
 ELASTIC_MISMATCHES = (0.1, 0.96)
-"""8-200 kPa in tissue of 4-6.25 kPa, with a little to spare; 6.4-305 kPa in the nominal slab."""
+"""6.4-305 kPa in the nominal slab, 2.6-122 kPa in tissue of 2 kPa, 38-1830 kPa in one of 30 kPa."""
 SMALLEST_SIZE_MM = 1.0
 COARSE = slice(None, None, 2)
 """Tables of what layers change are of every second size and depth: of an odd number of Chebyshev points these are
@@ -67,7 +67,7 @@ def build_surface_table(
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> SurfaceTable:
-    """Solve every point of the table (some 40 minutes on two cores, most of it other slabs); `on_point` hears done and
+    """Solve every point of the table (some 50 minutes on two cores, most of it other slabs); `on_point` hears done and
     total.
 
     Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.

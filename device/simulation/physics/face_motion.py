@@ -18,7 +18,7 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import Slab
-from device.simulation.physics.surface_table import PressRamps, Ramp
+from device.simulation.physics.surface_table import PressRamps
 
 NAME, SCHEMA = "face_motion", "tsis.face_motion/1"
 ACTION = "run `host_tools table --part motion` to make it again"
@@ -53,7 +53,7 @@ class FaceMotion:
         baseline = self._drawn_where_it_is(without, outward_mm)
         pressed = self._drawn_where_it_is(without + ramps.inclusion_field.fields_per_n, outward_mm + added_mm)
         return ramps._replace(
-            baseline=Ramp(ramps.baseline.force_n, baseline),
+            baseline=replace(ramps.baseline, fields_per_n=baseline),
             inclusion_field=replace(ramps.inclusion_field, fields_per_n=pressed - baseline),
             nominal_inclusion_field=ramps.nominal_inclusion_field or ramps.inclusion_field,
         )

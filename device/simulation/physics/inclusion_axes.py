@@ -46,7 +46,7 @@ class InclusionAxes(NamedTuple):
         of_mismatch = np.tensordot(interpolation_weights(self.elastic_mismatch, mismatch), fields_per_n_mm3, (0, 3))
         at_size, at_depth = interpolation_weights(self.size_mm, held_mm), interpolation_weights(self.depth_mm, depth_mm)
         with_size, with_depth = slope_weights(self.size_mm, held_mm), slope_weights(self.depth_mm, depth_mm)
-        grows = 3 * at_size + (size_mm * with_size if size_mm >= held_mm else 0.0)
+        grows = 3 * at_size + held_mm * with_size  # below the smallest as there, so that nothing jumps
         by_size, by_depth = (
             np.einsum("s,d,xsd...->x...", of_size, of_depth, of_mismatch)
             for of_size, of_depth in ((grows, at_depth), (at_size, with_depth))

@@ -1,6 +1,6 @@
 """What other layers change of the pressed face: the waveguide's three, the tissue's outermost and its deepest.
 
-A star, as of the slabs: one layer's modulus apart from the default, solved in finite strain at two ratios, each as the
+A star: one layer's modulus apart from the default, solved in finite strain at two ratios, each as the
 difference of two solves on one mesh; quadratic in the logarithm of the ratio, and several layers add up. Kept at
 coarse sizes, depths and mismatches, of the nominal slab and on the axis: what a layer changes of the tilt and of the
 shape of a field off the axis is left out. Written by `host_tools table --part layers`.

@@ -16,7 +16,7 @@ PEOPLES_KPA, PEOPLES_MM = (2.0, 30.0), (15.0, 60.0)
 2007), 2-3 kPa by magnetic resonance, 11 +- 6 kPa by shear waves."""
 NEAR_KPA, NEAR_MM = (4.0, 6.25), (27.0, 36.0)
 """Around the nominal slab: what was solved in it alone is added as it is to a press in these."""
-NEAREST_MM = 1.0
+ABOVE_BASE_MM = 1.0
 """An inclusion ends at least this far above the slab's base."""
 
 
@@ -56,7 +56,7 @@ class Slab:
         """Refuse an inclusion that touches the slab's base, or all but does."""
         lowest_mm = inclusion.depth_mm + inclusion.size_mm
         action = "choose a smaller or shallower inclusion, or a thicker slab"
-        require("depth_mm + size_mm", lowest_mm, Bound(0.0, self.thickness_mm - NEAREST_MM, "mm"), action)
+        require("depth_mm + size_mm", lowest_mm, Bound(0.0, self.thickness_mm - ABOVE_BASE_MM, "mm"), action)
 
     def require_near_nominal(self, quantity: str) -> None:
         """Refuse what is known in the nominal slab only, where this one is far from it."""
@@ -64,7 +64,8 @@ class Slab:
         near = zip((stated.youngs_modulus_kpa, stated.thickness_mm), (NEAR_KPA, NEAR_MM), strict=True)
         if not all(low <= value <= high for value, (low, high) in near):
             tissue = f"given in tissue of {stated.youngs_modulus_kpa:g} kPa, {stated.thickness_mm:g} mm thick"
-            bound = "absent but in 4-6.25 kPa and 27-36 mm"
+            (softest, firmest), (thinnest, thickest) = NEAR_KPA, NEAR_MM
+            bound = f"absent but in {softest:g}-{firmest:g} kPa and {thinnest:g}-{thickest:g} mm"
             raise InvalidQuantity(quantity, tissue, bound, "choose such tissue, or leave it away")
 
     @property
@@ -95,15 +96,6 @@ class ChangedSlab(Slab):
     """
 
     part_of: Slab = NOMINAL
-
-    def require_near_nominal(self, quantity: str) -> None:
-        """Refuse what is known in the nominal slab only, where this one is far from it."""
-        stated = self.stated
-        near = zip((stated.youngs_modulus_kpa, stated.thickness_mm), (NEAR_KPA, NEAR_MM), strict=True)
-        if not all(low <= value <= high for value, (low, high) in near):
-            tissue = f"given in tissue of {stated.youngs_modulus_kpa:g} kPa, {stated.thickness_mm:g} mm thick"
-            bound = "absent but in 4-6.25 kPa and 27-36 mm"
-            raise InvalidQuantity(quantity, tissue, bound, "choose such tissue, or leave it away")
 
     @property
     def stated(self) -> Slab:

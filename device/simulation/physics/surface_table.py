@@ -10,6 +10,7 @@ Source: Trefethen, Approximation Theory and Approximation Practice, chapter 5 (b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -26,9 +27,6 @@ from device.simulation.physics.slab_changes import SlabChanges, field_shapes
 
 NAME, SCHEMA = "surface_table", "tsis.surface_table/4"
 ACTION = "run `host_tools table` to make it again"
-COARSE = slice(None, None, 2)
-"""The changes with the slab are kept at every second size and depth: of an odd number of Chebyshev points these are
-Chebyshev points as well."""
 
 
 class Face(NamedTuple):
@@ -40,14 +38,18 @@ class Face(NamedTuple):
 
 @dataclass(frozen=True)
 class Ramp:
-    """One scene's faces over the force: `fields_per_n` [2, F, R] are w and p over the force at `force_n` [F]."""
+    """One scene's faces over the force: `fields_per_n` [2, F, R] are w and p over the force at `force_n` [F].
+
+    They hold to the last of these, or to `largest_n`.
+    """
 
     force_n: Array
     fields_per_n: Array
+    largest_n: float = math.inf
 
     def at(self, force_n: float) -> Face:
-        """Return the face under a force (N, not negative); beyond the table the largest one's, in proportion."""
-        weights = interpolation_weights(self.force_n, min(force_n, float(self.force_n[-1])))
+        """Return the face under a force (N, not negative); beyond what holds the largest one's, in proportion."""
+        weights = interpolation_weights(self.force_n, min(force_n, float(self.force_n[-1]), self.largest_n))
         w_mm, p_kpa = force_n * np.tensordot(weights, self.fields_per_n, (0, 1))
         return Face(w_mm, p_kpa)
 
@@ -89,7 +91,7 @@ class SurfaceTable:
     def ramps(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> PressRamps:
         """Return the ramps of one inclusion in a slab; refuses one outside the table, or at the slab's base."""
         inclusion_field = self.inclusion_field(inclusion, slab)
-        baseline = Ramp(self.force_n, self.bare_per_n + self.slabs.baseline_per_n(slab))
+        baseline = Ramp(self.force_n, self.bare_per_n + self.slabs.baseline_per_n(slab), inclusion_field.largest_n)
         nominal = None if slab == NOMINAL else self.inclusion_field(slab.nominal_equivalent(inclusion))
         return PressRamps(self.r_mm, baseline, inclusion_field, nominal)
 
@@ -101,7 +103,8 @@ class SurfaceTable:
         if slab == NOMINAL:
             return Ramp(self.force_n, axes.inclusion_per_n(self.lump_per_n_mm3, inclusion, slab))
         shapes = field_shapes(axes, self.lump_per_n_mm3, self.force_n, inclusion, slab)
-        return Ramp(self.force_n, shapes[0] + self.slabs.inclusion_per_n(shapes, self.force_n, inclusion, slab))
+        changed = shapes[0] + self.slabs.inclusion_per_n(shapes, self.force_n, inclusion, slab)
+        return Ramp(self.force_n, changed, float(self.slabs.largest_n))
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write surface_table.npz and its description with the hash."""

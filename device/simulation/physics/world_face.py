@@ -1,6 +1,6 @@
 """A pressed face in a world: each press leans as it does, on tissue that differs by place and gives way in time.
 
-Faces are made for three moduli of the tissue and are quadratic between them in its logarithm, as the table's are.
+Faces are made for three moduli of the tissue and are quadratic between them in its logarithm.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from device.measurement.mode import Mode
 from device.measurement.parameters import EVEN_STD, RANGES
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.ramp_modes.noise import ErrorLevels
-from device.simulation.physics.slab import NEAREST_MM, PEOPLES_KPA, PEOPLES_MM, Slab
+from device.simulation.physics.slab import ABOVE_BASE_MM, PEOPLES_KPA, PEOPLES_MM, Slab
 from device.simulation.physics.slab import NOMINAL as NOMINAL_SLAB
 from device.simulation.physics.surface_table import PressRamps, Ramp, SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
@@ -225,7 +225,7 @@ def random_scene(kind: TissueKind, rng: np.random.Generator) -> Scene:
     modulus_kpa = float(np.exp(rng.uniform(*np.log((least_kpa, CLEAR_KPA[1])))))
     while True:
         size_mm, depth_mm = (float(rng.uniform(*ends)) for ends in (CLEAR_SIZE_MM, CLEAR_DEPTH_MM))
-        if size_mm + depth_mm <= tissue.thickness_mm - NEAREST_MM:
+        if size_mm + depth_mm <= tissue.thickness_mm - ABOVE_BASE_MM:
             return Scene(Inclusion(size_mm, depth_mm, modulus_kpa), tissue=tissue)
 
 

@@ -13,9 +13,9 @@ from device.simulation.physics.pressed_face import ProbePlacement
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.press_models import press_samples as module
 from host_tools.press_models.press_samples import (
+    ABOVE_BASE_MM,
     BESIDE_TO_MM,
     INCLUSIONS_A_SKIN,
-    NEAREST_MM,
     PressSamples,
     draw_beside,
     draw_parameters,
@@ -62,7 +62,7 @@ def test_the_offset_is_even_over_its_disk(drawn):
 def test_inclusions_end_above_the_slabs_base():
     drawn = draw_parameters(COUNT, np.random.default_rng(1))
     clearance = drawn[:, SLAB] - drawn[:, 0] - drawn[:, 1]
-    assert NEAREST_MM <= clearance.min() < NEAREST_MM + 1
+    assert ABOVE_BASE_MM <= clearance.min() < ABOVE_BASE_MM + 1
 
 
 def test_consecutive_inclusions_share_tissue_and_skin_but_not_their_place():

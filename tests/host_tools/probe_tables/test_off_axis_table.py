@@ -38,6 +38,7 @@ TRUTHS = [
             ((5.4, 5.7, 46.0), 2.7, NOMINAL, 0.02),
             ((8.0, 5.0, 220.0), 4.0, Slab(20.0), 0.12),
             ((8.0, 5.0, 55.0), 4.0, Slab(5.0, 17.0), 0.15),
+            ((6.0, 4.5, 220.0), 8.0, Slab(20.0), 0.4),
         )
     ),
 ]
@@ -45,10 +46,9 @@ TRUTHS = [
 
 
 @pytest.mark.parametrize(("truth", "offset_mm", "slab", "bound"), TRUTHS)
-def test_the_face_off_the_axis_is_within_two_percent_of_the_inclusions_peak(tables, truth, offset_mm, slab, bound):
-    """Deformation anywhere in the central window; ring means of pressure, which jump from mesh to mesh, 4 % rms.
-
-    Deformations in other slabs are up to 15 % off, for what a slab changes of the shape is left out.
+def test_the_face_off_the_axis_is_near_a_fresh_solve(tables, truth, offset_mm, slab, bound):
+    """Deformation within 2 % of the peak anywhere in the central window; ring means of pressure 4 % rms, for these jump
+    from mesh to mesh. In other slabs deformations are 15-40 % off: what a slab changes of the shape is left out.
     """
     inclusion = Inclusion(*truth)
     scene = off_axis_scene(inclusion, offset_mm, force_n=FORCE_N)

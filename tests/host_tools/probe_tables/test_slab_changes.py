@@ -6,7 +6,7 @@ import pytest
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.inclusion_axes import InclusionAxes
-from device.simulation.physics.slab import NEAREST_MM, NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
+from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
 from device.simulation.physics.slab_changes import field_shapes
 from host_tools.forward.press_model import PressFailed
 from host_tools.probe_tables import slab_changes as module
@@ -39,7 +39,7 @@ def test_every_slab_holds_its_inclusion_and_its_mesh_has_no_thin_layers():
     for one in scattered():
         assert one.slabs[0] == NOMINAL
         assert len(one.slabs) == 1 + SLABS_A_PLACE
-        assert one.thicknesses_mm[0] >= one.size_mm + one.depth_mm + NEAREST_MM - 1e-9
+        assert one.thicknesses_mm[0] >= one.size_mm + one.depth_mm + ABOVE_BASE_MM - 1e-9
         assert (np.diff(one.thicknesses_mm) >= APART_MM - 1e-9).all()
 
 

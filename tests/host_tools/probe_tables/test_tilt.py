@@ -30,11 +30,11 @@ def test_no_side_of_the_face_sinks_more_than_its_back(tilted):
 
 @pytest.mark.long
 def test_between_the_tables_slabs_a_tilt_is_that_of_a_fresh_solve(tables):
-    """Of 3.2 kPa, 24 mm, over the largest value within 9 mm: deformation 2 %, ring means of pressure 3 %."""
+    """Of 3.2 kPa, 24 mm, over the largest value within 9 mm: deformation 2 %, ring means of pressure 5 %."""
     r_mm, w_mm, p_kpa = tilt_per_degree(Scene(None, tissue=Tissue(3.2, 24.0)))
     fresh, found = (w_mm, ring_means(r_mm, p_kpa)), tables.off_axis.tilt_in(Slab(3.2, 24.0))
     inside = tables.off_axis.r_mm <= 9.0
-    for one, other, bound in zip(fresh, found, (0.02, 0.03), strict=True):
+    for one, other, bound in zip(fresh, found, (0.02, 0.05), strict=True):
         assert np.abs(one[::EVERY] - other)[inside].max() < bound * np.abs(other[inside]).max()
 
 

@@ -100,6 +100,11 @@ def test_beyond_the_largest_force_the_face_grows_in_proportion(small_table):
     np.testing.assert_allclose(ramp.at(2 * last).w_mm, 2 * ramp.at(last).w_mm, rtol=1e-9)
 
 
+def test_in_another_slab_the_face_grows_in_proportion_beyond_what_was_solved(small_table):
+    for ramp in small_table.ramps(Inclusion(9.0, 5.0, 80.0), Slab(3.0, 40.0))[1:3]:
+        np.testing.assert_allclose(ramp.at(0.78).p_kpa, 0.78 / 0.66 * ramp.at(0.66).p_kpa, rtol=1e-9)
+
+
 def test_small_strain_is_the_smallest_force_in_proportion(small_table):
     ramp = small_table.inclusion_field(Inclusion(5.0, 6.0, 80.0))
     first = float(FORCE_N[0])

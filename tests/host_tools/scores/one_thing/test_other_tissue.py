@@ -91,13 +91,15 @@ def test_presses_of_the_tables_are_those_that_are_solved_beside_them(monkeypatch
 
 @pytest.mark.long
 def test_in_nominal_tissue_the_press_beside_is_the_tables_own(table):
-    """A slab of 30 mm and 5 kPa changes nothing; of 5.5 kPa what the table's star says, within 0.1 % of the peak."""
+    """A slab of 30 mm and 5 kPa changes nothing; of 5.5 kPa what the table says, whose level is another: 0.2 % of the
+    peak.
+    """
     nothing = Ramp(FORCES_N, None)
-    for kpa, slab in ((5.0, NOMINAL), (5.5, Slab(5.5))):
+    for kpa, slab, bound in ((5.0, NOMINAL, 0.001), (5.5, Slab(5.5), 0.002)):
         found = on_the_tables_mesh(nothing, Tissue(youngs_modulus_kpa=kpa), table).baseline.at(0.4)
         own, inside = table.ramps(Inclusion(0.0, 6.0, 80.0), slab).baseline.at(0.4), table.r_mm <= 9.9
         for one, other in zip(found, own, strict=True):
-            assert np.abs(one - other)[inside].max() < 1e-3 * np.abs(other[inside]).max()
+            assert np.abs(one - other)[inside].max() < bound * np.abs(other[inside]).max()
 
 
 def test_an_interval_holds_or_does_not_and_a_refused_press_has_none():
