@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -57,10 +58,23 @@ def ramps_of(
     """Return the ramps of scenes that differ in the modulus of the inclusion alone, on the first level that can."""
     presses = [Press(force_n=float(force)) for force in forces_n]
     plan = model_plan(scenes[0].with_press(presses[-1]), strain="finite")
-    for level in levels[:-1]:
+
+    def on(level: Level) -> tuple[tuple[Solution, ...], ...]:
+        return solve_ramps(scenes, presses, replace(plan, grading=level.grading, order=level.order))
+
+    return first_that_can(on, levels)
+
+
+Attempt = TypeVar("Attempt")
+Followed = TypeVar("Followed")
+
+
+def first_that_can(solve: Callable[[Attempt], Followed], choices: Sequence[Attempt]) -> Followed:
+    """Return what is solved with the first choice that the press can be followed with; raise the last one's failure."""
+    for choice in choices[:-1]:
         with suppress(PressFailed):
-            return solve_ramps(scenes, presses, replace(plan, grading=level.grading, order=level.order))
-    return solve_ramps(scenes, presses, replace(plan, grading=levels[-1].grading, order=levels[-1].order))
+            return solve(choice)
+    return solve(choices[-1])
 
 
 def fields(solution: Solution) -> tuple[Array, Array]:

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from functools import partial
+from functools import lru_cache, partial
 from itertools import product
 from typing import NamedTuple
 
@@ -37,22 +36,22 @@ from device.simulation.physics.slab_changes import (
     resampling,
 )
 from host_tools.forward.accuracy import Level
-from host_tools.forward.press_model import PressFailed
 from host_tools.probe_tables.force_ramps import (
     CHANGES,
     SceneOf,
     bare_per_n,
+    first_that_can,
     inclusions_per_n_mm3,
     scene_on_one_mesh,
 )
-from host_tools.scenes.scene import Scene, Waveguide
+from host_tools.scenes.scene import Waveguide
 
 PLACES, SLABS_A_PLACE = 160, 3
 """Inclusions that are solved, and slabs beside the nominal one that each of them is solved in."""
 SEED = 1
-LARGEST_N = 0.66
+SLAB_LARGEST_N = 0.66
 """As far as a hand goes in a ramp; softest tissue in a thick slab cannot be pressed much further."""
-FORCES_N = points_inside(0.0, LARGEST_N, 5)
+SLAB_FORCES_N = points_inside(0.0, SLAB_LARGEST_N, 5)
 FEWEST_FORCES = 3
 """Of these forces, as many are reached in any tissue."""
 MODULI_KPA = (2.0, 2.3, 3.3, 5.0, 9.0, 16.0, 25.0, 30.0)
@@ -116,26 +115,21 @@ def _not_too_near(thickness_mm: float, slabs: Sequence[Slab]) -> float:
 def inclusion_in_slabs(one: ScatteredInclusion, mismatches: Array, waveguide: Waveguide) -> Array:
     """Return what an inclusion adds in each of its slabs at all mismatches [1 + n, M, 2, F, R].
 
-    Over force, size cubed and mismatch, at `FORCES_N`; NaN where soft tissue cannot be pressed so far.
+    Over force, size cubed and mismatch, at `SLAB_FORCES_N`; NaN where soft tissue cannot be pressed so far.
     """
     scene_of = partial(scene_on_one_mesh, thicknesses_mm=one.thicknesses_mm, waveguide=waveguide)
     return np.array([_as_far_as_it_goes(scene_of, slab, one, mismatches) for slab in one.slabs])
 
 
 def _as_far_as_it_goes(scene_of: SceneOf, slab: Slab, one: ScatteredInclusion, mismatches: Array) -> Array:
-    """Return the fields [M, 2, F, R] in a slab; raises `PressFailed` where fewer than three forces are reached."""
-    for reached in range(len(FORCES_N), FEWEST_FORCES, -1):
-        with suppress(PressFailed):
-            return _padded(_reached(scene_of, slab, one, mismatches, reached))
-    return _padded(_reached(scene_of, slab, one, mismatches, FEWEST_FORCES))
+    """Return the fields [M, 2, F, R] in a slab; raises `PressFailed` where not even `FEWEST_FORCES` are reached."""
 
+    def to(reached: int) -> Array:
+        forces_n = SLAB_FORCES_N[:reached]
+        return inclusions_per_n_mm3(scene_of, slab, CHANGES, one.size_mm, one.depth_mm, mismatches, forces_n)
 
-def _reached(scene_of: SceneOf, slab: Slab, one: ScatteredInclusion, mismatches: Array, reached: int) -> Array:
-    return inclusions_per_n_mm3(scene_of, slab, CHANGES, one.size_mm, one.depth_mm, mismatches, FORCES_N[:reached])
-
-
-def _padded(fields: Array) -> Array:
-    missing = len(FORCES_N) - fields.shape[2]
+    fields = first_that_can(to, range(len(SLAB_FORCES_N), FEWEST_FORCES - 1, -1))
+    missing = len(SLAB_FORCES_N) - fields.shape[2]
     return np.pad(fields, ((0, 0), (0, 0), (0, missing), (0, 0)), constant_values=np.nan)
 
 
@@ -156,7 +150,7 @@ def as_rows(one: ScatteredInclusion, fields: Array, shapes: Array, mismatches: A
     Forces that were not reached are left out.
     """
     at = [
-        coordinates(Inclusion(one.size_mm, one.depth_mm, slab.modulus_kpa(float(mismatch))), slab, FORCES_N)
+        coordinates(Inclusion(one.size_mm, one.depth_mm, slab.modulus_kpa(float(mismatch))), slab, SLAB_FORCES_N)
         for slab in one.slabs[1:]
         for mismatch in mismatches
     ]
@@ -176,19 +170,20 @@ def fitted(rows: SlabRows) -> tuple[NDArray[np.uint8], Array]:
     slab a small change is to be right, too.
     """
     degrees, of_shape = terms_of_shapes()
-    terms = LegendreTerms(degrees)
+    terms, unknowns = LegendreTerms(degrees), sum(int(wanted.sum()) for wanted in of_shape)
+    normal, right = np.zeros((2, unknowns, unknowns)), np.zeros((2, unknowns))
+    for start in range(0, len(rows.at), ROWS_AT_ONCE):
+        part = SlabRows(*(one[start : start + ROWS_AT_ONCE] for one in rows))
+        design = changing_terms(terms, part.at)
+        for field in range(2):
+            equations, values = _equations(part, design, of_shape, field)
+            normal[field] += equations.T @ equations
+            right[field] += equations.T @ values
     found = np.zeros((len(degrees), *rows.shapes.shape[1:3]))
     for field in range(2):
-        unknowns = sum(int(wanted.sum()) for wanted in of_shape)
-        normal, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
-        for start in range(0, len(rows.at), ROWS_AT_ONCE):
-            part = SlabRows(*(one[start : start + ROWS_AT_ONCE] for one in rows))
-            equations, values = _equations(part, changing_terms(terms, part.at), of_shape, field)
-            normal += equations.T @ equations
-            right += equations.T @ values
-        shares = _solved(normal, right)
-        for shape, wanted in enumerate(of_shape):
-            found[wanted, shape, field], shares = shares[: wanted.sum()], shares[wanted.sum() :]
+        ends = np.cumsum([int(wanted.sum()) for wanted in of_shape])[:-1]
+        for shape, shares in enumerate(np.split(_solved(normal[field], right[field]), ends)):
+            found[of_shape[shape], shape, field] = shares
     return degrees, found
 
 
@@ -229,8 +224,8 @@ class NominalTable(NamedTuple):
     force_n: Array
 
     def shapes(self, one: ScatteredInclusion) -> Array:
-        """Return the `field_shapes` [5, 2, M, F, R] of an inclusion at `FORCES_N`, over size cubed and mismatch."""
-        to_own = resampling(self.force_n, FORCES_N)
+        """Return `field_shapes` [5, 2, M, F, R] of an inclusion at `SLAB_FORCES_N`, over size cubed and mismatch."""
+        to_own = resampling(self.force_n, SLAB_FORCES_N)
         at_forces = []
         for mismatch in self.axes.elastic_mismatch:
             inclusion = Inclusion(
@@ -264,25 +259,23 @@ def build_slab_changes(
 
 
 def slab_change_per_n(slab: Slab, waveguide: Waveguide) -> Array:
-    """Return what a slab changes of the fields [2, F, R] without an inclusion over the force, at `FORCES_N`.
+    """Return what a slab changes of the fields [2, F, R] without an inclusion over the force, at `SLAB_FORCES_N`.
 
     Slab and nominal slab are on one mesh and one level. Raises `PressFailed` where a force cannot be reached on any.
     """
-    scenes = [scene_on_one_mesh(one, None, THICKNESSES_MM, waveguide=waveguide) for one in (slab, NOMINAL)]
-    for level in WITHOUT_INCLUSION[:-1]:
-        with suppress(PressFailed):
-            return _difference(scenes, level)
-    return _difference(scenes, WITHOUT_INCLUSION[-1])
+    return first_that_can(
+        lambda level: _on_level(slab, waveguide, level) - _on_level(NOMINAL, waveguide, level), WITHOUT_INCLUSION
+    )
 
 
-def _difference(scenes: Sequence[Scene], level: Level) -> Array:
-    changed, usual = (bare_per_n(scene, FORCES_N, (level,)) for scene in scenes)
-    return changed - usual
+@lru_cache(maxsize=2 * len(WITHOUT_INCLUSION))  # the nominal slab is a term of every change
+def _on_level(slab: Slab, waveguide: Waveguide, level: Level) -> Array:
+    return bare_per_n(scene_on_one_mesh(slab, None, THICKNESSES_MM, waveguide=waveguide), SLAB_FORCES_N, (level,))
 
 
 def assembled(nominal: NominalTable, baseline: Sequence[Array], rows: SlabRows) -> SlabChanges:
     """Return the changes, those without an inclusion at the table's own forces, as polynomials in the force."""
-    to_own = resampling(FORCES_N, nominal.force_n)
+    to_own = resampling(SLAB_FORCES_N, nominal.force_n)
     shape = len(MODULI_KPA), len(THICKNESSES_MM)
     of_slabs = np.einsum("gf,kxfr->kxgr", to_own, np.array(baseline)).reshape(*shape, *baseline[0].shape)
     degrees, shares = fitted(rows)
@@ -292,5 +285,5 @@ def assembled(nominal: NominalTable, baseline: Sequence[Array], rows: SlabRows) 
         bare_change_per_n=of_slabs.astype(np.float32),
         change_degrees=degrees,
         shape_shares=shares.astype(np.float32),
-        largest_n=np.array(LARGEST_N),
+        largest_n=np.array(SLAB_LARGEST_N),
     )

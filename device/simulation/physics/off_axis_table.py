@@ -16,9 +16,10 @@ import numpy as np
 from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
-from device.simulation.physics.chebyshev import interpolated, interpolation_weights
+from device.simulation.physics.chebyshev import interpolated
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.slab_changes import between_slabs
 
 NAME, SCHEMA = "off_axis_table", "tsis.off_axis_table/3"
 ACTION = "run `host_tools table` to make it again"
@@ -72,9 +73,7 @@ class OffAxisTable:
 
     def tilt_in(self, slab: Slab) -> Array:
         """Return the field [2, R] of one degree in a slab, to be multiplied by the angle's cosine."""
-        modulus = interpolation_weights(np.log(self.tilt_modulus_kpa), float(np.log(slab.youngs_modulus_kpa)))
-        thickness = interpolation_weights(1 / self.tilt_thickness_mm, 1 / slab.thickness_mm)
-        return np.tensordot(np.multiply.outer(modulus, thickness), self.tilt_per_deg, 2)
+        return between_slabs(self.tilt_per_deg, self.tilt_modulus_kpa, self.tilt_thickness_mm, slab)
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write off_axis_table.npz and its description with the hash."""

@@ -50,9 +50,7 @@ class SlabChanges:
 
     def baseline_per_n(self, slab: Slab) -> Array:
         """Return what a slab changes of the fields [2, F, R] without an inclusion, over the force."""
-        modulus = interpolation_weights(np.log(self.slab_modulus_kpa), float(np.log(slab.youngs_modulus_kpa)))
-        thickness = interpolation_weights(1 / self.slab_thickness_mm, 1 / slab.thickness_mm)
-        return np.tensordot(np.multiply.outer(modulus, thickness), self.bare_change_per_n, 2)
+        return between_slabs(self.bare_change_per_n, self.slab_modulus_kpa, self.slab_thickness_mm, slab)
 
     def inclusion_per_n(self, shapes: Array, force_n: Array, inclusion: Inclusion, slab: Slab) -> Array:
         """Return what a slab changes of an inclusion's field [2, F, R], over the force, from its `field_shapes` at
@@ -71,6 +69,13 @@ class SlabChanges:
     @cached_property
     def _terms(self) -> LegendreTerms:
         return LegendreTerms(self.change_degrees)
+
+
+def between_slabs(fields: NDArray[np.floating], modulus_kpa: Array, thickness_mm: Array, slab: Slab) -> Array:
+    """Return the fields [...] of a slab, of those [E, T, ...] at moduli [E] and thicknesses [T], in ln Et and 1/T."""
+    modulus = interpolation_weights(np.log(modulus_kpa), float(np.log(slab.youngs_modulus_kpa)))
+    thickness = interpolation_weights(1 / thickness_mm, 1 / slab.thickness_mm)
+    return np.tensordot(np.multiply.outer(modulus, thickness), fields, 2)
 
 
 def field_shapes(

@@ -10,13 +10,13 @@ from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, PEOPLES_KPA, 
 from device.simulation.physics.slab_changes import field_shapes
 from host_tools.forward.press_model import PressFailed
 from host_tools.probe_tables import slab_changes as module
-from host_tools.probe_tables.force_ramps import FORCES_N as TABLES_N
+from host_tools.probe_tables.force_ramps import FORCES_N
 from host_tools.probe_tables.slab_changes import (
     APART_MM,
-    FORCES_N,
     MODULI_KPA,
     PLACES,
     REACHES,
+    SLAB_FORCES_N,
     SLABS_A_PLACE,
     THICKNESSES_MM,
     WITHOUT_INCLUSION,
@@ -72,7 +72,7 @@ def test_forces_that_are_not_reached_are_no_rows():
     one = next(one for one in scattered(64) if one.slabs[1].youngs_modulus_kpa < 2.1)
     rows = solved_on_paper(one, nominal_table().shapes(one))
     soft = sum(slab.youngs_modulus_kpa < 2.1 for slab in one.slabs[1:])
-    assert len(rows.at) == len(MISMATCHES) * (SLABS_A_PLACE * len(FORCES_N) - 2 * soft)
+    assert len(rows.at) == len(MISMATCHES) * (SLABS_A_PLACE * len(SLAB_FORCES_N) - 2 * soft)
     assert np.isfinite(rows.changes).all()
     assert rows.changes.shape[1:] == (2, R)
     assert rows.shapes.shape[1:] == (5, 2, R)
@@ -89,7 +89,7 @@ def test_soft_tissue_is_followed_as_far_as_it_goes(monkeypatch):
 
     monkeypatch.setattr(module, "inclusions_per_n_mm3", folds)
     found = inclusion_in_slabs(one, MISMATCHES, Waveguide())
-    assert found.shape == (1 + SLABS_A_PLACE, 3, 2, len(FORCES_N), R)
+    assert found.shape == (1 + SLABS_A_PLACE, 3, 2, len(SLAB_FORCES_N), R)
     assert np.isnan(found[1, :, :, 3:]).all()
     assert np.isfinite(found[1, :, :, :3]).all()
     assert np.isfinite(np.delete(found, 1, axis=0)).all()
@@ -126,9 +126,9 @@ RADIAL = 1 + 0.3 * np.arange(R)
 
 def nominal_table():
     """What an inclusion adds in the nominal slab: smooth in all, and of another profile at every size."""
-    size, depth, mismatch, force, radius = np.meshgrid(*AXES, TABLES_N, RADIAL, indexing="ij")
+    size, depth, mismatch, force, radius = np.meshgrid(*AXES, FORCES_N, RADIAL, indexing="ij")
     field = (2 - 0.05 * size * radius) * (1 - 0.03 * depth) * (1 + 0.2 * mismatch) * (1 + 0.5 * force)
-    return NominalTable(AXES, np.stack([field, 3 * field]), TABLES_N)
+    return NominalTable(AXES, np.stack([field, 3 * field]), FORCES_N)
 
 
 def effect(size_mm, depth_mm, slab, force_n):
@@ -140,7 +140,7 @@ def effect(size_mm, depth_mm, slab, force_n):
 def solved_on_paper(one, shapes):
     """The rows of an inclusion whose slabs add `effect` of its field and a little of its growth with the depth."""
     fields = [
-        shapes[0] * (1 + effect(one.size_mm, one.depth_mm, slab, FORCES_N)[:, None])
+        shapes[0] * (1 + effect(one.size_mm, one.depth_mm, slab, SLAB_FORCES_N)[:, None])
         + 0.1 * np.log(slab.youngs_modulus_kpa / 5.0) * shapes[2]
         for slab in one.slabs
     ]
@@ -154,12 +154,12 @@ def solved_on_paper(one, shapes):
 def test_what_changes_as_polynomials_is_fitted_and_carried_over_to_the_tables_forces():
     nominal = nominal_table()
     slabs = [Slab(kpa, mm) for kpa in MODULI_KPA for mm in THICKNESSES_MM]
-    baseline = [np.full((2, len(FORCES_N), R), np.log(slab.youngs_modulus_kpa / 5.0)) for slab in slabs]
+    baseline = [np.full((2, len(SLAB_FORCES_N), R), np.log(slab.youngs_modulus_kpa / 5.0)) for slab in slabs]
     rows = [solved_on_paper(one, nominal.shapes(one)) for one in scattered(128)]
     changes = assembled(nominal, baseline, SlabRows(*map(np.concatenate, zip(*rows, strict=True))))
     slab, inclusion = Slab(2.05, 41.0), Inclusion(7.0, 5.5, 60.0)
-    shapes = field_shapes(AXES, nominal.per_n_mm3, TABLES_N, inclusion, slab)
-    expected = effect(7.0, 5.5, slab, TABLES_N)[:, None] * shapes[0] + 0.1 * np.log(2.05 / 5.0) * shapes[2]
-    found = changes.inclusion_per_n(shapes, TABLES_N, inclusion, slab)
+    shapes = field_shapes(AXES, nominal.per_n_mm3, FORCES_N, inclusion, slab)
+    expected = effect(7.0, 5.5, slab, FORCES_N)[:, None] * shapes[0] + 0.1 * np.log(2.05 / 5.0) * shapes[2]
+    found = changes.inclusion_per_n(shapes, FORCES_N, inclusion, slab)
     assert np.abs(found - expected).max() < 2e-3 * np.abs(expected).max()
     np.testing.assert_allclose(changes.baseline_per_n(slab), np.log(2.05 / 5.0), rtol=1e-5)

@@ -108,9 +108,9 @@ def test_in_another_slab_an_inclusion_is_within_a_few_percent_of_its_peaks(table
     assert (np.abs(change - expected)[..., inside].max(axis=-1) < bound * peaks).all()
 
 
-@pytest.mark.parametrize(("truth", "slab", "_"), IN_SLABS[:1])
+@pytest.mark.parametrize(("truth", "slab"), [one[:2] for one in IN_SLABS[:1]])
 @pytest.mark.long
-def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(table, truth, slab, _):
+def test_in_another_slab_an_inclusions_deformation_is_that_of_a_mesh_of_its_own(table, truth, slab):
     """Within 1 % of its peak; pressures near the rim differ by more from mesh to mesh."""
     inclusion, inside = Inclusion(*truth), table.r_mm <= 9.9
     for force_n, solution in zip(FORCES_SEEN_N, ramp(scene_in(slab, inclusion), FORCES_SEEN_N), strict=True):
