@@ -15,7 +15,7 @@ from device.measurement.ramp_modes.surrogate import (
     PressSurrogate,
     polynomial_coordinates,
 )
-from host_tools.press_models.press_samples import NEAREST_MM
+from host_tools.press_models.press_samples import ABOVE_BASE_MM
 from host_tools.press_models.train_range import (
     DEPTHS,
     SIZES,
@@ -51,7 +51,7 @@ def test_everything_else_stays_in_its_range(drawn):
 
 def test_no_inclusion_touches_the_base_or_lies_deeper_than_the_table(drawn):
     size_mm, depth_mm = drawn[:, SIZE], drawn[:, DEPTH]
-    assert (size_mm + depth_mm <= drawn[:, THICKNESS] - NEAREST_MM).all()
+    assert (size_mm + depth_mm <= drawn[:, THICKNESS] - ABOVE_BASE_MM).all()
     assert all(depth <= deepest_mm(size) for size, depth in zip(size_mm, depth_mm, strict=True))
 
 
