@@ -40,7 +40,7 @@ RULES = (
     Rule("lumps?", "inclusion"),
     Rule("tumou?rs?", "inclusion; lesion to the operator"),
     Rule("nodules?", "inclusion; lesion to the operator"),
-    Rule("twins?", "nearest or equivalent inclusion"),
+    Rule("twins?", "nearest inclusion"),
     Rule("peers?", "cross-check, the other program"),
     Rule("contrasts?", "elastic mismatch: contrast is optical", where=TABLES),
     Rule("stiffness contrast", "elastic mismatch"),

@@ -5,8 +5,7 @@ of the probe, or is not there at all.
 
 Ellipsoid and sphere of its width are solved in three dimensions in the same way, and their difference is carried on to
 the probe's table: so an inclusion that is hardly longer is hardly another one, and what the table's own spheres are off
-is in both. Small strain; with force and slab the difference grows as the sphere does, as for every inclusion off the
-axis.
+is in both. Small strain in the nominal slab; with force and slab the difference grows as the sphere does.
 """
 
 from __future__ import annotations
@@ -18,10 +17,11 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.off_axis_table import OffAxisTable
+from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.plan import model_plan
 from host_tools.forward.tiers import build
-from host_tools.probe_tables.off_axis_table import face_modes
+from host_tools.probe_tables.cosine_modes import face_modes
 from host_tools.scenes.scene import Press, Scene
 
 UNDER_THE_PROBE_MM = 5.0
@@ -38,8 +38,11 @@ class SolvedInclusion(OffAxisTable):
         """Return 0: nothing of a sphere's field is this inclusion's."""
         return 0.0
 
-    def modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
-        """Return the modes [2, K, R] for 1 N of the inclusion under the probe, or zeros beside it."""
+    def modes(self, inclusion: Inclusion, offset_mm: float, slab: Slab = NOMINAL) -> Array:
+        """Return the modes [2, K, R] for 1 N of the inclusion under the probe, or zeros beside it.
+
+        They are those of the scene's own tissue, whatever slab is asked for.
+        """
         return self.modes_per_n if offset_mm < UNDER_THE_PROBE_MM else np.zeros_like(self.modes_per_n)
 
 
@@ -65,10 +68,13 @@ class StretchedInclusion(OffAxisTable):
 
     stretch_per_n: Array
 
-    def modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
+    def modes(self, inclusion: Inclusion, offset_mm: float, slab: Slab = NOMINAL) -> Array:
         """Return the modes [2, K, R] for 1 N of the ellipsoid under the probe, or of the sphere far beside it."""
-        sphere = super().modes(inclusion, offset_mm)
-        return sphere + self.stretch_per_n if offset_mm < UNDER_THE_PROBE_MM else sphere
+        sphere = super().modes(inclusion, offset_mm, slab)
+        if offset_mm >= UNDER_THE_PROBE_MM:
+            return sphere
+        growth = self.growth_with(slab, inclusion, offset_mm)
+        return np.asarray(sphere + growth[:, None, None] * self.stretch_per_n)
 
 
 def stretched_inclusion(scene: Scene, table: OffAxisTable) -> StretchedInclusion:

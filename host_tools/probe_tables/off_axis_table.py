@@ -27,7 +27,7 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.off_axis_table import OffAxisTable
 from device.simulation.physics.slab import NOMINAL, Slab
-from host_tools.forward.face_state import FaceState, Rays
+from host_tools.forward.face_state import Rays
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.meshes.solid_mesh import SolidResolution, solid_mesh
 from host_tools.forward.plan import model_plan
@@ -36,6 +36,8 @@ from host_tools.forward.small_strain.contact import contact_pressure_kpa
 from host_tools.forward.small_strain.linear_press import LinearPress
 from host_tools.forward.symmetry import SOLID
 from host_tools.forward.tiers import build
+from host_tools.probe_tables.aside_changes import OFFSETS_MM, PLACES, SIZE_MM, TableAside, build_aside_changes
+from host_tools.probe_tables.cosine_modes import EVERY, MODES, face_modes
 from host_tools.probe_tables.force_ramps import ring_means, scene_in
 from host_tools.probe_tables.surface_table import inclusion_axes, require_tabulated, solved_for
 from host_tools.scenes.probe import Probe
@@ -45,14 +47,9 @@ from host_tools.scenes.scene import Placement, Press, Scene, Waveguide
 ORDER = 3
 POINTS = (5, 5, 2, 7)
 """Points in size, depth, mismatch and offset."""
-SMALLEST_SIZE_MM = 2.0
-OFFSETS_MM = (2.0, 16.0)
-MODES = 11
-"""Cosines kept: the twelfth of the narrowest inclusion is below a thousandth of its peak."""
+SMALLEST_SIZE_MM = SIZE_MM[0]
 TILT_MODULI_KPA, TILT_THICKNESSES_MM = (2.0, 5.0, 12.0, 30.0), (15.0, 20.0, 30.0, 60.0)
 """Slabs that a tilted probe is pressed on, the nominal one among them."""
-EVERY = 4
-"""Every which of the face's radii is kept: 0.2 mm apart."""
 
 
 def tilt_per_degree(
@@ -78,13 +75,6 @@ def off_axis_scene(
     return Scene(inclusion, Press(force_n=force_n), waveguide or Waveguide(), placement=place)
 
 
-def cosine_modes(field: Array) -> Array:
-    """Return the cosine series [K, R] of a field [A, R] on evenly spaced rays, symmetric in the angle."""
-    series = np.fft.rfft(field, axis=0).real / len(field)
-    series[1:] *= 2
-    return np.asarray(series[:MODES])
-
-
 def inclusions_per_n_mm3(
     size_mm: float, depth_mm: float, offset_mm: float, mismatches: Array, waveguide: Waveguide | None = None
 ) -> Array:
@@ -105,20 +95,16 @@ def _with_modulus(scene: Scene, modulus_kpa: float) -> Scene:
     return replace(scene, inclusion=replace(scene.inclusion, youngs_modulus_kpa=modulus_kpa))
 
 
-def face_modes(r_mm: Array, face: FaceState, inclusion_free: FaceState) -> Array:
-    """Return the cosine series [2, K, R], on the table's radii, of an inclusion's deformation and pressure."""
-    p_kpa = np.array([ring_means(r_mm, ray) for ray in face.p_kpa - inclusion_free.p_kpa])
-    return np.stack([cosine_modes(face.w_mm - inclusion_free.w_mm), cosine_modes(p_kpa)])[..., ::EVERY]
-
-
 def build_off_axis_table(
     *,
     waveguide: Waveguide | None = None,
     points: tuple[int, int, int, int] = POINTS,
+    slab_places: int = PLACES,
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> OffAxisTable:
-    """Solve every point of the table (some ten minutes on two cores); `on_point` hears done and total.
+    """Solve every point of the table (some 50 minutes on two cores, most of it other slabs); `on_point` hears done and
+    total.
 
     Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.
     """
@@ -130,15 +116,24 @@ def build_off_axis_table(
     r_mm, tilt = tilts(waveguide, jobs)
     inclusion_field = np.zeros((*points, 2, MODES, len(r_mm)))
     grid = list(product(range(points[0]), range(points[1]), range(points[3])))
+    total = len(grid) + slab_places
     solved = Parallel(n_jobs=jobs, return_as="generator")(
         delayed(inclusions_per_n_mm3)(axes.size_mm[i], axes.depth_mm[j], offset[m], axes.elastic_mismatch, waveguide)
         for i, j, m in grid
     )
     for done, ((i, j, m), modes) in enumerate(zip(grid, solved, strict=True), start=1):
         inclusion_field[i, j, :, m] = modes
-        on_point(done, len(grid))
+        on_point(done, total)
+    nominal = TableAside(axes, np.moveaxis(inclusion_field, 4, 0), offset)
+    slabs = build_aside_changes(
+        nominal,
+        waveguide=waveguide,
+        places=slab_places,
+        jobs=jobs,
+        on_point=lambda done: on_point(len(grid) + done, total),
+    )
     of_tilts = np.array(TILT_MODULI_KPA), np.array(TILT_THICKNESSES_MM), tilt
-    return OffAxisTable(*axes, offset, r_mm, np.moveaxis(inclusion_field, 4, 0), *of_tilts)
+    return OffAxisTable(*axes, offset, r_mm, nominal.per_n_mm3, *of_tilts, slabs)
 
 
 def tilts(waveguide: Waveguide, jobs: int = -1) -> tuple[Array, Array]:

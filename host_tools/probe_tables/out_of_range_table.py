@@ -30,9 +30,10 @@ from device.simulation.physics.off_axis_table import OffAxisTable
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import Ramp, SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.probe_tables.aside_changes import OFFSETS_MM
 from host_tools.probe_tables.force_ramps import INCLUSIONS, scene_in
 from host_tools.probe_tables.force_ramps import inclusions_per_n_mm3 as centred_per_n_mm3
-from host_tools.probe_tables.off_axis_table import OFFSETS_MM, inclusions_per_n_mm3
+from host_tools.probe_tables.off_axis_table import inclusions_per_n_mm3
 from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES
 from host_tools.scenes.scene import Press, Scene
 
@@ -107,11 +108,11 @@ class WideOffAxisTable(OffAxisTable):
     wide_axes: WideAxes
     wide: Array
 
-    def _modes(self, inclusion: Inclusion, offset_mm: float) -> Array:
+    def _modes(self, inclusion: Inclusion, offset_mm: float, slab: Slab) -> Array:
         require("offset_mm", offset_mm, Bound(0.0, ASIDE_MM, "mm"), "press nearer to the inclusion")
         near = nearest(inclusion, self)
-        own = super()._modes(near, offset_mm)
-        return self.wide_axes.carried_on(own, self.wide, inclusion, near, NOMINAL)
+        own = super()._modes(near, offset_mm, slab)
+        return self.wide_axes.carried_on(own, self.wide, inclusion, near, slab)
 
 
 def nearest(inclusion: Inclusion, table: SurfaceTable | OffAxisTable) -> Inclusion:

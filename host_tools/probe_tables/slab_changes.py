@@ -80,6 +80,7 @@ class ScatteredInclusion(NamedTuple):
     size_mm: float
     depth_mm: float
     slabs: tuple[Slab, ...]
+    offset_mm: float = 0.0
 
     @property
     def thicknesses_mm(self) -> tuple[float, ...]:
@@ -87,14 +88,19 @@ class ScatteredInclusion(NamedTuple):
         return tuple(sorted({slab.thickness_mm for slab in self.slabs}))
 
 
-def scattered(places: int = PLACES) -> list[ScatteredInclusion]:
-    """Return inclusions in slabs that hold them, of a Sobol sequence with the density of Chebyshev points."""
-    even = qmc.Sobol(2 + 2 * SLABS_A_PLACE, seed=SEED).random_base2(places.bit_length())[:places]
+def scattered(
+    places: int = PLACES, ends: Sequence[tuple[float, float]] = (SIZE_MM, DEPTH_MM), seed: int = SEED
+) -> list[ScatteredInclusion]:
+    """Return inclusions in slabs that hold them, of a Sobol sequence with the density of Chebyshev points.
+
+    `ends` are those of size and depth, and of the offset where there is one.
+    """
+    even = qmc.Sobol(len(ends) + 2 * SLABS_A_PLACE, seed=seed).random_base2(places.bit_length())[:places]
+    low, high = np.array(ends).T
     found = []
-    for size, depth, *of_slabs in (1 - np.cos(np.pi * even)) / 2:
-        size_mm, depth_mm = (
-            float(low + share * (high - low)) for share, (low, high) in ((size, SIZE_MM), (depth, DEPTH_MM))
-        )
+    for shares in (1 - np.cos(np.pi * even)) / 2:
+        size_mm, depth_mm, *offset_mm = (low + shares[: len(ends)] * (high - low)).tolist()
+        of_slabs = shares[len(ends) :]
         thinnest_mm = max(PEOPLES_MM[0], size_mm + depth_mm + ABOVE_BASE_MM)
         slabs = [NOMINAL]
         for modulus, thickness in zip(of_slabs[::2], of_slabs[1::2], strict=True):
@@ -102,7 +108,7 @@ def scattered(places: int = PLACES) -> list[ScatteredInclusion]:
             wanted_mm = 1 / (1 / PEOPLES_MM[1] + thickness * (1 / thinnest_mm - 1 / PEOPLES_MM[1]))
             thickness_mm = max(round(float(wanted_mm), 1), math.ceil(10 * thinnest_mm) / 10)
             slabs.append(Slab(modulus_kpa, _not_too_near(thickness_mm, slabs)))
-        found.append(ScatteredInclusion(size_mm, depth_mm, tuple(slabs)))
+        found.append(ScatteredInclusion(size_mm, depth_mm, tuple(slabs), *offset_mm))
     return found
 
 
@@ -163,13 +169,15 @@ def as_rows(one: ScatteredInclusion, fields: Array, shapes: Array, mismatches: A
     return SlabRows(*(part[np.isfinite(changes).all(axis=(1, 2))] for part in rows))
 
 
-def fitted(rows: SlabRows) -> tuple[NDArray[np.uint8], Array]:
+def fitted(
+    rows: SlabRows, reaches: Sequence[Sequence[float]] = REACHES, highest: Sequence[int] = HIGHEST
+) -> tuple[NDArray[np.uint8], Array]:
     """Return degrees [N, 6] and shares [N, 5, 2] of the shapes, by least squares over all radii.
 
-    An error counts over the peak of the inclusion's field, and the less the more the slab changes it: near the nominal
-    slab a small change is to be right, too.
+    Which terms count: `REACHES`, `HIGHEST`. An error counts over the peak of the inclusion's field, and the less the
+    more the slab changes it: near the nominal slab a small change is to be right, too.
     """
-    degrees, of_shape = terms_of_shapes()
+    degrees, of_shape = terms_of_shapes(reaches, highest)
     terms, unknowns = LegendreTerms(degrees), sum(int(wanted.sum()) for wanted in of_shape)
     normal, right = np.zeros((2, unknowns, unknowns)), np.zeros((2, unknowns))
     for start in range(0, len(rows.at), ROWS_AT_ONCE):
@@ -206,12 +214,14 @@ def _solved(normal: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(scaled, right / scale) / scale)
 
 
-def terms_of_shapes() -> tuple[NDArray[np.uint8], list[NDArray[np.bool_]]]:
+def terms_of_shapes(
+    reaches: Sequence[Sequence[float]], highest: Sequence[int]
+) -> tuple[NDArray[np.uint8], list[NDArray[np.bool_]]]:
     """Return the degrees [N, 6] of all terms that change with the slab, and which of them each shape has."""
-    furthest = np.minimum(np.max(REACHES, axis=0), HIGHEST)
+    furthest = np.minimum(np.max(reaches, axis=0), highest)
     every = np.array(list(product(*(range(int(one) + 1) for one in furthest))), dtype=np.uint8)
     changes = every[:, SLAB].any(axis=1)
-    of_shape = [changes & ((every / np.array(reach)).sum(axis=1) <= 1 + 1e-9) for reach in REACHES]
+    of_shape = [changes & ((every / np.array(reach)).sum(axis=1) <= 1 + 1e-9) for reach in reaches]
     needed = np.any(of_shape, axis=0)
     return np.asarray(every[needed]), [wanted[needed] for wanted in of_shape]
 

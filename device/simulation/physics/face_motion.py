@@ -55,7 +55,7 @@ class FaceMotion:
         return ramps._replace(
             baseline=replace(ramps.baseline, fields_per_n=baseline),
             inclusion_field=replace(ramps.inclusion_field, fields_per_n=pressed - baseline),
-            nominal_inclusion_field=ramps.nominal_inclusion_field or ramps.inclusion_field,
+            tabulated_inclusion_field=ramps.tabulated_inclusion_field or ramps.inclusion_field,
         )
 
     def _drawn_where_it_is(self, fields: Array, outward_mm: Array) -> Array:

@@ -93,7 +93,7 @@ class LayerTable:
         return ramps._replace(
             baseline=replace(ramps.baseline, fields_per_n=ramps.baseline.fields_per_n + baseline),
             inclusion_field=replace(ramps.inclusion_field, fields_per_n=ramps.inclusion_field.fields_per_n + change),
-            nominal_inclusion_field=ramps.nominal_inclusion_field or ramps.inclusion_field,
+            tabulated_inclusion_field=ramps.tabulated_inclusion_field or ramps.inclusion_field,
         )
 
     def save(self, folder: Path, origin: dict[str, object]) -> None:

@@ -1,9 +1,9 @@
 """Force, position and tilt to the deformation and pressure of the whole face, on one grid of points.
 
-An inclusion off the axis is solved in small strain in the nominal slab, and changes with force and slab as the centred
-one of its elastic mismatch does; moving the centred field instead would be wrong: a probe that cannot turn answers with
-a moment. A tilt adds its own fields; where the pressure would pull the face has lifted, and the rest carries the force.
-What each costs in accuracy: docs/simulated_probe.md.
+An inclusion off the axis is solved in small strain, and changes with the force as the centred one does; moving the
+centred field instead would be wrong: a probe that cannot turn answers with a moment. A tilt adds its own fields; where
+the pressure would pull the face has lifted, and the rest carries the force. What each costs in accuracy:
+docs/simulated_probe.md.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class PressedFace:
         slab: Slab = NOMINAL,
     ) -> None:
         """Pressing far off the axis later raises `InvalidQuantity` for an inclusion that the table does not hold."""
-        self._ramps, self._off_axis, self._equivalent = ramps, off_axis, slab.nominal_equivalent(inclusion)
+        self._ramps, self._off_axis, self._inclusion, self._slab = ramps, off_axis, inclusion, slab
         self._x_mm, self._y_mm = np.broadcast_arrays(x_mm, y_mm)
         from_axis_mm = np.hypot(self._x_mm, self._y_mm)
         self._from_axis = RadialProfiles(ramps.r_mm, from_axis_mm)
@@ -71,11 +71,11 @@ class PressedFace:
         return self._tilted(w_mm, p_kpa, place)
 
     def _growth(self, inclusion_field: Face, force_n: float) -> list[float]:
-        """Return how much larger the centred inclusion's w and p are than nominal in small strain.
+        """Return how much larger the centred inclusion's w and p are than in small strain, as the table has it.
 
         By the root mean square over the face: peaks jump from radius to radius, and the image would with them.
         """
-        small = (self._ramps.nominal_inclusion_field or self._ramps.inclusion_field).at_small_strain(force_n)
+        small = (self._ramps.tabulated_inclusion_field or self._ramps.inclusion_field).at_small_strain(force_n)
         squares = [
             (self._ramps.r_mm @ now**2, self._ramps.r_mm @ before**2)
             for now, before in zip(inclusion_field, small, strict=True)
@@ -84,7 +84,7 @@ class PressedFace:
 
     def _aside_per_n(self, x_mm: float, y_mm: float) -> list[Image]:
         """Return w and p for 1 N of an inclusion at -(x, y) from the axis, but for the centred inclusion's share."""
-        modes = self._off_axis.modes(self._equivalent, float(np.hypot(x_mm, y_mm)))
+        modes = self._off_axis.modes(self._inclusion, float(np.hypot(x_mm, y_mm)), self._slab)
         angle = np.arctan2(self._y_mm, self._x_mm) - np.arctan2(-y_mm, -x_mm)
         cosines = [np.cos(k * angle) for k in range(len(modes[0]))]
         return [

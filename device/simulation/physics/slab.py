@@ -7,7 +7,7 @@ sphere. Source: Eshelby, Proc. R. Soc. A 241 (1957), on the mismatch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 
@@ -35,11 +35,6 @@ class Slab:
         require("tissue_modulus_kpa", self.youngs_modulus_kpa, Bound(*PEOPLES_KPA, "kPa"), action)
         require("slab_thickness_mm", self.thickness_mm, Bound(*PEOPLES_MM, "mm"), action)
 
-    @property
-    def stiffness_ratio(self) -> float:
-        """Young's modulus over the nominal one."""
-        return self.youngs_modulus_kpa / NOMINAL_KPA
-
     def elastic_mismatch(self, youngs_modulus_kpa: float) -> float:
         """Return an inclusion's mismatch in this slab, (E - Et) / (E + 3/2 Et)."""
         return (youngs_modulus_kpa - self.youngs_modulus_kpa) / (youngs_modulus_kpa + 1.5 * self.youngs_modulus_kpa)
@@ -47,10 +42,6 @@ class Slab:
     def modulus_kpa(self, mismatch: float) -> float:
         """Return the Young's modulus of an inclusion of a mismatch below 1 in this slab."""
         return self.youngs_modulus_kpa * (1 + 1.5 * mismatch) / (1 - mismatch)
-
-    def nominal_equivalent(self, inclusion: Inclusion) -> Inclusion:
-        """Return the inclusion that has the same mismatch in the nominal slab: its modulus over `stiffness_ratio`."""
-        return replace(inclusion, youngs_modulus_kpa=inclusion.youngs_modulus_kpa / self.stiffness_ratio)
 
     def require_held(self, inclusion: Inclusion) -> None:
         """Refuse an inclusion that touches the slab's base, or all but does."""
@@ -90,10 +81,7 @@ NOMINAL = Slab()
 
 @dataclass(frozen=True)
 class ChangedSlab(Slab):
-    """Tissue softer or stiffer than that of the slab it is part of.
-
-    Which inclusions it may hold, and of which one the field off the axis has the shape, is as in that slab.
-    """
+    """Tissue softer or stiffer than that of the slab it is part of, whose inclusions it may hold."""
 
     part_of: Slab = NOMINAL
 
@@ -101,7 +89,3 @@ class ChangedSlab(Slab):
     def stated(self) -> Slab:
         """The slab that it is part of."""
         return self.part_of
-
-    def nominal_equivalent(self, inclusion: Inclusion) -> Inclusion:
-        """Return the inclusion that has the mismatch of the stated slab in the nominal one."""
-        return self.part_of.nominal_equivalent(inclusion)

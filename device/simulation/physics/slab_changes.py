@@ -99,8 +99,11 @@ def resampling(from_n: Array, to_n: Array) -> Array:
     return np.array([interpolation_weights(from_n, float(force)) for force in to_n])
 
 
-def coordinates(inclusion: Inclusion, slab: Slab, force_n: Array) -> Array:
-    """Return the coordinates [F, 6] of an inclusion in a slab at forces: size, depth, ln Et, 1/T^2, mismatch, force."""
+def coordinates(inclusion: Inclusion, slab: Slab, last: Array, last_ends: tuple[float, float] = FORCE_N) -> Array:
+    """Return the coordinates [n, 6] of an inclusion in a slab: size, depth, ln Et, 1/T^2, mismatch, and a `last` [n].
+
+    That one is the force (N), unless its ends are those of another quantity.
+    """
     size_mm, depth_mm, modulus_kpa = inclusion.as_tuple()
     squared_per_mm2 = PEOPLES_MM[1] ** -2, PEOPLES_MM[0] ** -2
     of_place = (
@@ -110,8 +113,8 @@ def coordinates(inclusion: Inclusion, slab: Slab, force_n: Array) -> Array:
         slab.thickness_mm**-2,
         slab.elastic_mismatch(modulus_kpa),
     )
-    values = np.column_stack([np.tile(of_place, (len(force_n), 1)), force_n])
-    low, high = np.array([SIZE_MM, DEPTH_MM, np.log(PEOPLES_KPA), squared_per_mm2, (0.0, 1.0), FORCE_N]).T
+    values = np.column_stack([np.tile(of_place, (len(last), 1)), last])
+    low, high = np.array([SIZE_MM, DEPTH_MM, np.log(PEOPLES_KPA), squared_per_mm2, (0.0, 1.0), last_ends]).T
     return np.asarray(2 * (values - low) / (high - low) - 1)
 
 

@@ -62,14 +62,14 @@ class Ramp:
 class PressRamps(NamedTuple):
     """The ramp without an inclusion and what one inclusion adds, at radii `r_mm` [R].
 
-    `nominal_inclusion_field` is what one of the same mismatch adds in the nominal slab, None where that is `inclusion`
-    itself.
+    `tabulated_inclusion_field` is what it adds under the layers and at the place that fields off the axis are tabulated
+    with, None where that is `inclusion_field` itself.
     """
 
     r_mm: Array
     baseline: Ramp
     inclusion_field: Ramp
-    nominal_inclusion_field: Ramp | None = None
+    tabulated_inclusion_field: Ramp | None = None
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,7 @@ class SurfaceTable:
         """Return the ramps of one inclusion in a slab; refuses one outside the table, or at the slab's base."""
         inclusion_field = self.inclusion_field(inclusion, slab)
         baseline = Ramp(self.force_n, self.bare_per_n + self.slabs.baseline_per_n(slab), inclusion_field.largest_n)
-        nominal = None if slab == NOMINAL else self.inclusion_field(slab.nominal_equivalent(inclusion))
-        return PressRamps(self.r_mm, baseline, inclusion_field, nominal)
+        return PressRamps(self.r_mm, baseline, inclusion_field)
 
     def inclusion_field(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
         """Return what an inclusion adds to the ramp in a slab; refuses one outside the table, or at the slab's base."""

@@ -11,15 +11,10 @@ from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.forward.plan import model_plan
 from host_tools.forward.solve import solve
+from host_tools.probe_tables.aside_changes import OFFSETS_MM
+from host_tools.probe_tables.cosine_modes import MODES, cosine_modes
 from host_tools.probe_tables.force_ramps import ring_means
-from host_tools.probe_tables.off_axis_table import (
-    MODES,
-    OFFSETS_MM,
-    POINTS,
-    SMALLEST_SIZE_MM,
-    cosine_modes,
-    off_axis_scene,
-)
+from host_tools.probe_tables.off_axis_table import POINTS, SMALLEST_SIZE_MM, off_axis_scene
 from host_tools.probe_tables.surface_table import inclusion_axes
 from host_tools.scenes.scene import Tissue
 
@@ -36,19 +31,21 @@ TRUTHS = [
             ((12.0, 6.0, 10.0), 5.0, NOMINAL, 0.02),
             ((12.0, 6.0, 60.0), 10.0, NOMINAL, 0.02),
             ((5.4, 5.7, 46.0), 2.7, NOMINAL, 0.02),
-            ((8.0, 5.0, 220.0), 4.0, Slab(20.0), 0.12),
-            ((8.0, 5.0, 55.0), 4.0, Slab(5.0, 17.0), 0.15),
-            ((6.0, 4.5, 220.0), 8.0, Slab(20.0), 0.4),
+            ((8.0, 5.0, 220.0), 4.0, Slab(20.0), 0.02),
+            ((8.0, 5.0, 55.0), 4.0, Slab(5.0, 17.0), 0.03),
+            ((6.0, 4.5, 220.0), 8.0, Slab(20.0), 0.04),
+            ((13.2, 6.1, 25.0), 9.1, Slab(2.75, 56.0), 0.03),
+            ((3.1, 4.3, 9.0), 9.8, Slab(3.5, 17.5), 0.07),
         )
     ),
 ]
-"""Inclusion, offset (mm), slab, and how far off the peak a deformation may be: shapes are the nominal slab's."""
+"""Inclusion, offset (mm), slab, and how far off the peak a deformation may be."""
 
 
 @pytest.mark.parametrize(("truth", "offset_mm", "slab", "bound"), TRUTHS)
 def test_the_face_off_the_axis_is_near_a_fresh_solve(tables, truth, offset_mm, slab, bound):
     """Deformation within 2 % of the peak anywhere in the central window; ring means of pressure 4 % rms, for these jump
-    from mesh to mesh. In other slabs deformations are 15-40 % off: what a slab changes of the shape is left out.
+    from mesh to mesh. In other slabs deformations are up to 6 % off, most beside small inclusions.
     """
     inclusion = Inclusion(*truth)
     scene = off_axis_scene(inclusion, offset_mm, force_n=FORCE_N)
@@ -68,7 +65,7 @@ def test_the_face_off_the_axis_is_near_a_fresh_solve(tables, truth, offset_mm, s
         one - none
         for one, none in zip(
             fields(inclusion, ProbePlacement(x_mm=-offset_mm)),
-            fields(Inclusion(0.0, 5.0, 220.0), ProbePlacement()),
+            fields(replace(inclusion, size_mm=0.0), ProbePlacement()),
             strict=True,
         )
     )
@@ -82,6 +79,15 @@ def test_the_committed_table_is_of_the_points_that_are_solved_now(tables):
     of_inclusions, offsets_mm = inclusion_axes(POINTS[:3], SMALLEST_SIZE_MM), points_with_ends(*OFFSETS_MM, POINTS[3])
     for name, points in (*of_inclusions._asdict().items(), ("offset_mm", offsets_mm)):
         np.testing.assert_allclose(getattr(tables.off_axis, name), points, rtol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(2.0, 60.0), Slab(12.0, 30.0), Slab(27.0, 40.0), Slab(5.0, 17.5)])
+def test_pressures_of_an_inclusion_add_no_force(tables, slab):
+    """The force is the press's own: what an inclusion adds to the mean over the angle carries 0.2 % of it at most."""
+    r_mm, inclusion = tables.off_axis.r_mm, Inclusion(10.0, 6.0, slab.modulus_kpa(0.7))
+    for offset_mm in (2.0, 4.0, 8.0, 14.0):
+        mean_kpa = tables.off_axis.modes(inclusion, offset_mm, slab)[1, 0]
+        assert abs(np.trapezoid(2e-3 * np.pi * r_mm * mean_kpa, r_mm)) < 0.002
 
 
 def test_cosine_modes_of_a_cosine_series_are_its_coefficients():

@@ -13,6 +13,7 @@ from host_tools.probe_tables import slab_changes as module
 from host_tools.probe_tables.force_ramps import FORCES_N
 from host_tools.probe_tables.slab_changes import (
     APART_MM,
+    HIGHEST,
     MODULI_KPA,
     PLACES,
     REACHES,
@@ -60,7 +61,7 @@ def test_fewer_places_are_the_first_of_more():
 
 def test_there_are_more_slabs_than_terms_of_a_share_at_one_force_and_mismatch():
     """Of each slab, fields at many radii, three mismatches and five forces tell the shares of all shapes."""
-    degrees, of_shape = terms_of_shapes()
+    degrees, of_shape = terms_of_shapes(REACHES, HIGHEST)
     at_one = of_shape[0] & ~degrees[:, 4:].any(axis=1)
     assert 3 * at_one.sum() < PLACES * SLABS_A_PLACE
     assert degrees[:, 2:4].any(axis=1).all()  # a term of the inclusion alone changes nothing

@@ -15,7 +15,7 @@ from device.simulation.physics.off_axis_table import load_off_axis_table
 from device.simulation.physics.surface_table import load_surface_table
 from device.simulation.virtual_probe import SIMULATED_PROBE_SHA256, ProbeTables, probe_of_table, table_record
 from host_tools.optics.build_lookup import write_light_table
-from host_tools.probe_tables import off_axis_table, slab_changes, surface_table
+from host_tools.probe_tables import aside_changes, off_axis_table, slab_changes, surface_table
 from host_tools.scenes.probe_file import probe_text, simulated_probe
 
 OWN = simulated_probe()
@@ -47,6 +47,7 @@ def built(monkeypatch, tmp_path):
         (slab_changes, "slab_change_per_n"),
         (slab_changes, "inclusion_in_slabs"),
         (off_axis_table, "inclusions_per_n_mm3"),
+        (aside_changes, "aside_in_slabs"),
         (off_axis_table, "tilt_per_degree"),
     ):
         once(monkeypatch, module, name)

@@ -74,18 +74,11 @@ def test_another_slab_adds_its_change_at_the_same_elastic_mismatch_and_force(sma
     np.testing.assert_allclose(ramps.baseline.at(0.3).w_mm, without * 0.3 * (0.4 + R_MM / 20), rtol=1e-6)
 
 
-def test_the_nominal_slab_has_no_change_and_is_its_own_reference(small_table):
+def test_the_nominal_slab_has_no_change(small_table):
     inclusion = Inclusion(9.0, 5.0, 99.0)
     before, after = small_table.ramps(inclusion), small_table.ramps(inclusion, Slab(5.0, 30.0))
     np.testing.assert_array_equal(after.baseline.fields_per_n, small_table.bare_per_n)
     np.testing.assert_array_equal(after.inclusion_field.fields_per_n, before.inclusion_field.fields_per_n)
-    assert after.nominal_inclusion_field is None
-
-
-def test_in_another_slab_the_reference_is_the_inclusion_of_the_same_elastic_mismatch_in_the_nominal_one(small_table):
-    reference = small_table.ramps(Inclusion(9.0, 5.0, 80.0), Slab(4.0)).nominal_inclusion_field
-    expected = small_table.inclusion_field(Inclusion(9.0, 5.0, 100.0))
-    np.testing.assert_allclose(reference.fields_per_n, expected.fields_per_n, rtol=1e-12)
 
 
 def test_an_inclusion_smaller_than_the_tables_smallest_shrinks_with_its_volume(small_table):
