@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
+from device.simulation.physics.off_axis_table import OffAxisTable
+from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.probe_tables import ellipsoid as module
-from host_tools.probe_tables.ellipsoid import UNDER_THE_PROBE_MM, stretched_inclusion
+from host_tools.probe_tables.ellipsoid import UNDER_THE_PROBE_MM, StretchedInclusion, stretched_inclusion
 from host_tools.scenes.scene import Placement, Scene
 
 INCLUSION, OFFSET_MM = Inclusion(8.0, 5.0, 80.0), 1.0
@@ -34,6 +36,18 @@ def test_far_beside_it_the_probe_meets_its_own_sphere(tables, longer):
     away_mm = UNDER_THE_PROBE_MM + 0.01
     np.testing.assert_array_equal(longer.modes(INCLUSION, away_mm), tables.off_axis.modes(INCLUSION, away_mm))
     assert longer.centred_share(OFFSET_MM) == tables.off_axis.centred_share(OFFSET_MM)
+
+
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(20.0, 40.0), NOMINAL.changed(0.9)])
+def test_the_stretch_grows_with_the_slab_as_the_sphere_does(tables, slab):
+    own = {name: getattr(tables.off_axis, name) for name in OffAxisTable.__dataclass_fields__}
+    stretch_per_n = tables.off_axis.modes(INCLUSION, 3.0)
+    found = StretchedInclusion(**own, stretch_per_n=stretch_per_n).modes(INCLUSION, OFFSET_MM, slab)
+    added, growth = found - tables.off_axis.modes(INCLUSION, OFFSET_MM, slab), 1.0
+    if slab != NOMINAL:
+        growth = tables.off_axis.growth_with(slab, INCLUSION, OFFSET_MM)[:, None, None]
+        assert (growth != 1).all()
+    np.testing.assert_allclose(added, growth * stretch_per_n, atol=1e-12)
 
 
 def test_the_sphere_beside_it_is_of_the_same_scene(tables, monkeypatch):
