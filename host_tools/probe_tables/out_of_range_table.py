@@ -27,7 +27,7 @@ from device.measurement.ramp_modes.surrogate import far_field_strength
 from device.simulation.physics.chebyshev import interpolated, points_with_ends
 from device.simulation.physics.inclusion_axes import ACTION as CHOOSE
 from device.simulation.physics.off_axis_table import OffAxisTable
-from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, Slab
 from device.simulation.physics.surface_table import Ramp, SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.probe_tables.aside_changes import OFFSETS_MM
@@ -39,7 +39,7 @@ from host_tools.scenes.scene import Press, Scene
 
 NAME, SCHEMA = "wide_table", "tsis.wide_table/1"
 ACTION = "run `host_tools table --part wide` to make it again"
-SIZES_MM, SHALLOWEST_MM = (1.2, 18.0), 3.0
+SIZES_MM, SHALLOWEST_MM, ROUNDING_MM = (1.2, 18.0), 3.0, 1e-9
 POINTS, ASIDE_POINTS = (8, 9, 3), (6, 6, 2)
 """Points in size, depth and mismatch, on the axis and beside it."""
 SMALLEST_ASIDE_MM = 1.8
@@ -94,10 +94,11 @@ class WideSurfaceTable(SurfaceTable):
     wide: Array
 
     def inclusion_field(self, inclusion: Inclusion, slab: Slab = NOMINAL) -> Ramp:
-        """Return what an inclusion adds to the ramp in a slab; refuses one that is not among the wide ones."""
-        near = nearest(inclusion, self)
+        """Return what an inclusion adds to the ramp; refuses what is not among the wide ones, or not above the base."""
+        near = nearest(inclusion, self, slab)
         own = super().inclusion_field(near, slab)
         fields_per_n = self.wide_axes.carried_on(own.fields_per_n, self.wide, inclusion, near, slab)
+        slab.require_held(inclusion)
         return replace(own, fields_per_n=fields_per_n)
 
 
@@ -110,19 +111,20 @@ class WideOffAxisTable(OffAxisTable):
 
     def _modes(self, inclusion: Inclusion, offset_mm: float, slab: Slab) -> Array:
         require("offset_mm", offset_mm, Bound(0.0, ASIDE_MM, "mm"), "press nearer to the inclusion")
-        near = nearest(inclusion, self)
+        near = nearest(inclusion, self, slab)
         own = super()._modes(near, offset_mm, slab)
         return self.wide_axes.carried_on(own, self.wide, inclusion, near, slab)
 
 
-def nearest(inclusion: Inclusion, table: SurfaceTable | OffAxisTable) -> Inclusion:
-    """Return the inclusion of the probe's own table that is nearest in size and depth."""
-    size_mm, depth_mm, _ = inclusion.as_tuple()
-    return replace(
-        inclusion,
-        size_mm=float(np.clip(size_mm, table.size_mm[0], table.size_mm[-1])),
-        depth_mm=float(np.clip(depth_mm, table.depth_mm[0], table.depth_mm[-1])),
+def nearest(inclusion: Inclusion, table: SurfaceTable | OffAxisTable, slab: Slab) -> Inclusion:
+    """Return the inclusion of the probe's own table that is nearest in size and depth, and lies above the base."""
+    size_mm, depth_mm = (
+        float(np.clip(value, ends[0], ends[-1]))
+        for value, ends in ((inclusion.size_mm, table.size_mm), (inclusion.depth_mm, table.depth_mm))
     )
+    if depth_mm > inclusion.depth_mm:
+        size_mm = min(size_mm, slab.thickness_mm - ABOVE_BASE_MM - ROUNDING_MM - depth_mm)
+    return replace(inclusion, size_mm=size_mm, depth_mm=depth_mm)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 from device.measurement.parameters import RANGES
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.ramp_modes.surrogate import far_field_strength
-from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, Slab
 from host_tools.probe_tables import out_of_range_table
 from host_tools.probe_tables.out_of_range_table import (
     ASIDE_MM,
@@ -114,10 +114,10 @@ def test_an_inclusion_inside_is_the_probes_own(built, tables, slab):
 
 
 @pytest.mark.parametrize("one", OUTSIDE)
-@pytest.mark.parametrize("slab", [NOMINAL, Slab(5.5, 28.0)])
+@pytest.mark.parametrize("slab", [NOMINAL, Slab(5.5, 32.0)])
 def test_beyond_the_probes_own_table_the_wide_fields_carry_it_on(built, tables, one, slab):
     """From the nearest inclusion inside, as strong as far away; pressure is twice the deformation on paper."""
-    near = nearest(one, tables.centred)
+    near = nearest(one, tables.centred, slab)
     ratio = far_field_strength(one.size_mm, one.depth_mm) / far_field_strength(near.size_mm, near.depth_mm)
     gained = on_paper(one, slab) - ratio * on_paper(near, slab)
     expected = (
@@ -131,7 +131,7 @@ def test_beyond_the_probes_own_table_the_wide_fields_carry_it_on(built, tables, 
 @pytest.mark.parametrize("one", OUTSIDE)
 @pytest.mark.parametrize("slab", [NOMINAL, Slab(5.5, 28.0)])
 def test_an_inclusion_beside_the_axis_is_carried_on_likewise(built, tables, one, slab):
-    near = nearest(one, tables.off_axis)
+    near = nearest(one, tables.off_axis, slab)
     ratio = far_field_strength(one.size_mm, one.depth_mm) / far_field_strength(near.size_mm, near.depth_mm)
     scaled = [
         of_smallest(one, SMALLEST_ASIDE_MM, slab.elastic_mismatch(one.youngs_modulus_kpa))
@@ -143,6 +143,20 @@ def test_an_inclusion_beside_the_axis_is_carried_on_likewise(built, tables, one,
     expected = ratio * tables.off_axis.modes(near, ASIDE_MM, slab) + gained
     found = built.around(tables).off_axis.modes(one, ASIDE_MM, slab)
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
+
+
+def test_in_a_thin_slab_the_nearest_inclusion_lies_above_the_base_as_well(built, tables):
+    """Nearest in depth alone it would go through: a large one 3 mm deep, where the probe's own table begins at 4 mm."""
+    one, thin = Inclusion(11.0, 3.0, 60.0), Slab(5.0, 15.05)
+    near = nearest(one, tables.centred, thin)
+    assert (near.size_mm, near.depth_mm) == (pytest.approx(15.05 - ABOVE_BASE_MM - 4.0), 4.0)
+    assert np.isfinite(built.around(tables).centred.inclusion_field(one, thin).fields_per_n).all()
+    assert nearest(one, tables.centred, NOMINAL).size_mm == one.size_mm
+
+
+def test_an_inclusion_through_the_base_of_a_thin_slab_is_refused(built, tables):
+    with pytest.raises(InvalidQuantity, match=r"^depth_mm \+ size_mm is 18\.0, .* at most 15 mm"):
+        built.around(tables).centred.inclusion_field(Inclusion(6.0, 12.0, 60.0), Slab(5.0, 16.0))
 
 
 def test_nothing_jumps_at_the_ends_of_the_probes_own_table(built, tables):
