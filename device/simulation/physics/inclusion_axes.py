@@ -15,6 +15,8 @@ from device.simulation.physics.chebyshev import interpolated, interpolation_weig
 from device.simulation.physics.slab import Slab
 
 ACTION = "choose an inclusion inside the table's range"
+ROUNDING = 1e-6
+"""An inclusion at the very end of the mismatch is held: files keep that end in single precision."""
 
 
 class InclusionAxes(NamedTuple):
@@ -60,4 +62,5 @@ class InclusionAxes(NamedTuple):
         softest, stiffest = (slab.stated.modulus_kpa(float(end)) for end in self.elastic_mismatch[[0, -1]])
         require("size_mm", size_mm, Bound(0.0, float(self.size_mm[-1]), "mm"), ACTION)
         require("depth_mm", depth_mm, Bound(float(self.depth_mm[0]), float(self.depth_mm[-1]), "mm"), ACTION)
-        require("youngs_modulus_kpa", modulus_kpa, Bound(softest, stiffest, "kPa"), ACTION)
+        ends_kpa = Bound(softest * (1 - ROUNDING), stiffest * (1 + ROUNDING), "kPa")
+        require("youngs_modulus_kpa", modulus_kpa, ends_kpa, ACTION)

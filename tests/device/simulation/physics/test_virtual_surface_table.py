@@ -108,7 +108,7 @@ def test_small_strain_is_the_smallest_force_in_proportion(small_table):
 def test_the_committed_table_holds_every_corner_of_its_range_in_every_slab(table, slab):
     for size_mm in (0.0, 15.0):
         for depth_mm in (4.0, 12.0):
-            for mismatch in (0.11, 0.95):
+            for mismatch in (0.1, 0.96):
                 ramps = table.ramps(Inclusion(size_mm, depth_mm, slab.modulus_kpa(mismatch)), slab)
                 assert np.isfinite([ramp.at(0.5) for ramp in (ramps.baseline, ramps.inclusion_field)]).all()
 
