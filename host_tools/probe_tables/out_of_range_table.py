@@ -39,10 +39,12 @@ from host_tools.scenes.scene import Press, Scene
 
 NAME, SCHEMA = "wide_table", "tsis.wide_table/1"
 ACTION = "run `host_tools table --part wide` to make it again"
-SIZES_MM, SHALLOWEST_MM, ROUNDING_MM = (1.2, 18.0), 3.0, 1e-9
+SIZES_MM, SHALLOWEST_MM = (1.2, 18.0), 3.0
 POINTS, ASIDE_POINTS = (8, 9, 3), (6, 6, 2)
 """Points in size, depth and mismatch, on the axis and beside it."""
 SMALLEST_ASIDE_MM = 1.8
+ROUNDING_MM = 1e-9
+"""Room that is left above the base, so that a sum of depth and size does not round through it."""
 ASIDE_MM = OFFSETS_MM[0]
 """The first offset of the probe's own table: nearer the axis an inclusion's field fades into the centred one's."""
 DEEPEST_MM, BEND_MM, BENT_OVER_MM = 17.9, 11.5, 1 / 0.7
@@ -98,7 +100,7 @@ class WideSurfaceTable(SurfaceTable):
         near = nearest(inclusion, self, slab)
         own = super().inclusion_field(near, slab)
         fields_per_n = self.wide_axes.carried_on(own.fields_per_n, self.wide, inclusion, near, slab)
-        slab.require_held(inclusion)
+        slab.require_held(inclusion)  # last: what no slab holds is refused for its own size or depth
         return replace(own, fields_per_n=fields_per_n)
 
 

@@ -16,7 +16,7 @@ from device.simulation.physics.slab import Slab
 
 ACTION = "choose an inclusion inside the table's range"
 ROUNDING = 1e-6
-"""An inclusion at the very end of the mismatch is held: files keep that end in single precision."""
+"""An inclusion at either end of the mismatch is held: files keep the ends in single precision."""
 
 
 class InclusionAxes(NamedTuple):
