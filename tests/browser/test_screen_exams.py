@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from daemon_process import QUICK_HAND, Daemon
+from daemon_process import QUICK_HAND, Daemon, wait_for
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
 
@@ -59,6 +60,36 @@ def test_a_page_that_shows_an_old_exam_does_not_measure_but_shows_it_anew(page: 
     assert wrong_in(page) == []
     page.locator("#press-button").click()
     expect(page.locator("#press-button")).to_have_text("Cancel")
+
+
+def test_what_is_typed_is_there_again_when_the_connection_comes_back(page: Page, daemon: Daemon):
+    page.goto(daemon.url)
+    page.locator("#exam-button").click()
+    page.locator("#patient-ref").fill("A-17")
+    daemon.process.send_signal(signal.SIGSTOP)
+    expect(page.locator("#connection-lost")).to_be_visible()
+    expect(page.locator("dialog[open]")).to_have_count(0)
+    daemon.process.send_signal(signal.SIGCONT)
+    expect(page.locator("#connection-lost")).to_be_hidden()
+    expect(page.locator("#chooser")).to_be_visible()
+    expect(page.locator("#patient-ref")).to_have_value("A-17")
+    page.locator("#free-press").click()
+    expect(page.locator("#free-yes")).to_be_visible()
+
+
+def test_a_press_that_began_meanwhile_stays_in_sight_when_the_connection_comes_back(page: Page, daemon: Daemon):
+    page.goto(daemon.url)
+    page.locator("#menu-open").click()
+    page.route("**/api/v1/events", lambda route: route.abort())
+    with page.expect_event("requestfailed"):
+        daemon.process.send_signal(signal.SIGSTOP)
+    daemon.process.send_signal(signal.SIGCONT)
+    wait_for(lambda: daemon.ask("/api/v1/status").json["step"], lambda step: step == "ready")
+    assert daemon.ask("/api/v1/presses", "POST", {}).status == 202
+    expect(page.locator("#connection-lost")).to_be_visible()
+    page.unroute("**/api/v1/events")
+    expect(page.locator("#press-button")).to_have_text("Cancel")
+    expect(page.locator("dialog[open]")).to_have_count(0)
 
 
 def test_a_scanner_fills_in_the_patient_and_its_enter_presses_nothing(page: Page, daemon: Daemon):

@@ -44,6 +44,7 @@ let status = null;
 let offersAreKnown = false;
 let loading = false;
 let sending = false;
+let underCurtain = []; // dialogs that lay open when the connection was lost: what is typed there is not lost with it
 let told = null; // {word, reason, tone, service}: what came of the last command
 let service = ""; // the daemon's own words behind what is said now
 
@@ -229,12 +230,15 @@ function showConnection(lost) {
   byId("connection-lost").dataset.tone = absenceWords() ? "caution" : "bad";
   byId("connection-lost").hidden = !lost;
   for (const id of ["main", ...AROUND]) byId(id).inert = lost || (id !== "main" && pressUnderWay());
-  if (lost) closeDialogs(); // they lie above everything
+  if (lost) underCurtain.push(...closeDialogs()); // they lie above everything
+  else for (const dialog of underCurtain.splice(0)) dialog.showModal();
   if (lost) offersAreKnown = false; // whoever comes back may be another probe
 }
 
 function closeDialogs() {
-  for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();
+  const open = [...document.querySelectorAll("dialog[open]")];
+  for (const dialog of open) dialog.close();
+  return open;
 }
 
 function tell(next) {
@@ -252,7 +256,10 @@ function tellRefusal({ message, code, service: words }) {
 function follow(before, next) {
   const isNow = UNDER_WAY.has(next.press?.state);
   const began = isNow && !UNDER_WAY.has(before?.press?.state);
-  if (began) closeDialogs();
+  if (began) {
+    closeDialogs();
+    underCurtain = [];
+  }
   if (began) dismiss(next);
   if (before && before.guidance.code !== next.guidance.code && SOUNDS[next.guidance.code]) sound(SOUNDS[next.guidance.code]);
   stayAwake(isNow);
