@@ -21,6 +21,7 @@ from onnxruntime.capi import onnxruntime_pybind11_state as runtime_errors
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode, ModeWorth
+from device.measurement.parameters import NUISANCES, RANGES
 from device.measurement.quantities import UNKNOWNS, Bound, InvalidQuantity
 
 SCHEMA = "tsis.model/1"
@@ -125,6 +126,15 @@ class ModelCard:
     def ranges(self, group: str, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
         """Return (low, high) of each name under training_range."""
         return {name: self._range(f"training_range.{group}", name) for name in names}
+
+    def require_known_ranges(self) -> None:
+        """Refuse a network of other ranges of unknowns and nuisances: its coordinates mean something else here."""
+        for group, names in (("unknowns", UNKNOWNS), ("nuisances", NUISANCES)):
+            for name, (low, high) in self.ranges(group, names).items():
+                known = RANGES[name]
+                if (low, high) != (known.low, known.high):
+                    bound = f"{known.low:g} to {known.high:g}: install models that this software was released with"
+                    self.refuse(f"training_range.{group}.{name}", f"{low:g} to {high:g}", bound)
 
     def _range(self, group: str, name: str) -> tuple[float, float]:
         values, path = self.of(group, list, name), f"{group}.{name}"

@@ -1,8 +1,9 @@
 """What a press depends on: the three unknowns, and the nuisances that nobody tells the probe.
 
-Every model of a press - surrogate, networks, limits - takes them in this order and inside these ranges. A range is also
-the prior: nothing else is known before the probe touches. `offset_mm` is how far the inclusion's middle lies beside the
-probe's axis.
+Every model of a press - surrogate, networks, limits - takes them in this order and inside these ranges, of what is
+possible in them: an inclusion is stiffer than its tissue and lies above the slab's base. That is also the prior:
+nothing else is known before the probe touches. `offset_mm` is how far the inclusion's middle lies beside the probe's
+axis.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
@@ -27,14 +29,20 @@ RANGES: dict[str, Range] = {
     "size_mm": Range(2.0, 15.0),
     "depth_mm": Range(4.0, 12.0),
     "youngs_modulus_kpa": Range(10.0, 160.0, by_ratio=True),
-    "tissue_modulus_kpa": Range(4.0, 6.0),
-    "slab_thickness_mm": Range(27.0, 33.0),
+    "tissue_modulus_kpa": Range(2.0, 30.0, by_ratio=True),
+    "slab_thickness_mm": Range(15.0, 60.0, by_ratio=True),
     "contact_pressure_kpa": Range(1.5, 2.7, by_ratio=True),
     "albedo": Range(0.4, 0.6),
     "spread_mm": Range(0.8, 1.25, by_ratio=True),
     "offset_mm": Range(0.0, 2.0),
 }
-"""Tissue +-20 %, slab +-10 % about the paper's; skin +-30 % in its contact law, +-20 % in its light."""
+"""Tissue that people have; skin +-30 % in its contact law, +-20 % in its light."""
+NEAR_NOMINAL = RANGES | {"tissue_modulus_kpa": Range(4.0, 6.0, True), "slab_thickness_mm": Range(27.0, 33.0, True)}
+"""The same near the nominal tissue, where it is known what other layers of the waveguide and its motion do."""
+ELASTIC_MISMATCHES = (0.1, 0.96)
+"""Of an inclusion with its tissue: from 1.3 to 61 times as stiff. What is softer does not show as an inclusion."""
+ABOVE_BASE_MM = 1.0
+"""An inclusion ends at least this far above the slab's base."""
 PARAMETERS = tuple(RANGES)
 COUNT = len(UNKNOWNS)
 NUISANCES = PARAMETERS[COUNT:]
@@ -53,6 +61,19 @@ NOMINAL = {
 }
 
 
+def elastic_mismatch(modulus_kpa: Array, tissue_kpa: Array) -> Array:
+    """Return (E - Et) / (E + 3/2 Et), the dipole strength of an incompressible sphere (Eshelby 1957)."""
+    return np.asarray((modulus_kpa - tissue_kpa) / (modulus_kpa + 1.5 * tissue_kpa))
+
+
+def is_possible(values: Array) -> NDArray[np.bool_]:
+    """Return whether parameters [..., 9] are of an inclusion stiffer than its tissue that lies above the base."""
+    size_mm, depth_mm, modulus_kpa, tissue_kpa, slab_mm = np.moveaxis(values, -1, 0)[: COUNT + 2]
+    mismatch, (least, most) = elastic_mismatch(modulus_kpa, tissue_kpa), ELASTIC_MISMATCHES
+    is_above = size_mm + depth_mm <= slab_mm - ABOVE_BASE_MM
+    return np.asarray((least <= mismatch) & (mismatch <= most) & is_above)
+
+
 def normalise(values: Array) -> Array:
     """Return parameters [..., 9] as coordinates that are -1 and 1 at the ends of their ranges."""
     low, high = _evenly(LOW), _evenly(HIGH)
@@ -65,6 +86,19 @@ def denormalise(normalised: Array) -> Array:
     values = low + (normalised + 1) / 2 * (high - low)
     values[..., BY_RATIO] = np.exp(values[..., BY_RATIO])
     return np.where(normalised == -1, LOW, np.where(normalised == 1, HIGH, values))
+
+
+class Box(NamedTuple):
+    """Middle and half width [9] of ranges, in coordinates."""
+
+    middle: Array
+    half: Array
+
+
+def box_of(ranges: dict[str, Range]) -> Box:
+    """Return where ranges lie, by the name of each parameter; that of `RANGES` is 0 and 1."""
+    low, high = (normalise(np.array([getattr(ranges[name], end) for name in RANGES])) for end in ("low", "high"))
+    return Box((low + high) / 2, (high - low) / 2)
 
 
 def normalise_unknowns(values: Array) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, PARAMETERS, normalise
+from device.measurement.parameters import COUNT, EVEN_STD, HIGH, LOW, NOMINAL, PARAMETERS, is_possible, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.surrogate import MODULUS
@@ -38,7 +38,8 @@ def least_errors(answers: RampAnswers, mode: Mode, truth: Inclusion, nuisances: 
     """
     at = {**NOMINAL, **nuisances, **vars(truth)}
     parameters = np.array([at[name] for name in PARAMETERS])
-    if mode != "standard" or not np.all((parameters >= LOW) & (parameters <= HIGH)):
+    is_inside = np.all((parameters >= LOW) & (parameters <= HIGH)) and is_possible(parameters)
+    if mode != "standard" or not is_inside:
         return np.full(COUNT, np.nan)
     (row,), (jacobian,) = answers.surrogate.rows_and_jacobian(normalise(parameters)[None])
     return cramer_rao(jacobian, answers.noise.covariance(row), BOX_STD).std[:COUNT]

@@ -56,8 +56,8 @@ class PressProtocol:
     strain: RampStrain = "finite"
     offsets_mm: tuple[float, ...] = ()
     mean_level_counts: float = 100.0
-    tissue_modulus_spread_ratio: float = 0.115
-    thickness_spread_ratio: float = 0.058
+    tissue_modulus_spread_ratio: float = 0.78
+    thickness_spread_ratio: float = 0.4
     contact_law_spread_ratio: float = 0.17
     albedo_spread_ratio: float = 0.115
     scattering_spread_ratio: float = 0.13

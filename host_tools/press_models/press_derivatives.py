@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, normalise
+from device.measurement.parameters import HIGH, LOW, NEAR_NOMINAL, PARAMETERS, normalise
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
@@ -81,7 +82,7 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
     return worlds[name]()
 
 
-NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/1"
+NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/2"
 ACTION = "run `host_tools table --part derivatives` to make it again"
 
 
@@ -127,8 +128,17 @@ def sampled_derivatives(
     What is missed [COUNT] is the root mean square, over columns and one in six of the presses, which are kept apart and
     lie near the inclusion, over that of the changes. Raises `InvalidQuantity` for too few presses.
     """
-    near, missed = _region(tables, count, draw_parameters, (float(LOW[OFFSET]), float(HIGH[OFFSET])), seed, jobs)
-    beside, _ = _region(tables, count, draw_beside, (float(HIGH[OFFSET]), BESIDE_TO_MM), seed + 1, jobs)
+    near, missed = _region(
+        tables,
+        count,
+        partial(draw_parameters, ranges=NEAR_NOMINAL),
+        (float(LOW[OFFSET]), float(HIGH[OFFSET])),
+        seed,
+        jobs,
+    )
+    beside, _ = _region(
+        tables, count, partial(draw_beside, ranges=NEAR_NOMINAL), (float(HIGH[OFFSET]), BESIDE_TO_MM), seed + 1, jobs
+    )
     return RowDerivatives(near, beside), missed
 
 

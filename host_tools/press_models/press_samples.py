@@ -15,8 +15,8 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, NUISANCES, PARAMETERS, denormalise
-from device.measurement.quantities import Inclusion
+from device.measurement.parameters import HIGH, PARAMETERS, RANGES, Range, box_of, denormalise, is_possible
+from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, first_harmonic, second_harmonic
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.pixel_scale import PixelScale
@@ -27,7 +27,7 @@ from device.simulation.physics.image_formation import ScatteredImage
 from device.simulation.physics.lens import Lens
 from device.simulation.physics.pressed_face import PressedFace, ProbePlacement
 from device.simulation.physics.skin import Skin
-from device.simulation.physics.slab import ABOVE_BASE_MM, Slab
+from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.physics.world_face import WorldFace
@@ -42,6 +42,8 @@ INCLUSIONS_A_SKIN = 3
 CHUNK = 24
 BESIDE_TO_MM = 8.0
 """Largest offset of a press of a scan: three millimetres from the rim of the face."""
+MOST_DRAWS = 1000
+"""So often tissue is drawn again for inclusions that are told, before they are refused."""
 
 
 class Draw(Protocol):
@@ -67,28 +69,48 @@ class PressSamples:
         return PressSamples(self.parameters[of], self.rows[of], self.direction_rad[of])
 
 
-def draw_parameters(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
-    """Return parameters [count, 9], even over their ranges; the offset is even over its disk.
+def draw_parameters(
+    count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1, ranges: dict[str, Range] = RANGES
+) -> Array:
+    """Return parameters [count, 9], even over ranges; the offset is even over its disk.
 
-    Consecutive `inclusions_a_skin` rows share tissue and skin. Inclusions that would touch the slab's base are drawn
-    again.
+    Consecutive `inclusions_a_skin` rows share tissue and skin. What is not possible is drawn again: all of it, or the
+    inclusion alone where others share its tissue.
     """
-    unknowns = len(PARAMETERS) - len(NUISANCES)
-    normalised = rng.uniform(-1, 1, (count, len(PARAMETERS)))
-    normalised[:, unknowns:] = np.repeat(normalised[::inclusions_a_skin, unknowns:], inclusions_a_skin, axis=0)[:count]
-    normalised[:, -1] = 2 * np.sqrt(rng.uniform(0, 1, count)) - 1
-    values = denormalise(normalised)
-    while (
-        buried := values[:, 0] + values[:, 1] > values[:, PARAMETERS.index("slab_thickness_mm")] - ABOVE_BASE_MM
-    ).any():
-        normalised[buried, :2] = rng.uniform(-1, 1, (buried.sum(), 2))
-        values = denormalise(normalised)
+    unknowns, (middle, half) = len(UNKNOWNS), box_of(ranges)
+    drawn_again = slice(0, unknowns) if inclusions_a_skin > 1 else slice(0, OFFSET)
+    at = rng.uniform(-1, 1, (count, len(PARAMETERS)))
+    at[:, unknowns:] = np.repeat(at[::inclusions_a_skin, unknowns:], inclusions_a_skin, axis=0)[:count]
+    at[:, OFFSET] = 2 * np.sqrt(rng.uniform(0, 1, count)) - 1
+    values = denormalise(middle + half * at)
+    while (impossible := ~is_possible(values)).any():
+        at[impossible, drawn_again] = rng.uniform(-1, 1, (int(impossible.sum()), drawn_again.stop))
+        values = denormalise(middle + half * at)
     return values
 
 
-def draw_beside(count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1) -> Array:
+def draw_around(inclusions: Array, rng: np.random.Generator, *, ranges: dict[str, Range] = RANGES) -> Array:
+    """Return parameters [n, 9] of inclusions [n, 3] in tissue and under skins that are drawn, where that is possible.
+
+    Raises `InvalidQuantity` for one that is possible in no tissue of the ranges.
+    """
+    parameters = draw_parameters(len(inclusions), rng, ranges=ranges)
+    parameters[:, : len(UNKNOWNS)] = inclusions
+    for _ in range(MOST_DRAWS):
+        if not (impossible := ~is_possible(parameters)).any():
+            return parameters
+        again = draw_parameters(int(impossible.sum()), rng, ranges=ranges)
+        parameters[impossible, len(UNKNOWNS) :] = again[:, len(UNKNOWNS) :]
+    size_mm, depth_mm, modulus_kpa = parameters[impossible][0, : len(UNKNOWNS)]
+    stated = f"{size_mm:.3g} mm, {depth_mm:.3g} mm deep, {modulus_kpa:.3g} kPa"
+    raise InvalidQuantity("inclusion", stated, "possible in some tissue of the ranges", "choose another")
+
+
+def draw_beside(
+    count: int, rng: np.random.Generator, *, inclusions_a_skin: int = 1, ranges: dict[str, Range] = RANGES
+) -> Array:
     """Return the same [count, 9], but for offsets that are even from where those of one press end to `BESIDE_TO_MM`."""
-    values = draw_parameters(count, rng, inclusions_a_skin=inclusions_a_skin)
+    values = draw_parameters(count, rng, inclusions_a_skin=inclusions_a_skin, ranges=ranges)
     values[:, OFFSET] = rng.uniform(HIGH[OFFSET], BESIDE_TO_MM, count)
     return values
 

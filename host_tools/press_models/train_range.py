@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from device.measurement.arrays import Array, Single
-from device.measurement.parameters import PARAMETERS, normalise
+from device.measurement.parameters import ABOVE_BASE_MM, PARAMETERS, normalise
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.surrogate import (
@@ -31,7 +31,6 @@ from device.measurement.ramp_modes.surrogate import (
     polynomial_coordinates,
     turned,
 )
-from device.simulation.physics.slab import ABOVE_BASE_MM
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.dense_network import DenseLayer, InputScaling, activations_of, backward
 from host_tools.press_models.fit_surrogate import INCLUSION_REACH, fit_polynomials
@@ -46,8 +45,11 @@ SIZES, DEPTHS = (1.5, SIZES_MM[1]), (SHALLOWEST_MM, deepest_mm(1.5))
 PLACE = slice(SIZE, DEPTH + 1)
 THICKNESS = PARAMETERS.index("slab_thickness_mm")
 ENDS: Array = np.array([SIZES, DEPTHS])
-REACH, HIGHEST = INCLUSION_REACH | {"size_mm": 22.0, "depth_mm": 20.0}, {"size_mm": 11, "depth_mm": 11}
-"""Degrees as those of the probe's own surrogate, but higher in size and depth, whose ranges are wider.
+OTHERS_RATIO = 0.74
+REACH = {name: OTHERS_RATIO * reach for name, reach in INCLUSION_REACH.items()} | {"size_mm": 22.0, "depth_mm": 20.0}
+HIGHEST, TERMS = {"size_mm": 11, "depth_mm": 11}, 1600
+"""Degrees are higher than those of the probe's own surrogate in size and depth, whose ranges are wider, and lower in
+what else there is: these networks only ask on which side of an end a press lies. So many terms are kept.
 
 Still higher ones follow presses kept apart worse, where the largest and deepest inclusions are few.
 """
@@ -57,7 +59,7 @@ Still higher ones follow presses kept apart worse, where the largest and deepest
 class RangeBudget:
     """How many presses go into each step; the defaults take some twenty minutes on two cores."""
 
-    presses: int = 8_000
+    presses: int = 11_200
     held_out: int = 300
     trained_on: int = 200_000
     members: int = 2
@@ -110,7 +112,7 @@ def train_range(
 def wide_surrogate(samples: PressSamples, detail_ratio: float = 1.0) -> WideSurrogate:
     """Return the polynomials of presses in and around the ranges; as `fit_polynomials`."""
     at = wide_coordinates(samples.parameters)
-    return WideSurrogate(*fit_polynomials(samples, at, REACH, HIGHEST, detail_ratio=detail_ratio))
+    return WideSurrogate(*fit_polynomials(samples, at, REACH, HIGHEST, terms=TERMS, detail_ratio=detail_ratio))
 
 
 def wide_press_set(surrogate: WideSurrogate, noise: PressNoise, count: int, seed: int) -> PressSet:

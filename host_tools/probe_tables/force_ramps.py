@@ -126,7 +126,7 @@ def scene_in(slab: Slab, inclusion: Inclusion | None = None, *, waveguide: Waveg
 
 
 def scene_on_one_mesh(
-    slab: Slab,
+    slab: Slab | Tissue,
     inclusion: Inclusion | None,
     thicknesses_mm: Sequence[float],
     *,

@@ -22,19 +22,19 @@ from joblib import Parallel, delayed
 
 from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
+from device.measurement.parameters import ABOVE_BASE_MM, ELASTIC_MISMATCHES
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.ramp_modes.surrogate import far_field_strength
 from device.simulation.physics.chebyshev import interpolated, points_with_ends
 from device.simulation.physics.inclusion_axes import ACTION as CHOOSE
 from device.simulation.physics.off_axis_table import OffAxisTable
-from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, Slab
+from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.surface_table import Ramp, SurfaceTable
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.probe_tables.aside_changes import OFFSETS_MM
 from host_tools.probe_tables.force_ramps import INCLUSIONS, scene_in
 from host_tools.probe_tables.force_ramps import inclusions_per_n_mm3 as centred_per_n_mm3
 from host_tools.probe_tables.off_axis_table import inclusions_per_n_mm3
-from host_tools.probe_tables.surface_table import ELASTIC_MISMATCHES
 from host_tools.scenes.scene import Press, Scene
 
 NAME, SCHEMA = "wide_table", "tsis.wide_table/1"

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from device.measurement.arrays import Array
+from device.measurement.parameters import ABOVE_BASE_MM
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.legendre import LegendreTerms
 from device.simulation.physics.chebyshev import points_inside
 from device.simulation.physics.inclusion_axes import InclusionAxes
-from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
+from device.simulation.physics.slab import NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
 from device.simulation.physics.slab_changes import (
     DEPTH_MM,
     SIZE_MM,

@@ -19,6 +19,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from device.measurement.arrays import Array
+from device.measurement.parameters import ELASTIC_MISMATCHES
 from device.measurement.quantities import InvalidQuantity
 from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.inclusion_axes import InclusionAxes
@@ -32,8 +33,6 @@ from host_tools.scenes.scene import PAPER_BOX_HIGH, PAPER_BOX_LOW, Press, Scene,
 
 POINTS = (7, 7, 3)
 """Points in size, depth and mismatch."""
-ELASTIC_MISMATCHES = (0.1, 0.96)
-"""6.4-305 kPa in the nominal slab, 2.6-122 kPa in tissue of 2 kPa, 38-1830 kPa in one of 30 kPa."""
 SMALLEST_SIZE_MM = 1.0
 COARSE = slice(None, None, 2)
 """Tables of what layers change are of every second size and depth: of an odd number of Chebyshev points these are

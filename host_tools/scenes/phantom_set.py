@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from device.measurement.parameters import RANGES
+from device.measurement.parameters import NEAR_NOMINAL
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity
 from host_tools.scenes.scene import NEAREST_MM, Tissue
 from host_tools.scenes.stated import SIGMAS, SUFFIX, StatedNumbers, Tolerance, read_stated, require_fitting
@@ -73,7 +73,7 @@ class StatedPhantom:
 
     def outside(self) -> Iterator[InvalidQuantity]:
         """Yield what it states beyond the ranges of the design's model: commissioning refuses that."""
-        for name, (low, high, _) in RANGES.items():
+        for name, (low, high, _) in NEAR_NOMINAL.items():
             stated = getattr(self, TISSUE_OF.get(name, name), None)
             if stated is not None and not low <= stated <= high:
                 action = "cast one inside: commissioning knows no other"

@@ -1,7 +1,7 @@
 """The eight inclusions of the Breast Mechanical Imager, pressed with this probe.
 
-Their slab of 35 mm is thicker than any that the modes are trained for, and two of them are larger: what is asked is
-whether the answer, or its refusal, can be trusted. All eight are counted, too: one that gets no numbers as the guess of
+Two of them are larger than any that the modes are trained for: what is asked is whether the answer, or its refusal, can
+be trusted. All eight are counted, too: one that gets no numbers as the guess of
 the trained ranges. Source: Egorov & Sarvazyan, IEEE Trans. Medical Imaging 27 (2008),
 table II, whose own error in size is 7.5 %.
 """

@@ -70,7 +70,7 @@ def dial_chapter(
             Table("The dial", header, (*(_row(mode, found) for mode, found in seen.items()), _guess(seen["standard"]))),
             Table(
                 "The patient's tissue, which the press beside the lesion tells mode precise",
-                ("answered", "RMS error (kPa)", "stated spread (kPa)", "spread of the range (kPa)", "truth in 90 %"),
+                ("answered", "RMS error", "stated spread", "spread of the range", "truth in 90 %"),
                 (_tissue_row(seen["precise"]),),
             ),
         ),
@@ -168,18 +168,18 @@ def _row(mode: Mode, found: Sequence[TimedAnswers]) -> tuple[str, ...]:
 
 
 def _tissue_row(found: Sequence[TimedAnswers]) -> tuple[str, ...]:
-    """Return how well the tissue's modulus is told; its 90 % interval is that of a Gaussian of the stated spread."""
+    """Return how well the tissue's modulus is told, over itself; its 90 % interval is a Gaussian's of the spread."""
     told = np.array([
-        (one.estimate.features["tissue_modulus_kpa"] - one.tissue_kpa, one.estimate.features["tissue_modulus_std_kpa"])
+        (one.tissue_kpa, *(one.estimate.features[f"tissue_modulus_{what}kpa"] for what in ("", "std_")))
         for one in found
         if "tissue_modulus_kpa" in one.estimate.features
     ])  # fmt: skip
-    error, spread = told.T
+    truth, told_kpa, spread_kpa = told.T
+    error, spread = told_kpa / truth - 1, spread_kpa / told_kpa
     inside = np.mean(np.abs(error) < GAUSSIAN_90 * spread)
-    of_range = (HIGH[TISSUE] - LOW[TISSUE]) / 2 * EVEN_STD
-    stated = float(np.sqrt(np.mean(spread**2)))
-    rms = float(np.sqrt(np.mean(error**2)))
-    return f"{len(told)}", f"{rms:.2f}", f"{stated:.2f}", f"{of_range:.2f}", f"{inside:.0%}"
+    of_range = float(np.log(HIGH[TISSUE] / LOW[TISSUE])) / 2 * EVEN_STD
+    rms, stated = (float(np.sqrt(np.mean(one**2))) for one in (error, spread))
+    return f"{len(told)}", f"{rms:.1%}", f"{stated:.1%}", f"{of_range:.0%}", f"{inside:.0%}"
 
 
 def _guess(found: Sequence[TimedAnswers]) -> tuple[str, ...]:

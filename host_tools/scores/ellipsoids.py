@@ -20,7 +20,7 @@ from scipy.stats import ncx2
 
 from device.measurement.arrays import Array
 from device.measurement.mode import Mode
-from device.measurement.parameters import HIGH, normalise
+from device.measurement.parameters import HIGH, NEAR_NOMINAL, normalise
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
@@ -28,7 +28,7 @@ from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
-from host_tools.press_models.press_samples import draw_parameters, profile_rows
+from host_tools.press_models.press_samples import draw_around, profile_rows
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.probe_tables.ellipsoid import stretched_inclusion
@@ -147,9 +147,9 @@ def oblong_chapter(answer: EstimateOf, answers: RampAnswers, tables: ProbeTables
 
 
 def skins(inclusions: Sequence[Oblong], rng: np.random.Generator) -> Array:
-    """Return parameters [n, 9] of `SKINS` presses of each inclusion."""
-    parameters = draw_parameters(SKINS * len(inclusions), rng)
-    parameters[:, :3] = np.repeat([oblong.inclusion.as_tuple() for oblong in inclusions], SKINS, axis=0)
+    """Return parameters [n, 9] of `SKINS` presses of each inclusion, in tissue about that which it is solved in."""
+    alike = np.repeat([oblong.inclusion.as_tuple() for oblong in inclusions], SKINS, axis=0)
+    parameters = draw_around(alike, rng, ranges=NEAR_NOMINAL)
     parameters[:, -1] = np.repeat([oblong.offset_mm for oblong in inclusions], SKINS)
     return parameters
 

@@ -18,6 +18,7 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.estimate import Estimate
 from device.measurement.mode import FRAMES, Mode
+from device.measurement.parameters import COUNT, RANGES, Range
 from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.model import RAMP_MODES
 from device.measurement.ramp_modes.noise import ErrorLevels
@@ -46,6 +47,8 @@ SUNK_MM = (1.5, 3.0)
 """So much deeper does an inclusion lie after the first ramp that gives way."""
 RecordPress = Callable[[Mode, int], Recording]
 SHARE = "share refused"
+CLEAR_IN = RANGES | {"tissue_modulus_kpa": Range(2.5, 23.0, True), "slab_thickness_mm": Range(21.0, 60.0, True)}
+"""Tissue in which each of these is possible, sunk too."""
 REFUSED_AT_LEAST, FALSE_AT_MOST = 0.95, 0.05
 EstimateOf = Callable[[Recording, Mode], Estimate]
 
@@ -63,9 +66,9 @@ class Kind:
 def kinds(tables: ProbeTables, seed: int, jobs: int = -1) -> list[Kind]:
     """Return ordinary presses first, then those that are to be refused; some solves run here."""
     rng = np.random.default_rng(seed)
-    ordinary, none, two, wet = (draw_parameters(count, rng) for count in (ORDINARY, PRESSES, PRESSES, PRESSES))
+    ordinary, none, wet = (draw_parameters(count, rng) for count in (ORDINARY, PRESSES, PRESSES))
     none[:, 0] = 0.0
-    two[:, :3] = clear_inclusions(len(two), rng)
+    two = draw_clear(PRESSES, rng)
     further_mm = further_offsets_mm(ORDINARY, np.random.default_rng([seed, 1]))
 
     def record(tables: ProbeTables, parameters: Array, mode: Mode, number: int, **others: Any) -> Recording:
@@ -111,6 +114,13 @@ def _given_way(before: Recording, after: Recording) -> Recording:
     """Return a scan whose first ramp is of one recording, and whose others are of the other with the same drifts."""
     later = [frame for frame in after.frames if frame.role == "press" and frame.ramp]
     return replace(before, frames=(*(one for one in before.frames if one.role != "press" or not one.ramp), *later))
+
+
+def draw_clear(count: int, rng: np.random.Generator) -> Array:
+    """Return parameters [count, 9] of inclusions that show well."""
+    parameters = draw_parameters(count, rng, ranges=CLEAR_IN)
+    parameters[:, :COUNT] = clear_inclusions(count, rng)
+    return parameters
 
 
 def clear_inclusions(count: int, rng: np.random.Generator) -> Array:

@@ -105,7 +105,7 @@ def ranked(samples: WeightedSamples, truth: Array, rng: np.random.Generator) -> 
     """Return how a posterior's samples judge a truth [3]."""
     at, weight = samples.at[:, :COUNT], samples.weight
     drawn = at[rng.choice(len(at), DRAWS, p=weight)]
-    of_ranges = rng.uniform(-1, 1, (DRAWS, COUNT))
+    of_ranges = normalise(draw_parameters(DRAWS, rng))[:, :COUNT]
     return RankedPress(
         weight @ (at < truth),
         np.array([joint_region(at[:, :count], weight).holds(truth[:count]) for count in TOGETHER]),

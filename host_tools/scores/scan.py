@@ -184,7 +184,8 @@ def bound_in_box(jacobian: Array, modulus: float) -> BoundInBox:
     What is seen of the modulus strays about its true coordinate as the Cramer-Rao bound without its range says; what is
     left of it then ends with the range. Size and depth are Gaussian given the modulus, with their ranges as prior: what
     is left of the modulus is carried to them along the line on which they hang on it. Mean squares are those of the
-    best estimate, the mean of the posterior: over random truths none errs less. Source: Kay (1993), section 10.
+    best estimate, the mean of the posterior: over truths that are even in the ranges none errs less. Truths that are
+    not possible are not drawn, which leaves a little more to know. Source: Kay (1993), section 10.
     """
     prior = np.full(jacobian.shape[1], EVEN_STD**-2)
     prior[MODULUS] = UNTOLD

@@ -47,8 +47,12 @@ class QuickModel:
     """
 
     def __init__(self, bundle: ModelBundle) -> None:
-        """Raises `BundleRefused` when the card of a bundle that reads `QUICK_UNITS` lacks belts or a limit."""
+        """Raises `BundleRefused` when the card of a bundle that reads `QUICK_UNITS` lacks belts or a limit.
+
+        And where it is of other ranges of the parameters.
+        """
         self.bundle = bundle
+        bundle.fields.require_known_ranges()
         try:
             entry = bundle.card["modes"]["quick"]
             self.belts = belts_of(entry)

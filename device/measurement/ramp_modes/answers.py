@@ -12,7 +12,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, HIGH, LOW, denormalise, slope_of_normalised
-from device.measurement.ramp_modes.fit import PressPosterior, best_fits
+from device.measurement.ramp_modes.fit import TOLERANCE, PressPosterior, best_fits
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
 from device.measurement.ramp_modes.misfit_blocks import Departure
 from device.measurement.ramp_modes.noise import PressNoise
@@ -23,8 +23,6 @@ from device.measurement.ramp_modes.surrogate import OFFSET, TISSUE, ScanSurrogat
 
 WELL_INSIDE = 0.95
 """A fit is begun no nearer to the ends of the ranges, where it would stick."""
-NEAR = 1e-6
-"""Of several starts only the best is sought to the last digit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +63,12 @@ class RampAnswer:
 
     @property
     def tissue_from_middle_ratio(self) -> float:
-        """How far the tissue's modulus lies from the middle of its range, over half the range; below 1.
+        """How far the tissue's modulus lies from the middle of its range, over half the range, by ratio; below 1.
 
         Of tissue outside the range the posterior crowds at the end, nearer than that of any tissue inside.
         """
         low_kpa, high_kpa = LOW[TISSUE], HIGH[TISSUE]
-        return float(abs(2 * (self.tissue_kpa[0] - low_kpa) / (high_kpa - low_kpa) - 1))
+        return float(abs(np.log(self.tissue_kpa[0] ** 2 / (low_kpa * high_kpa))) / np.log(high_kpa / low_kpa))
 
     @property
     def spread(self) -> Array:
@@ -135,7 +133,7 @@ class RampAnswers:
         if len(rows) == 1:
             return np.concatenate([inside[0], np.zeros(posterior.dimensions - COUNT)])
         starts = scan_starts(rows, inside, self.surrogate, self.noise, self.reach_mm(len(rows)), direction_rad)
-        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=NEAR)
+        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=TOLERANCE)
         return np.asarray(found[np.argmin(np.sum(posterior.residuals(found) ** 2, axis=1))])
 
 

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS
+from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS, denormalise, is_possible
 from device.measurement.ramp_modes.bounded_least_squares import least_squares
 from device.measurement.ramp_modes.misfit_blocks import BLOCK_OF_COLUMN, BlockMisfit, RowBlock, misfit_by_block
 from device.measurement.ramp_modes.noise import FURTHER, PressNoise, as_one_row
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
-TOLERANCE, STEPS = 1e-10, 100
+TOLERANCE, STEPS = 1e-6, 100
+"""A fit ends when a step lowers its cost by so little of it: further ones, nearly half of all, move no answer."""
 
 
 class Explained(Protocol):
@@ -119,10 +120,11 @@ class PressPosterior:
     def log_density(self, at: Array) -> Array:
         """Return the logarithm of the posterior density [n], but for a constant, at coordinates [n, 8 + N].
 
-        Coordinates are even within their ranges before the press, but for offsets: a place is even over a disk.
+        Coordinates are even within their ranges before the press, where they are possible, but for offsets: a place is
+        even over a disk.
         """
         log = np.full(len(at), -np.inf)
-        inside = np.all(np.abs(at) <= 1, axis=1)
+        inside = np.all(np.abs(at) <= 1, axis=1) & is_possible(denormalise(at[:, : OFFSET + 1]))
         residuals = self.residuals(at[inside].astype(np.float32))  # single precision: see `PressRows`
         log[inside] = np.log1p(at[inside, OFFSET:]).sum(axis=1) - 0.5 * np.sum(residuals**2, axis=1)
         return log
@@ -186,7 +188,10 @@ def best_fit(posterior: Explained, start: Array) -> Array:
 def best_fits(
     posterior: Explained, start: Array, free: NDArray[np.bool_], *, tolerance: float, steps: int = STEPS
 ) -> Array:
-    """Return the best fits [n, 8 + N] begun at n points, in those of the coordinates that are `free`; others stay."""
+    """Return the best fits [n, 8 + N] begun at n points, in those of the coordinates that are `free`; others stay.
+
+    They keep to the ranges, and may lie where these hold nothing possible: the density does not.
+    """
     held = np.broadcast_to(np.eye(free.sum()) / EVEN_STD, (len(start), free.sum(), free.sum()))
 
     def residuals(at: Array, which: NDArray[np.intp]) -> tuple[Array, Array]:

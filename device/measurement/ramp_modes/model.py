@@ -126,8 +126,12 @@ class RampModel:
     """
 
     def __init__(self, bundle: ModelBundle, answers: RampAnswers, ranges: RangeClassifier) -> None:
-        """Raises `BundleRefused` when the card of a bundle that reads `RAMP_UNITS` lacks the values of a mode."""
+        """Raises `BundleRefused` when the card of a bundle that reads `RAMP_UNITS` lacks the values of a mode.
+
+        And where it is of other ranges of the parameters.
+        """
         self.bundle, self.answers, self.ranges = bundle, answers, ranges
+        bundle.fields.require_known_ranges()
         try:
             self.critical = {mode: _critical_values(bundle.card["modes"][mode]) for mode in RAMP_MODES}
         except (KeyError, TypeError, ValueError, InvalidQuantity) as error:

@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise, slope_of_normalised
+from device.measurement.parameters import (
+    ELASTIC_MISMATCHES,
+    HIGH,
+    LOW,
+    PARAMETERS,
+    denormalise,
+    elastic_mismatch,
+    slope_of_normalised,
+)
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.radial_profile import COLUMN_COUNTS, COLUMNS
@@ -39,17 +47,6 @@ ARRAYS = (
     "turned_coefficients",
     "bare_degrees",
     "bare_coefficients",
-)
-
-
-def elastic_mismatch(modulus_kpa: Array, tissue_kpa: Array) -> Array:
-    """Return (E - Et) / (E + 3/2 Et), the dipole strength of an incompressible sphere (Eshelby 1957)."""
-    return np.asarray((modulus_kpa - tissue_kpa) / (modulus_kpa + 1.5 * tissue_kpa))
-
-
-ELASTIC_MISMATCH_RANGE = (
-    float(elastic_mismatch(LOW[MODULUS], HIGH[TISSUE])),
-    float(elastic_mismatch(HIGH[MODULUS], LOW[TISSUE])),
 )
 
 
@@ -219,7 +216,7 @@ def far_field_strength(size_mm: Number, depth_mm: Number) -> Number:
 
 def polynomial_coordinates(normalised: Array, parameters: Array) -> Array:
     """Return coordinates [n, 9] in which presses are polynomials: the modulus' one is the elastic mismatch."""
-    low, high = ELASTIC_MISMATCH_RANGE
+    low, high = ELASTIC_MISMATCHES
     at = np.array(normalised)
     at[:, MODULUS] = 2 * (elastic_mismatch(parameters[:, MODULUS], parameters[:, TISSUE]) - low) / (high - low) - 1
     return at
@@ -275,7 +272,7 @@ def _factor_slope(parameters: Array) -> Array:
 
 def _by_normalised(gradient: Array, parameters: Array) -> Array:
     """Return derivatives [9, n, Q] by `normalised` of those by the polynomials' coordinates, at parameters [n, 9]."""
-    (low, high), by_normalised = ELASTIC_MISMATCH_RANGE, slope_of_normalised(parameters)
+    (low, high), by_normalised = ELASTIC_MISMATCHES, slope_of_normalised(parameters)
     E, Et = parameters[:, MODULUS], parameters[:, TISSUE]
     by_mismatch = gradient[MODULUS] * (2 / (high - low) * 2.5 / (E + 1.5 * Et) ** 2)[:, None]
     slope = np.array(gradient)

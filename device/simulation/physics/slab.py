@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from device.measurement.parameters import ABOVE_BASE_MM
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 
 PEOPLES_KPA, PEOPLES_MM = (2.0, 30.0), (15.0, 60.0)
@@ -16,8 +17,6 @@ PEOPLES_KPA, PEOPLES_MM = (2.0, 30.0), (15.0, 60.0)
 2007), 2-3 kPa by magnetic resonance, 11 +- 6 kPa by shear waves."""
 NEAR_KPA, NEAR_MM = (4.0, 6.25), (27.0, 36.0)
 """Around the nominal slab: what was solved in it alone is added as it is to a press in these."""
-ABOVE_BASE_MM = 1.0
-"""An inclusion ends at least this far above the slab's base."""
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,12 @@ from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from host_tools.commissioning.left_out import answers_to_seen
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
-from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
 from host_tools.scores.one_thing.causes import NOTHING, CauseToName, causes_to_name
 from host_tools.scores.one_thing.press_answers import SHIPPED, TOLERANT, DesignToTry, with_tolerances
 from host_tools.scores.one_thing.tried_presses import Setting, TruthDesign, random_design, tried_presses
-from host_tools.scores.outside import WET_RATIO, clear_inclusions, neighbour_beside
+from host_tools.scores.outside import WET_RATIO, draw_clear, neighbour_beside
 
 PRESSES = 16
 NAMED_AT_LEAST = 0.9
@@ -127,8 +126,7 @@ def _tried(thing: CauseToName, design: DesignToTry, truths: TruthDesign, jobs: i
 def _recorded(name: str, design: DesignToTry, presses: int, seed: int, jobs: int) -> list[SeenPresses]:
     """Return what is read of recordings of inclusions that show well, with a second one beside or gel on the face."""
     rng = np.random.default_rng(derived_seed(seed, name))
-    parameters = draw_parameters(presses, rng)
-    parameters[:, :3] = clear_inclusions(presses, rng)
+    parameters = draw_clear(presses, rng)
     neighbours = [neighbour_beside(one, rng) if name == TWO else None for one in parameters]
     wet_ratios = rng.uniform(*WET_RATIO, presses) if name == GEL else np.zeros(presses)
 

@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH
+from device.measurement.parameters import HIGH, NEAR_NOMINAL
 from device.measurement.quantities import UNKNOWNS, Inclusion
 from device.measurement.ramp_modes.surrogate import OFFSET, SIZE
 from device.simulation.physics.world import AS_BELIEVED
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
-from host_tools.press_models.press_samples import draw_parameters
+from host_tools.press_models.press_samples import draw_around
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.probe_tables.ellipsoid import stretched_inclusion
@@ -124,8 +124,8 @@ def _of_solved(solved: Sequence[Sequence[ProbeTables]]) -> SettingsOf:
 def _balls(inclusions: int, scans: int, seed: int) -> TruthDesign:
     """Return presses of a few balls that show well, each on several skins, at places of its own."""
     rng = np.random.default_rng(derived_seed(seed, "prolate inclusions"))
-    parameters = draw_parameters(inclusions * SKINS, rng)
-    parameters[:, :3] = np.tile(clear_inclusions(inclusions, rng), (SKINS, 1))
+    balls = np.tile(clear_inclusions(inclusions, rng), (SKINS, 1))
+    parameters = draw_around(balls, rng, ranges=NEAR_NOMINAL)
     parameters[:, OFFSET] = np.tile(_offsets_mm(inclusions, rng), SKINS)
     further_mm = np.tile(rng.uniform(*FURTHER_MM, inclusions), SKINS)
     return TruthDesign(parameters, parameters, further_mm, scans, seed)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.arrays import Array
+from device.measurement.parameters import NEAR_NOMINAL
 from device.measurement.quick_mode.profile import QuickPress, elongation_ratio
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
@@ -71,9 +72,9 @@ def scans_of(presses: int) -> int:
 
 
 def random_design(presses: int, scans: int, seed: int) -> TruthDesign:
-    """Return random truths over the trained ranges."""
+    """Return random truths over the trained ranges, in tissue where it is known what layers and motion do."""
     rng = np.random.default_rng(derived_seed(seed, "truths of one thing at a time"))
-    parameters = draw_parameters(presses, rng)
+    parameters = draw_parameters(presses, rng, ranges=NEAR_NOMINAL)
     return TruthDesign(parameters, parameters, rng.uniform(*FURTHER_MM, presses), scans, seed)
 
 

@@ -89,9 +89,9 @@ def test_one_tampered_byte_is_refused(folder: Path, position: int) -> None:
         read_paper_model(folder)
 
 
-def widened(card: dict[str, Any]) -> None:
-    for group in card["training_range"].values():
-        group.update({name: [low - (high - low) / 2, high + (high - low) / 2] for name, (low, high) in group.items()})
+def widened(card: dict[str, Any], group: str = "features") -> None:
+    ranges = card["training_range"][group]
+    ranges.update({name: [low - (high - low) / 2, high + (high - low) / 2] for name, (low, high) in ranges.items()})
 
 
 @pytest.mark.parametrize(
@@ -109,6 +109,18 @@ def test_a_card_with_doubled_training_ranges_is_refused(
     with pytest.raises(
         BundleRefused, match=r"sha256 of model\.json is [0-9a-f]{64}, but must be '[0-9a-f]{64}' as model"
     ):
+        read(folder)
+
+
+@pytest.mark.parametrize("group", ["unknowns", "nuisances"])
+@pytest.mark.parametrize(("name", "read"), [("quick", read_quick_model), ("standard", read_ramp_model)])
+def test_a_bundle_of_other_ranges_of_its_parameters_is_refused(
+    tmp_path: Path, name: str, read: Callable[[Path], object], group: str
+) -> None:
+    """Its coordinates mean something else: a model of before the ranges grew would answer, and wrongly."""
+    folder = shutil.copytree(ROOT / "models" / name, tmp_path / name)
+    edit_card(folder, lambda card: widened(card, group))
+    with pytest.raises(BundleRefused, match=rf"training_range\.{group}\.\w+ is .*: install models that this software"):
         read(folder)
 
 

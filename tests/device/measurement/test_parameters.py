@@ -4,14 +4,20 @@ import numpy as np
 import pytest
 
 from device.measurement.parameters import (
+    ABOVE_BASE_MM,
+    ELASTIC_MISMATCHES,
     HIGH,
     LOW,
+    NEAR_NOMINAL,
     NOMINAL,
     NUISANCES,
     PARAMETERS,
     RANGES,
+    box_of,
     denormalise,
     denormalise_unknowns,
+    elastic_mismatch,
+    is_possible,
     normalise,
     normalise_unknowns,
     slope_of_normalised,
@@ -69,3 +75,39 @@ def test_the_unknowns_alone_have_the_same_coordinates_as_among_all():
     np.testing.assert_allclose(denormalise_unknowns(normalised), values)
     np.testing.assert_allclose(normalise_unknowns(values), normalised, atol=1e-12)
     np.testing.assert_allclose(normalise_unknowns(values[0]), normalised[0], atol=1e-12)
+
+
+def test_the_box_of_all_ranges_is_the_whole_one():
+    middle, half = box_of(RANGES)
+    np.testing.assert_array_equal(middle, 0.0)
+    np.testing.assert_array_equal(half, 1.0)
+
+
+def test_the_ends_of_a_smaller_box_are_those_of_its_ranges():
+    middle, half = box_of(NEAR_NOMINAL)
+    for coordinates, end in ((middle - half, "low"), (middle + half, "high")):
+        np.testing.assert_allclose(denormalise(coordinates), [getattr(one, end) for one in NEAR_NOMINAL.values()])
+
+
+def test_mismatch_is_that_of_a_sphere_in_its_tissue():
+    """0 for an inclusion as soft as its tissue, 2/7 for one twice as stiff, 1 for a rigid one."""
+    np.testing.assert_allclose(elastic_mismatch(np.array([5.0, 10.0, 1e9]), np.full(3, 5.0)), [0, 2 / 7, 1], atol=1e-7)
+
+
+def at(**changed: float) -> np.ndarray:
+    nominal = {"size_mm": 8.0, "depth_mm": 6.0, "youngs_modulus_kpa": 60.0} | NOMINAL
+    return np.array([(nominal | changed)[name] for name in PARAMETERS])
+
+
+def test_an_inclusion_ends_above_the_base():
+    room_mm = 8.0 + 6.0 + ABOVE_BASE_MM
+    thick = np.array([at(slab_thickness_mm=room_mm), at(slab_thickness_mm=room_mm - 1e-6)])
+    np.testing.assert_array_equal(is_possible(thick), [True, False])
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_an_inclusion_is_stiffer_than_its_tissue_by_what_shows(end):
+    mismatch, inwards = ELASTIC_MISMATCHES[end], 1 - 2 * end
+    moduli_kpa = [5.0 * (1 + 1.5 * m) / (1 - m) for m in (mismatch + 1e-6 * inwards, mismatch - 1e-6 * inwards)]
+    found = is_possible(np.array([at(youngs_modulus_kpa=modulus_kpa) for modulus_kpa in moduli_kpa]))
+    np.testing.assert_array_equal(found, [True, False])

@@ -4,8 +4,20 @@ import numpy as np
 import pytest
 from joblib import parallel_config
 
-from device.measurement.parameters import HIGH, LOW, NOMINAL, NUISANCES, PARAMETERS, normalise
-from device.measurement.quantities import Inclusion
+from device.measurement.parameters import (
+    ABOVE_BASE_MM,
+    ELASTIC_MISMATCHES,
+    HIGH,
+    LOW,
+    NEAR_NOMINAL,
+    NOMINAL,
+    NUISANCES,
+    PARAMETERS,
+    elastic_mismatch,
+    is_possible,
+    normalise,
+)
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FIRST, RAMP_HIGH_N, RESPONSE, SECOND, press_profile
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.ring_means import RINGS
@@ -13,10 +25,10 @@ from device.simulation.physics.pressed_face import ProbePlacement
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.press_models import press_samples as module
 from host_tools.press_models.press_samples import (
-    ABOVE_BASE_MM,
     BESIDE_TO_MM,
     INCLUSIONS_A_SKIN,
     PressSamples,
+    draw_around,
     draw_beside,
     draw_parameters,
     profile_rows,
@@ -24,7 +36,7 @@ from host_tools.press_models.press_samples import (
 )
 
 COUNT = 20_000
-SLAB = PARAMETERS.index("slab_thickness_mm")
+SLAB, TISSUE = PARAMETERS.index("slab_thickness_mm"), PARAMETERS.index("tissue_modulus_kpa")
 INCLUSION = Inclusion(12.0, 6.0, 60.0)
 
 
@@ -44,8 +56,8 @@ def test_parameters_fill_their_ranges_and_no_more(drawn):
     np.testing.assert_allclose(normalise(drawn).max(axis=0), 1, atol=0.02)
 
 
-@pytest.mark.parametrize("name", [name for name in PARAMETERS if name not in ("size_mm", "depth_mm", "offset_mm")])
-def test_what_is_not_redrawn_is_even_over_its_range(drawn, name):
+@pytest.mark.parametrize("name", [name for name in NUISANCES[2:] if name != "offset_mm"])
+def test_a_skin_is_even_over_its_range(drawn, name):
     """Mean 0 and variance 1/3 of its coordinate, within five standard errors."""
     normalised = normalise(drawn)[:, PARAMETERS.index(name)]
     assert normalised.mean() == pytest.approx(0, abs=5 * np.sqrt(1 / 3 / COUNT))
@@ -59,10 +71,38 @@ def test_the_offset_is_even_over_its_disk(drawn):
     assert np.abs(offset - even).max() < 0.05
 
 
-def test_inclusions_end_above_the_slabs_base():
-    drawn = draw_parameters(COUNT, np.random.default_rng(1))
+@pytest.mark.parametrize("inclusions_a_skin", [1, 3])
+def test_what_is_drawn_is_possible_up_to_its_ends(inclusions_a_skin):
+    drawn = draw_parameters(COUNT, np.random.default_rng(1), inclusions_a_skin=inclusions_a_skin)
     clearance = drawn[:, SLAB] - drawn[:, 0] - drawn[:, 1]
+    assert is_possible(drawn).all()
     assert ABOVE_BASE_MM <= clearance.min() < ABOVE_BASE_MM + 1
+    mismatch = elastic_mismatch(drawn[:, 2], drawn[:, TISSUE])
+    np.testing.assert_allclose((mismatch.min(), mismatch.max()), ELASTIC_MISMATCHES, atol=0.02)
+
+
+@pytest.mark.parametrize("draw", [draw_parameters, draw_beside])
+def test_tissue_is_drawn_near_the_nominal_where_that_is_asked_for(draw):
+    drawn = draw(COUNT, np.random.default_rng(1), ranges=NEAR_NOMINAL)
+    assert is_possible(drawn).all()
+    for name in ("tissue_modulus_kpa", "slab_thickness_mm"):
+        ends, (low, high, _) = drawn[:, PARAMETERS.index(name)], NEAR_NOMINAL[name]
+        assert low <= ends.min() < low * 1.01
+        assert high >= ends.max() > high / 1.01
+
+
+def test_tissue_is_drawn_around_inclusions_that_are_told():
+    inclusions = np.tile([(12.0, 9.0, 20.0), (3.0, 4.0, 160.0)], (200, 1))
+    drawn = draw_around(inclusions, np.random.default_rng(1))
+    np.testing.assert_array_equal(drawn[:, :3], inclusions)
+    assert is_possible(drawn).all()
+    assert drawn[::2, SLAB].min() >= 12.0 + 9.0 + ABOVE_BASE_MM > drawn[1::2, SLAB].min()
+    assert drawn[::2, TISSUE].max() < 20.0 < drawn[1::2, TISSUE].max()
+
+
+def test_an_inclusion_that_no_tissue_holds_is_refused_by_what_it_is():
+    with pytest.raises(InvalidQuantity, match="^inclusion is 12 mm, 9 mm deep, 4 kPa, but must be possible"):
+        draw_around(np.array([(12.0, 9.0, 4.0)]), np.random.default_rng(1), ranges=NEAR_NOMINAL)
 
 
 def test_consecutive_inclusions_share_tissue_and_skin_but_not_their_place():

@@ -9,10 +9,11 @@ from small_surrogate import COLUMNS, white_noise
 from device.measurement.parameters import PARAMETERS, denormalise, normalise
 from device.measurement.ramp_modes.radial_profile import NETWORK_NAMES, network_rows
 from host_tools.press_models import fit_surrogate, train_range
-from host_tools.press_models.fit_surrogate import INCLUSION_HIGHEST, INCLUSION_REACH
+from host_tools.press_models.fit_surrogate import INCLUSION_REACH
 from host_tools.press_models.noisy_presses import NoiseSampler, PressSet
 from host_tools.press_models.press_samples import PressSamples
 from host_tools.press_models.train_range import (
+    THICKNESS,
     RangeBudget,
     RangeNetwork,
     WideSurrogate,
@@ -23,14 +24,18 @@ from host_tools.press_models.train_range import (
     wide_surrogate,
 )
 
-STD, COUNT = 0.3, 20_000
+STD, COUNT, THICK_MM = 0.3, 20_000, 40.0
 BUDGET = RangeBudget(members=1, steps=700)
 
 
 @pytest.fixture(scope="module")
 def press_set() -> PressSet:
-    """Columns 44 and 45, whose noise does not depend on the light, are the coordinates of size and depth."""
-    normalised = normalise(draw_wide_parameters(COUNT, np.random.default_rng(1)))
+    """Columns 44 and 45, whose noise does not depend on the light, are the coordinates of size and depth.
+
+    In thick slabs nothing but the table's depths bounds both.
+    """
+    drawn = draw_wide_parameters(8 * COUNT, np.random.default_rng(1))
+    normalised = normalise(drawn[drawn[:, THICKNESS] > THICK_MM][:COUNT])
     rows = np.zeros((COUNT, COLUMNS), np.float32)
     rows[:, 44:46] = normalised[:, :2]
     return PressSet(normalised.astype(np.float32), rows, np.zeros(COUNT), NoiseSampler(white_noise(STD)))
@@ -78,6 +83,7 @@ def test_the_same_seed_gives_the_same_network(press_set):
     assert (first != other).all()
 
 
+FEW_TERMS = {name: 0.5 * reach for name, reach in INCLUSION_REACH.items()} | {"size_mm": 18.0, "depth_mm": 16.0}
 ONLY_OFFSET = dict.fromkeys(PARAMETERS, 0.5) | {"offset_mm": 1.0}
 
 
@@ -87,9 +93,8 @@ def surrogate() -> WideSurrogate:
     rng = np.random.default_rng(2)
     parameters = draw_wide_parameters(3200, rng, inclusions_a_skin=3)
     direction_rad = rng.uniform(0, 2 * np.pi, 3200)
-    with pytest.MonkeyPatch.context() as patch:  # terms of the probe's own surrogate are half as many, and enough here
-        patch.setattr(train_range, "REACH", INCLUSION_REACH)
-        patch.setattr(train_range, "HIGHEST", INCLUSION_HIGHEST)
+    with pytest.MonkeyPatch.context() as patch:  # a third of the terms is enough here
+        patch.setattr(train_range, "REACH", FEW_TERMS)
         patch.setattr(fit_surrogate, "TURNED_REACH", ONLY_OFFSET)
         return wide_surrogate(PressSamples(parameters, far_rows(parameters, direction_rad), direction_rad))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, RANGES, normalise
+from device.measurement.parameters import ABOVE_BASE_MM, HIGH, LOW, PARAMETERS, RANGES, normalise
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.surrogate import (
     DEPTH,
@@ -15,7 +15,6 @@ from device.measurement.ramp_modes.surrogate import (
     PressSurrogate,
     polynomial_coordinates,
 )
-from host_tools.press_models.press_samples import ABOVE_BASE_MM
 from host_tools.press_models.train_range import (
     DEPTHS,
     SIZES,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from device.measurement.parameters import RANGES
+from device.measurement.parameters import ABOVE_BASE_MM, RANGES
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.ramp_modes.surrogate import far_field_strength
-from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, Slab
+from device.simulation.physics.slab import NOMINAL, Slab
 from host_tools.probe_tables import out_of_range_table
 from host_tools.probe_tables.out_of_range_table import (
     ASIDE_MM,

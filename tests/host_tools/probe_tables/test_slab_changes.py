@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from device.measurement.parameters import ABOVE_BASE_MM
 from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import points_with_ends
 from device.simulation.physics.inclusion_axes import InclusionAxes
-from device.simulation.physics.slab import ABOVE_BASE_MM, NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
+from device.simulation.physics.slab import NOMINAL, PEOPLES_KPA, PEOPLES_MM, Slab
 from device.simulation.physics.slab_changes import field_shapes
 from host_tools.forward.press_model import PressFailed
 from host_tools.probe_tables import slab_changes as module

@@ -55,6 +55,6 @@ def test_the_guess_is_scored_on_all_presses():
 
 
 def test_the_tissue_is_scored_where_it_is_told():
-    """5.0 +- 0.2 kPa for 4.6 and 5.3: off by 0.4 and 0.3, and the range alone would leave 1 kPa / sqrt(3)."""
+    """5.0 kPa +- 4 % for 4.6 and 5.3: off by 8.7 and 5.7 %, and the range alone would leave ln 15 / 2 / sqrt(3)."""
     found = [press(10.0, 10.0, 0.0, tissue_kpa=tissue) for tissue in (4.6, 5.3)]
-    assert _tissue_row([*found, press(10.0, None, 0.0)]) == ("2", "0.35", "0.20", "0.58", "50%")
+    assert _tissue_row([*found, press(10.0, None, 0.0)]) == ("2", "7.3%", "4.0%", "78%", "50%")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, PARAMETERS
+from device.measurement.parameters import HIGH, PARAMETERS, denormalise, is_possible
 from device.measurement.ramp_modes.answers import UnlikeDesign
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
 from device.measurement.ramp_modes.commissioned.own_probe import (
@@ -150,6 +150,7 @@ class OwnPosterior:
         log = np.full(len(at), -np.inf)
         from_axis = self._from_axis(at).reshape(len(at), self.presses)
         inside = np.all(np.abs(at[:, :OFFSET]) <= 1, axis=1) & np.all(from_axis <= 1, axis=1)
+        inside &= is_possible(denormalise(at[:, : OFFSET + 1]))
         residuals = self.residuals(at[inside].astype(np.float32))  # single precision: see `PressRows`
         log[inside] = -0.5 * np.sum(residuals**2, axis=1)
         return log

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise
+from device.measurement.parameters import HIGH, LOW, NEAR_NOMINAL, PARAMETERS, box_of, denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import light_ratio
@@ -27,6 +27,7 @@ from device.measurement.ramp_modes.surrogate import (
     INCLUSION_COLUMNS,
     OFFSET,
     SIZE,
+    TISSUE,
     assemble,
     far_field_strength,
     offsets_in_range,
@@ -85,6 +86,7 @@ def owned_by(owner: Owner) -> NDArray[np.intp]:
     return np.array([number for number, one in enumerate(DIRECTIONS.values()) if one.owner == owner])
 
 
+KNOWN_IN, TISSUE_AND_SLAB = box_of(NEAR_NOMINAL), slice(TISSUE, TISSUE + 2)
 ARRAYS = "baseline_degrees", "baseline_coefficients", "inclusion_degrees", "inclusion_coefficients"
 
 
@@ -120,8 +122,13 @@ class RegionDerivatives:
 
 
 def derivative_coordinates(normalised: Array, parameters: Array, from_mm: float, to_mm: float) -> Array:
-    """Return the coordinates [n, 9] of the polynomials, of points of `normalise` whose parameters are told, too."""
-    return offsets_in_range(polynomial_coordinates(normalised, parameters), from_mm, to_mm)
+    """Return the coordinates [n, 9] of the polynomials, of points of `normalise` whose parameters are told, too.
+
+    Tissue and slab are over `NEAR_NOMINAL`, where the layers were solved; others take the nearest there.
+    """
+    at = offsets_in_range(polynomial_coordinates(normalised, parameters), from_mm, to_mm)
+    at[:, TISSUE_AND_SLAB] = ((normalised - KNOWN_IN.middle) / KNOWN_IN.half)[:, TISSUE_AND_SLAB]
+    return at
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,11 +61,11 @@ def test_the_truth_lies_in_each_interval_and_size_and_depth_near_it(ramp, scan, 
             assert quantity.value == pytest.approx(truth, rel=share)
 
 
-@pytest.mark.parametrize("tissue_kpa", [4.3, 5.7])
+@pytest.mark.parametrize("tissue_kpa", [2.6, 4.3, 5.7, 17.0])
 def test_the_press_beside_the_lesion_tells_the_patients_tissue(pressed, ramp_model, calibration, tissue_kpa):
     recording = pressed("standard", tissue_modulus_kpa=tissue_kpa)
     features = estimate_ramp(recording, "standard", ramp_model, calibration).features
-    assert features["tissue_modulus_std_kpa"] < 0.4
+    assert features["tissue_modulus_std_kpa"] < 0.15 * tissue_kpa
     assert features["tissue_modulus_kpa"] == pytest.approx(tissue_kpa, abs=3 * features["tissue_modulus_std_kpa"])
 
 
@@ -144,11 +144,11 @@ def test_gel_on_the_face_gets_no_numbers(pressed, ramp_model, calibration):
     assert estimate_ramp(wet, "standard", ramp_model, calibration).size_mm.value is None
 
 
-@pytest.mark.parametrize("tissue_kpa", [2.5, 8.0])
+@pytest.mark.parametrize("tissue_kpa", [1.75, 50.0])
 def test_tissue_softer_or_stiffer_than_trained_gets_no_numbers(pressed, ramp_model, calibration, tissue_kpa):
     """By finite elements: the tables hold no such tissue. Refused for it alone, another place is asked for."""
     scene = Scene(Inclusion(10.0, 5.0, 60.0), tissue=Tissue(youngs_modulus_kpa=tissue_kpa))
-    press = pressed("standard", (10.0, 5.0, 60.0), ramps=press_ramps(scene, 0.65))
+    press = pressed("standard", (10.0, 5.0, 60.0), ramps=press_ramps(scene, 0.6))
     estimate = estimate_ramp(press, "standard", ramp_model, calibration)
     assert estimate.status == "outside_range"
     assert REASONS["tissue_from_middle_ratio"] in estimate.reason

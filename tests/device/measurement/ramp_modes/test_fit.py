@@ -7,7 +7,7 @@ from small_surrogate import COLUMNS, linear_surrogate, random_surrogate
 
 from device.measurement.parameters import EVEN_STD, PARAMETERS
 from device.measurement.ramp_modes.fit import PressPosterior, best_fit
-from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, OFFSET
+from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, DEPTH, MODULUS, OFFSET, SIZE, TISSUE
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +51,16 @@ def test_nothing_is_possible_outside_the_ranges_and_inside_residuals_count_and_t
     expected = np.log1p(TRUTH[OFFSET]) - 0.5 * np.sum(posterior.residuals(TRUTH) ** 2)
     assert log[0] == pytest.approx(expected)
     assert log[1] == -np.inf
+
+
+def test_what_is_not_possible_has_no_density(row, slopes):
+    """An inclusion as soft as its tissue, and one whose lower end would touch a thin slab's base."""
+    posterior = PressPosterior(row, linear_surrogate(slopes), NOISE)
+    soft, deep = np.zeros(len(PARAMETERS)), np.zeros(len(PARAMETERS))
+    soft[[MODULUS, TISSUE]] = -0.9, 0.5
+    deep[[SIZE, DEPTH, TISSUE + 1]] = 0.9, 0.9, -0.9
+    log = posterior.log_density(np.array([np.zeros(len(PARAMETERS)), soft, deep]))
+    np.testing.assert_array_equal(np.isfinite(log), [True, False, False])
 
 
 @pytest.mark.parametrize("direction_rad", [None, np.array([0.7]), np.array([np.nan])])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_surrogate import COLUMNS, REACH_MM, LinearRows, random_scan_surrogate, white_noise
 
-from device.measurement.parameters import COUNT, HIGH, PARAMETERS
+from device.measurement.parameters import COUNT, HIGH, PARAMETERS, RANGES
 from device.measurement.ramp_modes import answers as answers_module
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
@@ -51,14 +51,17 @@ def test_the_nearest_press_is_told_with_its_best_fit_in_coordinates_of_the_param
 
 @pytest.mark.parametrize("offsets_mm", [(1.4,), (1.2, 5.0, 3.3)])
 def test_mean_spread_and_tissue_are_those_of_the_posterior(answers, offsets_mm):
-    """The tissue runs from 4 to 6 kPa: its coordinate 0.1 is 5.1 kPa, and a spread s is s kPa."""
+    """The tissue runs from 2 to 30 kPa by ratio: a coordinate x is the middle's 15^(x / 2), a spread a share of it."""
     answer = answers.answer(rows_at(answers, offsets_mm), FIRST_GUESSES)
     np.testing.assert_array_equal(answer.mean, answer.fit.mean[:COUNT])
     np.testing.assert_array_equal(answer.spread, answer.fit.spread[:COUNT])
     mean_kpa, spread_kpa = answer.tissue_kpa
-    assert mean_kpa == pytest.approx(5 + answer.fit.mean[TISSUE])
-    assert spread_kpa == pytest.approx(answer.fit.spread[TISSUE])
-    assert mean_kpa == pytest.approx(5.1, abs=4 * spread_kpa)
+    low_kpa, high_kpa, _ = RANGES["tissue_modulus_kpa"]
+    middle_kpa, half = np.sqrt(low_kpa * high_kpa), np.log(high_kpa / low_kpa) / 2
+    assert mean_kpa == pytest.approx(middle_kpa * np.exp(half * answer.fit.mean[TISSUE]))
+    assert spread_kpa == pytest.approx(mean_kpa * half * answer.fit.spread[TISSUE])
+    assert mean_kpa == pytest.approx(middle_kpa * np.exp(half * 0.1), abs=4 * spread_kpa)
+    assert answer.tissue_from_middle_ratio == pytest.approx(abs(answer.fit.mean[TISSUE]))
     told = np.arange(COUNT) != MODULUS
     assert (answer.intervals.low[told] < answer.mean[told]).all()
     assert answer.intervals.is_identifiable.tolist() == told.tolist()
@@ -112,7 +115,7 @@ def test_a_scans_fit_begins_where_its_presses_are_explained_in_their_own_directi
 
 def answer_at(offset_mm: float, nearest: int) -> RampAnswer:
     at = np.append(SHARED, 2 * offset_mm / HIGH[OFFSET] - 1)
-    return RampAnswer(None, None, 1.25, nearest, at, (5.85, 0.1))
+    return RampAnswer(None, None, 1.25, nearest, at, (24.49, 0.5))
 
 
 def test_round_and_inside_are_told_by_the_nearest_press():
@@ -122,7 +125,7 @@ def test_round_and_inside_are_told_by_the_nearest_press():
     answer, direction_rad = answer_at(1.5, nearest=2), np.array([0.3, -1.0, 0.8])
     found = found_values(answer, SeenPresses(rows, seconds, direction_rad), answers, lambda of: of[:, 7])
     assert (found.misfit_ratio, found.outside_log_odds) == (1.25, rows[2, 7])
-    assert found.tissue_from_middle_ratio == pytest.approx(0.85)
+    assert found.tissue_from_middle_ratio == pytest.approx(0.85, abs=1e-3)
     (of_round,) = answers.surrogate.rows(answer.best[None], direction_rad[2:])
     expected = elongation_deviations(seconds[2], of_round, answers.noise)
     assert found.elongation_deviations == expected > 0
@@ -149,4 +152,4 @@ def test_presses_that_all_lie_beside_tell_neither_round_nor_inside():
     found = found_values(answer_at(2.1, nearest=0), seen, answers, lambda of: of[:, 0] + 9)
     assert found.misfit_ratio == 1.25
     assert (found.elongation_deviations, found.outside_log_odds) == (0.0, NOT_TOLD_LOG_ODDS)
-    assert found.tissue_from_middle_ratio == pytest.approx(0.85)
+    assert found.tissue_from_middle_ratio == pytest.approx(0.85, abs=1e-3)

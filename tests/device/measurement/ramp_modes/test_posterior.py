@@ -1,14 +1,31 @@
 """The posterior of a linear forward model with Gaussian noise is known on paper; nothing here is a real press."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from linear_press import NOISE, START, TOLD, TRUTH, noisy_row, on_paper, random_slopes
 from small_surrogate import COLUMNS, linear_surrogate, white_noise
 
-from device.measurement.parameters import EVEN_STD, PARAMETERS
+from device.measurement.parameters import EVEN_STD, PARAMETERS, is_possible, normalise
 from device.measurement.ramp_modes.fit import PressPosterior
-from device.measurement.ramp_modes.posterior import FEWEST_EFFECTIVE, MOST_SPOTS, PressFit, sample_press
-from device.measurement.ramp_modes.surrogate import MODULUS
+from device.measurement.ramp_modes.posterior import (
+    FEWEST_EFFECTIVE,
+    MOST_SPOTS,
+    PressFit,
+    sample_press,
+    weighted_samples,
+)
+from device.measurement.ramp_modes.surrogate import MODULUS, TISSUE
+from host_tools.press_models.press_samples import draw_parameters
+
+
+@pytest.fixture(scope="module", autouse=True)
+def box() -> Iterator[None]:
+    """The ranges without what is impossible in them: a box, of which all is known on paper."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("device.measurement.ramp_modes.fit.is_possible", lambda values: np.full(len(values), True))
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -127,3 +144,19 @@ def test_a_bent_posterior_gets_more_gaussians_and_comes_nearer_to_its_integral(m
         errors = [np.abs(getattr(fit, moment)[:2] - exact) for fit in (bent, straight)]
         assert errors[0][0] < 0.5 * errors[1][0]
     assert bent.spread[1] > 1.5 * straight.spread[1]
+
+
+def test_a_press_that_tells_nothing_leaves_what_is_possible_and_no_more(monkeypatch):
+    """Means, spreads, and how modulus and tissue hang together: those of parameters that are drawn."""
+    monkeypatch.setattr("device.measurement.ramp_modes.fit.is_possible", is_possible)
+    monkeypatch.setattr("device.measurement.ramp_modes.posterior.SAMPLES", 40_000)
+    nothing = linear_surrogate(np.zeros_like(random_slopes()))
+    posterior = PressPosterior(nothing.rows(np.zeros((1, len(PARAMETERS))))[0], nothing, NOISE)
+    at, weight, effective = weighted_samples(posterior, START)
+    drawn, error = normalise(draw_parameters(20_000, np.random.default_rng(1))), 4 * EVEN_STD / np.sqrt(effective)
+    mean = weight @ at
+    np.testing.assert_allclose(mean, drawn.mean(axis=0), atol=error)
+    np.testing.assert_allclose(np.sqrt(weight @ (at - mean) ** 2), drawn.std(axis=0), atol=error)
+    together = drawn[:, MODULUS] @ drawn[:, TISSUE] / len(drawn)
+    assert weight @ (at[:, MODULUS] * at[:, TISSUE]) == pytest.approx(together, abs=error * EVEN_STD)
+    assert together > 1.5 * error * EVEN_STD

@@ -7,7 +7,7 @@ import pytest
 from small_surrogate import COLUMNS, REACH_MM, random_scan_surrogate, random_surrogate, white_noise
 
 from device.files.bundle_file import read_ramp_answers
-from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise, normalise
+from device.measurement.parameters import ELASTIC_MISMATCHES, HIGH, LOW, PARAMETERS, denormalise, normalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.model import SURROGATE_ARRAYS, surrogate_arrays
@@ -205,7 +205,8 @@ def test_tissue_in_tissue_is_no_inclusion_and_a_rigid_sphere_has_mismatch_one():
 
 def test_the_modulus_coordinate_stays_inside_the_cube_and_touches_its_ends():
     corners = np.array([LOW, HIGH])
-    corners[:, TISSUE] = HIGH[TISSUE], LOW[TISSUE]
+    corners[:, MODULUS] = [5.0 * (1 + 1.5 * mismatch) / (1 - mismatch) for mismatch in ELASTIC_MISMATCHES]
+    corners[:, TISSUE] = 5.0
     at = polynomial_coordinates(normalise(corners), corners)
     np.testing.assert_allclose(at[:, MODULUS], [-1, 1], atol=1e-13)
 

@@ -47,7 +47,7 @@ PROBE = owned_by("probe")
 @pytest.fixture(scope="module")
 def derivatives():
     arrays, _ = load_table(
-        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/1", DERIVATIVE_ARRAYS, "make them again"
+        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/2", DERIVATIVE_ARRAYS, "make them again"
     )
     return row_derivatives_of(arrays)
 
