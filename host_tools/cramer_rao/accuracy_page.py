@@ -55,7 +55,7 @@ def accuracy_facts(scenes: list[MappedScene], beside: Array) -> Facts:
         "orders": list(ORDERS),
         "protocols": {name: _protocol(ways()[name]) for name in (STANDARD, PRECISE)},
         "known": _known(scenes),
-        "smooth_error_factors": _numbers(1 / factors(scenes, NOT_SMOOTH)),
+        "smooth_error_factors": [float(f"{times:.6g}") for times in 1 / factors(scenes, NOT_SMOOTH)],
         "frames_factors": _numbers(1 / factors(scenes, PRECISE)),
         "worst_direction": _numbers(
             np.median([scene.limits[STANDARD].quoted.alone.worst_direction for scene in scenes], axis=0)

@@ -39,7 +39,7 @@ FURTHER_MM, STRAY_MM, NEAREST_MM = (3.0, 4.0, 2.0, 5.0), 1.0, 0.5
 
 @dataclass(frozen=True)
 class TrainingBudget:
-    """How many presses go into each step; the defaults take 70 minutes on two cores.
+    """How many presses go into each step; the defaults take 100 minutes on two cores.
 
     `presses` and `beside` are many times the polynomials' terms: with a third of them those miss large, shallow and
     soft inclusions by far more than a scan's noise, and its intervals hold too seldom.
