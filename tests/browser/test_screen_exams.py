@@ -77,7 +77,7 @@ def test_what_is_typed_is_there_again_when_the_connection_comes_back(page: Page,
     expect(page.locator("#free-yes")).to_be_visible()
 
 
-def test_a_press_that_began_meanwhile_stays_in_sight_when_the_connection_comes_back(page: Page, daemon: Daemon):
+def test_a_press_that_began_meanwhile_is_shown_when_the_connection_comes_back(page: Page, daemon: Daemon):
     page.goto(daemon.url)
     page.locator("#menu-open").click()
     page.route("**/api/v1/events", lambda route: route.abort())
