@@ -149,7 +149,7 @@ def sampled(posterior: PressPosterior, near: Array, seed: int) -> Sampled:
 def _run(posterior: PressPosterior, near: Array, seed: list[int]) -> tuple[Array, float]:
     """Return the unknowns' chain [steps, walkers, 3] of one run, and what its samples are worth."""
     rng = np.random.default_rng(seed)
-    begin = np.clip(near + AROUND * rng.standard_normal((WALKERS, len(PARAMETERS))), -0.999, 0.999)
+    begin = _begun(posterior, near, rng)
     moves = [(emcee.moves.DEMove(), 0.7), (emcee.moves.DESnookerMove(), 0.1), (emcee.moves.StretchMove(), 0.2)]
     sampler = emcee.EnsembleSampler(WALKERS, len(PARAMETERS), posterior.log_density, vectorize=True, moves=moves)
     sampler.random_state = np.random.RandomState(seed).get_state()
@@ -158,6 +158,15 @@ def _run(posterior: PressPosterior, near: Array, seed: list[int]) -> tuple[Array
     sampler.run_mcmc(state, STEPS)
     longest = float(np.max(sampler.get_autocorr_time(tol=0)[: len(UNKNOWNS)]))
     return np.asarray(sampler.get_chain()[:, :, : len(UNKNOWNS)]), WALKERS * STEPS / longest
+
+
+def _begun(posterior: PressPosterior, near: Array, rng: np.random.Generator) -> Array:
+    """Return where walkers begin [walkers, 9], around coordinates [9]: all possible, or one might never move."""
+    begin = np.empty((0, len(PARAMETERS)))
+    while len(begin) < WALKERS:
+        tried = np.clip(near + AROUND * rng.standard_normal((WALKERS, len(PARAMETERS))), -0.999, 0.999)
+        begin = np.vstack([begin, tried[np.isfinite(posterior.log_density(tried))]])
+    return begin[:WALKERS]
 
 
 def split_r_hat(chains: Sequence[Array]) -> float:

@@ -173,7 +173,10 @@ def test_layers_that_are_expected_to_be_stiffer_are_found_stiffer(fit, ramps, mo
     told = fit_probe(ramps, Design(model.answers, derivatives, ProbePrior(mean, std)), fit.believed)
     of_layers = np.isin(PROBE, layers)
     away, before = (np.abs(one.mean - np.log(1.1))[of_layers] for one in (told, fit))
-    assert np.all(away < before)
+    otherwise = before > 0.05
+    assert otherwise.sum() == 2
+    assert np.all(away[otherwise] < before[otherwise])
+    assert np.all(away[~otherwise] < 0.005)
     assert np.linalg.norm(away) < 0.6 * np.linalg.norm(before)
     assert np.all(np.diag(told.covariance)[of_layers] < np.diag(fit.covariance)[of_layers])
     own = told.own_probe(derivatives)

@@ -8,7 +8,7 @@ import pytest
 
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
-from device.measurement.parameters import PARAMETERS, normalise
+from device.measurement.parameters import NEAR_NOMINAL, PARAMETERS, normalise
 from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, NAMES, STD
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw
@@ -104,7 +104,7 @@ def test_a_probe_of_two_layers_is_of_another_design():
 
 @pytest.fixture(scope="module")
 def parameters():
-    return draw_parameters(6, np.random.default_rng(5))
+    return draw_parameters(6, np.random.default_rng(5), ranges=NEAR_NOMINAL)
 
 
 def rows_of(tables, parameters, world=AS_BELIEVED):

@@ -49,7 +49,7 @@ def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("slab", "missed_at_most"), [((3.0, 30.0), 0.7), ((20.0, 40.0), 0.35)])
+@pytest.mark.parametrize(("slab", "missed_at_most"), [((3.0, 30.0), 0.7), ((20.0, 40.0), 0.4)])
 def test_in_other_tissue_what_the_layers_change_is_nearly_that_of_the_nearest_that_was_solved(
     tables, slab, missed_at_most
 ):

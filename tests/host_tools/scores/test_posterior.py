@@ -87,7 +87,7 @@ def test_r_hat_notes_a_run_that_drifts():
 
 
 def test_the_same_seed_gives_the_same_sample_and_another_one_another(row, slopes, monkeypatch):
-    monkeypatch.setattr(mode_posterior, "STEPS", 20)
+    monkeypatch.setattr(mode_posterior, "STEPS", 100)
     monkeypatch.setattr(mode_posterior, "BURN_IN", 5)
     posterior = PressPosterior(row, linear_surrogate(slopes), white_noise(STD))
     first, again, other = (sampled(posterior, TRUTH, seed) for seed in (2, 2, 3))

@@ -10,11 +10,11 @@ from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90, SMALLEST_SHARE, intervals_of
 from device.measurement.ramp_modes.posterior import CELLS, MIDDLES, ModulusCells, PressFit, sample_press
 from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE
-from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE
+from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, TISSUE
 
 DEVIATIONS = 1.6449
 """Nine in ten of a Gaussian lie within so many."""
-K = len(PARAMETERS)
+K, SLAB = len(PARAMETERS), PARAMETERS.index("slab_thickness_mm")
 
 
 def fit_of(shares, means, spreads, mean=0.0, spread=0.1):
@@ -135,11 +135,14 @@ def hanging(monkeypatch) -> LinearRows:
 
 
 def covered_at(hanging, modulus_from, modulus_to, presses=PRESSES):
-    """Return how often profiled and plain intervals of the size hold it, for true moduli between two ends."""
+    """Return how often profiled and plain intervals of the size hold it, for true moduli between two ends.
+
+    Tissue is soft and slabs are thick, where every modulus is possible.
+    """
     rng, held = np.random.default_rng(8), []
     for _ in range(presses):
         truth = rng.uniform(-0.5, 0.5, K)
-        truth[MODULUS] = rng.uniform(modulus_from, modulus_to)
+        truth[MODULUS], truth[TISSUE], truth[SLAB] = rng.uniform([modulus_from, -1, 0], [modulus_to, -0.5, 0.5])
         row = hanging.rows(truth[None])[0] + rng.normal(0, STD, COLUMNS)
         fit = sample_press(PressPosterior(row, hanging, white_noise(STD)), np.zeros(K))
         low, high = size_ends(fit)
