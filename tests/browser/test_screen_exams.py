@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from daemon_process import QUICK_HAND, Daemon, wait_for
+from daemon_process import QUICK_HAND, Daemon
 from playwright.sync_api import Page, expect
 from screen_layout import wrong_in
 
@@ -77,19 +77,28 @@ def test_what_is_typed_is_there_again_when_the_connection_comes_back(page: Page,
     expect(page.locator("#free-yes")).to_be_visible()
 
 
+STREAMS = """
+window.streams = [];
+window.EventSource = class extends EventSource { constructor(url) { super(url); window.streams.push(this); } };
+"""
+
+
 def test_a_press_that_began_meanwhile_is_shown_when_the_connection_comes_back(page: Page, daemon: Daemon):
-    page.goto(daemon.url)
-    page.locator("#menu-open").click()
-    page.route("**/api/v1/events", lambda route: route.abort())
-    with page.expect_event("requestfailed"):
-        daemon.process.send_signal(signal.SIGSTOP)
-    daemon.process.send_signal(signal.SIGCONT)
-    wait_for(lambda: daemon.ask("/api/v1/status").json["step"], lambda step: step == "ready")
-    assert daemon.ask("/api/v1/presses", "POST", {}).status == 202
-    expect(page.locator("#connection-lost")).to_be_visible()
-    page.unroute("**/api/v1/events")
-    expect(page.locator("#press-button")).to_have_text("Cancel")
-    expect(page.locator("dialog[open]")).to_have_count(0)
+    """A scan is still under way when this page's streams are cut, and when they are let through again."""
+    browser = page.context.browser
+    assert browser is not None
+    cut_off = browser.new_page()
+    cut_off.add_init_script(STREAMS)
+    cut_off.goto(daemon.url)
+    cut_off.locator("#menu-open").click()
+    cut_off.route("**/api/v1/events", lambda route: route.abort())
+    cut_off.evaluate("for (const stream of window.streams) stream.close()")
+    expect(cut_off.locator("#connection-lost")).to_be_visible()
+    assert daemon.ask("/api/v1/presses", "POST", {"mode": "precise"}).status == 202
+    cut_off.unroute("**/api/v1/events")
+    expect(cut_off.locator("#press-button")).to_have_text("Cancel")
+    expect(cut_off.locator("dialog[open]")).to_have_count(0)
+    cut_off.close()
 
 
 def test_a_scanner_fills_in_the_patient_and_its_enter_presses_nothing(page: Page, daemon: Daemon):
