@@ -12,7 +12,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, HIGH, LOW, denormalise, slope_of_normalised
-from device.measurement.ramp_modes.fit import TOLERANCE, PressPosterior, best_fits
+from device.measurement.ramp_modes.fit import PressPosterior, best_fits
 from device.measurement.ramp_modes.intervals import PressIntervals, intervals_of
 from device.measurement.ramp_modes.misfit_blocks import Departure
 from device.measurement.ramp_modes.noise import PressNoise
@@ -133,7 +133,7 @@ class RampAnswers:
         if len(rows) == 1:
             return np.concatenate([inside[0], np.zeros(posterior.dimensions - COUNT)])
         starts = scan_starts(rows, inside, self.surrogate, self.noise, self.reach_mm(len(rows)), direction_rad)
-        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=TOLERANCE)
+        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool))
         return np.asarray(found[np.argmin(np.sum(posterior.residuals(found) ** 2, axis=1))])
 
 

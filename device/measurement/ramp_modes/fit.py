@@ -23,7 +23,10 @@ from device.measurement.ramp_modes.noise import FURTHER, PressNoise, as_one_row
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
 TOLERANCE, STEPS = 1e-6, 100
-"""A fit ends when a step lowers its cost by so little of it: further ones, nearly half of all, move no answer."""
+"""A fit ends when a step lowers its cost by so little of it.
+
+Further steps, nearly half of all, move answers by less than the posterior's samples scatter.
+"""
 
 
 class Explained(Protocol):
@@ -181,12 +184,12 @@ def _extended(found: Array, shared: Array, own: Array) -> Array:
 
 def best_fit(posterior: Explained, start: Array) -> Array:
     """Return the coordinates [8 + N] that explain a row best, each held weakly to the middle of its range."""
-    (best,) = best_fits(posterior, start[None], np.ones(len(start), dtype=bool), tolerance=TOLERANCE)
+    (best,) = best_fits(posterior, start[None], np.ones(len(start), dtype=bool))
     return np.asarray(best)
 
 
 def best_fits(
-    posterior: Explained, start: Array, free: NDArray[np.bool_], *, tolerance: float, steps: int = STEPS
+    posterior: Explained, start: Array, free: NDArray[np.bool_], *, tolerance: float = TOLERANCE, steps: int = STEPS
 ) -> Array:
     """Return the best fits [n, 8 + N] begun at n points, in those of the coordinates that are `free`; others stay.
 

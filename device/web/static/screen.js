@@ -259,8 +259,8 @@ function follow(before, next) {
   if (began) {
     closeDialogs();
     underCurtain = [];
+    dismiss(next);
   }
-  if (began) dismiss(next);
   if (before && before.guidance.code !== next.guidance.code && SOUNDS[next.guidance.code]) sound(SOUNDS[next.guidance.code]);
   stayAwake(isNow);
 }

@@ -20,7 +20,7 @@ from device.measurement.ramp_modes.answers import (
 )
 from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place
-from device.measurement.ramp_modes.fit import TOLERANCE, best_fit, best_fits
+from device.measurement.ramp_modes.fit import best_fit, best_fits
 from device.measurement.ramp_modes.misfit_blocks import Departure
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import sample_press
@@ -89,7 +89,7 @@ class OwnAnswers(RampAnswers):
         """Return coordinates [8 + 2 N] to begin at: of several the one that explains the presses best."""
         starts = self._scan_starts(seen, inside, reach_mm) if len(seen.rows) > 1 else _single_starts(inside)
         posterior = self._posterior(seen, starts[0], reach_mm)
-        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=TOLERANCE)
+        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool))
         return np.asarray(found[np.argmin(np.sum(posterior.residuals(found) ** 2, axis=1))])
 
     def _scan_starts(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:
