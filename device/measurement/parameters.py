@@ -66,6 +66,11 @@ def elastic_mismatch(modulus_kpa: Array, tissue_kpa: Array) -> Array:
     return np.asarray((modulus_kpa - tissue_kpa) / (modulus_kpa + 1.5 * tissue_kpa))
 
 
+def modulus_ratio(mismatch: float) -> float:
+    """Return the modulus of an inclusion of a mismatch below 1, over its tissue's."""
+    return (1 + 1.5 * mismatch) / (1 - mismatch)
+
+
 def is_possible(values: Array) -> NDArray[np.bool_]:
     """Return whether parameters [..., 9] are of an inclusion stiffer than its tissue that lies above the base."""
     size_mm, depth_mm, modulus_kpa, tissue_kpa, slab_mm = np.moveaxis(values, -1, 0)[: COUNT + 2]

@@ -81,12 +81,10 @@ class ProbeTables:
         if world.layers != AS_TABULATED:
             if self.layers is None:
                 raise _no_table("world.layers", "layers")
-            slab.require_near_nominal("world.layers")
             ramps = self.layers.changed(ramps, world.layers, inclusion, slab)
         if world.face_motion_ratio:
             if self.motion is None:
                 raise _no_table("world.face_motion_ratio", "motion")
-            slab.require_near_nominal("world.face_motion_ratio")
             ramps = self.motion.moved(ramps, world.face_motion_ratio, inclusion, slab)
         return ramps
 

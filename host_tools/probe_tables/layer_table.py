@@ -1,7 +1,8 @@
 """Builds the virtual probe's table of what other layers change: a star of moduli, each against its own mesh's default.
 
 Each layer at two ratios, every second size and depth of the surface table and the ends of its mismatches; differences
-of two solves on one mesh, since meshes differ by more than a layer changes an inclusion's pressure.
+of two solves on one mesh, since meshes differ by more than a layer changes an inclusion's pressure. The waveguide's
+layers are then solved in other slabs, too: each a quarter stiffer.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -21,13 +23,24 @@ from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.layer_table import (
     AS_TABULATED,
     DEEP_FROM_MM,
+    IN_SLABS_RATIO,
     SKIN_MM,
     SOLVED_RATIOS,
+    WAVEGUIDE_LAYERS,
     LayerRatios,
     LayerTable,
 )
 from device.simulation.physics.slab import NOMINAL, Slab
-from host_tools.probe_tables.force_ramps import CHANGES, FORCES_N, bare_per_n, inclusions_per_n_mm3
+from device.simulation.physics.slab_changes import SlabChanges
+from host_tools.forward.accuracy import Level
+from host_tools.probe_tables.changes_in_slabs import PLACES, SLABS_SOLVED, build_changes_in_slabs
+from host_tools.probe_tables.force_ramps import CHANGES, FORCES_N, bare_per_n, first_that_can, inclusions_per_n_mm3
+from host_tools.probe_tables.slab_changes import (
+    SLAB_FORCES_N,
+    WITHOUT_INCLUSION,
+    NominalTable,
+    ScatteredInclusion,
+)
 from host_tools.probe_tables.surface_table import (
     COARSE,
     POINTS,
@@ -39,9 +52,6 @@ from host_tools.probe_tables.surface_table import (
 from host_tools.scenes.probe import Probe
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scenes.scene import Scene, Tissue, TissueLayer, Waveguide
-
-WAVEGUIDE_LAYERS = 3
-"""The first of `SOLVED_RATIOS` are the waveguide's: they need no further surfaces in the tissue."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +91,11 @@ def build_layer_table(
     *,
     waveguide: Waveguide | None = None,
     points: tuple[int, int, int] = POINTS,
+    slab_places: int = PLACES,
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> LayerTable:
-    """Solve every point of the table (some ten minutes on two cores); `on_point` hears done and total.
+    """Solve every point of the table (half an hour on two cores); `on_point` hears done and total.
 
     Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one that has not three layers, or
     whose face no table holds.
@@ -104,24 +115,71 @@ def build_layer_table(
         delayed(inclusions_per_n_mm3)(*place, axes.elastic_mismatch) for place in places
     )
     solved: list[Array] = []
+    total = len(places) + SLABS_SOLVED * slab_places
     for done, of_place in enumerate(solving, start=1):
         solved.append(of_place)
-        on_point(done, len(places))
+        on_point(done, total)
     # [scene, S, D, M, 2, F, R] to [scene, 2, S, D, M, F, R]
     on_axes = np.array(solved).reshape(len(scenes), len(axes.size_mm), len(axes.depth_mm), *solved[0].shape)
-    return _assembled(axes, np.array(baseline), np.moveaxis(on_axes, 4, 1))
+    change = _changes(np.moveaxis(on_axes, 4, 1))
+    in_slabs = build_changes_in_slabs(
+        nominal_tables(axes, change),
+        partial(layers_of_inclusion, waveguide, axes.elastic_mismatch),
+        partial(layers_without_inclusion, waveguide),
+        places=slab_places,
+        jobs=jobs,
+        on_point=lambda done: on_point(len(places) + done, total),
+    )
+    return assembled(axes, _changes(np.array(baseline)), change, in_slabs)
 
 
-def _assembled(axes: InclusionAxes, baseline: Array, inclusions: Array) -> LayerTable:
-    """Return the table of the fields [scene, 2, ...] in the order of `solved_scenes`."""
-    change = _changes(inclusions)
-    scale = np.abs(change).max(axis=tuple(range(3, change.ndim)))
+def assembled(axes: InclusionAxes, baseline: Array, inclusions: Array, slabs: tuple[SlabChanges, ...]) -> LayerTable:
+    """Return the table of changes [layer, 2, 2, ...] of `SOLVED_RATIOS`, and of what other slabs change of them."""
+    scale = np.abs(inclusions).max(axis=tuple(range(3, inclusions.ndim)))
+    over = scale.reshape(*scale.shape, *[1] * (inclusions.ndim - 3))
     return LayerTable(
         *axes,
-        bare_change_per_n=_changes(baseline).astype(np.float32),
-        inclusion_change_per_n_mm3=(change / scale.reshape(*scale.shape, *[1] * (change.ndim - 3))).astype(np.float16),
+        force_n=FORCES_N,
+        bare_change_per_n=baseline.astype(np.float32),
+        inclusion_change_per_n_mm3=(inclusions / over).astype(np.float16),
         inclusion_scale=scale,
+        slabs=slabs,
     )
+
+
+def nominal_tables(axes: InclusionAxes, change: Array) -> list[NominalTable]:
+    """Return what each of the waveguide's layers changes in the nominal slab at `IN_SLABS_RATIO`, of all changes."""
+    solved = list(SOLVED_RATIOS.values())[:WAVEGUIDE_LAYERS]
+    return [
+        NominalTable(axes, of_layer[ratios.index(IN_SLABS_RATIO)], FORCES_N)
+        for of_layer, ratios in zip(change, solved, strict=False)
+    ]
+
+
+def scenes_in_slabs(waveguide: Waveguide) -> list[LayeredScene]:
+    """Return the probe as it is, then each of its layers at `IN_SLABS_RATIO`."""
+    names = list(SOLVED_RATIOS)[:WAVEGUIDE_LAYERS]
+    others = [replace(AS_TABULATED, **{name: IN_SLABS_RATIO}) for name in names]
+    return [LayeredScene(layers, in_tissue=False, waveguide=waveguide) for layers in (AS_TABULATED, *others)]
+
+
+def layers_of_inclusion(
+    waveguide: Waveguide, mismatches: Array, one: ScatteredInclusion, slab: Slab, reached: int
+) -> Array:
+    """Return what each layer changes of what an inclusion adds in a slab [layer, M, 2, F, R]."""
+    at = one.size_mm, one.depth_mm, mismatches, SLAB_FORCES_N[:reached]
+    usual, *others = (inclusions_per_n_mm3(scene, slab, CHANGES, *at) for scene in scenes_in_slabs(waveguide))
+    return np.array(others) - usual
+
+
+def layers_without_inclusion(waveguide: Waveguide, slab: Slab) -> Array:
+    """Return what each layer changes in a slab without an inclusion [layer, 2, F, R], all on one level."""
+
+    def on(level: Level) -> Array:
+        usual, *others = (bare_per_n(scene(slab), SLAB_FORCES_N, (level,)) for scene in scenes_in_slabs(waveguide))
+        return np.array(others) - usual
+
+    return first_that_can(on, WITHOUT_INCLUSION)
 
 
 def _changes(fields: Array) -> Array:

@@ -141,8 +141,8 @@ def _as_far_as_it_goes(scene_of: SceneOf, slab: Slab, one: ScatteredInclusion, m
 
 
 class SlabRows(NamedTuple):
-    """Coordinates [n, 6] of inclusions in slabs at a mismatch and a force, changes [n, 2, R], `field_shapes`
-    [n, 5, 2, R] of the inclusions in the nominal slab, and their peaks [n, 2].
+    """Coordinates [n, 6] of inclusions in slabs at a mismatch and a force, changes [n, X, R] of X fields,
+    `field_shapes` [n, 5, X, R] of the inclusions in the nominal slab, and their peaks [n, X].
     """
 
     at: Array
@@ -152,7 +152,7 @@ class SlabRows(NamedTuple):
 
 
 def as_rows(one: ScatteredInclusion, fields: Array, shapes: Array, mismatches: Array) -> SlabRows:
-    """Return the rows of one inclusion: fields [1 + n, M, 2, F, R] in its slabs, shapes [5, 2, M, F, R].
+    """Return the rows of one inclusion: fields [1 + n, M, X, F, R] in its slabs, shapes [5, X, M, F, R].
 
     Forces that were not reached are left out.
     """
@@ -173,23 +173,24 @@ def as_rows(one: ScatteredInclusion, fields: Array, shapes: Array, mismatches: A
 def fitted(
     rows: SlabRows, reaches: Sequence[Sequence[float]] = REACHES, highest: Sequence[int] = HIGHEST
 ) -> tuple[NDArray[np.uint8], Array]:
-    """Return degrees [N, 6] and shares [N, 5, 2] of the shapes, by least squares over all radii.
+    """Return degrees [N, 6] and shares [N, 5, X] of the shapes, by least squares over all radii.
 
     Which terms count: `REACHES`, `HIGHEST`. An error counts over the peak of the inclusion's field, and the less the
     more the slab changes it: near the nominal slab a small change is to be right, too.
     """
     degrees, of_shape = terms_of_shapes(reaches, highest)
     terms, unknowns = LegendreTerms(degrees), sum(int(wanted.sum()) for wanted in of_shape)
-    normal, right = np.zeros((2, unknowns, unknowns)), np.zeros((2, unknowns))
+    fields = rows.changes.shape[1]
+    normal, right = np.zeros((fields, unknowns, unknowns)), np.zeros((fields, unknowns))
     for start in range(0, len(rows.at), ROWS_AT_ONCE):
         part = SlabRows(*(one[start : start + ROWS_AT_ONCE] for one in rows))
         design = changing_terms(terms, part.at)
-        for field in range(2):
+        for field in range(fields):
             equations, values = _equations(part, design, of_shape, field)
             normal[field] += equations.T @ equations
             right[field] += equations.T @ values
     found = np.zeros((len(degrees), *rows.shapes.shape[1:3]))
-    for field in range(2):
+    for field in range(fields):
         ends = np.cumsum([int(wanted.sum()) for wanted in of_shape])[:-1]
         for shape, shares in enumerate(np.split(_solved(normal[field], right[field]), ends)):
             found[of_shape[shape], shape, field] = shares
@@ -228,14 +229,14 @@ def terms_of_shapes(
 
 
 class NominalTable(NamedTuple):
-    """A table's fields [2, S, D, M, F, R] in the nominal slab, over force, size cubed and mismatch, at its forces."""
+    """A table's fields [X, S, D, M, F, R] in the nominal slab, over force, size cubed and mismatch, at its forces."""
 
     axes: InclusionAxes
     per_n_mm3: Array
     force_n: Array
 
     def shapes(self, one: ScatteredInclusion) -> Array:
-        """Return `field_shapes` [5, 2, M, F, R] of an inclusion at `SLAB_FORCES_N`, over size cubed and mismatch."""
+        """Return `field_shapes` [5, X, M, F, R] of an inclusion at `SLAB_FORCES_N`, over size cubed and mismatch."""
         to_own = resampling(self.force_n, SLAB_FORCES_N)
         at_forces = []
         for mismatch in self.axes.elastic_mismatch:

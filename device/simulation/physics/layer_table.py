@@ -3,12 +3,15 @@
 A star: one layer's modulus apart from the default, solved in finite strain at two ratios, each as the
 difference of two solves on one mesh; quadratic in the logarithm of the ratio, and several layers add up. Kept at
 coarse sizes, depths and mismatches, of the nominal slab and on the axis: what a layer changes of the tilt and of the
-shape of a field off the axis is left out. Written by `host_tools table --part layers`.
+shape of a field off the axis is left out. In other slabs the waveguide's layers are known as `slab_changes` knows the
+face, from one stiffer ratio of each; the tissue's are not. Written by `host_tools table --part layers`.
 """
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, replace
+import math
+from dataclasses import astuple, dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +22,11 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import Bound, Inclusion, require
 from device.simulation.physics.chebyshev import interpolation_weights
 from device.simulation.physics.inclusion_axes import InclusionAxes
-from device.simulation.physics.slab import Slab
+from device.simulation.physics.slab import NOMINAL, Slab
+from device.simulation.physics.slab_changes import OF_SLABS, SlabChanges, field_shapes, slab_arrays, slabs_of
 from device.simulation.physics.surface_table import PressRamps
 
-NAME, SCHEMA = "layer_table", "tsis.layer_table/1"
+NAME, SCHEMA = "layer_table", "tsis.layer_table/2"
 ACTION = "run `host_tools table --part layers` to make it again"
 SOLVED_RATIOS = {
     "face_modulus_ratio": (0.8, 1.25),
@@ -33,6 +37,10 @@ SOLVED_RATIOS = {
 }
 """Each layer's moduli over the default that are solved; 1 is the third point of its quadratic."""
 SKIN_MM, DEEP_FROM_MM = 1.5, 20.0
+WAVEGUIDE_LAYERS = 3
+"""The first of `SOLVED_RATIOS` are the waveguide's."""
+IN_SLABS_RATIO = 1.25
+"""That at which these are solved in other slabs than the nominal one."""
 
 
 @dataclass(frozen=True)
@@ -65,44 +73,70 @@ class LayerRatios:
 AS_TABULATED = LayerRatios()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LayerTable:
     """`bare_change_per_n` [layer, 2, 2, F, R]: what each of `SOLVED_RATIOS` changes, w first, then p, over the force.
 
     `inclusion_change_per_n_mm3` [layer, 2, 2, S, D, M, F, R]: the same of what an inclusion adds, also over size cubed
-    and mismatch, and over `inclusion_scale` [layer, 2, 2] of its own largest.
+    and mismatch, and over `inclusion_scale` [layer, 2, 2] of its own largest. Both at `force_n` [F].
+    `slabs`: what other slabs change of these, one for each of the waveguide's layers, at `IN_SLABS_RATIO`.
     """
 
     size_mm: Array
     depth_mm: Array
     elastic_mismatch: Array
+    force_n: Array
     bare_change_per_n: NDArray[np.float32]
     inclusion_change_per_n_mm3: NDArray[np.float16]
     inclusion_scale: Array
+    slabs: tuple[SlabChanges, ...]
 
     def changed(self, ramps: PressRamps, layers: LayerRatios, inclusion: Inclusion, slab: Slab) -> PressRamps:
         """Return the ramps of an inclusion in a slab with other layers; refuses one outside the table.
 
-        A field off the axis grows by as much as the centred one does with the layers.
+        A field off the axis grows by as much as the centred one does with the layers. Raises `InvalidQuantity` for
+        other layers of the tissue far from the nominal slab.
         """
-        axes, weights = InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch), layers.weights()
+        for name in (field.name for field in fields(layers)[WAVEGUIDE_LAYERS:]):
+            if getattr(layers, name) != 1.0:
+                slab.require_near_nominal(f"world.layers.{name}")
+        weights = layers.weights()
         baseline = np.tensordot(weights, self.bare_change_per_n, 2)
-        scaled = weights[..., None] * self.inclusion_scale
-        per_n_mm3 = np.einsum("lnf,lnfsdmkr->fsdmkr", scaled, self.inclusion_change_per_n_mm3, optimize=True)
-        change = axes.inclusion_per_n(per_n_mm3, inclusion, slab)
+        change = self.axes.inclusion_per_n(self._weighted(weights), inclusion, slab)
+        if slab != NOMINAL:
+            for layer in np.flatnonzero(weights[:WAVEGUIDE_LAYERS].any(axis=1)):
+                in_slabs, log_ratio = self.slabs[layer], math.log(astuple(layers)[layer])
+                baseline = baseline + log_ratio / math.log(IN_SLABS_RATIO) * in_slabs.baseline_per_n(slab)
+                per_n_mm3 = self._weighted(weights, slice(layer, layer + 1))
+                shapes = field_shapes(self.axes, per_n_mm3, self.force_n, inclusion, slab)
+                change = change + in_slabs.inclusion_per_n(shapes, self.force_n, inclusion, slab)
         return ramps._replace(
             baseline=replace(ramps.baseline, fields_per_n=ramps.baseline.fields_per_n + baseline),
             inclusion_field=replace(ramps.inclusion_field, fields_per_n=ramps.inclusion_field.fields_per_n + change),
             tabulated_inclusion_field=ramps.tabulated_inclusion_field or ramps.inclusion_field,
         )
 
+    @cached_property
+    def axes(self) -> InclusionAxes:
+        """Sizes, depths and mismatches that are tabulated."""
+        return InclusionAxes(self.size_mm, self.depth_mm, self.elastic_mismatch)
+
+    def _weighted(self, weights: Array, layers: slice = slice(None)) -> Array:
+        """Return what an inclusion adds [2, S, D, M, F, R] with some of the layers, added up by weights [layer, 2]."""
+        scaled = weights[layers, :, None] * self.inclusion_scale[layers]
+        changes = self.inclusion_change_per_n_mm3[layers]
+        return np.asarray(np.einsum("lnf,lnfsdmkr->fsdmkr", scaled, changes, optimize=True))
+
     def save(self, folder: Path, origin: dict[str, object]) -> None:
         """Write layer_table.npz and its description with the hash."""
-        arrays = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        arrays = {name: getattr(self, name) for name in OWN} | slab_arrays(self.slabs)
         save_table(folder, NAME, arrays, {"schema": SCHEMA, "command": "host_tools table --part layers", **origin})
+
+
+OWN = tuple(name for name in LayerTable.__dataclass_fields__ if name != "slabs")
 
 
 def load_layer_table(folder: Path) -> LayerTable:
     """Read a table; raise `InvalidQuantity` when it is missing or not what its description says."""
-    arrays, _ = load_table(folder, NAME, SCHEMA, tuple(LayerTable.__dataclass_fields__), ACTION)
-    return LayerTable(**arrays)
+    arrays, _ = load_table(folder, NAME, SCHEMA, (*OWN, *OF_SLABS), ACTION)
+    return LayerTable(**{name: arrays[name] for name in OWN}, slabs=slabs_of(arrays))

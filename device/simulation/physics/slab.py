@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from device.measurement.parameters import ABOVE_BASE_MM
+from device.measurement.parameters import ABOVE_BASE_MM, modulus_ratio
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 
 PEOPLES_KPA, PEOPLES_MM = (2.0, 30.0), (15.0, 60.0)
@@ -40,7 +40,7 @@ class Slab:
 
     def modulus_kpa(self, mismatch: float) -> float:
         """Return the Young's modulus of an inclusion of a mismatch below 1 in this slab."""
-        return self.youngs_modulus_kpa * (1 + 1.5 * mismatch) / (1 - mismatch)
+        return self.youngs_modulus_kpa * modulus_ratio(mismatch)
 
     def require_held(self, inclusion: Inclusion) -> None:
         """Refuse an inclusion that touches the slab's base, or all but does."""

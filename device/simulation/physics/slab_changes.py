@@ -1,4 +1,4 @@
-"""What tissue other than the nominal slab changes of the pressed face, at the same force and the same mismatch.
+"""What tissue other than the nominal slab changes of a table's fields, at the same force and the same mismatch.
 
 Without an inclusion it is interpolated between slabs, in ln Et and 1/T. What an inclusion adds becomes stronger or
 weaker, wider or narrower, and takes the shape of an inclusion a little larger, deeper or pressed harder: the change is
@@ -13,8 +13,10 @@ multivariate meshes, Commun. Comput. Phys. 18 (2015).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +36,11 @@ SLAB = slice(2, 4)
 
 @dataclass(frozen=True, eq=False)
 class SlabChanges:
-    """`bare_change_per_n` [K, T, 2, F, R] at `slab_modulus_kpa` [K] and `slab_thickness_mm` [T], w first, then p.
+    """`bare_change_per_n` [K, T, X, F, R] of X fields at `slab_modulus_kpa` [K] and `slab_thickness_mm` [T].
 
     `change_degrees` [N, 6] of the terms in size, depth, modulus, thickness, mismatch and force; `shape_shares`
-    [N, 5, 2] are how much they add of each of `field_shapes`, from 0 to `largest_n`: beyond, what they change is
-    carried on as a polynomial in the force.
+    [N, 5, X] are how much they add of each of `field_shapes`, from 0 to `largest_n`: beyond, what they change is
+    carried on as a polynomial in the force. Of the pressed face the fields are w and p.
     """
 
     slab_modulus_kpa: Array
@@ -49,11 +51,11 @@ class SlabChanges:
     largest_n: Array
 
     def baseline_per_n(self, slab: Slab) -> Array:
-        """Return what a slab changes of the fields [2, F, R] without an inclusion, over the force."""
+        """Return what a slab changes of the fields [X, F, R] without an inclusion, over the force."""
         return between_slabs(self.bare_change_per_n, self.slab_modulus_kpa, self.slab_thickness_mm, slab)
 
     def inclusion_per_n(self, shapes: Array, force_n: Array, inclusion: Inclusion, slab: Slab) -> Array:
-        """Return what a slab changes of an inclusion's field [2, F, R], over the force, from its `field_shapes` at
+        """Return what a slab changes of an inclusion's fields [X, F, R], over the force, from their `field_shapes` at
         `force_n` [F].
         """
         reached_n = points_inside(0.0, float(self.largest_n), len(force_n))
@@ -71,6 +73,28 @@ class SlabChanges:
         return LegendreTerms(self.change_degrees)
 
 
+EACH = "bare_change_per_n", "shape_shares"
+"""What is each table's own where several know the same slabs."""
+OF_SLABS = tuple(f"slabs_{name}" for name in SlabChanges.__dataclass_fields__)
+
+
+def slab_arrays(several: Sequence[SlabChanges]) -> dict[str, NDArray[Any]]:
+    """Return what a file holds of changes in the same slabs, of the same terms, by the names in `OF_SLABS`."""
+    first = several[0]
+    return {
+        f"slabs_{name}": np.stack([getattr(one, name) for one in several]) if name in EACH else getattr(first, name)
+        for name in SlabChanges.__dataclass_fields__
+    }
+
+
+def slabs_of(arrays: Mapping[str, NDArray[Any]]) -> tuple[SlabChanges, ...]:
+    """Return the changes whose arrays `slab_arrays` gave."""
+    named = {name: arrays[f"slabs_{name}"] for name in SlabChanges.__dataclass_fields__}
+    return tuple(
+        SlabChanges(**named | {name: named[name][number] for name in EACH}) for number in range(len(named[EACH[0]]))
+    )
+
+
 def between_slabs(fields: NDArray[np.floating], modulus_kpa: Array, thickness_mm: Array, slab: Slab) -> Array:
     """Return the fields [...] of a slab, of those [E, T, ...] at moduli [E] and thicknesses [T], in ln Et and 1/T."""
     modulus = interpolation_weights(np.log(modulus_kpa), float(np.log(slab.youngs_modulus_kpa)))
@@ -81,10 +105,10 @@ def between_slabs(fields: NDArray[np.floating], modulus_kpa: Array, thickness_mm
 def field_shapes(
     axes: InclusionAxes, per_n_mm3: Array, force_n: Array, inclusion: Inclusion, slab: Slab = NOMINAL
 ) -> Array:
-    """Return shapes [5, 2, F, R] over the force of an inclusion in the nominal slab: its field, and how that grows.
+    """Return shapes [5, X, F, R] over the force of an inclusion in the nominal slab: its fields, and how they grow.
 
     With its size, per size itself; with its depth, per mm; and with the force, per force itself. The last is the field
-    times the squared share of the radius in the largest. `per_n_mm3` [2, S, D, M, F, R] as a table has it on `axes`, at
+    times the squared share of the radius in the largest. `per_n_mm3` [X, S, D, M, F, R] as a table has it on `axes`, at
     `force_n` [F] and even radii; the mismatch is the inclusion's in `slab`.
     """
     field = axes.inclusion_per_n(per_n_mm3, inclusion, slab)
