@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from device.files.table_file import load_table, save_table
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, NEAR_NOMINAL, PARAMETERS, normalise
+from device.measurement.parameters import HIGH, LOW, PARAMETERS, RANGES, Range, normalise
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
@@ -26,13 +26,19 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import (
     DIRECTIONS,
     RegionDerivatives,
     RowDerivatives,
-    derivative_coordinates,
     row_derivatives_of,
 )
 from device.measurement.ramp_modes.legendre import LegendreSum, LegendreTerms
 from device.measurement.ramp_modes.noise import light_ratio
 from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE
-from device.measurement.ramp_modes.surrogate import DEPTH, OFFSET, SIZE, far_field_strength
+from device.measurement.ramp_modes.surrogate import (
+    DEPTH,
+    OFFSET,
+    SIZE,
+    far_field_strength,
+    offsets_in_range,
+    polynomial_coordinates,
+)
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw
 from device.simulation.physics.world import AS_BELIEVED, OverLesion, PressTilts, Relaxation, TrueLight, World
@@ -50,8 +56,10 @@ from host_tools.press_models.seeds import derived_seed
 from host_tools.probe_tables.surface_table import solved_for
 from host_tools.scenes.probe import Probe
 
-PRESSES, SEED = 400, 5
+PRESSES, SEED = 900, 5
 """Presses of each region for the derivatives that are kept, and their seed."""
+IN_TISSUE = RANGES | {"tissue_modulus_kpa": Range(2.1, 29.0, by_ratio=True)}
+"""Tables end where tissue may give way, or be stiffer over the lesion than beside it."""
 BASELINE_DEGREE, INCLUSION_DEGREE = 2, 2
 OF_BASELINE = ("tissue_modulus_kpa", "slab_thickness_mm", "contact_pressure_kpa", "albedo", "spread_mm")
 STEEPER = {"size_mm": 3, "depth_mm": 3, "offset_mm": 3}
@@ -82,7 +90,7 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
     return worlds[name]()
 
 
-NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/2"
+NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/3"
 ACTION = "run `host_tools table --part derivatives` to make it again"
 
 
@@ -131,13 +139,13 @@ def sampled_derivatives(
     near, missed = _region(
         tables,
         count,
-        partial(draw_parameters, ranges=NEAR_NOMINAL),
+        partial(draw_parameters, ranges=IN_TISSUE),
         (float(LOW[OFFSET]), float(HIGH[OFFSET])),
         seed,
         jobs,
     )
     beside, _ = _region(
-        tables, count, partial(draw_beside, ranges=NEAR_NOMINAL), (float(HIGH[OFFSET]), BESIDE_TO_MM), seed + 1, jobs
+        tables, count, partial(draw_beside, ranges=IN_TISSUE), (float(HIGH[OFFSET]), BESIDE_TO_MM), seed + 1, jobs
     )
     return RowDerivatives(near, beside), missed
 
@@ -166,7 +174,7 @@ def fit_region(parameters: Array, rows: Array, changes: Array, ends_mm: tuple[fl
     """Return the derivatives of presses with parameters [n, 9], rows [n, P] and changes [n, COUNT, P]."""
     of_baseline, of_inclusion = _baseline_degrees(), _inclusion_degrees()
     require("presses", len(rows), Bound(len(of_baseline) + len(of_inclusion), np.inf, "presses"), "simulate more")
-    at = derivative_coordinates(normalise(parameters), parameters, *ends_mm)
+    at = offsets_in_range(polynomial_coordinates(normalise(parameters), parameters), *ends_mm)
     baseline = LegendreTerms(of_baseline).values(at)
     strength = far_field_strength(parameters[:, SIZE], parameters[:, DEPTH])[:, None]
     inclusion = strength * LegendreTerms(of_inclusion).values(at)

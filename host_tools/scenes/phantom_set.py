@@ -12,9 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
-from device.measurement.parameters import NEAR_NOMINAL
+from device.measurement.parameters import ABOVE_BASE_MM, ELASTIC_MISMATCHES, RANGES, elastic_mismatch, modulus_ratio
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity
 from host_tools.scenes.scene import NEAREST_MM, Tissue
 from host_tools.scenes.stated import SIGMAS, SUFFIX, StatedNumbers, Tolerance, read_stated, require_fitting
@@ -73,11 +74,28 @@ class StatedPhantom:
 
     def outside(self) -> Iterator[InvalidQuantity]:
         """Yield what it states beyond the ranges of the design's model: commissioning refuses that."""
-        for name, (low, high, _) in NEAR_NOMINAL.items():
+        for name, (low, high, _) in RANGES.items():
             stated = getattr(self, TISSUE_OF.get(name, name), None)
             if stated is not None and not low <= stated <= high:
                 action = "cast one inside: commissioning knows no other"
                 yield InvalidQuantity(f"{name} of {self.name}", stated, str(Bound(low, high, "")), action)
+        if self.inclusion:
+            yield from self._not_possible(self.inclusion)
+
+    def _not_possible(self, inclusion: Inclusion) -> Iterator[InvalidQuantity]:
+        """Yield what is not possible in its tissue, though each number may be."""
+        (least, most), tissue_kpa = ELASTIC_MISMATCHES, self.tissue_modulus_kpa
+        mismatch = float(elastic_mismatch(np.array(inclusion.youngs_modulus_kpa), np.array(tissue_kpa)))
+        if not least <= mismatch <= most:
+            softest, stiffest = (round(tissue_kpa * modulus_ratio(one), 1) for one in (least, most))
+            action = f"cast one 1.3 to 61 times as stiff as its tissue of {tissue_kpa:g} kPa"
+            found = inclusion.youngs_modulus_kpa
+            bound = str(Bound(softest, stiffest, "kPa"))
+            yield InvalidQuantity(f"youngs_modulus_kpa of {self.name}", found, bound, action)
+        lowest_mm, base_mm = inclusion.size_mm + inclusion.depth_mm, self.tissue_thickness_mm - ABOVE_BASE_MM
+        if lowest_mm > base_mm:
+            action = f"cast a block of {lowest_mm + ABOVE_BASE_MM:g} mm at least"
+            yield InvalidQuantity(f"size_mm + depth_mm of {self.name}", lowest_mm, f"at most {base_mm:g} mm", action)
 
     def agrees_with(self, truth: Inclusion) -> bool:
         """Return whether a recording's truth is its own, within three standard deviations of each number."""

@@ -82,13 +82,25 @@ def test_a_set_of_one_surface_and_tissue_is_taken_and_told_what_would_tell_more(
 def test_what_commissioning_will_refuse_is_told_when_the_set_is_checked(tmp_path):
     """A set is taken before anything is cast from it: other uses know more tissue."""
     table = good()
-    table["phantoms"][0]["size_mm"], table["phantoms"][1]["tissue_modulus_kpa"] = 1.5, 6.2
+    table["phantoms"][0]["size_mm"], table["phantoms"][1]["tissue_modulus_kpa"] = 1.5, 31.0
     told = list(read_phantoms(written(tmp_path, table)).advice())
     assert len(told) == 2
     assert told[0].startswith("size_mm of ")
     assert "is 1.5, but must be at least 2 and at most 15" in told[0]
     assert "tissue_modulus_kpa of " in told[1]
     assert "cast one inside" in told[1]
+
+
+def test_castings_whose_inclusion_is_not_possible_in_their_tissue_are_told(tmp_path):
+    """Each number lies in its range: as soft as its tissue nothing shows, and no press is answered beyond 61 times."""
+    table = good()
+    of_soft, of_thin = table["phantoms"][:2]
+    of_soft["tissue_modulus_kpa"], of_soft["youngs_modulus_kpa"] = 20.0, 22.0
+    of_thin["tissue_thickness_mm"] = of_thin["size_mm"] + of_thin["depth_mm"] + 0.6
+    told = list(read_phantoms(written(tmp_path, table)).advice())
+    assert "youngs_modulus_kpa of " in told[0]
+    assert "1.3 to 61 times as stiff" in told[0]
+    assert any("size_mm + depth_mm of " in one and "cast a block of" in one for one in told)
 
 
 def test_everything_that_is_wrong_is_told_at_once(tmp_path):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, LOW, NEAR_NOMINAL, PARAMETERS, box_of, denormalise
+from device.measurement.parameters import HIGH, LOW, PARAMETERS, denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.legendre import LegendreSum
 from device.measurement.ramp_modes.noise import light_ratio
@@ -86,7 +86,7 @@ def owned_by(owner: Owner) -> NDArray[np.intp]:
     return np.array([number for number, one in enumerate(DIRECTIONS.values()) if one.owner == owner])
 
 
-KNOWN_IN, TISSUE_AND_SLAB = box_of(NEAR_NOMINAL), slice(TISSUE, TISSUE + 2)
+ACTION = "install the model bundle again, or commission the probe again"
 ARRAYS = "baseline_degrees", "baseline_coefficients", "inclusion_degrees", "inclusion_coefficients"
 
 
@@ -106,7 +106,8 @@ class RegionDerivatives:
     def changes(self, normalised: Array, rows: Array) -> Array:
         """Return the changes [n, COUNT, P] of rows [n, P] at coordinates [n, 9], or the nearest inside."""
         parameters = denormalise(normalised)
-        at = np.clip(derivative_coordinates(normalised, parameters, self.from_mm, self.to_mm), -1, 1)
+        at = offsets_in_range(polynomial_coordinates(normalised, parameters), self.from_mm, self.to_mm)
+        at = np.clip(at, -1, 1)
         baseline = self.baseline.values(at).reshape(len(at), COUNT, COLUMNS)
         inclusion = self.inclusion.values(at).reshape(len(at), COUNT, INCLUSION_COLUMNS)
         strength = far_field_strength(parameters[:, SIZE], parameters[:, DEPTH])[:, None, None]
@@ -119,16 +120,6 @@ class RegionDerivatives:
         values = [part for field in fields for part in (field.degrees, field.coefficients)]
         kinds = (np.uint8, np.float32) * 2
         return {name: np.asarray(value, kind) for name, value, kind in zip(ARRAYS, values, kinds, strict=True)}
-
-
-def derivative_coordinates(normalised: Array, parameters: Array, from_mm: float, to_mm: float) -> Array:
-    """Return the coordinates [n, 9] of the polynomials, of points of `normalise` whose parameters are told, too.
-
-    Tissue and slab are over `NEAR_NOMINAL`, where the layers were solved; others take the nearest there.
-    """
-    at = offsets_in_range(polynomial_coordinates(normalised, parameters), from_mm, to_mm)
-    at[:, TISSUE_AND_SLAB] = ((normalised - KNOWN_IN.middle) / KNOWN_IN.half)[:, TISSUE_AND_SLAB]
-    return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +146,21 @@ class RowDerivatives:
         """Return what a file holds of them: the arrays of both, and the largest offset."""
         parts = {"near": self.near, "beside": self.beside}
         named = {f"{part}_{name}": value for part, one in parts.items() for name, value in one.arrays().items()}
-        return named | {"to_mm": np.array(self.beside.to_mm)}
+        return named | {"to_mm": np.array(self.beside.to_mm), "tissue_kpa": TISSUE_KPA}
 
 
-DERIVATIVE_ARRAYS = (*(f"{part}_{name}" for part in ("near", "beside") for name in ARRAYS), "to_mm")
+TISSUE_KPA = np.array([LOW[TISSUE], HIGH[TISSUE]])
+"""The tissue over which coordinates run: a file of before, of 4-6 kPa, does not say it."""
+DERIVATIVE_ARRAYS = (*(f"{part}_{name}" for part in ("near", "beside") for name in ARRAYS), "to_mm", "tissue_kpa")
 
 
 def row_derivatives_of(arrays: Mapping[str, NDArray[Any]]) -> RowDerivatives:
-    """Return what the arrays in `DERIVATIVE_ARRAYS` say; raise `InvalidQuantity` when one is of another shape."""
+    """Return what the arrays in `DERIVATIVE_ARRAYS` say; raise `InvalidQuantity` when one is of another shape.
+
+    Also where they are of tissue of another range than the models'.
+    """
+    if not np.array_equal(arrays["tissue_kpa"], TISSUE_KPA):
+        raise InvalidQuantity("tissue_kpa of the derivatives", arrays["tissue_kpa"], f"{TISSUE_KPA}", ACTION)
     low_mm, end_mm, to_mm = float(LOW[OFFSET]), float(HIGH[OFFSET]), float(arrays["to_mm"])
     return RowDerivatives(_region(arrays, "near", low_mm, end_mm), _region(arrays, "beside", end_mm, to_mm))
 
@@ -173,8 +171,7 @@ def _region(arrays: Mapping[str, NDArray[Any]], part: str, from_mm: float, to_mm
         degrees, values = (arrays[f"{part}_{name}_{what}"] for what in ("degrees", "coefficients"))
         expected = (len(degrees), len(PARAMETERS)), (len(degrees), columns)
         if (degrees.shape, values.shape) != expected:
-            action = "install the model bundle again"
-            raise InvalidQuantity(f"shape of the {part} derivatives", values.shape, str(expected[1]), action)
+            raise InvalidQuantity(f"shape of the {part} derivatives", values.shape, str(expected[1]), ACTION)
         fields.append(LegendreSum(degrees, values.astype(np.float64)))
     baseline, inclusion = fields
     return RegionDerivatives(baseline, inclusion, from_mm, to_mm)
