@@ -9,13 +9,22 @@ from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.parameters import HIGH, LOW, NEAR_NOMINAL, NOMINAL, box_of, denormalise, normalise
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.ramp_modes.commissioned.row_derivatives import COUNT, DIRECTIONS, NAMES, RowDerivatives
-from device.measurement.ramp_modes.noise import light_ratio
-from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
+from device.measurement.ramp_modes.commissioned.own_probe import SECOND_ACROSS, SEEN_COLUMNS, OwnProbe, Place
+from device.measurement.ramp_modes.commissioned.row_derivatives import (
+    COUNT,
+    DIRECTIONS,
+    NAMES,
+    STD,
+    RowDerivatives,
+)
+from device.measurement.ramp_modes.commissioned.squared_tilt import FURTHER_RATIO, LEFT_STD, of_leaning
+from device.measurement.ramp_modes.noise import LOADS, ErrorLevels, light_ratio
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE, SECOND
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.physics.slab import Slab
-from device.simulation.physics.world import AS_BELIEVED, World
+from device.simulation.physics.world import AS_BELIEVED, PressTilts, World
 from host_tools.press_models.press_derivatives import (
+    IN_TISSUE,
     changes_of_presses,
     fit_region,
     load_derivatives,
@@ -26,6 +35,7 @@ from host_tools.press_models.press_samples import PressedScene, draw_parameters,
 from host_tools.probe_tables.force_ramps import press_ramps, scene_in
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scenes.scene import Waveguide
+from host_tools.scores.foreign_presses import seen_columns
 
 ENDS_MM = float(LOW[OFFSET]), float(HIGH[OFFSET])
 
@@ -39,7 +49,7 @@ def test_no_step_along_a_direction_is_no_change_of_the_world(name):
 def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
     """On presses that they were not learnt from: of the sizes that count, within a fifth of themselves."""
     rng = np.random.default_rng(77)
-    parameters = draw_parameters(3, rng, inclusions_a_skin=3, ranges=NEAR_NOMINAL)
+    parameters = draw_parameters(3, rng, inclusions_a_skin=3, ranges=IN_TISSUE)
     direction_rad = rng.uniform(0, 2 * np.pi, 3)
     rows, changes = changes_of_presses(tables, parameters, direction_rad)
     kept = load_derivatives(SIMULATED_PROBE).changes(normalise(parameters), rows)
@@ -49,10 +59,8 @@ def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("slab", "missed_at_most"), [((3.0, 30.0), 0.7), ((20.0, 40.0), 0.4)])
-def test_in_other_tissue_what_the_layers_change_is_nearly_that_of_the_nearest_that_was_solved(
-    tables, slab, missed_at_most
-):
+@pytest.mark.parametrize("slab", [(3.0, 30.0), (5.0, 30.0), (20.0, 40.0)])
+def test_in_peoples_tissue_what_the_layers_change_is_that_of_fresh_solves(tables, slab):
     """By finite elements: each layer a tenth stiffer, of the contrast of a hard inclusion 6 mm deep."""
     hard, layers = Inclusion(10.0, 6.0, 100.0), Waveguide().layer_moduli_kpa
     believed = np.array([*hard.as_tuple(), *NOMINAL.values()])[None]
@@ -68,7 +76,7 @@ def test_in_other_tissue_what_the_layers_change_is_nearly_that_of_the_nearest_th
         stiffer = tuple(kpa * (1.1 if place == number else 1) for place, kpa in enumerate(layers))
         change = (pressed(stiffer) - rows)[0, CONTRAST] / math.log(1.1)
         missed = kept[NAMES.index(f"{name}_modulus_log_ratio"), CONTRAST] - change
-        assert np.linalg.norm(missed) < missed_at_most * np.linalg.norm(change), name
+        assert np.linalg.norm(missed) < 0.3 * np.linalg.norm(change), name
 
 
 def test_the_face_drawn_where_it_moved_to_changes_the_contrast_by_hundredths_of_its_peak(tables):
@@ -96,6 +104,52 @@ def test_rows_and_changes_have_the_inclusion_where_the_forward_model_has_it(tabl
     for name in ("contact_exponent", "contact_pressure_log_ratio"):
         found, true = (one[0, NAMES.index(name), FIRST] for one in (kept, changes))
         assert np.linalg.norm(found - true) < 0.3 * np.linalg.norm(true), name
+
+
+@pytest.mark.parametrize("tissue_kpa", [5.0, 25.0])
+def test_what_a_leaning_reference_does_to_second_harmonics_is_twice_what_is_told_of_it(tables, tissue_kpa):
+    """A hand's habit, along the inclusion. Half of it is told: that the lesion leant instead would show alike.
+
+    In stiff tissue it is a hundredth of the light, ten times the noise: presses were refused for it.
+    """
+    parameters = np.array([10.0, 7.0, 100.0, tissue_kpa, 30.0, 2.0, 0.5, 1.0, 0.0])
+    leaning = World(tilt=PressTilts(beside_x_deg=DIRECTIONS["tilt_beside_deg"].std))
+    straight, leant = (
+        seen_columns(PressedScene(tables, world=one).press(parameters, 0.0), 0.0) for one in (AS_BELIEVED, leaning)
+    )
+    own = OwnProbe(load_derivatives(SIMULATED_PROBE), np.zeros(COUNT), np.diag(STD**2), ErrorLevels())
+    place, rows = Place(normalise(parameters[None]), np.zeros(1), np.zeros(1)), straight[None, :COLUMNS]
+    unmoved, moved = (own.changes(place, rows, one[None]).shift[0, SECOND] for one in (straight, leant))
+    change = (leant - straight)[SECOND]
+    assert np.linalg.norm(change - 2 * (moved - unmoved)) < 0.2 * np.linalg.norm(change)
+
+
+@pytest.mark.long
+def test_higher_orders_of_tilts_do_as_much_as_is_believed_of_them(tables):
+    """Of random tilts in people's tissue, where the larger one's first harmonic is 0.15 to 0.5: 0.25 of its cube."""
+    parameters = draw_parameters(40, np.random.default_rng(3), ranges=IN_TISSUE)
+    derivatives, sizes, missed = load_derivatives(SIMULATED_PROBE), [], []
+    for number, one in enumerate(parameters):
+        habits = np.random.default_rng([1, number]).standard_normal((2, 2))
+        tilt = PressTilts(*map(float, DIRECTIONS["tilt_lesion_deg"].std * habits.ravel()))
+        straight, leant = (
+            seen_columns(PressedScene(tables, world=world).press(one, 0.0), 0.0)
+            for world in (AS_BELIEVED, World(tilt=tilt))
+        )
+        row = straight[None, :COLUMNS]
+        (changes,) = derivatives.changes(normalise(one[None]), row)
+        first = DIRECTIONS["tilt_beside_deg"].std * changes[NAMES.index("tilt_beside_deg"), FIRST].reshape(LOADS, -1)
+        squares = np.pad(first**2, ((0, 0), (1, 0)))[None]
+        on_lesion, beside = habits
+        told, factor = of_leaning(squares, (on_lesion - beside)[None], SEEN_COLUMNS, SECOND_ACROSS)
+        rest = factor[0, :, :2] @ ((on_lesion + beside) / 2) / LEFT_STD
+        missed.append((leant - straight - told[0] + rest)[CONTRAST])
+        sizes.append((np.sqrt(squares[0]) * np.linalg.norm(habits, axis=1).max()).ravel())
+    size, error = np.concatenate(sizes), np.concatenate(missed)
+    where = (size > 0.15) & (size < 0.5)
+    ratio = np.sqrt(np.mean(error[where] ** 2) / np.mean(size[where] ** 6))
+    assert where.sum() > 100
+    assert 0.5 * FURTHER_RATIO < ratio < 1.5 * FURTHER_RATIO
 
 
 def test_changes_that_are_polynomials_are_given_back():

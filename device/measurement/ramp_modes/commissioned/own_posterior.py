@@ -59,8 +59,9 @@ class OwnPosterior:
         self._bright_side_rad, self._surrogate, self._own = seen.direction_rad, surrogate, own
         self._units = reach_mm / float(HIGH[OFFSET])  # of `normalise`, for one of the offset's own
         place = self._place(at[None])
-        changes = self._changes = own.changes(place, self._rows(place))
-        self._seen = _joined((np.hstack([seen.rows, seen.across]) - changes.shift)[None])[0]
+        whole = np.hstack([seen.rows, seen.across])
+        changes = self._changes = own.changes(place, self._rows(place), whole)
+        self._seen = _joined((whole - changes.shift)[None])[0]
         factor = _joined(changes.factor.transpose(2, 0, 1)).T
         covariance = seen_covariance(seen.rows, seen.across, noise) + factor @ factor.T
         self._whitening = np.linalg.inv(np.linalg.cholesky(covariance))

@@ -5,7 +5,7 @@ rows follow them by derivatives: so they shift what the forward model says, and 
 a scan's presses are shared as they are: the probe by all, the lesion's skin and the reference press by those of one
 scan, tilt and light by none. A tilt of a third of a degree outshines the side on which most inclusions lie. So the
 harmonics across the bright side are read, too, and the inclusion lies anywhere beside it.
-Source: docs/own_probe.md; second order of a ratio of tilted lights: its mean over the angle.
+Source: docs/own_probe.md.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import (
     owned_by,
     row_derivatives_of,
 )
+from device.measurement.ramp_modes.commissioned.squared_tilt import SMOOTH_FACTOR, of_habit, of_leaning
 from device.measurement.ramp_modes.noise import LOADS, ErrorLevels
 from device.measurement.ramp_modes.radial_profile import (
     COLUMN_COUNTS,
@@ -38,7 +39,6 @@ from device.measurement.ramp_modes.radial_profile import (
     FIRST_RINGS,
     SECOND,
 )
-from device.measurement.recording.ring_means import RING_RADII_MM
 
 OF_DISCREPANCY = tuple(Discrepancy.__dataclass_fields__)
 OWN_ARRAYS = (
@@ -55,8 +55,8 @@ SEEN_COLUMNS = SECOND_ACROSS.stop
 LESION_TILT, BESIDE_TILT, ALONG = (
     NAMES.index(name) for name in ("tilt_lesion_deg", "tilt_beside_deg", "light_along_ratio")
 )
-NOT_LINEAR_RATIO, NOT_LINEAR_MM = 0.2, 1.35
-"""Where the face's edge lifts a tilt is not linear: its harmonic is believed to this part, over so many millimetres."""
+NOT_LINEAR_RATIO = 0.2
+"""Where the face's edge lifts a tilt is not linear: its harmonic is believed to this part."""
 
 
 class Place(NamedTuple):
@@ -97,20 +97,25 @@ class OwnProbe:
         except np.linalg.LinAlgError:
             raise InvalidQuantity("probe's covariance", "indefinite", "positive", ACTION) from None
 
-    def changes(self, place: Place, rows: Array) -> RowChanges:
-        """Return how what is seen of presses with one reference moves; rows [N, P] are in the inclusion's direction."""
+    def changes(self, place: Place, rows: Array, presses_seen: Array | None = None) -> RowChanges:
+        """Return how what is seen of presses with one reference moves; rows [N, P] are in the inclusion's direction.
+
+        `presses_seen` [N, S] tell how far each leant, and so what the tilts' squares do; without them that is believed.
+        """
         presses = len(rows)
         changes = self.derivatives.changes(place.normalised, rows)
         seen = turned_columns(changes, place.angle_rad[:, None, None])
         shared = np.concatenate([owned_by("probe"), owned_by("lesion")])
         parts = [np.einsum("nds,dk->nsk", seen[:, shared], self._factor(shared)), self._lacking(seen, place, rows)]
         parts.append(self._std(BESIDE_TILT) * self._beside(changes, place))
+        shift = self._linear_shift(seen, place, rows)
+        squared, not_told = self._squared(changes, place, rows, None if presses_seen is None else presses_seen - shift)
         for number in range(presses):
             own = self._of_press(changes[number], place.angle_rad[number], place.bright_side_rad[number])
-            columns = np.zeros((presses, *own.shape))
-            columns[number] = own
+            columns = np.zeros((presses, SEEN_COLUMNS, own.shape[1] + not_told.shape[2]))
+            columns[number] = np.hstack([own, not_told[number]])
             parts.append(columns)
-        return RowChanges(self._shift(seen, changes, place, rows), np.concatenate(parts, axis=2))
+        return RowChanges(shift + squared, np.concatenate(parts, axis=2))
 
     def tilted_columns(self, place: Place, rows: Array) -> Array:
         """Return what a standard deviation of each press's tilt does to it [N, S, 2], along the bright side and across.
@@ -124,12 +129,12 @@ class OwnProbe:
     def shift(self, place: Place, rows: Array) -> Array:
         """Return what is believed to shift what is seen of presses [N, S], as of `changes`."""
         changes = self.derivatives.changes(place.normalised, rows)
-        return self._shift(turned_columns(changes, place.angle_rad[:, None, None]), changes, place, rows)
+        linear = self._linear_shift(turned_columns(changes, place.angle_rad[:, None, None]), place, rows)
+        return linear + self._squared(changes, place, rows)[0]
 
-    def _shift(self, seen: Array, changes: Array, place: Place, rows: Array) -> Array:
+    def _linear_shift(self, seen: Array, place: Place, rows: Array) -> Array:
         scalar = np.array([number not in (LESION_TILT, BESIDE_TILT, ALONG, PAIR) for number in range(COUNT)])
         shift: Array = np.einsum("nds,d->ns", seen[:, scalar], self.mean[scalar])
-        shift[:, CONTRAST] += self._squared_tilt(changes)
         return shift + turned_columns(self.discrepancy.shift(place.normalised, rows), place.angle_rad[:, None])
 
     def _lacking(self, seen: Array, place: Place, rows: Array) -> Array:
@@ -154,22 +159,29 @@ class OwnProbe:
         vectors = [self._std(number) * vector_columns(changes[number], angle_rad) for number in (LESION_TILT, ALONG)]
         pair = self._std(PAIR) * pair_columns(changes[PAIR], bright_side_rad)[:, None]
         tilt = self._std(LESION_TILT) * changes[LESION_TILT, FIRST].reshape(LOADS, FIRST_RINGS)
-        bent = NOT_LINEAR_RATIO * (tilt[:, :, None] * _SMOOTH_FACTOR).reshape(LOADS * FIRST_RINGS, -1)
+        bent = NOT_LINEAR_RATIO * (tilt[:, :, None] * SMOOTH_FACTOR).reshape(LOADS * FIRST_RINGS, -1)
         not_linear = np.zeros((SEEN_COLUMNS, 2 * FIRST_RINGS))
         not_linear[FIRST, :FIRST_RINGS], not_linear[FIRST_ACROSS, FIRST_RINGS:] = bent, bent
-        squared = np.zeros((SEEN_COLUMNS, 1))
-        squared[CONTRAST, 0] = self._squared_tilt(changes[None])[0]
-        return np.hstack([*vectors, pair, not_linear, squared])
+        return np.hstack([*vectors, pair, not_linear])
 
-    def _squared_tilt(self, changes: Array) -> Array:
-        """Return by how much tilts move ring means of a ratio of lights [n, contrast], in the mean and about it.
+    def _squared(self, changes: Array, place: Place, rows: Array, left: Array | None = None) -> tuple[Array, Array]:
+        """Return what the tilts' squares move [N, S], and a factor [N, S, K] of what of it is not told.
 
-        Of light 1 + b cos on the reference and 1 + p cos on the lesion it is (b - p) b / 2, of which p's part is as
-        often above as below.
+        `left` [N, S] is what is seen less what is shifted.
         """
-        tilt = self._std(BESIDE_TILT) * changes[:, BESIDE_TILT, FIRST].reshape(-1, LOADS, FIRST_RINGS)
-        whole = np.concatenate([np.zeros((len(tilt), LOADS, 1)), tilt], axis=2)
-        return np.asarray((whole**2).reshape(len(tilt), -1))
+        squares = self._tilt_of_rings(changes, BESIDE_TILT) ** 2
+        if left is None:
+            return of_habit(squares, SEEN_COLUMNS, SECOND_ACROSS)
+        left = left - turned_columns(rows, place.angle_rad[:, None])
+        tilt = self._tilt_of_rings(changes, LESION_TILT)[:, :, 1:].reshape(len(rows), -1)
+        along, across = (np.sum(left[:, part] * tilt, axis=1) for part in (FIRST, FIRST_ACROSS))
+        leant = np.column_stack([along, across]) / np.sum(tilt**2, axis=1, keepdims=True)
+        return of_leaning(squares, leant, SEEN_COLUMNS, SECOND_ACROSS)
+
+    def _tilt_of_rings(self, changes: Array, number: int) -> Array:
+        """Return the first harmonic of a standard deviation of a tilt [n, K, J]; in the middle there is none."""
+        tilt = self._std(number) * changes[:, number, FIRST].reshape(-1, LOADS, FIRST_RINGS)
+        return np.concatenate([np.zeros((len(tilt), LOADS, 1)), tilt], axis=2)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return what a file holds, by the names in `OWN_ARRAYS`."""
@@ -213,16 +225,6 @@ def pair_columns(change: Array, bright_side_rad: float) -> Array:
     seen, angle = np.zeros(SEEN_COLUMNS), 2 * np.nan_to_num(bright_side_rad)
     seen[SECOND], seen[SECOND_ACROSS] = np.cos(angle) * change[SECOND], -np.sin(angle) * change[SECOND]
     return seen
-
-
-def _smooth_factor() -> Array:
-    """Return a factor [J - 1, J - 1] of the correlation of rings."""
-    r_mm = RING_RADII_MM[1:]
-    apart = (r_mm[:, None] - r_mm) / NOT_LINEAR_MM
-    return np.asarray(np.linalg.cholesky(np.exp(-(apart**2) / 2) + 1e-9 * np.eye(len(r_mm))))
-
-
-_SMOOTH_FACTOR = _smooth_factor()
 
 
 def own_probe_of(arrays: Mapping[str, NDArray[Any]]) -> OwnProbe:

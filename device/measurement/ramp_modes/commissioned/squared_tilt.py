@@ -1,0 +1,90 @@
+"""What tilts do to a ratio of two lights that lean, the lesion's over the reference's, beyond first order.
+
+Along a radius e it is (1 + p e) / (1 + b e), of tilts p and b in units of a hand's habit: to second order it has
+(b e) (b e - p e) beside p e - b e. Of both only d = p - b is seen, in the first harmonic. Given that, b lies about
+-d / 2, as far off in each direction as 1 / sqrt(2) of a habit: so (d e)^2 / 2 is told, and (D e) (d e) is not.
+Such products move ring means and second harmonics, in stiff tissue by a hundredth of the light: there the pressure
+falls off steeply across a face that leans. What higher orders do grows with the cube of the first harmonic.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.ramp_modes.radial_profile import CONTRAST, SECOND
+from device.measurement.recording.ring_means import RING_RADII_MM
+
+FURTHER_RATIO, ALIKE_MM = 0.25, 1.35
+"""Of the cube of the larger tilt's first harmonic, root mean square, where that is 0.15 to 0.5; over so many
+millimetres it is alike. Of random tilts of the virtual probe in people's tissue
+(`tests/host_tools/press_models/test_press_derivatives.py`)."""
+HABITS_SQUARE = 4.0
+"""Mean square of d."""
+LEFT_STD = 0.5**0.5
+"""Standard deviation of D in each direction."""
+BELIEVED_STD = 1.5**0.5
+"""That of the whole product in each of its parts, where nothing is seen yet; its mean is 1 in ring means."""
+
+
+def of_leaning(squares: Array, leant: Array, columns: int, second_across: slice) -> tuple[Array, Array]:
+    """Return what moves presses that leant by d [N, 2] along the bright side and across it [N, columns].
+
+    And a factor [N, columns, K] of the covariance of what is not told. `squares` [N, K, J] are those of the first
+    harmonic of a habit's tilt.
+    """
+    parts = squares, columns, second_across
+    told = 0.5 * _products(*parts, leant, leant)
+    unknown = [LEFT_STD * _products(*parts, np.broadcast_to(axis, leant.shape), leant) for axis in np.eye(2)]
+    further = _higher_orders(*parts, np.sum(leant**2, axis=1))
+    return told, np.concatenate([np.stack(unknown, axis=2), further], axis=2)
+
+
+def of_habit(squares: Array, columns: int, second_across: slice) -> tuple[Array, Array]:
+    """Return the same of presses of which nothing is seen yet."""
+    shift, factor = np.zeros((len(squares), columns)), np.zeros((len(squares), columns, 3))
+    shift[:, CONTRAST] = squares.reshape(len(squares), -1)
+    factor[:, CONTRAST, 0] = BELIEVED_STD * shift[:, CONTRAST]
+    factor[:, SECOND, 1] = factor[:, second_across, 2] = BELIEVED_STD * _seconds(squares)
+    further = _higher_orders(squares, columns, second_across, np.full(len(squares), HABITS_SQUARE))
+    return shift, np.concatenate([factor, further], axis=2)
+
+
+def _higher_orders(squares: Array, columns: int, second_across: slice, leant_square: Array) -> Array:
+    """Return a factor [N, columns, K] of what higher orders do where |d|^2 is that [N], smooth along the rings."""
+    count, _, rings = squares.shape
+    larger = np.sqrt(squares * (leant_square / 2 + 1)[:, None, None])  # given d the mean square of b, and of p
+    bent = FURTHER_RATIO * larger[..., 1:, None] ** 3 * SMOOTH_FACTOR
+    factor = np.zeros((count, columns, 3 * (rings - 1)))
+    means = np.zeros((*squares.shape, rings - 1))
+    means[:, :, 1:] = bent
+    each = np.split(factor, 3, axis=2)
+    each[0][:, CONTRAST] = means.reshape(count, -1, rings - 1)
+    for one, part in ((each[1], SECOND), (each[2], second_across)):
+        one[:, part] = bent[:, :, :-1].reshape(count, -1, rings - 1)
+    return factor
+
+
+def _smooth_factor() -> Array:
+    """Return a factor [J - 1, J - 1] of the correlation of rings."""
+    r_mm = RING_RADII_MM[1:]
+    apart = (r_mm[:, None] - r_mm) / ALIKE_MM
+    return np.asarray(np.linalg.cholesky(np.exp(-(apart**2) / 2) + 1e-9 * np.eye(len(r_mm))))
+
+
+SMOOTH_FACTOR = _smooth_factor()
+
+
+def _products(squares: Array, columns: int, second_across: slice, one: Array, other: Array) -> Array:
+    """Return the mean over the angle and second harmonics of (one e) (other e) [N, columns]."""
+    (x, y), (u, v) = one.T[:, :, None], other.T[:, :, None]
+    found = np.zeros((len(squares), columns))
+    found[:, CONTRAST] = (x * u + y * v) / 2 * squares.reshape(len(squares), -1)
+    found[:, SECOND] = (x * u - y * v) / 2 * _seconds(squares)
+    found[:, second_across] = (x * v + y * u) / 2 * _seconds(squares)
+    return found
+
+
+def _seconds(squares: Array) -> Array:
+    """Return the squares at the rings of second harmonics [N, K (J - 2)]."""
+    return np.asarray(squares[:, :, 1:-1].reshape(len(squares), -1))
