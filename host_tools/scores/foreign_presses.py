@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import NEAR_NOMINAL, PARAMETERS, box_of, denormalise
+from device.measurement.parameters import PARAMETERS, RANGES, Range, denormalise
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import SeenPresses
@@ -34,6 +34,8 @@ PHANTOM_OFFSET_MM = 0.5
 """How far off the middle of a phantom's inclusion the probe is set down, standard deviation in x and y."""
 SURFACES = {"contact_pressure_kpa": (1.6, 2.4), "albedo": (0.42, 0.58), "spread_mm": (0.85, 1.2)}
 """Skins of two surfaces, the ends of their ranges: phantoms have one or the other."""
+OF_PATIENTS = RANGES | {"tissue_modulus_kpa": Range(2.4, 27.0, by_ratio=True)}
+"""Tissue over a lesion may be a tenth softer or stiffer, and gives way by a twentieth: the tables hold that, too."""
 
 
 class ForeignPresses(NamedTuple):
@@ -77,8 +79,8 @@ def press_part(probe: World, rng: np.random.Generator, *, on_phantom: bool = Fal
 def foreign_presses(
     tables: ProbeTables, probe: World, noise: PressNoise, count: int, *, seed: int, jobs: int = -1
 ) -> ForeignPresses:
-    """Return random presses of a probe on patients."""
-    parameters = draw_parameters(count, np.random.default_rng([seed, 0]), ranges=NEAR_NOMINAL)
+    """Return random presses of a probe on patients, in tissue that people have."""
+    parameters = draw_parameters(count, np.random.default_rng([seed, 0]), ranges=OF_PATIENTS)
 
     def pressed(number: int) -> SeenPresses:
         rng = np.random.default_rng([seed, 1, number])
@@ -106,9 +108,8 @@ def foreign_phantoms(
 
 def _true_values(stated: Array, std: Array, number: int, rng: np.random.Generator) -> Array:
     """Return the parameters [9] of a phantom: as stated but for tolerances, of one of two surfaces, off its middle."""
-    middle, half = box_of(NEAR_NOMINAL)
     missed = std * np.clip(rng.standard_normal(len(stated)), -2, 2)
-    values = denormalise(np.clip(stated + missed, middle - half, middle + half))
+    values = denormalise(np.clip(stated + missed, -1, 1))
     for name, ends in SURFACES.items():
         values[PARAMETERS.index(name)] = ends[number % 2] * (1 + 0.03 * rng.standard_normal())
     values[PARAMETERS.index("offset_mm")] = min(float(np.hypot(*(PHANTOM_OFFSET_MM * rng.standard_normal(2)))), 2.0)
