@@ -149,8 +149,12 @@ def _drawn(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.random.Gen
     direction_rad = rng.uniform(0, 2 * np.pi, len(each))
     rows = answers.surrogate.rows(each, direction_rad)
     rows[1:, RESPONSE] = rows[0, RESPONSE]
-    changes = answers.own.changes(Place(each, np.zeros(len(each)), direction_rad), rows)
-    seen = turned_columns(rows, 0.0) + changes.shift + changes.factor @ rng.standard_normal(changes.factor.shape[2])
+    place, straight = Place(each, np.zeros(len(each)), direction_rad), turned_columns(rows, 0.0)
+    changes = answers.own.changes(place, rows)
+    drawn = rng.standard_normal(changes.factor.shape[2])
+    leaning = straight + changes.shift + changes.factor @ drawn
+    changes = answers.own.changes(place, rows, leaning)  # how far each leans tells what its tilts' squares do
+    seen = straight + changes.shift + changes.factor @ drawn
     seen[1:, RESPONSE] = seen[0, RESPONSE]
     return to_bright_side(seen_with_noise(seen, answers.noise, rng), direction_rad)
 

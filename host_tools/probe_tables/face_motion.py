@@ -67,7 +67,7 @@ def build_face_motion(
     jobs: int = -1,
     on_point: Callable[[int, int], None] = lambda done, n: None,
 ) -> FaceMotion:
-    """Solve every point of the table (ten minutes on two cores); `on_point` hears done and total.
+    """Solve every point of the table (six minutes on two cores); `on_point` hears done and total.
 
     Of a waveguide, the simulated probe's unless given; raise `InvalidQuantity` for one whose face no table holds.
     """

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import PARAMETERS, RANGES, Range, denormalise
+from device.measurement.parameters import PARAMETERS, RANGES, Range, box_of, denormalise
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import SeenPresses
@@ -108,8 +108,9 @@ def foreign_phantoms(
 
 def _true_values(stated: Array, std: Array, number: int, rng: np.random.Generator) -> Array:
     """Return the parameters [9] of a phantom: as stated but for tolerances, of one of two surfaces, off its middle."""
+    middle, half = box_of(OF_PATIENTS)
     missed = std * np.clip(rng.standard_normal(len(stated)), -2, 2)
-    values = denormalise(np.clip(stated + missed, -1, 1))
+    values = denormalise(np.clip(stated + missed, middle - half, middle + half))
     for name, ends in SURFACES.items():
         values[PARAMETERS.index(name)] = ends[number % 2] * (1 + 0.03 * rng.standard_normal())
     values[PARAMETERS.index("offset_mm")] = min(float(np.hypot(*(PHANTOM_OFFSET_MM * rng.standard_normal(2)))), 2.0)

@@ -72,7 +72,7 @@ def scans_of(presses: int) -> int:
 
 
 def random_design(presses: int, scans: int, seed: int) -> TruthDesign:
-    """Return random truths over the trained ranges, in tissue where it is known what layers and motion do."""
+    """Return random truths over the trained ranges, in tissue where a stiffer skin was solved."""
     rng = np.random.default_rng(derived_seed(seed, "truths of one thing at a time"))
     parameters = draw_parameters(presses, rng, ranges=NEAR_NOMINAL)
     return TruthDesign(parameters, parameters, rng.uniform(*FURTHER_MM, presses), scans, seed)

@@ -10,10 +10,12 @@ import pytest
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.bundle import BundleRefused
+from device.measurement.parameters import denormalise
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD
 from device.measurement.ramp_modes.radial_profile import CONTRAST, FORCES, RESPONSE
+from device.measurement.ramp_modes.surrogate import TISSUE
 from device.measurement.recording.ring_means import RING_RADII_MM, RINGS
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import ContactLaw
@@ -24,7 +26,13 @@ from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning import commission as commission_module
 from host_tools.commissioning import left_out as left_out_module
-from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, commission, gates_of
+from host_tools.commissioning.commission import (
+    LARGEST_MISFIT_RATIO,
+    WORST_PHANTOM,
+    believed_presses,
+    commission,
+    gates_of,
+)
 from host_tools.commissioning.joint_fit import (
     DISCREPANCY_RATIOS,
     FLAT_FIELD_RATIO,
@@ -35,7 +43,7 @@ from host_tools.commissioning.joint_fit import (
     Design,
     fit_probe,
 )
-from host_tools.commissioning.left_out import LeftOut, left_out
+from host_tools.commissioning.left_out import LeftOut, answers_to_seen, left_out
 from host_tools.commissioning.own_bundle import write_own_bundle
 from host_tools.commissioning.page import PAGE_FILE
 from host_tools.commissioning.phantom_ramps import phantom_ramps
@@ -45,6 +53,7 @@ from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scores.foreign_presses import foreign_phantoms
+from host_tools.scores.scored_presses import tolerant
 
 EXPONENT = NAMES[PROBE[0]], 0
 RAMP_N = tuple(np.linspace(0.1, 0.64, 8))
@@ -316,3 +325,14 @@ def test_an_interval_fits_a_truth_as_far_as_that_is_known():
     assert not answer.is_covered.any()
     assert replace(answer, tolerance=wide).is_covered.all()
     assert not replace(answer, tolerance=wide, truth=np.full(3, 9.5)).is_covered.any()
+
+
+@pytest.mark.long
+def test_presses_that_are_drawn_from_what_is_believed_are_explained_in_stiff_tissue_too(model, derivatives):
+    """There a tilt's square is ten times the noise: it has to be that of the tilt which is drawn."""
+    answers = tolerant(Design(model.answers, derivatives))
+    seen, truth = believed_presses(answers, 60, 3)
+    stiff = [one for one, kpa in zip(seen, denormalise(truth)[:, TISSUE], strict=True) if kpa > 10]
+    misfits = [one.misfit_ratio for one in answers_to_seen(answers, model.first_guesses, stiff)]
+    assert len(misfits) > 15
+    assert 0.85 < np.mean(misfits) < 1.2

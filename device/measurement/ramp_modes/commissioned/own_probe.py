@@ -167,16 +167,19 @@ class OwnProbe:
     def _squared(self, changes: Array, place: Place, rows: Array, left: Array | None = None) -> tuple[Array, Array]:
         """Return what the tilts' squares move [N, S], and a factor [N, S, K] of what of it is not told.
 
-        `left` [N, S] is what is seen less what is shifted.
+        `left` [N, S] is what is seen less what is shifted. A press whose bright side is not known leans as is believed.
         """
         squares = self._tilt_of_rings(changes, BESIDE_TILT) ** 2
+        habit = of_habit(squares, SEEN_COLUMNS, SECOND_ACROSS)
         if left is None:
-            return of_habit(squares, SEEN_COLUMNS, SECOND_ACROSS)
+            return habit
         left = left - turned_columns(rows, place.angle_rad[:, None])
         tilt = self._tilt_of_rings(changes, LESION_TILT)[:, :, 1:].reshape(len(rows), -1)
         along, across = (np.sum(left[:, part] * tilt, axis=1) for part in (FIRST, FIRST_ACROSS))
         leant = np.column_stack([along, across]) / np.sum(tilt**2, axis=1, keepdims=True)
-        return of_leaning(squares, leant, SEEN_COLUMNS, SECOND_ACROSS)
+        told = of_leaning(squares, leant, SEEN_COLUMNS, SECOND_ACROSS)
+        is_told = ~np.isnan(place.bright_side_rad)
+        return np.where(is_told[:, None], told[0], habit[0]), np.where(is_told[:, None, None], told[1], habit[1])
 
     def _tilt_of_rings(self, changes: Array, number: int) -> Array:
         """Return the first harmonic of a standard deviation of a tilt [n, K, J]; in the middle there is none."""

@@ -5,6 +5,8 @@ Along a radius e it is (1 + p e) / (1 + b e), of tilts p and b in units of a han
 -d / 2, as far off in each direction as 1 / sqrt(2) of a habit: so (d e)^2 / 2 is told, and (D e) (d e) is not.
 Such products move ring means and second harmonics, in stiff tissue by a hundredth of the light: there the pressure
 falls off steeply across a face that leans. What higher orders do grows with the cube of the first harmonic.
+
+Habits are the same on the lesion and beside it. Presses of a scan are taken each by itself, though they share b.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ def of_leaning(squares: Array, leant: Array, columns: int, second_across: slice)
     parts = squares, columns, second_across
     told = 0.5 * _products(*parts, leant, leant)
     unknown = [LEFT_STD * _products(*parts, np.broadcast_to(axis, leant.shape), leant) for axis in np.eye(2)]
+    unknown.append(np.zeros_like(told))  # as many columns as of a habit: what is drawn by the one is told by the other
     further = _higher_orders(*parts, np.sum(leant**2, axis=1))
     return told, np.concatenate([np.stack(unknown, axis=2), further], axis=2)
 
@@ -53,7 +56,7 @@ def of_habit(squares: Array, columns: int, second_across: slice) -> tuple[Array,
 def _higher_orders(squares: Array, columns: int, second_across: slice, leant_square: Array) -> Array:
     """Return a factor [N, columns, K] of what higher orders do where |d|^2 is that [N], smooth along the rings."""
     count, _, rings = squares.shape
-    larger = np.sqrt(squares * (leant_square / 2 + 1)[:, None, None])  # given d the mean square of b, and of p
+    larger = np.sqrt(squares * (leant_square / 2 + 1)[:, None, None])  # about the mean square of the larger tilt
     bent = FURTHER_RATIO * larger[..., 1:, None] ** 3 * SMOOTH_FACTOR
     factor = np.zeros((count, columns, 3 * (rings - 1)))
     means = np.zeros((*squares.shape, rings - 1))

@@ -37,7 +37,7 @@ from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.misfit_blocks import BLOCKS
 from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
 from device.measurement.ramp_modes.noise import ErrorLevels
-from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE, SECOND
 from device.measurement.ramp_modes.surrogate import OFFSET
 
 TRUTH = np.array([10.0, 6.0, 80.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
@@ -125,6 +125,21 @@ def test_a_tilt_of_the_reference_is_one_vector_in_the_image_whichever_side_is_br
     apart = np.diag(together[FIRST, FIRST_ACROSS])
     alone = np.diag((first @ first.T)[FIRST, FIRST])
     assert apart == pytest.approx(-alone, rel=1e-3) or apart == pytest.approx(alone, rel=1e-3)
+
+
+def test_a_press_that_is_not_seen_yet_is_believed_to_lean_as_hands_do(derivatives, ramp_model):
+    """One whose bright side is no number, as a further press of a scan; one that is seen straight is known better."""
+    at, rows = rows_at(ramp_model, np.tile(TRUTH, (2, 1)))
+    own, seen = believed(derivatives), turned_columns(rows, 0.0)
+    place = Place(at, np.zeros(2), np.array([0.0, np.nan]))
+    told, habit = own.changes(place, rows, seen).factor, own.changes(place, rows).factor
+    assert told[1] == pytest.approx(habit[1])
+    assert np.linalg.norm(told[0][SECOND]) < 0.9 * np.linalg.norm(habit[0][SECOND])
+
+
+def test_derivatives_of_other_tissue_are_refused(derivatives):
+    with pytest.raises(InvalidQuantity, match="tissue_kpa"):
+        row_derivatives_of(derivatives.arrays() | {"tissue_kpa": np.array([4.0, 6.0])})
 
 
 def test_turning_to_the_bright_side_keeps_what_is_seen(ramp_model):

@@ -45,7 +45,7 @@ def test_higher_orders_grow_with_the_cube_of_the_first_harmonic():
         _, factor = of_leaning(squares, np.ones((1, 2)), SEEN_COLUMNS, SECOND_ACROSS)
         levels.append([np.sqrt(np.sum(factor[0, part, 2:] ** 2, axis=1)).max() for part in PARTS])
     assert np.divide(*levels[::-1]) == pytest.approx(8.0)
-    assert levels[1] == pytest.approx([0.25 * (0.2 * 2**0.5) ** 3] * 3)  # of d = (1, 1): given it, p and b are 1.4
+    assert levels[1] == pytest.approx([0.25 * (0.2 * 2**0.5) ** 3] * 3)  # of d = (1, 1)
 
 
 def test_before_anything_is_seen_a_habit_is_the_mean_over_all_tilts():
