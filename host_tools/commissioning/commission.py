@@ -18,11 +18,11 @@ from device.measurement.parameters import normalise
 from device.measurement.quantities import UNKNOWNS, Bound
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
-from device.measurement.ramp_modes.commissioned.own_probe import SEEN_COLUMNS, Place, turned_columns
+from device.measurement.ramp_modes.commissioned.own_probe import Place, turned_columns
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, RowDerivatives
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
-from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
+from device.measurement.ramp_modes.radial_profile import RESPONSE, SEEN_COLUMNS, SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.calibration.gates import Gate, require_all
 from host_tools.commissioning.joint_fit import PROBE, Design, ProbeFit, fit_probe

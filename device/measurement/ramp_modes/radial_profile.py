@@ -106,6 +106,10 @@ CONTRAST, RESPONSE, FIRST, SECOND = (
 )
 """Columns of a row: contrast, reference response, first and second harmonic, each force by force and ring by ring."""
 COLUMNS = SECOND.stop
+FIRST_ACROSS = slice(COLUMNS, COLUMNS + COLUMN_COUNTS[2])
+SECOND_ACROSS = slice(FIRST_ACROSS.stop, FIRST_ACROSS.stop + COLUMN_COUNTS[3])
+SEEN_COLUMNS = SECOND_ACROSS.stop
+"""Columns of what is seen of a press: its profile row, then first and second harmonics across the bright side."""
 
 
 def network_rows(rows: Rows) -> Rows:

@@ -9,7 +9,7 @@ from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.parameters import HIGH, LOW, NEAR_NOMINAL, NOMINAL, box_of, denormalise, normalise
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from device.measurement.ramp_modes.commissioned.own_probe import SECOND_ACROSS, SEEN_COLUMNS, OwnProbe, Place
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place
 from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
     DIRECTIONS,
@@ -19,7 +19,13 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import (
 )
 from device.measurement.ramp_modes.commissioned.squared_tilt import FURTHER_RATIO, LEFT_STD, of_leaning
 from device.measurement.ramp_modes.noise import LOADS, ErrorLevels, light_ratio
-from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE, SECOND
+from device.measurement.ramp_modes.radial_profile import (
+    COLUMNS,
+    CONTRAST,
+    FIRST,
+    RESPONSE,
+    SECOND,
+)
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.world import AS_BELIEVED, PressTilts, World
@@ -141,7 +147,7 @@ def test_higher_orders_of_tilts_do_as_much_as_is_believed_of_them(tables):
         first = DIRECTIONS["tilt_beside_deg"].std * changes[NAMES.index("tilt_beside_deg"), FIRST].reshape(LOADS, -1)
         squares = np.pad(first**2, ((0, 0), (1, 0)))[None]
         on_lesion, beside = habits
-        told, factor = of_leaning(squares, (on_lesion - beside)[None], SEEN_COLUMNS, SECOND_ACROSS)
+        told, factor = of_leaning(squares, (on_lesion - beside)[None])
         rest = factor[0, :, :2] @ ((on_lesion + beside) / 2) / LEFT_STD
         missed.append((leant - straight - told[0] + rest)[CONTRAST])
         sizes.append((np.sqrt(squares[0]) * np.linalg.norm(habits, axis=1).max()).ravel())

@@ -14,17 +14,19 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import HIGH, PARAMETERS, denormalise, is_possible
 from device.measurement.ramp_modes.answers import UnlikeDesign
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
-from device.measurement.ramp_modes.commissioned.own_probe import (
-    FIRST_ACROSS,
-    SECOND_ACROSS,
-    SEEN_COLUMNS,
-    OwnProbe,
-    Place,
-    turned_columns,
-)
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place, turned_columns
 from device.measurement.ramp_modes.misfit_blocks import BLOCK_OF_COLUMN, BlockMisfit, RowBlock, misfit_by_block
 from device.measurement.ramp_modes.noise import FURTHER, LOADS, PressNoise, light_ratio, smooth_errors
-from device.measurement.ramp_modes.radial_profile import COLUMNS, FIRST, RESPONSE, SECOND, SeenPresses
+from device.measurement.ramp_modes.radial_profile import (
+    COLUMNS,
+    FIRST,
+    FIRST_ACROSS,
+    RESPONSE,
+    SECOND,
+    SECOND_ACROSS,
+    SEEN_COLUMNS,
+    SeenPresses,
+)
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 from device.measurement.recording.ring_means import RING_RADII_MM
 

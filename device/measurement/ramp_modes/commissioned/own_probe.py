@@ -32,12 +32,14 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import (
 from device.measurement.ramp_modes.commissioned.squared_tilt import SMOOTH_FACTOR, of_habit, of_leaning
 from device.measurement.ramp_modes.noise import LOADS, ErrorLevels
 from device.measurement.ramp_modes.radial_profile import (
-    COLUMN_COUNTS,
     COLUMNS,
     CONTRAST,
     FIRST,
+    FIRST_ACROSS,
     FIRST_RINGS,
     SECOND,
+    SECOND_ACROSS,
+    SEEN_COLUMNS,
 )
 
 OF_DISCREPANCY = tuple(Discrepancy.__dataclass_fields__)
@@ -48,10 +50,6 @@ OWN_ARRAYS = (
 )
 """Arrays that the file of a commissioned probe's surrogate has beside the others."""
 ACTION = "commission the probe again"
-FIRST_ACROSS = slice(COLUMNS, COLUMNS + COLUMN_COUNTS[2])
-SECOND_ACROSS = slice(FIRST_ACROSS.stop, FIRST_ACROSS.stop + COLUMN_COUNTS[3])
-SEEN_COLUMNS = SECOND_ACROSS.stop
-"""Columns of what is seen of a press: its profile row, then first and second harmonics across the bright side."""
 LESION_TILT, BESIDE_TILT, ALONG = (
     NAMES.index(name) for name in ("tilt_lesion_deg", "tilt_beside_deg", "light_along_ratio")
 )
@@ -170,14 +168,14 @@ class OwnProbe:
         `left` [N, S] is what is seen less what is shifted. A press whose bright side is not known leans as is believed.
         """
         squares = self._tilt_of_rings(changes, BESIDE_TILT) ** 2
-        habit = of_habit(squares, SEEN_COLUMNS, SECOND_ACROSS)
+        habit = of_habit(squares)
         if left is None:
             return habit
         left = left - turned_columns(rows, place.angle_rad[:, None])
         tilt = self._tilt_of_rings(changes, LESION_TILT)[:, :, 1:].reshape(len(rows), -1)
         along, across = (np.sum(left[:, part] * tilt, axis=1) for part in (FIRST, FIRST_ACROSS))
         leant = np.column_stack([along, across]) / np.sum(tilt**2, axis=1, keepdims=True)
-        told = of_leaning(squares, leant, SEEN_COLUMNS, SECOND_ACROSS)
+        told = of_leaning(squares, leant)
         is_told = ~np.isnan(place.bright_side_rad)
         return np.where(is_told[:, None], told[0], habit[0]), np.where(is_told[:, None, None], told[1], habit[1])
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.ramp_modes.radial_profile import CONTRAST, SECOND
+from device.measurement.ramp_modes.radial_profile import CONTRAST, SECOND, SECOND_ACROSS, SEEN_COLUMNS
 from device.measurement.recording.ring_means import RING_RADII_MM
 
 FURTHER_RATIO, ALIKE_MM = 0.25, 1.35
@@ -29,41 +29,40 @@ BELIEVED_STD = 1.5**0.5
 """That of the whole product in each of its parts, where nothing is seen yet; its mean is 1 in ring means."""
 
 
-def of_leaning(squares: Array, leant: Array, columns: int, second_across: slice) -> tuple[Array, Array]:
-    """Return what moves presses that leant by d [N, 2] along the bright side and across it [N, columns].
+def of_leaning(squares: Array, leant: Array) -> tuple[Array, Array]:
+    """Return what moves presses that leant by d [N, 2] along the bright side and across it [N, S].
 
-    And a factor [N, columns, K] of the covariance of what is not told. `squares` [N, K, J] are those of the first
+    And a factor [N, S, K] of the covariance of what is not told. `squares` [N, K, J] are those of the first
     harmonic of a habit's tilt.
     """
-    parts = squares, columns, second_across
-    told = 0.5 * _products(*parts, leant, leant)
-    unknown = [LEFT_STD * _products(*parts, np.broadcast_to(axis, leant.shape), leant) for axis in np.eye(2)]
+    told = 0.5 * _products(squares, leant, leant)
+    unknown = [LEFT_STD * _products(squares, np.broadcast_to(axis, leant.shape), leant) for axis in np.eye(2)]
     unknown.append(np.zeros_like(told))  # as many columns as of a habit: what is drawn by the one is told by the other
-    further = _higher_orders(*parts, np.sum(leant**2, axis=1))
+    further = _higher_orders(squares, np.sum(leant**2, axis=1))
     return told, np.concatenate([np.stack(unknown, axis=2), further], axis=2)
 
 
-def of_habit(squares: Array, columns: int, second_across: slice) -> tuple[Array, Array]:
+def of_habit(squares: Array) -> tuple[Array, Array]:
     """Return the same of presses of which nothing is seen yet."""
-    shift, factor = np.zeros((len(squares), columns)), np.zeros((len(squares), columns, 3))
+    shift, factor = np.zeros((len(squares), SEEN_COLUMNS)), np.zeros((len(squares), SEEN_COLUMNS, 3))
     shift[:, CONTRAST] = squares.reshape(len(squares), -1)
     factor[:, CONTRAST, 0] = BELIEVED_STD * shift[:, CONTRAST]
-    factor[:, SECOND, 1] = factor[:, second_across, 2] = BELIEVED_STD * _seconds(squares)
-    further = _higher_orders(squares, columns, second_across, np.full(len(squares), HABITS_SQUARE))
+    factor[:, SECOND, 1] = factor[:, SECOND_ACROSS, 2] = BELIEVED_STD * _seconds(squares)
+    further = _higher_orders(squares, np.full(len(squares), HABITS_SQUARE))
     return shift, np.concatenate([factor, further], axis=2)
 
 
-def _higher_orders(squares: Array, columns: int, second_across: slice, leant_square: Array) -> Array:
-    """Return a factor [N, columns, K] of what higher orders do where |d|^2 is that [N], smooth along the rings."""
+def _higher_orders(squares: Array, leant_square: Array) -> Array:
+    """Return a factor [N, S, K] of what higher orders do where |d|^2 is that [N], smooth along the rings."""
     count, _, rings = squares.shape
     larger = np.sqrt(squares * (leant_square / 2 + 1)[:, None, None])  # about the mean square of the larger tilt
     bent = FURTHER_RATIO * larger[..., 1:, None] ** 3 * SMOOTH_FACTOR
-    factor = np.zeros((count, columns, 3 * (rings - 1)))
+    factor = np.zeros((count, SEEN_COLUMNS, 3 * (rings - 1)))
     means = np.zeros((*squares.shape, rings - 1))
     means[:, :, 1:] = bent
     each = np.split(factor, 3, axis=2)
     each[0][:, CONTRAST] = means.reshape(count, -1, rings - 1)
-    for one, part in ((each[1], SECOND), (each[2], second_across)):
+    for one, part in ((each[1], SECOND), (each[2], SECOND_ACROSS)):
         one[:, part] = bent[:, :, :-1].reshape(count, -1, rings - 1)
     return factor
 
@@ -78,13 +77,13 @@ def _smooth_factor() -> Array:
 SMOOTH_FACTOR = _smooth_factor()
 
 
-def _products(squares: Array, columns: int, second_across: slice, one: Array, other: Array) -> Array:
-    """Return the mean over the angle and second harmonics of (one e) (other e) [N, columns]."""
+def _products(squares: Array, one: Array, other: Array) -> Array:
+    """Return the mean over the angle and second harmonics of (one e) (other e) [N, S]."""
     (x, y), (u, v) = one.T[:, :, None], other.T[:, :, None]
-    found = np.zeros((len(squares), columns))
+    found = np.zeros((len(squares), SEEN_COLUMNS))
     found[:, CONTRAST] = (x * u + y * v) / 2 * squares.reshape(len(squares), -1)
     found[:, SECOND] = (x * u - y * v) / 2 * _seconds(squares)
-    found[:, second_across] = (x * v + y * u) / 2 * _seconds(squares)
+    found[:, SECOND_ACROSS] = (x * v + y * u) / 2 * _seconds(squares)
     return found
 
 

@@ -17,13 +17,7 @@ from device.measurement.ramp_modes.commissioned.own_posterior import (
     seen_with_noise,
     to_bright_side,
 )
-from device.measurement.ramp_modes.commissioned.own_probe import (
-    FIRST_ACROSS,
-    OwnProbe,
-    Place,
-    turned_columns,
-    vector_columns,
-)
+from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place, turned_columns, vector_columns
 from device.measurement.ramp_modes.commissioned.row_derivatives import (
     COUNT,
     DERIVATIVE_ARRAYS,
@@ -37,7 +31,7 @@ from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.misfit_blocks import BLOCKS
 from device.measurement.ramp_modes.model import ramp_answers_of, surrogate_arrays
 from device.measurement.ramp_modes.noise import ErrorLevels
-from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, RESPONSE, SECOND
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FIRST, FIRST_ACROSS, RESPONSE, SECOND
 from device.measurement.ramp_modes.surrogate import OFFSET
 
 TRUTH = np.array([10.0, 6.0, 80.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])

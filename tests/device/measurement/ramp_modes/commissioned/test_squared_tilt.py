@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from device.measurement.ramp_modes.commissioned.own_probe import SECOND_ACROSS, SEEN_COLUMNS
 from device.measurement.ramp_modes.commissioned.squared_tilt import LEFT_STD, of_habit, of_leaning
 from device.measurement.ramp_modes.noise import LOADS
-from device.measurement.ramp_modes.radial_profile import CONTRAST, SECOND
+from device.measurement.ramp_modes.radial_profile import CONTRAST, SECOND, SECOND_ACROSS
 from device.measurement.recording.ring_means import RINGS
 
 ANGLE_RAD = np.arange(64) * 2 * np.pi / 64
@@ -26,7 +25,7 @@ def even_orders(first_harmonic):
 def second_order(first_harmonic):
     """The same by what is told of d = P - B, and by the rest, which here is known."""
     squares, leant = np.full((1, LOADS, RINGS), first_harmonic**2), (P - B)[None]
-    told, factor = of_leaning(squares, leant, SEEN_COLUMNS, SECOND_ACROSS)
+    told, factor = of_leaning(squares, leant)
     of_rest = factor[0, :, :2] @ (B + leant[0] / 2) / LEFT_STD
     return np.array([(told[0] - of_rest)[part][10] for part in PARTS])
 
@@ -42,7 +41,7 @@ def test_higher_orders_grow_with_the_cube_of_the_first_harmonic():
     levels = []
     for first_harmonic in (0.1, 0.2):
         squares = np.full((1, LOADS, RINGS), first_harmonic**2)
-        _, factor = of_leaning(squares, np.ones((1, 2)), SEEN_COLUMNS, SECOND_ACROSS)
+        _, factor = of_leaning(squares, np.ones((1, 2)))
         levels.append([np.sqrt(np.sum(factor[0, part, 2:] ** 2, axis=1)).max() for part in PARTS])
     assert np.divide(*levels[::-1]) == pytest.approx(8.0)
     assert levels[1] == pytest.approx([0.25 * (0.2 * 2**0.5) ** 3] * 3)  # of d = (1, 1)
@@ -52,8 +51,8 @@ def test_before_anything_is_seen_a_habit_is_the_mean_over_all_tilts():
     rng = np.random.default_rng(1)
     tilts = rng.standard_normal((20_000, 2, 2))
     squares = np.broadcast_to(np.linspace(0.0, 0.04, RINGS), (len(tilts), LOADS, RINGS))
-    told, _ = of_leaning(squares, tilts[:, 0] - tilts[:, 1], SEEN_COLUMNS, SECOND_ACROSS)
-    shift, factor = of_habit(squares[:1], SEEN_COLUMNS, SECOND_ACROSS)
+    told, _ = of_leaning(squares, tilts[:, 0] - tilts[:, 1])
+    shift, factor = of_habit(squares[:1])
     assert told.mean(axis=0) == pytest.approx(shift[0], abs=0.03 * shift.max())
     e = tilts[:, 1, 0] ** 2 + tilts[:, 1, 1] ** 2 - np.sum(tilts[:, 0] * tilts[:, 1], axis=1)
     assert np.sqrt(np.sum(factor[0, CONTRAST, :3] ** 2, axis=1)).max() == pytest.approx(0.04 * np.std(e / 2), rel=0.05)
