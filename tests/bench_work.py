@@ -37,7 +37,7 @@ PRESS = np.array([12.0, 6.0, 60.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
 """Size, depth, modulus and everything else of the press, in the order of `PARAMETERS`."""
 SECOND_MM = 5.0
 """Mode precise is a scan of two ramps here, the fewest that it answers: the second lies so far beside."""
-BOUNDS: dict[Mode, float] = {"quick": 24.0, "standard": 450.0, "precise": 1200.0}
+BOUNDS: dict[Mode, float] = {"quick": 24.0, "standard": 380.0, "precise": 600.0}
 Works = dict[str, tuple[Callable[[], object], float | None]]
 MODELS = Path(__file__).resolve().parents[1] / "models"
 
@@ -77,7 +77,7 @@ def _paper_works(tables: ProbeTables, calibration: Calibration) -> Works:
 
 
 def _press_works(tables: ProbeTables, calibration: Calibration) -> Works:
-    """Return the estimates that the operator waits for; bounds: 6, 110 and 300 ms where the yardstick takes 0.25."""
+    """Return the estimates that the operator waits for; bounds: 6, 95 and 150 ms where the yardstick takes 0.25."""
     quick, ramp = read_quick_model(MODELS / "quick"), read_ramp_model(MODELS / "standard")
     further_mm: dict[Mode, tuple[float, ...]] = {"precise": (SECOND_MM,)}
     recorded = {

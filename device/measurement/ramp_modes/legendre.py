@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,16 +42,20 @@ class LegendreSum:
 
     def values(self, at: Array) -> Array:
         """Return the outputs [n, Q] at points [n, V] of the cube from -1 to 1, in the precision of the points."""
-        parts = np.split(at, range(POINTS_AT_ONCE, len(at), POINTS_AT_ONCE))
-        outputs_of_terms = (self._ordered_single if at.dtype == np.float32 else self._ordered).T
+        polynomials = self._terms.polynomials(at)
+        parts = np.split(polynomials, range(POINTS_AT_ONCE, len(at), POINTS_AT_ONCE), axis=2)
+        outputs_of_terms = self._outputs_of_terms(at)
         return np.concatenate([outputs_of_terms @ self._terms.tree_values(part) for part in parts], axis=1).T
 
     def values_and_gradient(self, at: Array) -> tuple[Array, Array]:
-        """Return the outputs [n, Q] and their derivatives [V, n, Q] by each variable."""
+        """Return the outputs [n, Q] and their derivatives [V, n, Q] by each variable, in the points' precision."""
         terms = self._terms.tree_values_and_slopes(at)
-        flat = self._ordered.T @ terms.reshape(len(terms), -1)
+        flat = self._outputs_of_terms(at) @ terms.reshape(len(terms), -1)
         outputs = flat.reshape(-1, *terms.shape[1:]).transpose(1, 2, 0)
         return outputs[0], outputs[1:]
+
+    def _outputs_of_terms(self, at: Array) -> NDArray[Any]:
+        return (self._ordered_single if at.dtype == np.float32 else self._ordered).T
 
     @cached_property
     def _terms(self) -> LegendreTerms:
@@ -87,21 +91,24 @@ class LegendreTerms:
 
     def values(self, at: Array) -> Array:
         """Return the terms [n, M] at points [n, V]."""
-        return np.ascontiguousarray(self.tree_values(at)[self.places].T)
+        return np.ascontiguousarray(self.tree_values(self.polynomials(at))[self.places].T)
 
-    def tree_values(self, at: Array) -> Array:
-        """Return the tree's terms [T, n] at points [n, V]."""
-        polynomials = _polynomials(at, self._highest)
-        terms = np.ones((self.size, len(at)), at.dtype)
+    def polynomials(self, at: Array) -> Array:
+        """Return the polynomials [highest + 1, V, n] of every variable at points [n, V], degree by degree."""
+        return _polynomials(at, self._highest)
+
+    def tree_values(self, polynomials: Array) -> Array:
+        """Return the tree's terms [T, n] at points with those polynomials [highest + 1, V, n]."""
+        terms = np.ones((self.size, polynomials.shape[2]), polynomials.dtype)
         for level in self._levels:
             np.multiply(terms[level.parent], polynomials[level.degree, level.variable], out=terms[level.rows])
         return terms
 
     def tree_values_and_slopes(self, at: Array) -> Array:
         """Return the tree's terms, and their derivatives by each variable [T, 1 + V, n], by the product rule."""
-        polynomials = _polynomials(at, self._highest)
+        polynomials = self.polynomials(at)
         slopes = _slopes(polynomials)
-        terms = np.zeros((self.size, 1 + at.shape[1], len(at)))
+        terms = np.zeros((self.size, 1 + at.shape[1], len(at)), at.dtype)
         terms[0, 0] = 1
         for level in self._levels:
             factor = level.degree, level.variable

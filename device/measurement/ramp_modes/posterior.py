@@ -1,18 +1,16 @@
 """The posterior of a press: Gaussian given the modulus, whatever shape it takes along the modulus.
 
 The modulus is what a press tells least of, and along it the best size and depth run on a curve. So its range is cut
-into cells: given the modulus in the middle of one, the rest is nearly Gaussian about its own best fit. Samples of these
-Gaussians, weighted by the true density, make the answer neither narrower nor wider than the press allows.
+into cells: given the modulus in the middle of one, the rest is nearly Gaussian about its own best fit, cut off by the
+ranges. Samples of that, weighted by the true density, make the answer neither narrower nor wider than the press allows.
 Sources: Rue, Martino & Chopin, J. R. Stat. Soc. B 71 (2009), nested Laplace approximations; Tierney & Kadane, JASA 81
-(1986); importance sampling with Student's tails and a defensive share, Hesterberg, Technometrics 37 (1995).
+(1986); importance sampling with a defensive share, Hesterberg, Technometrics 37 (1995).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import lgamma, log, pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,22 +20,23 @@ from device.measurement.parameters import COUNT, EVEN_STD
 from device.measurement.ramp_modes.fit import Explained, best_fit, best_fits
 from device.measurement.ramp_modes.joint_region import JointRegion, joint_region
 from device.measurement.ramp_modes.surrogate import MODULUS
+from device.measurement.ramp_modes.within_ranges import draw_within, log_density_within
 
-CELLS, SAMPLES = 11, 6000
-WIDER, FREEDOM = 1.15, 6.0
-"""Gaussians are drawn wider than they are, with the tails of Student's distribution: nothing may be missed."""
+CELLS, SAMPLES = 11, 1000
+RANGE_STD = 1.0
+"""A range is Gaussian with this standard deviation, cut off at its ends: not quite even, since presses bend it, too."""
 DEFENSIVE_SHARE = 0.15
 """Share of the samples that go evenly to all cells, whatever their Gaussians promise."""
 FEWEST_EFFECTIVE = 20.0
 """Fewer say nothing of the posterior: presses that the ranges hold leave hundreds."""
-FEW_EFFECTIVE, MOST_SPOTS, SPOT_SAMPLES = 300.0, 12, 500
+ENOUGH_EFFECTIVE, MOST_SPOTS, SPOT_SAMPLES = 400.0, 40, 100
 """Samples that are worth less than the first get further Gaussians, at most so many of so many samples each."""
 SEED = 20130317
 TOGETHER = (2, COUNT)
 """Size and depth, the first two of the unknowns, and all three."""
 EDGES = np.linspace(-1.0, 1.0, CELLS + 1)
 MIDDLES = (EDGES[1:] + EDGES[:-1]) / 2
-NEAR, MOST_STEPS = 1e-5, 12
+NEAR, MOST_STEPS = 1e-5, 4
 """A cell's best fit needs to be near, not exact: the weights correct it. One that creeps would cost more than all."""
 
 
@@ -83,69 +82,58 @@ class ModulusCells(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
-    """Best fit [C, k], its slope by the modulus [C, k - 1], factor of the covariance [C, k - 1, k - 1], share [C]."""
+    """Gaussians of all coordinates but the modulus, each in its cell; the ranges cut them off.
 
-    best: Array
+    `middle` [C, k - 1] where the modulus is in the cell's middle, `slope` by it, `factor` [C, k - 1, k - 1] of the
+    covariance, `share` [C] of the samples.
+    """
+
+    middle: Array
     slope: Array
     factor: Array
     share: Array
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
-        """Return samples [n, k]."""
-        cell = rng.choice(CELLS, count, p=self.share)
-        rest = self.slope.shape[1]
-        samples = np.empty((count, rest + 1))
-        samples[:, MODULUS] = rng.uniform(EDGES[cell], EDGES[cell + 1])
-        standard = _students(rng, count, rest)
-        samples[:, _rest(rest + 1)] = self._middle(cell, samples[:, MODULUS]) + np.einsum(
-            "nij,nj->ni", self.factor[cell], standard
-        )
+        """Return samples [n, k], as evenly over the modulus as the shares allow."""
+        ends = np.append(0.0, np.cumsum(self.share)) / self.share.sum()
+        modulus = np.interp((np.arange(count) + rng.uniform(size=count)) / count, ends, EDGES)
+        samples = np.empty((count, self.middle.shape[1] + 1))
+        samples[:, MODULUS] = modulus
+        samples[:, _rest(samples.shape[1])] = draw_within(*self._given(modulus), rng)
         return samples
 
     def log_density(self, samples: Array) -> Array:
-        """Return the logarithm of the density [n] of samples [n, k], which is -inf outside the modulus' range."""
-        modulus, rest = samples[:, MODULUS], _rest(samples.shape[1])
-        cell = np.clip(np.searchsorted(EDGES, modulus, side="right") - 1, 0, CELLS - 1)
-        away = samples[:, rest] - self._middle(cell, modulus)
-        standard = np.einsum("nij,nj->ni", np.linalg.inv(self.factor)[cell], away)
-        log = np.log(self.share[cell] / np.diff(EDGES)[cell]) + _log_students(standard)
-        return np.where(np.abs(modulus) <= 1, log - _log_volume(self.factor)[cell], -np.inf)
+        """Return the logarithm of the density [n] of samples [n, k]."""
+        modulus = samples[:, MODULUS]
+        log = log_density_within(samples[:, _rest(samples.shape[1])], *self._given(modulus))
+        return np.asarray(log + np.log(self.share / np.diff(EDGES))[_cell_of(modulus)])
 
-    def _middle(self, cell: NDArray[np.intp], modulus: Array) -> Array:
-        """Return where the other coordinates [n, k - 1] lie at moduli [n] of cells."""
-        best = self.best[cell][:, _rest(self.best.shape[1])]
-        return np.asarray(best + self.slope[cell] * (modulus - MIDDLES[cell])[:, None])
+    def _given(self, modulus: Array) -> tuple[Array, Array]:
+        """Return middles [n, k - 1] and factors [n, k - 1, k - 1] of the other coordinates at moduli [n]."""
+        cell = _cell_of(modulus)
+        return self.middle[cell] + self.slope[cell] * (modulus - MIDDLES[cell])[:, None], self.factor[cell]
 
 
 @dataclass(frozen=True, eq=False)
 class _Spot:
-    """Student's distribution about coordinates [k], with a factor of the covariance [k, k]."""
+    """A Gaussian about coordinates [k], with a factor of the covariance [k, k]; the ranges cut it off."""
 
     middle: Array
     factor: Array
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
         """Return samples [n, k]."""
-        return np.asarray(self.middle + _students(rng, count, len(self.middle)) @ self.factor.T)
+        factor = np.broadcast_to(self.factor, (count, *self.factor.shape))
+        return draw_within(np.tile(self.middle, (count, 1)), factor, rng)
 
     def log_density(self, samples: Array) -> Array:
         """Return the logarithm of the density [n] of samples [n, k]."""
-        standard = (samples - self.middle) @ np.linalg.inv(self.factor).T
-        return _log_students(standard) - float(np.log(np.diag(self.factor)).sum())
+        return log_density_within(samples, self.middle, self.factor)
 
 
-def _students(rng: np.random.Generator, count: int, dimensions: int) -> Array:
-    """Return standard samples [n, k] of Student's distribution."""
-    return np.asarray(
-        rng.standard_normal((count, dimensions)) / np.sqrt(rng.chisquare(FREEDOM, count) / FREEDOM)[:, None]
-    )
-
-
-def _log_students(standard: Array) -> Array:
-    """Return the logarithm of the standard density [n] of Student's distribution at [n, k]."""
-    k, freedom = standard.shape[1], FREEDOM
-    constant = lgamma((freedom + k) / 2) - lgamma(freedom / 2) - k / 2 * log(freedom * pi)
-    return np.asarray(constant - (freedom + k) / 2 * np.log1p(np.sum(standard**2, axis=1) / freedom))
+def _cell_of(modulus: Array) -> NDArray[np.intp]:
+    """Return the numbers [n] of the cells of moduli."""
+    return np.clip(np.searchsorted(EDGES, modulus, side="right") - 1, 0, CELLS - 1)
 
 
 def sample_press(posterior: Explained, start: Array) -> PressFit:
@@ -165,38 +153,39 @@ def weighted_samples(posterior: Explained, best: Array) -> WeightedSamples:
     Where Gaussians miss a bent posterior, the sample of the largest weight says where: there another one is put, and
     all samples count as drawn from the mixture. Source: Raftery & Bao, Biometrics 66 (2010), incremental mixtures.
     """
-    cells, rng = _cells(posterior, best), np.random.default_rng(SEED)
-    parts: list[tuple[_Cells | _Spot, int]] = [(cells, SAMPLES)]
-    samples = cells.draw(SAMPLES, rng)
-    log_density = posterior.log_density(samples)
+    rng = np.random.default_rng(SEED)
+    parts: list[tuple[_Cells | _Spot, int]] = []
+    samples, density, drawn = np.zeros((0, len(best))), np.zeros(0), np.zeros((0, 0))
+    further: tuple[_Cells | _Spot, int] = _cells(posterior, best), SAMPLES
     while True:
-        log_weight = log_density - _log_mixture(parts, samples)
-        weight = np.exp(log_weight - max(log_weight.max(), np.finfo(float).min))  # -inf when all lie outside
-        effective = float(weight.sum() ** 2 / np.sum(weight**2)) if weight.any() else 0.0
-        if effective >= FEW_EFFECTIVE or len(parts) > MOST_SPOTS or not weight.any():
-            return WeightedSamples(samples, weight / max(weight.sum(), np.finfo(float).tiny), effective)
-        spot = _spot_at(posterior, samples[np.argmax(weight)])
-        parts.append((spot, SPOT_SAMPLES))
-        further = spot.draw(SPOT_SAMPLES, rng)
-        samples = np.concatenate([samples, further])
-        log_density = np.concatenate([log_density, posterior.log_density(further)])
+        part, count = further
+        new = part.draw(count, rng)
+        drawn = np.vstack([drawn, np.log(count) + part.log_density(samples)])
+        parts.append(further)
+        drawn = np.hstack([drawn, [np.log(number) + one.log_density(new) for one, number in parts]])
+        samples, density = np.concatenate([samples, new]), np.append(density, posterior.log_density(new))
+        weight, effective = _weights(density - np.logaddexp.reduce(drawn, axis=0))
+        if effective >= ENOUGH_EFFECTIVE or len(parts) > MOST_SPOTS or not effective:
+            return WeightedSamples(samples, weight, effective)
+        further = _spot_at(posterior, samples[np.argmax(weight)]), SPOT_SAMPLES
 
 
-def _log_mixture(parts: Sequence[tuple[_Cells | _Spot, int]], samples: Array) -> Array:
-    """Return the logarithm of the density [n] of a mixture at samples [n, k], each part with its number of samples."""
-    logs = [np.log(count) + part.log_density(samples) for part, count in parts]
-    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(sum(count for _, count in parts)))
+def _weights(log: Array) -> tuple[Array, float]:
+    """Return weights [n] that add up to 1, of their logarithms but for a constant, and how many samples they make."""
+    weight = np.exp(log - max(log.max(), np.finfo(float).min))  # -inf when none is possible
+    effective = float(weight.sum() ** 2 / np.sum(weight**2)) if weight.any() else 0.0
+    return weight / max(weight.sum(), np.finfo(float).tiny), effective
 
 
 def _spot_at(posterior: Explained, at: Array) -> _Spot:
-    """Return the Gaussian of the posterior about coordinates [k], a little wider."""
+    """Return the Gaussian of the posterior about coordinates [k]."""
     _, jacobian = posterior.residuals_and_jacobian(at[None])
-    return _Spot(at, WIDER * np.linalg.cholesky(np.linalg.inv(_precision(jacobian)[0])))
+    return _Spot(at, np.linalg.cholesky(np.linalg.inv(_precision(jacobian, RANGE_STD)[0])))
 
 
 def _by_modulus(samples: Array, weight: Array) -> ModulusCells:
     cells = _even_cells(np.zeros(samples.shape[1]))
-    cell = np.clip(np.searchsorted(EDGES, samples[:, MODULUS], side="right") - 1, 0, CELLS - 1)
+    cell = _cell_of(samples[:, MODULUS])
     share = np.bincount(cell, weight, CELLS).astype(np.float64)
     for number in np.flatnonzero(share):
         inside = cell == number
@@ -218,26 +207,33 @@ def _moments(samples: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def _cells(posterior: Explained, best: Array) -> _Cells:
-    centres = _best_in_cells(posterior, best)
-    residuals, jacobian = posterior.residuals_and_jacobian(centres)
-    precision, rest = _precision(jacobian), _rest(len(best))
+    """Return the Gaussians about the best fit in each cell: its middle may lie outside the ranges, the fit may not."""
+    at, rest = _best_in_cells(posterior, best), _rest(len(best))
+    residuals, jacobian = posterior.residuals_and_jacobian(at)
+    precision = _precision(jacobian, RANGE_STD)
     covariance = np.linalg.inv(precision[:, rest][:, :, rest])
-    factor = WIDER * np.linalg.cholesky(covariance)
-    log = _log_volume(factor) - 0.5 * np.sum(residuals**2, axis=1)
-    share = np.exp(log - log.max())
-    share = (1 - DEFENSIVE_SHARE) * share / share.sum() + DEFENSIVE_SHARE / CELLS
-    return _Cells(centres, -np.einsum("nij,nj->ni", covariance, precision[:, rest, MODULUS]), factor, share)
+    uphill = np.einsum("nsi,ns->ni", jacobian[:, :, rest], residuals) + at[:, rest] / RANGE_STD**2
+    step, slope = (-np.einsum("nij,nj->ni", covariance, one) for one in (uphill, precision[:, rest, MODULUS]))
+    factor = np.linalg.cholesky(covariance)
+    log = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1) - 0.5 * np.sum(residuals**2, axis=1)
+    return _Cells(at[:, rest] + step, slope, factor, _defended(np.exp(log - log.max())))
+
+
+def _defended(share: Array) -> Array:
+    """Return shares [C] of which each has a part of its own."""
+    return np.asarray((1 - DEFENSIVE_SHARE) * share / share.sum() + DEFENSIVE_SHARE / CELLS)
 
 
 def _best_in_cells(posterior: Explained, best: Array) -> Array:
     """Return the best fits [C, k] with the modulus held in the middle of each cell, begun where `best` slides to."""
     _, jacobian = posterior.residuals_and_jacobian(best[None])
-    precision, rest = _precision(jacobian)[0], _rest(len(best))
+    precision, rest = _precision(jacobian, EVEN_STD)[0], _rest(len(best))
     slope = -np.linalg.solve(precision[np.ix_(rest, rest)], precision[rest, MODULUS])
     start = np.tile(best, (CELLS, 1))
     start[:, MODULUS] = MIDDLES
     start[:, rest] += slope * (MIDDLES - best[MODULUS])[:, None]
-    return best_fits(posterior, np.clip(start, -1.0, 1.0), rest, tolerance=NEAR, steps=MOST_STEPS)
+    single: NDArray[Any] = np.clip(start, -1.0, 1.0).astype(np.float32)  # twice as fast: see `PressRows`
+    return best_fits(posterior, single, rest, tolerance=NEAR, steps=MOST_STEPS)
 
 
 def _rest(dimensions: int) -> NDArray[np.bool_]:
@@ -245,11 +241,6 @@ def _rest(dimensions: int) -> NDArray[np.bool_]:
     return np.asarray(np.arange(dimensions) != MODULUS)
 
 
-def _precision(jacobian: Array) -> Array:
+def _precision(jacobian: Array, range_std: float) -> Array:
     """Return the inverse covariances [n, k, k] of a Gaussian posterior: of the presses, and of the ranges."""
-    return np.asarray(jacobian.transpose(0, 2, 1) @ jacobian + np.eye(jacobian.shape[2]) / EVEN_STD**2)
-
-
-def _log_volume(factor: Array) -> Array:
-    """Return the logarithm of the determinants [C] of triangular factors [C, k, k]."""
-    return np.asarray(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1))
+    return np.asarray(jacobian.transpose(0, 2, 1) @ jacobian + np.eye(jacobian.shape[2]) / range_std**2)

@@ -117,8 +117,8 @@ class PressSurrogate:
 class PressRows(Protocol):
     """A forward model of a press at any offset up to `to_mm`, in coordinates of `parameters.normalise`.
 
-    Rows have the precision of their coordinates. Single is twice as fast and good to a millionth of the light, far
-    below noise: a posterior's samples need no more.
+    Polynomials have the precision of their coordinates. Single is twice as fast and good to a millionth of the light,
+    far below noise: a posterior's samples need no more.
     Directions [n] are those in which the inclusion lies in the image; without them rows are the mean over all of them.
     """
 

@@ -5,7 +5,6 @@ import pytest
 from small_surrogate import LinearRows, white_noise
 
 from device.measurement.parameters import COUNT, EVEN_STD, PARAMETERS
-from device.measurement.ramp_modes import posterior
 from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90, SMALLEST_SHARE, intervals_of
 from device.measurement.ramp_modes.posterior import CELLS, MIDDLES, ModulusCells, PressFit, sample_press
@@ -125,9 +124,8 @@ HANGS, STD, PRESSES = 0.3, 0.05, 100
 
 
 @pytest.fixture
-def hanging(monkeypatch) -> LinearRows:
+def hanging() -> LinearRows:
     """All parameters but the modulus have a column of their own, in which nothing is a contrast."""
-    monkeypatch.setattr(posterior, "SAMPLES", 1500)  # a quarter: presses are many here
     slopes = np.zeros((K, COLUMNS))
     slopes[np.arange(K), RESPONSE.start + np.arange(K)] = 1.0
     slopes[MODULUS] = HANGS * slopes[SIZE]

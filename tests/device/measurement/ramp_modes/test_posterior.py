@@ -10,8 +10,10 @@ from small_surrogate import COLUMNS, linear_surrogate, white_noise
 from device.measurement.parameters import EVEN_STD, PARAMETERS, is_possible, normalise
 from device.measurement.ramp_modes.fit import PressPosterior
 from device.measurement.ramp_modes.posterior import (
+    ENOUGH_EFFECTIVE,
     FEWEST_EFFECTIVE,
     MOST_SPOTS,
+    SAMPLES,
     PressFit,
     sample_press,
     weighted_samples,
@@ -57,7 +59,7 @@ def test_what_the_row_does_not_tell_keeps_the_spread_of_its_even_prior(fit):
 
 
 def test_the_samples_are_worth_enough(fit):
-    assert 200 < fit.effective_samples <= 6000
+    assert ENOUGH_EFFECTIVE <= fit.effective_samples <= SAMPLES  # of a Gaussian the first ones are enough
 
 
 def test_the_same_row_twice_gives_the_same_answer(fit, row, slopes):
@@ -136,7 +138,7 @@ def test_a_bent_posterior_gets_more_gaussians_and_comes_nearer_to_its_integral(m
     bent = sample_press(posterior, start)
     monkeypatch.setattr("device.measurement.ramp_modes.posterior.MOST_SPOTS", 0)
     straight = sample_press(posterior, start)
-    assert straight.effective_samples < 100 < 2 * 100 < bent.effective_samples
+    assert straight.effective_samples < ENOUGH_EFFECTIVE / 2 < ENOUGH_EFFECTIVE <= bent.effective_samples
     x1 = np.linspace(-1, 1, 20_001)
     x0 = 0.3 - 1.5 * x1**2
     x0, x1 = x0[np.abs(x0) <= 1], x1[np.abs(x0) <= 1]
