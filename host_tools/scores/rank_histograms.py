@@ -1,4 +1,4 @@
-"""Whether the posterior is right as a whole: ranks of the truth in it, its joint regions, and the energy score.
+"""Whether the posterior is right as a whole: ranks of the truth in it, its own regions, and the energy score.
 
 Where inclusions are drawn as the posterior believes and presses from the forward model and its noise, the truth is a
 sample of the posterior like any other: its rank is even, and 90 % regions hold it in nine of ten presses.

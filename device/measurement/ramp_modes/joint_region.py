@@ -1,9 +1,11 @@
 """The joint 90 % region of unknowns: where a press says that they lie together.
 
 Intervals of single unknowns hold together less often than each alone, and say nothing of how the unknowns hang on each
-other. The region is the ellipse about the posterior's mean, in its own covariance, that holds nine in ten of its
-samples: of a Gaussian posterior the smallest such region. Source: Box & Tiao, Bayesian Inference in Statistical
-Analysis (1973), 2.8, highest density regions.
+other. Of all unknowns the region is the ellipse about the posterior's mean, in its own covariance, that holds nine in
+ten of its samples. It weighs them by how many inclusions have each modulus, so it misses many of the softest ones. So
+size and depth are profiled, as their intervals are: they lie together where they are likely under some modulus.
+Sources: Box & Tiao, Bayesian Inference in Statistical Analysis (1973), 2.8, highest density regions; Cox & Hinkley,
+Theoretical Statistics (1974), 9.3, profile likelihood; docs/modes.md counts how often regions hold.
 """
 
 from __future__ import annotations
@@ -11,30 +13,59 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import COVERAGE
 
+CHI_SQUARE_90_OF_TWO = 4.6052
+"""Nine in ten of the chi-square distribution's values of two degrees of freedom lie below."""
+SHARED_SAMPLES = 10.0
+"""A cell's covariance counts those of all cells as so many samples of its own: a few samples alone tell none."""
+
 
 class JointRegion(NamedTuple):
-    """The middle [k], the inverse covariance [k, k], and the squared distance in it at which the ellipse ends."""
+    """Ellipses: middles [C, k], inverse covariances [C, k, k], and squared distances [C] in them at which each ends."""
 
     middle: Array
     precision: Array
-    square: float
+    square: Array
 
     def holds(self, at: Array) -> bool:
-        """Return whether coordinates [k] lie inside; the edge belongs to it."""
+        """Return whether coordinates [k] lie inside one of them; the edge belongs to it."""
         away = at - self.middle
-        return bool(away @ self.precision @ away <= self.square)
+        return bool(np.any(np.einsum("ci,cij,cj->c", away, self.precision, away) <= self.square))
 
 
 def joint_region(at: Array, weight: Array) -> JointRegion:
-    """Return the region of samples [n, k] whose weights [n] add up to 1."""
-    middle = weight @ at
-    away = at - middle
-    precision = np.asarray(np.linalg.inv((away * weight[:, None]).T @ away), np.float64)
+    """Return the ellipse that holds nine in ten of samples [n, k] whose weights [n] add up to 1."""
+    middle, covariance = _moments(at, weight)
+    away, precision = at - middle, np.linalg.inv(covariance)
     square = np.einsum("ni,ij,nj->n", away, precision, away)
     order = np.argsort(square)
     last = min(int(np.searchsorted(np.cumsum(weight[order]), COVERAGE)), len(order) - 1)
-    return JointRegion(middle, precision, float(square[order[last]]))
+    return JointRegion(middle[None], np.asarray(precision[None], np.float64), square[order[last], None])
+
+
+def profiled_region(at: Array, weight: Array, cell: NDArray[np.intp]) -> JointRegion:
+    """Return where two unknowns [n, 2] are likely under the modulus of some cell, by samples [n] of cells.
+
+    Within a cell they are Gaussian. Cells without samples have no ellipse.
+    """
+    share = np.bincount(cell, weight)
+    seen = np.flatnonzero(share)
+    share, inside = share[seen], [cell == number for number in seen]
+    of_cells = [weight[one] / weight[one].sum() for one in inside]
+    moments = [_moments(at[one], part) for one, part in zip(inside, of_cells, strict=True)]
+    middle, own = (np.array(part) for part in zip(*moments, strict=True))
+    worth = np.array([1 / np.sum(part**2) for part in of_cells])[:, None, None]
+    covariance = (worth * own + SHARED_SAMPLES * np.tensordot(share, own, axes=1)) / (worth + SHARED_SAMPLES)
+    deviance = np.log(np.linalg.det(covariance)) - 2 * np.log(share)
+    return JointRegion(middle, np.linalg.inv(covariance), CHI_SQUARE_90_OF_TWO - (deviance - deviance.min()))
+
+
+def _moments(at: Array, weight: Array) -> tuple[Array, Array]:
+    """Return mean [k] and covariance [k, k] of samples [n, k] whose weights [n] add up to 1."""
+    middle = weight @ at
+    away = at - middle
+    return middle, np.asarray((away * weight[:, None]).T @ away)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, EVEN_STD
 from device.measurement.ramp_modes.fit import Explained, best_fit, best_fits
-from device.measurement.ramp_modes.joint_region import JointRegion, joint_region
+from device.measurement.ramp_modes.joint_region import JointRegion, joint_region, profiled_region
 from device.measurement.ramp_modes.surrogate import MODULUS
 from device.measurement.ramp_modes.within_ranges import draw_within, log_density_within
 
@@ -143,7 +143,9 @@ def sample_press(posterior: Explained, start: Array) -> PressFit:
     if effective < FEWEST_EFFECTIVE:
         return PressFit(best, best, np.full(len(best), EVEN_STD), effective, _even_cells(best))
     mean, spread = _moments(samples, weight)
-    regions = tuple(joint_region(samples[:, :count], weight) for count in TOGETHER)
+    size_and_depth, all_three = (samples[:, :count] for count in TOGETHER)
+    profiled = profiled_region(size_and_depth, weight, _cell_of(samples[:, MODULUS]))
+    regions = profiled, joint_region(all_three, weight)
     return PressFit(best, mean, spread, effective, _by_modulus(samples, weight), regions)
 
 
