@@ -21,8 +21,8 @@ FURTHER_RATIO, ALIKE_MM = 0.25, 1.35
 """Of the cube of the larger tilt's first harmonic, root mean square, where that is 0.15 to 0.5; over so many
 millimetres it is alike. Of random tilts of the virtual probe in people's tissue
 (`tests/host_tools/press_models/test_press_derivatives.py`)."""
-HABITS_SQUARE = 4.0
-"""Mean square of d."""
+HABITS_LARGER = 90 ** (1 / 3)
+"""E[m^6]^(1/3) of the larger m of |p| and |b|, whose squares are exponential of mean 2 each: 2 * 48 - 6 is E[m^6]."""
 LEFT_STD = 0.5**0.5
 """Standard deviation of D in each direction."""
 BELIEVED_STD = 1.5**0.5
@@ -38,7 +38,7 @@ def of_leaning(squares: Array, leant: Array) -> tuple[Array, Array]:
     told = 0.5 * _products(squares, leant, leant)
     unknown = [LEFT_STD * _products(squares, np.broadcast_to(axis, leant.shape), leant) for axis in np.eye(2)]
     unknown.append(np.zeros_like(told))  # as many columns as of a habit: what is drawn by the one is told by the other
-    further = _higher_orders(squares, np.sum(leant**2, axis=1))
+    further = _higher_orders(squares, _larger_given(np.linalg.norm(leant, axis=1)))
     return told, np.concatenate([np.stack(unknown, axis=2), further], axis=2)
 
 
@@ -48,14 +48,25 @@ def of_habit(squares: Array) -> tuple[Array, Array]:
     shift[:, CONTRAST] = squares.reshape(len(squares), -1)
     factor[:, CONTRAST, 0] = BELIEVED_STD * shift[:, CONTRAST]
     factor[:, SECOND, 1] = factor[:, SECOND_ACROSS, 2] = BELIEVED_STD * _seconds(squares)
-    further = _higher_orders(squares, np.full(len(squares), HABITS_SQUARE))
+    further = _higher_orders(squares, np.full(len(squares), HABITS_LARGER))
     return shift, np.concatenate([factor, further], axis=2)
 
 
-def _higher_orders(squares: Array, leant_square: Array) -> Array:
-    """Return a factor [N, S, K] of what higher orders do where |d|^2 is that [N], smooth along the rings."""
+def _larger_given(leant: Array) -> Array:
+    """Return E[m^6]^(1/3) of the larger m of |p| and |b| given |d| [N], within 1 % of random tilts up to |d| = 6.
+
+    Where nothing is left of d, |p|^2 is exponential of mean 1, and E[m^6] is 6.
+    """
+    return np.asarray(6 ** (1 / 3) + 0.65 * leant + 0.23 * leant**2)
+
+
+def _higher_orders(squares: Array, larger_square: Array) -> Array:
+    """Return a factor [N, S, K] of what higher orders do where the larger tilt's square is that [N].
+
+    It is smooth along the rings.
+    """
     count, _, rings = squares.shape
-    larger = np.sqrt(squares * (leant_square / 2 + 1)[:, None, None])  # about the mean square of the larger tilt
+    larger = np.sqrt(squares * larger_square[:, None, None])
     bent = FURTHER_RATIO * larger[..., 1:, None] ** 3 * SMOOTH_FACTOR
     factor = np.zeros((count, SEEN_COLUMNS, 3 * (rings - 1)))
     means = np.zeros((*squares.shape, rings - 1))

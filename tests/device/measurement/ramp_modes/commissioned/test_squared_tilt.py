@@ -37,14 +37,30 @@ def test_told_and_untold_together_are_the_ratio_to_second_order():
     assert errors[0] / errors[1] == pytest.approx(16, rel=0.15)
 
 
+def further_std(factor):
+    """Largest standard deviation of higher orders in ring means and second harmonics of the first press."""
+    return [np.sqrt(np.sum(factor[0, part, -3 * (RINGS - 1) :] ** 2, axis=1)).max() for part in PARTS]
+
+
 def test_higher_orders_grow_with_the_cube_of_the_first_harmonic():
-    levels = []
-    for first_harmonic in (0.1, 0.2):
-        squares = np.full((1, LOADS, RINGS), first_harmonic**2)
-        _, factor = of_leaning(squares, np.ones((1, 2)))
-        levels.append([np.sqrt(np.sum(factor[0, part, 2:] ** 2, axis=1)).max() for part in PARTS])
+    squares = [np.full((1, LOADS, RINGS), first_harmonic**2) for first_harmonic in (0.1, 0.2)]
+    levels = [further_std(of_leaning(one, np.ones((1, 2)))[1]) for one in squares]
     assert np.divide(*levels[::-1]) == pytest.approx(8.0)
-    assert levels[1] == pytest.approx([0.25 * (0.2 * 2**0.5) ** 3] * 3)  # of d = (1, 1)
+
+
+@pytest.mark.parametrize("leant", [0.0, 1.0, 2.0, 4.0, None])
+def test_higher_orders_are_of_the_larger_tilt_that_may_be_behind_what_is_seen(leant):
+    """Of tilts drawn with that difference, or with any, against a quarter of their cube, root mean square."""
+    p, b = np.random.default_rng(2).standard_normal((2, 200_000, 2))
+    squares = np.full((1, LOADS, RINGS), 0.1**2)
+    if leant is None:
+        _, factor = of_habit(squares)
+    else:
+        middle, half = (p + b) / 2, np.array([leant, 0.0]) / 2
+        p, b = middle + half, middle - half
+        _, factor = of_leaning(squares, 2 * half[None])
+    sixth = np.mean(np.maximum(np.sum(p**2, axis=1), np.sum(b**2, axis=1)) ** 3)
+    assert further_std(factor) == pytest.approx([0.25 * 0.1**3 * sixth**0.5] * 3, rel=0.03)
 
 
 def test_before_anything_is_seen_a_habit_is_the_mean_over_all_tilts():
