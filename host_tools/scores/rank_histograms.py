@@ -48,7 +48,7 @@ SCORE_HEADER = ("mode", "energy score", "that of the ranges alone", "ratio")
 
 
 class RankedPress(NamedTuple):
-    """Of one press: rank [3] of each truth, whether the joint region of each of `JOINT` holds it, energy scores.
+    """Of one press: rank [3] of each truth, whether the ellipse of each of `JOINT` holds it, energy scores.
 
     The second energy score is that of the ranges alone.
     """

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import IDENTIFIABLE_RATIO
 from device.measurement.parameters import COUNT, EVEN_STD
+from device.measurement.ramp_modes.joint_region import pooled
 from device.measurement.ramp_modes.posterior import PressFit
 from device.measurement.ramp_modes.surrogate import MODULUS
 
@@ -52,8 +53,9 @@ def _profiled(fit: PressFit, unknown: int) -> tuple[float, float]:
         half = float(np.sqrt(CHI_SQUARE_90) * spread)
         return float(mean) - half, float(mean) + half
     cells = fit.by_modulus
-    seen = (cells.share > SMALLEST_SHARE) & (cells.spread[:, unknown] > 0)
-    mean, spread = cells.mean[seen, unknown], cells.spread[seen, unknown]
+    seen = cells.share > SMALLEST_SHARE
+    spread = np.sqrt(pooled(cells.spread[seen, unknown] ** 2, cells.share[seen], cells.worth[seen]))
+    mean = cells.mean[seen, unknown]
     deviance = -2 * np.log(cells.share[seen] / spread)
     half = spread * np.sqrt(np.maximum(CHI_SQUARE_90 - (deviance - deviance.min()), 0.0))
     likely = half > 0

@@ -21,7 +21,7 @@ from device.measurement.confidence_belt import COVERAGE
 CHI_SQUARE_90_OF_TWO = 4.6052
 """Nine in ten of the chi-square distribution's values of two degrees of freedom lie below."""
 SHARED_SAMPLES = 10.0
-"""A cell's covariance counts those of all cells as so many samples of its own: a few samples alone tell none."""
+"""What all cells spread by counts as so many samples of each one's own: a few samples alone tell none."""
 
 
 class JointRegion(NamedTuple):
@@ -52,16 +52,25 @@ def profiled_region(at: Array, weight: Array, cell: NDArray[np.intp]) -> JointRe
 
     Within a cell they are Gaussian. Cells without samples have no ellipse.
     """
-    share = np.bincount(cell, weight)
-    seen = np.flatnonzero(share)
-    share, inside = share[seen], [cell == number for number in seen]
+    of_all = np.bincount(cell, weight).astype(np.float64)
+    seen = np.flatnonzero(of_all)
+    share, inside = of_all[seen], [cell == number for number in seen]
     of_cells = [weight[one] / weight[one].sum() for one in inside]
     moments = [_moments(at[one], part) for one, part in zip(inside, of_cells, strict=True)]
     middle, own = (np.array(part) for part in zip(*moments, strict=True))
-    worth = np.array([1 / np.sum(part**2) for part in of_cells])[:, None, None]
-    covariance = (worth * own + SHARED_SAMPLES * np.tensordot(share, own, axes=1)) / (worth + SHARED_SAMPLES)
+    covariance = pooled(own, share, np.array([1 / np.sum(part**2) for part in of_cells]))
     deviance = np.log(np.linalg.det(covariance)) - 2 * np.log(share)
-    return JointRegion(middle, np.linalg.inv(covariance), CHI_SQUARE_90_OF_TWO - (deviance - deviance.min()))
+    precision = np.asarray(np.linalg.inv(covariance), np.float64)
+    return JointRegion(middle, precision, CHI_SQUARE_90_OF_TWO - (deviance - deviance.min()))
+
+
+def pooled(own: Array, share: Array, worth: Array) -> Array:
+    """Return variances [C, ...] of cells of a posterior, those of few samples nearer to the mean of all.
+
+    `own` [C, ...] are those of each cell's samples, `worth` [C] how many these are, `share` [C] add up to 1.
+    """
+    worth = worth.reshape(-1, *[1] * (own.ndim - 1))
+    return np.asarray((worth * own + SHARED_SAMPLES * np.tensordot(share, own, axes=1)) / (worth + SHARED_SAMPLES))
 
 
 def _moments(at: Array, weight: Array) -> tuple[Array, Array]:

@@ -29,8 +29,11 @@ DEFENSIVE_SHARE = 0.15
 """Share of the samples that go evenly to all cells, whatever their Gaussians promise."""
 FEWEST_EFFECTIVE = 20.0
 """Fewer say nothing of the posterior: presses that the ranges hold leave hundreds."""
-ENOUGH_EFFECTIVE, MOST_SPOTS, SPOT_SAMPLES = 400.0, 40, 100
-"""Samples that are worth less than the first get further Gaussians, at most so many of so many samples each."""
+ENOUGH_EFFECTIVE, MOST_SPOTS, SPOT_SAMPLES = 400.0, 15, 200
+"""Samples that are worth less than the first get further Gaussians, at most so many of so many samples each.
+
+One lucky sample in each of them is less than the fewest that say anything.
+"""
 SEED = 20130317
 TOGETHER = (2, COUNT)
 """Size and depth, the first two of the unknowns, and all three."""
@@ -72,22 +75,26 @@ class WeightedSamples(NamedTuple):
 class ModulusCells(NamedTuple):
     """Of each cell of the modulus: its `share` [C] of the posterior, and mean and spread [C, 8 + N] in it.
 
-    A cell without samples has no share, the middle of the cell as its mean, and the spread of the ranges.
+    `worth` [C]: how many samples these are of. A cell without any has no share, the middle of the cell as its mean, and
+    the spread of the ranges.
     """
 
     share: Array
     mean: Array
     spread: Array
+    worth: Array
 
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
     """Gaussians of all coordinates but the modulus, each in its cell; the ranges cut them off.
 
-    `middle` [C, k - 1] where the modulus is in the cell's middle, `slope` by it, `factor` [C, k - 1, k - 1] of the
-    covariance, `share` [C] of the samples.
+    `order` [k - 1]: which coordinates these are, in the order in which they are drawn. `middle` [C, k - 1] where the
+    modulus is in the cell's middle, `slope` by it, `factor` [C, k - 1, k - 1] of the covariance, `share` [C] of the
+    samples.
     """
 
+    order: NDArray[np.intp]
     middle: Array
     slope: Array
     factor: Array
@@ -99,19 +106,20 @@ class _Cells:
         modulus = np.interp((np.arange(count) + rng.uniform(size=count)) / count, ends, EDGES)
         samples = np.empty((count, self.middle.shape[1] + 1))
         samples[:, MODULUS] = modulus
-        samples[:, _rest(samples.shape[1])] = draw_within(*self._given(modulus), rng)
+        middle, cell = self._given(modulus)
+        samples[:, self.order] = draw_within(middle, self.factor[cell], rng)
         return samples
 
     def log_density(self, samples: Array) -> Array:
         """Return the logarithm of the density [n] of samples [n, k]."""
-        modulus = samples[:, MODULUS]
-        log = log_density_within(samples[:, _rest(samples.shape[1])], *self._given(modulus))
-        return np.asarray(log + np.log(self.share / np.diff(EDGES))[_cell_of(modulus)])
+        middle, cell = self._given(samples[:, MODULUS])
+        log = log_density_within(samples[:, self.order], middle, np.linalg.inv(self.factor)[cell])
+        return np.asarray(log + np.log(self.share / np.diff(EDGES))[cell])
 
-    def _given(self, modulus: Array) -> tuple[Array, Array]:
-        """Return middles [n, k - 1] and factors [n, k - 1, k - 1] of the other coordinates at moduli [n]."""
+    def _given(self, modulus: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Return middles [n, k - 1] of the other coordinates at moduli [n], and the numbers [n] of their cells."""
         cell = _cell_of(modulus)
-        return self.middle[cell] + self.slope[cell] * (modulus - MIDDLES[cell])[:, None], self.factor[cell]
+        return self.middle[cell] + self.slope[cell] * (modulus - MIDDLES[cell])[:, None], cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +136,7 @@ class _Spot:
 
     def log_density(self, samples: Array) -> Array:
         """Return the logarithm of the density [n] of samples [n, k]."""
-        return log_density_within(samples, self.middle, self.factor)
+        return log_density_within(samples, self.middle, np.linalg.inv(self.factor))
 
 
 def _cell_of(modulus: Array) -> NDArray[np.intp]:
@@ -192,14 +200,15 @@ def _by_modulus(samples: Array, weight: Array) -> ModulusCells:
     for number in np.flatnonzero(share):
         inside = cell == number
         cells.mean[number], cells.spread[number] = _moments(samples[inside], weight[inside] / share[number])
-    return cells._replace(share=share)
+    worth = share**2 / np.maximum(np.bincount(cell, weight**2, CELLS), np.finfo(float).tiny)
+    return cells._replace(share=share, worth=worth)
 
 
 def _even_cells(at: Array) -> ModulusCells:
     """Return the cells of a posterior that tells nothing, about coordinates [k]."""
     mean = np.tile(at, (CELLS, 1))
     mean[:, MODULUS] = MIDDLES
-    return ModulusCells(np.full(CELLS, 1 / CELLS), mean, np.full_like(mean, EVEN_STD))
+    return ModulusCells(np.full(CELLS, 1 / CELLS), mean, np.full_like(mean, EVEN_STD), np.zeros(CELLS))
 
 
 def _moments(samples: Array, weight: Array) -> tuple[Array, Array]:
@@ -209,16 +218,23 @@ def _moments(samples: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def _cells(posterior: Explained, best: Array) -> _Cells:
-    """Return the Gaussians about the best fit in each cell: its middle may lie outside the ranges, the fit may not."""
-    at, rest = _best_in_cells(posterior, best), _rest(len(best))
+    """Return the Gaussians about the best fit in each cell: its middle may lie outside the ranges, the fit may not.
+
+    What the ranges cut off most is drawn first: the others follow from where it came to lie.
+    """
+    at, rest = _best_in_cells(posterior, best), np.flatnonzero(_rest(len(best)))
     residuals, jacobian = posterior.residuals_and_jacobian(at)
     precision = _precision(jacobian, RANGE_STD)
     covariance = np.linalg.inv(precision[:, rest][:, :, rest])
+    log = -0.5 * np.linalg.slogdet(precision[:, rest][:, :, rest])[1] - 0.5 * np.sum(residuals**2, axis=1)
+    share = _defended(np.exp(log - log.max()))
     uphill = np.einsum("nsi,ns->ni", jacobian[:, :, rest], residuals) + at[:, rest] / RANGE_STD**2
     step, slope = (-np.einsum("nij,nj->ni", covariance, one) for one in (uphill, precision[:, rest, MODULUS]))
-    factor = np.linalg.cholesky(covariance)
-    log = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1) - 0.5 * np.sum(residuals**2, axis=1)
-    return _Cells(at[:, rest] + step, slope, factor, _defended(np.exp(log - log.max())))
+    middle = at[:, rest] + step
+    cut_off = share @ np.maximum(np.abs(middle) - 1, 0)
+    order = np.argsort(-cut_off, kind="stable")
+    factor = np.linalg.cholesky(covariance[:, order][:, :, order])
+    return _Cells(rest[order], middle[:, order], slope[:, order], factor, share)
 
 
 def _defended(share: Array) -> Array:

@@ -8,7 +8,7 @@ Source: Hajivassiliou, McFadden & Ruud, J. Econometrics 72 (1996), the simulator
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +32,13 @@ def draw_within(middle: Array, factor: Array, rng: np.random.Generator) -> Array
     return np.clip(at, -1.0, 1.0)
 
 
-def log_density_within(at: Array, middle: Array, factor: Array) -> Array:
-    """Return the logarithm of the density [n] with which `draw_within` draws samples [n, k]; one factor may do."""
-    deviation = np.einsum("...ij,...j->...i", np.linalg.inv(factor), at - middle)
-    spread = np.diagonal(factor, axis1=-2, axis2=-1)
+def log_density_within(at: Array, middle: Array, whitening: NDArray[Any]) -> Array:
+    """Return the logarithm of the density [n] with which `draw_within` draws samples [n, k].
+
+    `whitening` [n, k, k] is the inverse of the factor, of each sample or one of all.
+    """
+    deviation = np.einsum("...ij,...j->...i", whitening, at - middle)
+    spread = 1 / np.diagonal(whitening, axis1=-2, axis2=-1)
     mean = at - spread * deviation  # given those before
     tail = _Tail.between((-1 - mean) / spread, (1 - mean) / spread)
     return np.asarray(np.sum(tail.log_density(deviation / SCALE) - np.log(SCALE * spread), axis=-1))

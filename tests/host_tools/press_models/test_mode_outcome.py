@@ -41,7 +41,9 @@ def middle(rows: np.ndarray) -> np.ndarray:
 def answer_of(mean: float, spread: float, misfit_ratio: float = 1.0) -> RampAnswer:
     """Return an answer of a Gaussian posterior, the same whatever the modulus."""
     at, width = np.full(K, mean), np.full(K, spread)
-    cells = ModulusCells(np.full(CELLS, 1 / CELLS), np.tile(at, (CELLS, 1)), np.tile(width, (CELLS, 1)))
+    cells = ModulusCells(
+        np.full(CELLS, 1 / CELLS), np.tile(at, (CELLS, 1)), np.tile(width, (CELLS, 1)), np.full(CELLS, 100.0)
+    )
     fit = PressFit(at, at, width, 1000.0, cells)
     return RampAnswer(fit, intervals_of(fit), misfit_ratio, 0, at, (5.0, 0.2))
 

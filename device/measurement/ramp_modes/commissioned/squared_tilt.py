@@ -53,7 +53,7 @@ def of_habit(squares: Array) -> tuple[Array, Array]:
 
 
 def _larger_given(leant: Array) -> Array:
-    """Return E[m^6]^(1/3) of the larger m of |p| and |b| given |d| [N], within 1 % of random tilts up to |d| = 6.
+    """Return E[m^6]^(1/3) of the larger m of |p| and |b| given |d| [N], within 2 % of random tilts up to |d| = 6.
 
     Where nothing is left of d, |p|^2 is exponential of mean 1, and E[m^6] is 6.
     """

@@ -1,5 +1,7 @@
 """Intervals of posteriors that are Gaussian, or a few Gaussians by the modulus: their ends are known on paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_surrogate import LinearRows, white_noise
@@ -13,6 +15,7 @@ from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE, TISSUE
 
 DEVIATIONS = 1.6449
 """Nine in ten of a Gaussian lie within so many."""
+MANY = np.full(CELLS, 1e9)
 K, SLAB = len(PARAMETERS), PARAMETERS.index("slab_thickness_mm")
 
 
@@ -26,7 +29,7 @@ def fit_of(shares, means, spreads, mean=0.0, spread=0.1):
     share[:count], in_cells[:count, SIZE], wide[:count, SIZE] = shares, means, spreads
     in_cells[:, MODULUS] = MIDDLES
     whole = np.full(K, mean), np.full(K, spread)
-    return PressFit(np.full(K, mean), *whole, 1000.0, ModulusCells(share, in_cells, wide))
+    return PressFit(np.full(K, mean), *whole, 1000.0, ModulusCells(share, in_cells, wide, MANY))
 
 
 def size_ends(fit):
@@ -77,10 +80,13 @@ def test_a_cell_too_unlikely_adds_nothing(share):
         assert size_ends(fit) == pytest.approx((-0.3 - 0.1 * DEVIATIONS, -0.3 + 0.1 * DEVIATIONS), abs=1e-4)
 
 
-def test_a_cell_of_a_single_sample_has_no_spread_and_adds_nothing():
-    assert size_ends(fit_of([0.5, 0.5], [0.0, 0.9], [0.1, 0.0])) == pytest.approx(
-        (-0.1 * DEVIATIONS, 0.1 * DEVIATIONS), abs=1e-4
-    )
+@pytest.mark.parametrize("spread", [0.0, 1e-5])
+def test_a_cell_of_all_but_a_single_sample_is_no_dense_one(spread):
+    """Of its own spread it would outshine everything; as wide as the others, and a hundredth, it adds nothing."""
+    fit = fit_of([0.99, 0.01], [0.0, 0.9], [0.1, spread])
+    few = np.where(np.arange(CELLS) == 1, 1.0, MANY)
+    fit = replace(fit, by_modulus=fit.by_modulus._replace(worth=few))
+    assert size_ends(fit) == pytest.approx((-0.1 * DEVIATIONS, 0.1 * DEVIATIONS), abs=1e-4)
 
 
 def test_the_modulus_itself_is_profiled_over_nothing():

@@ -36,6 +36,13 @@ def test_the_values_beside_the_gradient_are_the_values(field, points):
     np.testing.assert_allclose(field.values_and_gradient(points)[0], field.values(points), rtol=1e-13)
 
 
+def test_single_precision_is_the_same_to_a_millionth(field, points):
+    single = field.values_and_gradient(points.astype(np.float32))
+    for one, double in zip(single, field.values_and_gradient(points), strict=True):
+        assert one.dtype == np.float32
+        np.testing.assert_allclose(one, double, atol=2e-6 * np.abs(double).max())
+
+
 def test_points_of_several_passes_come_in_their_order(field):
     many = np.random.default_rng(3).uniform(-1, 1, (2 * POINTS_AT_ONCE + 5, 3))
     np.testing.assert_allclose(field.values(many)[::-1], field.values(many[::-1]), rtol=1e-12)

@@ -22,7 +22,7 @@ def test_samples_have_the_density_they_are_said_to_have(middle):
     samples = draw_within(*alike(middle, factor), rng)
     assert np.abs(samples).max() <= 1
     even = rng.uniform(-1, 1, samples.shape)
-    density = 8 * np.exp(log_density_within(even, *alike(middle, factor)))
+    density = 8 * np.exp(log_density_within(even, *alike(middle, np.linalg.inv(factor))))
     error = density.std() / np.sqrt(COUNT)
     assert density.mean() == pytest.approx(1.0, abs=5 * error)
     np.testing.assert_allclose(density @ even / COUNT, samples.mean(axis=0), atol=6 * error)
@@ -42,5 +42,5 @@ def test_far_outside_a_sample_lies_at_the_nearer_end_as_an_exponential_does(midd
     samples, scale = draw_within(*alike([middle], [[spread]]), np.random.default_rng(1))[:, 0], SCALE * spread
     assert np.mean(1 - np.sign(middle) * samples) == pytest.approx(scale, rel=0.02)
     from_end = np.array([0.0, 3.0, 20.0]) * scale
-    log = log_density_within((np.sign(middle) * (1 - from_end))[:, None], *alike([middle], [[spread]], 3))
+    log = log_density_within((np.sign(middle) * (1 - from_end))[:, None], *alike([middle], [[1 / spread]], 3))
     np.testing.assert_allclose(log, -from_end / scale - np.log(scale), atol=1e-6)
