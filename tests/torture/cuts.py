@@ -91,7 +91,8 @@ class Cuts:
         except DeviceError as error:
             self.problems.append(f"{name} was acknowledged: {error}")
             return
-        if (found["force_n"], job["measurement_id"], job["state"]) != (int(name[2:]) / 7.0, name, "done"):
+        kept = found.get("force_n"), job.get("measurement_id"), job.get("state")
+        if kept != (int(name[2:]) / 7.0, name, "done"):
             self.problems.append(f"{name} is altered: {found}, {job}")
         if hashlib.sha256(path.read_bytes()).hexdigest() != own:
             self.problems.append(f"the recording of {name} is altered")
