@@ -5,8 +5,25 @@ Imported before anything else by the command line: loading takes longer than a c
 
 from __future__ import annotations
 
+import signal
 import sys
-from types import TracebackType
+from types import FrameType, TracebackType
+
+LOADING = "<frozen importlib._bootstrap>"
+"""The file of the code that loads modules, on the stack while one is loaded."""
+
+
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """Raise `KeyboardInterrupt` as Python does, but end the process where a module is being loaded.
+
+    Some modules swallow whatever is raised while they load others (ngsolve, netgen.occ): the command would go on.
+    """
+    while frame is not None and frame.f_code.co_filename != LOADING:
+        frame = frame.f_back
+    if frame is not None:
+        signal.signal(number, signal.SIG_DFL)
+        signal.raise_signal(number)
+    raise KeyboardInterrupt
 
 
 def without_traceback(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
@@ -23,3 +40,5 @@ def _is_interrupted(error: BaseException | None) -> bool:
 
 
 sys.excepthook = without_traceback
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background ignores it
+    signal.signal(signal.SIGINT, interrupt)
