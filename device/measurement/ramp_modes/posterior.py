@@ -225,8 +225,9 @@ def _cells(posterior: Explained, best: Array) -> _Cells:
     at, rest = _best_in_cells(posterior, best), np.flatnonzero(_rest(len(best)))
     residuals, jacobian = posterior.residuals_and_jacobian(at)
     precision = _precision(jacobian, RANGE_STD)
-    covariance = np.linalg.inv(precision[:, rest][:, :, rest])
-    log = -0.5 * np.linalg.slogdet(precision[:, rest][:, :, rest])[1] - 0.5 * np.sum(residuals**2, axis=1)
+    of_rest = precision[:, rest][:, :, rest]
+    covariance = np.linalg.inv(of_rest)
+    log = -0.5 * np.linalg.slogdet(of_rest)[1] - 0.5 * np.sum(residuals**2, axis=1)
     share = _defended(np.exp(log - log.max()))
     uphill = np.einsum("nsi,ns->ni", jacobian[:, :, rest], residuals) + at[:, rest] / RANGE_STD**2
     step, slope = (-np.einsum("nij,nj->ni", covariance, one) for one in (uphill, precision[:, rest, MODULUS]))
