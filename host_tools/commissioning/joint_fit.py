@@ -62,6 +62,21 @@ def tolerances_only(derivatives: RowDerivatives, levels: ErrorLevels, prior: Pro
     return OwnProbe(derivatives, prior.mean, np.diag(prior.std**2), levels)
 
 
+def levels_on_skin(of_design: ErrorLevels, flat_field_ratio: float, model_ratio: float) -> ErrorLevels:
+    """Return the design's levels with smooth errors of a flat field that has the skin's texture in it, and of a model.
+
+    Skin differs alike over the lesion and beside it, so each has half of what is not the face's. A scan's presses share
+    the face and the patch beside; each is believed to have a patch of its own over the lesion, however close.
+    """
+    of_face = (of_design.flat_field_ratio / flat_field_ratio) ** 2
+    return replace(
+        of_design,
+        flat_field_ratio=flat_field_ratio,
+        flat_field_shared_ratio=(1 + of_face) / 2,
+        model_ratio=model_ratio,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class ProbeFit:
     """Posterior of the probe's directions: mean [D] and covariance [D, D]; `log_evidence` of all ramps.
@@ -216,7 +231,7 @@ class _JointFit:
 
     def __init__(self, ramps: Sequence[PhantomRamp], design: Design, believed: BelievedErrors) -> None:
         noise, self._believed = design.answers.noise, believed
-        levels = replace(noise.levels, flat_field_ratio=believed.flat_field_ratio, model_ratio=believed.model_ratio)
+        levels = levels_on_skin(noise.levels, believed.flat_field_ratio, believed.model_ratio)
         self._lacking = prior_discrepancy(believed.discrepancy_ratio)
         self._ramps, self._surrogate, self._levels = ramps, design.answers.surrogate, levels
         self._noise, self._derivatives = replace(noise, levels=levels), design.derivatives

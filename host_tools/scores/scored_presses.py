@@ -20,7 +20,13 @@ from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
 from device.measurement.ramp_modes.radial_profile import SeenPresses
-from host_tools.commissioning.joint_fit import FLAT_FIELD_RATIO, MODEL_RATIOS, Design, tolerances_only
+from host_tools.commissioning.joint_fit import (
+    FLAT_FIELD_RATIO,
+    USUAL_MODEL_RATIO,
+    Design,
+    levels_on_skin,
+    tolerances_only,
+)
 from host_tools.commissioning.left_out import answer_to_seen
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.recorded_presses import in_parallel
@@ -118,7 +124,7 @@ def _score_of(answers: RampAnswers, model: RampModel, critical: CriticalValues, 
 
 def tolerant(design: Design) -> OwnAnswers:
     """Return what answers a probe of which nothing is known but its builder's tolerances."""
-    levels = replace(design.answers.noise.levels, flat_field_ratio=FLAT_FIELD_RATIO, model_ratio=MODEL_RATIOS[1])
+    levels = levels_on_skin(design.answers.noise.levels, FLAT_FIELD_RATIO, USUAL_MODEL_RATIO)
     noise = replace(design.answers.noise, levels=levels)
     return OwnAnswers(design.answers.surrogate, noise, tolerances_only(design.derivatives, levels))
 

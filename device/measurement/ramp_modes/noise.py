@@ -44,8 +44,9 @@ class ErrorLevels:
     `force_n` is that of each of the profile's forces by itself, of cell and tremor.
 
     `reference_ratio` of the camera's variance of a contrast is the reference press's, which a scan's presses share.
-    Both smooth errors are ratios of the light, correlated over `flat_field_mm` and `model_mm`. The flat field's is one
-    of all presses with one reference; of the model's error they share `model_shared_ratio` of the variance.
+    Both smooth errors are ratios of the light, correlated over `flat_field_mm` and `model_mm`. Presses with one
+    reference share a part of the variance of each: all of a flat field that is the face's, but not the texture of the
+    skin that lies under each alone.
     """
 
     gain_ratio: float = 0.01
@@ -53,6 +54,7 @@ class ErrorLevels:
     force_n: float = 0.0005
     flat_field_ratio: float = 0.002
     flat_field_mm: float = 2.0
+    flat_field_shared_ratio: float = 1.0
     model_ratio: float = 0.002
     model_mm: float = 3.0
     model_shared_ratio: float = 0.5
@@ -85,8 +87,8 @@ class PressNoise:
     def scan_covariance(self, rows: Array) -> Array:
         """Return the covariance [S, S] of the presses of a scan, rows [N, P], in the order of `as_one_row`.
 
-        Each press has gain, zero and a part of the model's error of its own. All share the reference press, the flat
-        field and the rest of the model's error.
+        Each press has gain, zero and parts of both smooth errors of its own. All share the reference press and the rest
+        of both.
         """
         columns = [np.arange(rows.shape[1]), *[FURTHER] * (len(rows) - 1)]
         light, shared = light_ratio(rows), self._shared_by_presses
@@ -122,7 +124,7 @@ class PressNoise:
         of_reference = self.levels.reference_ratio * np.diag(self.camera)[CONTRAST] - np.diag(shared)[CONTRAST]
         shared[CONTRAST, CONTRAST] += np.clip(np.mean(of_reference / np.diag(alone)), 0, MOST_SHARED) * alone
         flat, model = smooth_ring_errors(self.levels, harmonic=0)
-        shared[CONTRAST, CONTRAST] += np.kron(np.ones((LOADS, LOADS)), flat)
+        shared[CONTRAST, CONTRAST] += self.levels.flat_field_shared_ratio * np.kron(np.ones((LOADS, LOADS)), flat)
         shared[CONTRAST, CONTRAST] += self.levels.model_shared_ratio * np.kron(np.eye(LOADS), model)
         return shared
 

@@ -50,10 +50,9 @@ class OwnAnswers(RampAnswers):
             at = best_fit(posterior, at)
         posterior = self._posterior(seen, at, reach_mm)
         fit = sample_press(posterior, at)
-        misfit = float(np.mean(posterior.residuals(fit.best) ** 2))
         offset_mm = reach_mm * np.linalg.norm(fit.best[OFFSET:].reshape(-1, AXES), axis=1)
         unlike = posterior.unlike(fit.best, int(np.argmin(offset_mm)))
-        return answer_of(fit, misfit, offset_mm, unlike)
+        return answer_of(fit, posterior.misfit_ratio(fit.best), offset_mm, unlike)
 
     def ordinary_shift(self, rows: Array) -> Array:
         """Return what is believed to move rows [n, P] of presses on an inclusion in the middle of all ranges [n, P]."""

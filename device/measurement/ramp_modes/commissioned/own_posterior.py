@@ -2,7 +2,7 @@
 
 As `fit.PressPosterior`, but for two coordinates of each press instead of one: where the inclusion lies along the bright
 side and across it. Rows of the forward model are in the inclusion's direction; they are turned into what is seen.
-Source: docs/own_probe.md.
+Source: docs/own_probe.md; that a scan's data count in part: Miller & Dunson, JASA 114 (2019), coarsened posteriors.
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ from device.measurement.recording.ring_means import RING_RADII_MM
 AXES = 2
 OF_FIRST, OF_SECOND = (slice(one.start - COLUMNS, one.stop - COLUMNS) for one in (FIRST_ACROSS, SECOND_ACROSS))
 """Harmonics among those across the bright side."""
+SCAN_VARIANCE = 1.4
+"""By how much the covariance of a scan's presses counts as larger. What is unlike the design is taken at the best fit,
+but changes with tissue and place, and a scan tells these closely: of 132 scans of two drawn from what is believed, 84 %
+of sizes, 83 % of depths and 75 % of joint regions held without it; 90, 94 and 89 % do."""
 LEAST = 1e-4
 """An offset this small is on the axis, in units of the reach: there its direction means nothing."""
 BLOCK_OF_SEEN = np.concatenate([BLOCK_OF_COLUMN, *(BLOCK_OF_COLUMN[along] for along in (FIRST, SECOND))])
@@ -66,7 +70,8 @@ class OwnPosterior:
         self._seen = _joined((whole - changes.shift)[None])[0]
         factor = _joined(changes.factor.transpose(2, 0, 1)).T
         covariance = seen_covariance(seen.rows, seen.across, noise) + factor @ factor.T
-        self._whitening = np.linalg.inv(np.linalg.cholesky(covariance))
+        self._coarse = SCAN_VARIANCE**0.5 if self.presses > 1 else 1.0
+        self._whitening = np.linalg.inv(np.linalg.cholesky(covariance)) / self._coarse
 
     def unlike(self, at: Array, number: int) -> UnlikeDesign:
         """Return what makes one of the presses another than the forward model's, at coordinates [8 + 2 N]."""
@@ -94,10 +99,14 @@ class OwnPosterior:
         spread = discrepancy.spread(place.normalised, self._rows(place)).transpose(2, 0, 1)
         return np.asarray(self._whitening @ _joined(turned_columns(spread, place.angle_rad[:, None])).T)
 
+    def misfit_ratio(self, at: Array) -> float:
+        """Return squared residuals over their number, against noise as it is believed, at coordinates [8 + 2 N]."""
+        return float(np.mean((self._coarse * self.residuals(at)) ** 2))
+
     def misfit_by_block(self, at: Array) -> dict[RowBlock, BlockMisfit]:
         """Return the misfit of each block of what is seen, at coordinates [8 + 2 N]."""
         (blocks,) = _joined(np.tile(BLOCK_OF_SEEN, (1, self.presses, 1)))
-        return misfit_by_block(self.residuals(at), self._whitening, blocks)
+        return misfit_by_block(self._coarse * self.residuals(at), self._coarse * self._whitening, blocks)
 
     def tilt_deviations(self, at: Array) -> float:
         """Return how far the probe leant on the lesion in the press that leant most, at coordinates [8 + 2 N].
@@ -106,7 +115,7 @@ class OwnPosterior:
         """
         place = self._place(at[None])
         tilted = self._own.tilted_columns(place, self._rows(place))
-        told = self._whitening.T @ self.residuals(at)
+        told = self._coarse**2 * (self._whitening.T @ self.residuals(at))
         parts = zip(_places(self.presses), tilted, strict=True)
         return max(
             float(np.linalg.norm(told[own] @ (one[OF_FURTHER] if number else one)))

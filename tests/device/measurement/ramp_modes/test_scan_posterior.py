@@ -175,8 +175,10 @@ def test_cells_of_the_modulus_add_up_to_the_posterior(linear):
 
 
 def test_a_scans_errors_are_its_presses_own_but_for_what_they_share():
-    """Two presses at one place, rows 0: contrasts differ by camera and the own part of the model's error alone."""
-    levels = ErrorLevels(gain_ratio=0.0, zero_n=0.0, model_shared_ratio=0.25, reference_ratio=0.2)
+    """Two presses, rows 0: contrasts differ by the camera and by the own parts of both smooth errors alone."""
+    drifts = {"gain_ratio": 0.0, "zero_n": 0.0}
+    shared = {"flat_field_shared_ratio": 0.6, "model_shared_ratio": 0.25, "reference_ratio": 0.2}
+    levels = ErrorLevels(**drifts, **shared)
     noise = white_noise(1e-4, levels)
     covariance = noise.scan_covariance(np.zeros((2, COLUMNS)))
     size = COLUMNS + len(FURTHER)
@@ -187,10 +189,11 @@ def test_a_scans_errors_are_its_presses_own_but_for_what_they_share():
     difference[np.arange(len(FURTHER)), FURTHER] = 1
     difference[np.arange(len(FURTHER)), COLUMNS + np.arange(len(FURTHER))] = -1
     left = (difference @ covariance @ difference.T)[0, 0]
-    model = white_noise(0.0, ErrorLevels(gain_ratio=0.0, zero_n=0.0, flat_field_ratio=0.0)).covariance(
-        np.zeros(COLUMNS)
-    )[0, 0]
-    assert left == pytest.approx(2 * (0.8e-8 + 0.75 * model), rel=1e-9)
+    flat, model = (
+        white_noise(0.0, ErrorLevels(**drifts, **{without: 0.0})).covariance(np.zeros(COLUMNS))[0, 0]
+        for without in ("model_ratio", "flat_field_ratio")
+    )
+    assert left == pytest.approx(2 * (0.8e-8 + 0.4 * flat + 0.75 * model), rel=1e-9)
 
 
 def test_what_the_reference_press_makes_of_the_cameras_noise_is_shared():

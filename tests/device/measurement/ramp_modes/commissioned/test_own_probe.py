@@ -165,6 +165,23 @@ def test_derivatives_of_the_posterior_are_its_differences(derivatives, ramp_mode
 
 
 @pytest.mark.parametrize("presses", [1, 2])
+def test_the_misfit_is_against_noise_as_it_is_believed_of_scans_too(derivatives, ramp_model, presses):
+    """In all blocks together: what a scan tells is believed in part, what it shows is not."""
+    answers, nothing = ramp_model.answers, believed(derivatives, mean=np.zeros(COUNT), std=np.full(COUNT, 1e-9))
+    at, rows = rows_at(ramp_model, np.tile(TRUTH, (presses, 1)))
+    along = TRUTH[OFFSET] / answers.reach_mm(presses)
+    place = np.append(at[0, :OFFSET], np.tile([along, 0.0], presses))
+    ratios, squares = [], []
+    for seed in range(20):
+        noisy = seen_with_noise(turned_columns(rows, 0.0), answers.noise, np.random.default_rng(seed))
+        posterior = own_posterior(seen_of(noisy, np.zeros(presses)), ramp_model, nothing, place)
+        ratios.append(posterior.misfit_ratio(place))
+        squares.append([block.ratio for block in posterior.misfit_by_block(place).values()])
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.05)
+    assert np.mean(squares, axis=0) == pytest.approx(np.ones(len(BLOCKS)), abs=0.15)
+
+
+@pytest.mark.parametrize("presses", [1, 2])
 def test_samples_that_all_lie_outside_have_no_density(derivatives, ramp_model, presses):
     """Then not one is left to be computed, of a scan's columns either."""
     at, rows = rows_at(ramp_model, np.tile(TRUTH, (presses, 1)))
