@@ -80,11 +80,11 @@ def evaluated(truth: Array, found: Sequence[RampAnswer]) -> EvaluatedPresses:
     intervals = [answer.intervals for answer in found]
     return EvaluatedPresses(
         truth,
-        np.array([answer.mean for answer in found]),
-        np.array([one.low for one in intervals]),
-        np.array([one.high for one in intervals]),
-        np.array([one.is_identifiable for one in intervals]),
-        np.array([_in_regions(*pair) for pair in zip(truth, found, strict=True)]),
+        np.array([answer.mean for answer in found]).reshape(-1, THREE),
+        np.array([one.low for one in intervals]).reshape(-1, THREE),
+        np.array([one.high for one in intervals]).reshape(-1, THREE),
+        np.array([one.is_identifiable for one in intervals], bool).reshape(-1, THREE),
+        np.array([_in_regions(*pair) for pair in zip(truth, found, strict=True)], bool).reshape(-1, len(TOGETHER)),
     )
 
 

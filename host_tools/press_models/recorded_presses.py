@@ -170,8 +170,11 @@ def in_parallel(
 def drifted(recording: Recording, rng: np.random.Generator, levels: ErrorLevels) -> Recording:
     """Return the recording with errors of the light above dark, and of the force that the cell reports on the lesion.
 
-    Counts are rounded up or down at random, for errors of a part of a count would be lost otherwise.
+    Counts are rounded up or down at random, for errors of a part of a count would be lost otherwise. The flat field is
+    the face's, one of all ramps: raises `ValueError` for levels of which each ramp has a part of its own.
     """
+    if levels.flat_field_shared_ratio != 1.0:
+        raise ValueError(f"a flat field of which ramps share {levels.flat_field_shared_ratio:.2f}")
     scale, shape = recording.camera.scale, recording.frames[0].counts.shape
     ramps = max(recording.ramps(), default=0) + 1
     gain, zero_n = (level * rng.standard_normal(ramps) for level in (levels.gain_ratio, levels.zero_n))

@@ -1,13 +1,15 @@
 """Presses and phantoms of probes that differ from the design in all that a builder's tolerances and a hand leave open.
 
 A world of `foreign_probes` is split: what is the probe's stays, what is a press' own - tilts, skin and tissue over the
-lesion, relaxation, light between the presses, the patch of skin - is drawn anew for each. Its camera is left out: a
-grid target tells it, and it is undone in the image. Rows are exact, of the virtual probe's own light and faces, with
-noise and drift as they are believed of the design's.
+lesion, relaxation, light between the presses, the patch of skin - is drawn anew for each; a further press of a scan has
+tilt and light of its own, on the same patient. The probe's camera is left out: a grid target tells it, and it is undone
+in the image. Rows are exact, of the virtual probe's own light and faces, with noise and drift as they are believed of
+the design's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,7 +19,8 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import PARAMETERS, RANGES, Range, box_of, denormalise
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.radial_profile import SeenPresses
+from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
+from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.led_sides import LedRatio
 from device.simulation.physics.lens import AS_CERTIFIED
 from device.simulation.physics.world import OverLesion, PressTilts, Relaxation, TrueLight, World
@@ -34,6 +37,8 @@ PHANTOM_OFFSET_MM = 0.5
 """How far off the middle of a phantom's inclusion the probe is set down, standard deviation in x and y."""
 SURFACES = {"contact_pressure_kpa": (1.6, 2.4), "albedo": (0.42, 0.58), "spread_mm": (0.85, 1.2)}
 """Skins of two surfaces, the ends of their ranges: phantoms have one or the other."""
+FURTHER_MM = 2.0, 5.0
+"""Offsets of the second press of a scan."""
 OF_PATIENTS = RANGES | {"tissue_modulus_kpa": Range(2.4, 27.0, by_ratio=True)}
 """Tissue over a lesion may be a tenth softer or stiffer, and gives way by a twentieth: the tables hold that, too."""
 
@@ -63,8 +68,7 @@ def press_part(probe: World, rng: np.random.Generator, *, on_phantom: bool = Fal
     about = 0.0 if on_phantom else 1.0
     tilts = 0.3 * rng.standard_normal(4)
     lesion = 1 + about * np.array([0.03, 0.02, 0.05]) * np.clip(rng.standard_normal(3), -2, 2)
-    sides = tuple(map(float, 1 + 0.005 * rng.standard_normal(4)))
-    lit: LedRatio = (sides[0], sides[1], sides[2], sides[3])
+    lit = _sides(rng)
     lost, constant_s, beside, lesion_rate = rng.uniform((0.02, 2.0, 0.1, 0.1), (0.05, 10.0, 0.2, 0.2))
     return replace(
         probe,
@@ -76,6 +80,18 @@ def press_part(probe: World, rng: np.random.Generator, *, on_phantom: bool = Fal
     )
 
 
+def pressed_again(first: World, rng: np.random.Generator) -> World:
+    """Return the world of a further press of a scan: of the hand and of the light another one, on the same patient."""
+    x_deg, y_deg = map(float, 0.3 * rng.standard_normal(2))
+    tilt = replace(first.tilt, lesion_x_deg=x_deg, lesion_y_deg=y_deg)
+    return replace(first, tilt=tilt, light=replace(first.light, lesion_side_ratio=_sides(rng)))
+
+
+def _sides(rng: np.random.Generator) -> LedRatio:
+    x, y, left, below = map(float, 1 + 0.005 * rng.standard_normal(4))
+    return x, y, left, below
+
+
 def foreign_presses(
     tables: ProbeTables, probe: World, noise: PressNoise, count: int, *, seed: int, jobs: int = -1
 ) -> ForeignPresses:
@@ -84,7 +100,22 @@ def foreign_presses(
 
     def pressed(number: int) -> SeenPresses:
         rng = np.random.default_rng([seed, 1, number])
-        return _seen(tables, parameters[number], press_part(probe, rng), noise, rng)
+        return _seen(tables, parameters[[number]], [press_part(probe, rng)], noise, rng)
+
+    return ForeignPresses(parameters, in_parallel(pressed, count, jobs))
+
+
+def foreign_scans(
+    tables: ProbeTables, probe: World, noise: PressNoise, count: int, *, seed: int, jobs: int = -1
+) -> ForeignPresses:
+    """Return random scans of two presses on patients; parameters are those of the first, the second lies beside it."""
+    parameters = draw_parameters(count, np.random.default_rng([seed, 3]), ranges=OF_PATIENTS)
+
+    def pressed(number: int) -> SeenPresses:
+        rng = np.random.default_rng([seed, 4, number])
+        first, each = press_part(probe, rng), np.tile(parameters[number], (2, 1))
+        each[1, OFFSET] = rng.uniform(*FURTHER_MM)
+        return _seen(tables, each, [first, pressed_again(first, rng)], noise, rng)
 
     return ForeignPresses(parameters, in_parallel(pressed, count, jobs))
 
@@ -100,7 +131,7 @@ def foreign_phantoms(
         values = _true_values(stated, std, number, rng)
         if not has_inclusion:
             values[: len(NO_INCLUSION.as_tuple())] = NO_INCLUSION.as_tuple()
-        seen = _seen(tables, values, press_part(probe, rng, on_phantom=True), noise, rng)
+        seen = _seen(tables, values[None], [press_part(probe, rng, on_phantom=True)], noise, rng)
         return PhantomRamp(phantom.name, seen, stated, std, has_inclusion)
 
     return in_parallel(pressed, len(phantoms.phantoms), jobs)
@@ -118,13 +149,24 @@ def _true_values(stated: Array, std: Array, number: int, rng: np.random.Generato
 
 
 def _seen(
-    tables: ProbeTables, parameters: Array, world: World, noise: PressNoise, rng: np.random.Generator
+    tables: ProbeTables, parameters: Array, worlds: Sequence[World], noise: PressNoise, rng: np.random.Generator
 ) -> SeenPresses:
-    """Return what is read of one press in a world, with noise."""
-    direction_rad = np.array([rng.uniform(0, 2 * np.pi)])
-    pressed = PressedScene(tables, world=world).press(parameters, float(direction_rad[0]))
-    columns = seen_columns(pressed, float(direction_rad[0]))
-    return to_bright_side(seen_with_noise(columns[None], noise, rng), direction_rad)
+    """Return what is read of presses with one reference, of parameters [N, 9] each in its world, with noise."""
+    direction_rad = rng.uniform(0, 2 * np.pi, len(parameters))
+    rings = [
+        PressedScene(tables, world=world).press(at, float(angle))
+        for at, world, angle in zip(parameters, worlds, direction_rad, strict=True)
+    ]
+    return seen_presses(rings, direction_rad, noise, rng)
+
+
+def seen_presses(
+    rings: Sequence[PressedRings], direction_rad: Array, noise: PressNoise, rng: np.random.Generator
+) -> SeenPresses:
+    """Return what is read of presses with one reference whose inclusions lie in directions [N], with noise."""
+    columns = np.array([seen_columns(one, float(angle)) for one, angle in zip(rings, direction_rad, strict=True)])
+    columns[1:, RESPONSE] = columns[0, RESPONSE]
+    return to_bright_side(seen_with_noise(columns, noise, rng), direction_rad)
 
 
 def seen_columns(pressed: PressedRings, direction_rad: float) -> Array:

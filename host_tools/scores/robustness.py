@@ -1,15 +1,16 @@
 """What a builder's tolerances and a hand's habits cost: presses of foreign probes, before and after commissioning.
 
 The same presses are answered by the design's bundle as it ships, by one that allows for a builder's tolerances, by the
-bundle that commissioning made of this probe's own phantoms, and by the probe as if it were known exactly. Mechanics are
-always the virtual probe's own; its optics are another block's, scattered by another law, in a chapter of their own.
-There the probe that is known exactly has the design's optics: what lies between both is all that the light costs.
+bundle that commissioning made of this probe's own phantoms, and by the probe as if it were known exactly; scans of two,
+of other patients, by the last two. Mechanics are always the virtual probe's own; its optics are another block's,
+scattered by another law, in a chapter of their own. There the probe that is known exactly has the design's optics: what
+lies between both is all that the light costs.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD, RowDerivatives
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
+from device.measurement.ramp_modes.noise import PressNoise
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
@@ -31,7 +33,13 @@ from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_m
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.scenes.phantom_set import PhantomSet
-from host_tools.scores.foreign_presses import foreign_phantoms, foreign_presses, probe_part
+from host_tools.scores.foreign_presses import (
+    ForeignPresses,
+    foreign_phantoms,
+    foreign_presses,
+    foreign_scans,
+    probe_part,
+)
 from host_tools.scores.foreign_probes import foreign_world
 from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, joined, paired, scored, tolerant
 
@@ -43,6 +51,9 @@ SOFT_KPA = 15.0
 GROUPS = f"{SOFT_KPA:g} kPa and more", f"below {SOFT_KPA:g} kPa"
 """Hard and soft inclusions are scored apart: the soft ones are hardly stiffer than tissue may be."""
 SHIPPED, TOLERANCES, COMMISSIONED, KNOWN = "as it ships", "with tolerances", "commissioned", "known exactly"
+SCANS, KNOWN_SCANS = (f"{name}, scans of two" for name in (COMMISSIONED, KNOWN))
+BESIDE = {COMMISSIONED: KNOWN, SCANS: KNOWN_SCANS}
+"""Who answers, and the probe known exactly that the same presses are held against."""
 GOALS = {"pooled": 0.86, "each probe": 0.80, "joint": 0.84, "answered": 0.95, "rmse": 1.3}
 OTHER_GOALS = {"pooled": 0.83, "answered": 0.90, "rmse": 1.6}
 """Of other optics nothing is asked of each probe, nor of both at once."""
@@ -82,7 +93,8 @@ def robustness_chapter(
     setup = TrialSetup(model, derivatives, tables, phantoms, seed, jobs)
     return _chapter(
         "Probes of random tolerances",
-        f"{probes} probes, {presses} random presses each, everything at once; phantoms as {phantoms.serial}.",
+        f"{probes} probes, {presses} random presses and half as many scans each, everything at once; "
+        f"phantoms as {phantoms.serial}.",
         "host_tools/scores/robustness.py; probes: scenarios/worlds, their cameras undone by a grid target",
         _trials(setup, tables, probes, presses),
         _of_design(setup, min(probes * presses, OF_DESIGN)),
@@ -106,7 +118,8 @@ def other_optics_chapter(
     foreign = replace(tables, light=other_optics())
     return _chapter(
         "Probes of other optics",
-        f"{probes} probes of random tolerances, {presses} random presses each; phantoms as {phantoms.serial}.",
+        f"{probes} probes of random tolerances, {presses} random presses and half as many scans each; "
+        f"phantoms as {phantoms.serial}.",
         "host_tools/scores/robustness.py; light: host_tools/optics/other_light.py",
         _trials(setup, foreign, probes, presses),
         _of_design(setup, min(probes * presses, OF_DESIGN)),
@@ -141,22 +154,35 @@ def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> Tr
     model, design, jobs = setup.model, setup.design, 1
     probe = probe_part(foreign_world(setup.seed, number))
     noise, own = model.answers.noise, derived_seed(setup.seed, f"probe {number}")
-    taken = foreign_presses(lit, probe, noise, presses, seed=own, jobs=jobs)
-    of_design = (
-        taken if lit is setup.tables else foreign_presses(setup.tables, probe, noise, presses, seed=own, jobs=jobs)
-    )
+    taken, of_design = _as_lit(foreign_presses, (lit, setup.tables), probe, noise, presses, own)
+    scans, scans_of_design = _as_lit(foreign_scans, (lit, setup.tables), probe, noise, (presses + 1) // 2, own)
     ramps = foreign_phantoms(lit, probe, noise, setup.phantoms, seed=own, jobs=jobs)
     fit = fit_probe(ramps, design)
     answers, known = answers_of(design, fit), known_probe(design, probe)
     critical = limits(answers, model, left_out(ramps, design, model.first_guesses, fit, jobs), setup.seed)
+    critical_of_known = known_limits(known, model, setup.seed)
     few = taken.first(FEW)
     scores = {
         SHIPPED: scored(model.answers, model, model.critical["standard"], few, jobs),
         TOLERANCES: scored(tolerant(design), model, critical, few, jobs),
         COMMISSIONED: scored(answers, model, critical, taken, jobs),
-        KNOWN: scored(known, model, known_limits(known, model, setup.seed), of_design, jobs),
+        KNOWN: scored(known, model, critical_of_known, of_design, jobs),
+        SCANS: scored(answers, model, critical, scans, jobs),
+        KNOWN_SCANS: scored(known, model, critical_of_known, scans_of_design, jobs),
     }
     return TriedProbe(number, scores, fit)
+
+
+Pressing = Callable[..., ForeignPresses]
+"""`foreign_presses` or `foreign_scans`."""
+
+
+def _as_lit(
+    pressing: Pressing, both: tuple[ProbeTables, ProbeTables], probe: World, noise: PressNoise, count: int, seed: int
+) -> tuple[ForeignPresses, ForeignPresses]:
+    """Return presses of a probe with its own light and the same with the design's, of two tables in this order."""
+    own = pressing(both[0], probe, noise, count, seed=seed, jobs=1)
+    return own, own if both[0] is both[1] else pressing(both[1], probe, noise, count, seed=seed, jobs=1)
 
 
 def true_directions(world: World) -> Array:
@@ -296,9 +322,9 @@ def _share(found: NDArray[np.bool_], known: NDArray[np.bool_]) -> float:
     return float(found[known].mean()) if known.any() else np.nan
 
 
-def pairs_of(trials: Sequence[TriedProbe]) -> Pairs:
-    """Return the pairs of all probes."""
-    found, known = zip(*(paired(one.scores[COMMISSIONED], one.scores[KNOWN]) for one in trials), strict=True)
+def pairs_of(trials: Sequence[TriedProbe], name: str = COMMISSIONED) -> Pairs:
+    """Return the pairs of all probes, by one of those in `BESIDE`."""
+    found, known = zip(*(paired(one.scores[name], one.scores[BESIDE[name]]) for one in trials), strict=True)
     return Pairs(joined(found), joined(known))
 
 
@@ -308,31 +334,38 @@ def rmse_ratio(trials: Sequence[TriedProbe]) -> Array:
 
 
 def benchmarks(group: str, trials: Sequence[TriedProbe], goals: Mapping[str, float]) -> list[Benchmark]:
-    """Return what commissioned probes reach of what is asked for, of inclusions of one group."""
-    whole, names, pairs = _whole(trials, COMMISSIONED), UNKNOWNS[:2], pairs_of(trials)
-    each = np.array([_covered(trial.scores[COMMISSIONED]) for trial in trials])
-    covered, ratio = _covered(whole), pairs.rmse_ratio()
+    """Return what commissioned probes reach of what is asked for, of inclusions of one group, in presses and scans.
+
+    There are few scans: of those of one probe, and of soft inclusions, nothing is asked.
+    """
+    of_scans = {name: goal for name, goal in goals.items() if name != "each probe"}
+    asked = {COMMISSIONED: goals} | ({SCANS: of_scans} if group == GROUPS[0] else {})
+    return [
+        benchmark
+        for name, of_name in asked.items()
+        if len(_whole(trials, name).is_answered)
+        for benchmark in _benchmarks(f"{name}, {group}", trials, name, of_name)
+    ]
+
+
+def _benchmarks(case: str, trials: Sequence[TriedProbe], name: str, goals: Mapping[str, float]) -> Iterator[Benchmark]:
+    whole, names, pairs = _whole(trials, name), UNKNOWNS[:2], pairs_of(trials, name)
+    each = np.array([_covered(trial.scores[name]) for trial in trials])
+    covered = _covered(whole)
     least = {
         "answered": [
             ("answered, of what the probe known exactly answers", pairs.answered_ratio()),
             ("size and depth determined, of where the probe known exactly has both", pairs.determined_ratio()),
         ],
-        "pooled": [(f"{name} covered, pooled", covered[i]) for i, name in enumerate(names)],
-        "each probe": [(f"{name} covered, worst probe", each[:, i].min()) for i, name in enumerate(names)],
+        "pooled": [(f"{unknown} covered, pooled", covered[i]) for i, unknown in enumerate(names)],
+        "each probe": [(f"{unknown} covered, worst probe", each[:, i].min()) for i, unknown in enumerate(names)],
         "joint": [("joint region of size and depth holds", whole.region_holds())],
     }
-    return [
-        *(
-            at_least(f"{COMMISSIONED}, {group}", what, float(found), goals[goal])
-            for goal, figures in least.items()
-            if goal in goals
-            for what, found in figures
-        ),
-        *(
-            at_most(f"{COMMISSIONED}, {group}", f"{name} RMSE over the same probe's known exactly", one, goals["rmse"])
-            for name, one in zip(names, map(float, ratio), strict=True)
-        ),
-    ]
+    for goal, figures in least.items():
+        for what, found in figures if goal in goals else ():
+            yield at_least(case, what, float(found), goals[goal])
+    for unknown, ratio in zip(names, map(float, pairs.rmse_ratio()), strict=True):
+        yield at_most(case, f"{unknown} RMSE over the same probe's known exactly", ratio, goals["rmse"])
 
 
 def _covered(found: ScoredPresses) -> Array:
@@ -349,4 +382,4 @@ def _facts(trials: Sequence[TriedProbe]) -> dict[str, dict[str, float | None]]:
         shares = {"size": size, "depth": depth, "both": both, "region": found.region_holds()}
         return {name: None if np.isnan(one) else round(float(one), 3) for name, one in shares.items()}
 
-    return {name: of(_whole(trials, name)) for name in (COMMISSIONED, KNOWN)}
+    return {name: of(_whole(trials, name)) for pair in BESIDE.items() for name in pair}

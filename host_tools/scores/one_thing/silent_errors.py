@@ -24,6 +24,7 @@ from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.probe_tables.ellipsoid import stretched_inclusion
 from host_tools.scenes.scene import Placement, Scene
+from host_tools.scores.foreign_presses import FURTHER_MM
 from host_tools.scores.one_thing.causes import FOUR_TIMES_SLOWER_N_PER_S, NOTHING, Cause, relaxing, stiff_below
 from host_tools.scores.one_thing.press_answers import (
     SHIPPED,
@@ -34,7 +35,6 @@ from host_tools.scores.one_thing.press_answers import (
     with_tolerances,
 )
 from host_tools.scores.one_thing.tried_presses import (
-    FURTHER_MM,
     Setting,
     SettingsOf,
     TruthDesign,

@@ -15,9 +15,8 @@ import numpy as np
 from device.measurement.arrays import Array
 from device.measurement.parameters import NEAR_NOMINAL
 from device.measurement.quick_mode.profile import QuickPress, elongation_ratio
-from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE, SeenPresses, harmonic
+from device.measurement.ramp_modes.radial_profile import CONTRAST, SeenPresses, harmonic
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.ring_means import RINGS, RingMeans
 from device.simulation.physics.world import World
@@ -27,11 +26,9 @@ from host_tools.press_models.press_samples import PressedRings, PressedScene, dr
 from host_tools.press_models.quick_training import QuickPressSet, force_weights, quick_rows
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
-from host_tools.scores.foreign_presses import ForeignPresses, seen_columns
+from host_tools.scores.foreign_presses import FURTHER_MM, ForeignPresses, seen_presses
 
 SCANS_IN_TEN = 3
-FURTHER_MM = 2.0, 5.0
-"""Offsets of the second press of a scan."""
 
 
 class Setting(NamedTuple):
@@ -106,9 +103,7 @@ def _pressed(
     if count > 1:
         again = scene if _is_same(*settings) else PressedScene(settings[1].tables, world=settings[1].world)
         rings.append(again.press(at[1], float(direction_rad[1])))
-    columns = np.array([seen_columns(one, float(angle)) for one, angle in zip(rings, direction_rad, strict=False)])
-    columns[1:, RESPONSE] = columns[0, RESPONSE]
-    seen = to_bright_side(seen_with_noise(columns, noise, rng), direction_rad[:count])
+    seen = seen_presses(rings, direction_rad[:count], noise, rng)
     return seen, held_press(rings[0], noise, of_held)
 
 

@@ -10,16 +10,27 @@ from told_answers import scored_presses, told_presses
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.ramp_modes.commissioned.row_derivatives import DIRECTIONS, MEAN, NAMES, STD
+from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FORCES
+from device.measurement.ramp_modes.surrogate import OFFSET
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design
 from host_tools.press_models.press_derivatives import load_derivatives, world_changed
-from host_tools.scores.foreign_presses import foreign_presses, probe_part
+from host_tools.press_models.recorded_presses import EXACT
+from host_tools.scores.foreign_presses import (
+    foreign_presses,
+    foreign_scans,
+    press_part,
+    pressed_again,
+    probe_part,
+)
 from host_tools.scores.foreign_probes import foreign_world
 from host_tools.scores.robustness import (
     COMMISSIONED,
     GOALS,
     GROUPS,
     KNOWN,
+    KNOWN_SCANS,
     OTHER_GOALS,
+    SCANS,
     SHIPPED,
     TriedProbe,
     _chapter,
@@ -35,13 +46,21 @@ from host_tools.scores.scored_presses import FIGURES, joined, scored
 FIT = SimpleNamespace(levels=SimpleNamespace(model_ratio=0.003), believed=SimpleNamespace(discrepancy_ratio=0.02))
 
 
-def tried(found, known, number=1):
+def tried(found, known, number=1, scans=None):
     shipped = replace(found, is_answered=np.zeros(len(found.number), bool))
-    return TriedProbe(number, {SHIPPED: shipped, COMMISSIONED: found, KNOWN: known}, FIT)
+    scores = {
+        SHIPPED: shipped,
+        COMMISSIONED: found,
+        KNOWN: known,
+        SCANS: found if scans is None else scans,
+        KNOWN_SCANS: known,
+    }
+    return TriedProbe(number, scores, FIT)
 
 
 def by_quantity(trials, goals=GOALS, group=GROUPS[0]):
-    return {one.quantity.removesuffix(" (at least)"): one for one in benchmarks(group, trials, goals)}
+    whole = benchmarks(group, trials, goals)
+    return {one.quantity.removesuffix(" (at least)"): one for one in whole if one.case == f"{COMMISSIONED}, {group}"}
 
 
 def test_errors_are_compared_on_the_presses_that_both_answer():
@@ -83,6 +102,16 @@ def test_each_bound_is_named_and_missed_by_what_misses_it():
     assert missed == {f"size_mm {what}" for what in of_size}
 
 
+def test_scans_are_held_against_scans_of_the_known_probe():
+    good, scans = told_presses(20), told_presses(6, wrong=4)
+    trials = [tried(good, good, scans=scans)._replace(number=number) for number in (1, 2)]
+    trials = [one._replace(scores=one.scores | {KNOWN_SCANS: told_presses(10)}) for one in trials]
+    found = {one.quantity: one for one in benchmarks(GROUPS[0], trials, GOALS) if one.case == f"{SCANS}, {GROUPS[0]}"}
+    assert found["size_mm covered, pooled (at least)"].measured == pytest.approx(0.6)
+    assert found["size_mm RMSE over the same probe's known exactly"].measured > 1
+    assert found["answered, of what the probe known exactly answers (at least)"].measured == 1.0
+
+
 def test_of_other_optics_neither_each_probe_nor_the_region_is_asked():
     names = set(by_quantity([tried(told_presses(5), told_presses(5))], OTHER_GOALS))
     assert not any("worst" in name or "region" in name for name in names)
@@ -98,6 +127,7 @@ def test_soft_inclusions_stand_apart_in_tables_and_bounds():
     cases = [one.case for one in chapter.benchmarks]
     assert cases.count(f"commissioned, {GROUPS[0]}") == 9
     assert cases.count(f"commissioned, {GROUPS[1]}") == 7
+    assert [cases.count(f"{SCANS}, {group}") for group in GROUPS] == [7, 0]
     assert [table.caption for table in chapter.tables] == [
         f"{what}, inclusions of {group}"
         for group in GROUPS
@@ -110,7 +140,7 @@ def test_soft_inclusions_stand_apart_in_tables_and_bounds():
 def test_a_group_that_nobody_pressed_has_no_bound():
     hard = told_presses(4)
     chapter = _chapter("Probes", "Claim.", "source", [tried(hard, hard)], hard, GOALS)
-    assert {one.case for one in chapter.benchmarks} == {f"commissioned, {GROUPS[0]}"}
+    assert {one.case for one in chapter.benchmarks} == {f"{name}, {GROUPS[0]}" for name in (COMMISSIONED, SCANS)}
     assert list(chapter.facts["groups"]) == [GROUPS[0]]
     assert chapter.facts["groups"][GROUPS[0]][KNOWN] == {"size": 1.0, "depth": 1.0, "both": 1.0, "region": 1.0}
     assert chapter.facts["refused_as_it_ships"] == 1.0
@@ -143,6 +173,27 @@ def test_it_believes_its_own_directions_as_closely_as_after_commissioning_and_a_
     others = np.setdiff1d(np.arange(len(NAMES)), PROBE)
     np.testing.assert_allclose(own.mean[others], MEAN[others])
     np.testing.assert_allclose(spread[others], STD[others])
+
+
+def test_a_further_press_of_a_scan_has_hand_and_light_of_its_own_on_the_same_patient():
+    first = press_part(probe_part(foreign_world(1, 3)), np.random.default_rng(1))
+    again = pressed_again(first, np.random.default_rng(2))
+    unlike = {name for name in first.__dataclass_fields__ if getattr(first, name) != getattr(again, name)}
+    assert unlike == {"tilt", "light"}
+    assert again.light.side_ratio == first.light.side_ratio
+    assert (again.tilt.beside_x_deg, again.tilt.beside_y_deg) == (first.tilt.beside_x_deg, first.tilt.beside_y_deg)
+    assert again.tilt.lesion_x_deg != first.tilt.lesion_x_deg
+
+
+def test_a_scan_is_two_presses_with_one_reference(model, tables):
+    scans = foreign_scans(tables, probe_part(foreign_world(1, 3)), model.answers.noise, 2, seed=4, jobs=1)
+    assert len(scans.parameters) == len(scans.seen) == 2
+    assert (scans.parameters[:, OFFSET] <= 2).all()
+    quiet = replace(model.answers.noise, camera=1e-12 * np.eye(COLUMNS), levels=EXACT, forward=None)
+    (exact,) = foreign_scans(tables, probe_part(foreign_world(1, 3)), quiet, 1, seed=4, jobs=1).seen
+    middle = exact.rows[:, CONTRAST].reshape(2, FORCES, -1)[:, -1, 0]
+    assert middle[1] < middle[0]  # it lies farther from the inclusion
+    assert [seen.rows.shape for seen in scans.seen] == [(2, COLUMNS)] * 2
 
 
 @pytest.mark.long

@@ -61,7 +61,10 @@ class OwnAnswers(RampAnswers):
         return self.own.shift(middle, rows)[:, :COLUMNS]
 
     def worth(self, seen: SeenPresses, answer: RampAnswer, places_mm: Sequence[float]) -> Array:
-        """Return to which part [n, 3] a further press at each place narrows the unknowns' spreads."""
+        """Return to which part [n, 3] a further press at each place narrows the unknowns' spreads.
+
+        Of a single press it may be above 1: a scan counts for less than it adds up to (`SCAN_VARIANCE`).
+        """
         to_mm = self.surrogate.to_mm
         ratio = self.reach_mm(len(seen.rows)) / to_mm
         at = np.concatenate([answer.fit.best[:OFFSET], ratio * answer.fit.best[OFFSET:]])

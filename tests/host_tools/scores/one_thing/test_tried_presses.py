@@ -10,7 +10,8 @@ from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.world import AS_BELIEVED, OverLesion, World
 from host_tools.press_models.press_samples import profile_rows
 from host_tools.press_models.quick_training import quick_rows
-from host_tools.scores.one_thing.tried_presses import FURTHER_MM, Setting, random_design, scans_of, tried_presses
+from host_tools.scores.foreign_presses import FURTHER_MM
+from host_tools.scores.one_thing.tried_presses import Setting, random_design, scans_of, tried_presses
 
 DESIGN = random_design(4, 2, seed=3)
 

@@ -12,6 +12,7 @@ from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import (
     AXES,
+    SCAN_VARIANCE,
     OwnPosterior,
     seen_of,
     seen_with_noise,
@@ -177,6 +178,9 @@ def test_the_misfit_is_against_noise_as_it_is_believed_of_scans_too(derivatives,
         posterior = own_posterior(seen_of(noisy, np.zeros(presses)), ramp_model, nothing, place)
         ratios.append(posterior.misfit_ratio(place))
         squares.append([block.ratio for block in posterior.misfit_by_block(place).values()])
+        part = 1.0 if presses == 1 else 1 / SCAN_VARIANCE
+        density = -0.5 * ratios[-1] * len(posterior.residuals(place)) * part
+        assert posterior.log_density(place[None]) == pytest.approx(density, rel=1e-4)
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.05)
     assert np.mean(squares, axis=0) == pytest.approx(np.ones(len(BLOCKS)), abs=0.15)
 
@@ -284,7 +288,7 @@ def test_where_to_press_next_is_told_of_a_commissioned_probe_too(foreign, deriva
     answer = own.answer_to(foreign, ramp_model.first_guesses(foreign.rows))
     parts = own.worth(foreign, answer, (2.0, 4.0))
     assert parts.shape == (2, 3)
-    assert np.all((parts > 0) & (parts <= 1 + 1e-9))
+    assert np.all((parts > 0) & (parts <= SCAN_VARIANCE**0.5 + 1e-9))
 
 
 def test_a_bundle_keeps_what_is_the_probes_own(derivatives, ramp_model):
