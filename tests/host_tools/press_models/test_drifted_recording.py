@@ -239,6 +239,11 @@ def test_all_ramps_of_a_scan_share_the_flat_field():
     assert 0.02 < error[0, 0].std() < 0.1
 
 
+def test_a_flat_field_of_which_ramps_have_a_part_of_their_own_is_refused(recording):
+    with pytest.raises(ValueError, match=r"share 0\.60"):
+        drifted(recording, np.random.default_rng(1), ErrorLevels(flat_field_shared_ratio=0.6))
+
+
 @pytest.mark.parametrize("shared", [0.0, 0.25, 1.0])
 def test_of_the_models_error_ramps_have_their_own_part_and_the_reference_the_rest(shared):
     """Over many scans: variance 1 - shared of the level's square in each ramp, shared in the reference."""

@@ -96,6 +96,13 @@ def test_answers_stand_beside_their_truths_with_the_intervals_that_the_device_gi
     np.testing.assert_array_equal(found.in_region, [[True] * 2] * 2)  # of no posterior the whole range
 
 
+def test_answers_to_no_press_join_others():
+    nothing = evaluated(np.zeros((0, COUNT)), [])
+    assert {getattr(nothing, name).shape for name in ("mean", "low", "high", "is_known")} == {(0, COUNT)}
+    assert nothing.in_region is not None
+    assert nothing.in_region.shape == (0, len(TOGETHER))
+
+
 def test_truths_stand_in_the_joint_regions_of_their_answers():
     rng = np.random.default_rng(1)
     at = 0.1 * rng.standard_normal((2000, COUNT))
