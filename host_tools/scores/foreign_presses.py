@@ -93,29 +93,30 @@ def _sides(rng: np.random.Generator) -> LedRatio:
 
 
 def foreign_presses(
-    tables: ProbeTables, probe: World, noise: PressNoise, count: int, *, seed: int, jobs: int = -1
+    tables: ProbeTables,
+    probe: World,
+    noise: PressNoise,
+    count: int,
+    *,
+    seed: int,
+    jobs: int = -1,
+    are_scans: bool = False,
 ) -> ForeignPresses:
-    """Return random presses of a probe on patients, in tissue that people have."""
-    parameters = draw_parameters(count, np.random.default_rng([seed, 0]), ranges=OF_PATIENTS)
+    """Return random presses of a probe on patients, in tissue that people have, or scans of two of them.
+
+    Parameters of a scan are those of its first press; the second lies beside the inclusion.
+    """
+    of_truths, of_presses = (3, 4) if are_scans else (0, 1)  # no draw is of both, nor of phantoms
+    parameters = draw_parameters(count, np.random.default_rng([seed, of_truths]), ranges=OF_PATIENTS)
 
     def pressed(number: int) -> SeenPresses:
-        rng = np.random.default_rng([seed, 1, number])
-        return _seen(tables, parameters[[number]], [press_part(probe, rng)], noise, rng)
-
-    return ForeignPresses(parameters, in_parallel(pressed, count, jobs))
-
-
-def foreign_scans(
-    tables: ProbeTables, probe: World, noise: PressNoise, count: int, *, seed: int, jobs: int = -1
-) -> ForeignPresses:
-    """Return random scans of two presses on patients; parameters are those of the first, the second lies beside it."""
-    parameters = draw_parameters(count, np.random.default_rng([seed, 3]), ranges=OF_PATIENTS)
-
-    def pressed(number: int) -> SeenPresses:
-        rng = np.random.default_rng([seed, 4, number])
-        first, each = press_part(probe, rng), np.tile(parameters[number], (2, 1))
-        each[1, OFFSET] = rng.uniform(*FURTHER_MM)
-        return _seen(tables, each, [first, pressed_again(first, rng)], noise, rng)
+        rng = np.random.default_rng([seed, of_presses, number])
+        each, worlds = parameters[[number]], [press_part(probe, rng)]
+        if are_scans:
+            each = np.tile(each, (2, 1))
+            each[1, OFFSET] = rng.uniform(*FURTHER_MM)
+            worlds.append(pressed_again(worlds[0], rng))
+        return _seen(tables, each, worlds, noise, rng)
 
     return ForeignPresses(parameters, in_parallel(pressed, count, jobs))
 

@@ -10,7 +10,7 @@ lies between both is all that the light costs.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,7 +22,6 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD, RowDerivatives
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
-from device.measurement.ramp_modes.noise import PressNoise
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
@@ -37,7 +36,6 @@ from host_tools.scores.foreign_presses import (
     ForeignPresses,
     foreign_phantoms,
     foreign_presses,
-    foreign_scans,
     probe_part,
 )
 from host_tools.scores.foreign_probes import foreign_world
@@ -154,8 +152,8 @@ def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> Tr
     model, design, jobs = setup.model, setup.design, 1
     probe = probe_part(foreign_world(setup.seed, number))
     noise, own = model.answers.noise, derived_seed(setup.seed, f"probe {number}")
-    taken, of_design = _as_lit(foreign_presses, (lit, setup.tables), probe, noise, presses, own)
-    scans, scans_of_design = _as_lit(foreign_scans, (lit, setup.tables), probe, noise, (presses + 1) // 2, own)
+    taken, of_design = _as_lit(setup, lit, probe, presses, own)
+    scans, scans_of_design = _as_lit(setup, lit, probe, (presses + 1) // 2, own, are_scans=True)
     ramps = foreign_phantoms(lit, probe, noise, setup.phantoms, seed=own, jobs=jobs)
     fit = fit_probe(ramps, design)
     answers, known = answers_of(design, fit), known_probe(design, probe)
@@ -173,16 +171,17 @@ def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> Tr
     return TriedProbe(number, scores, fit)
 
 
-Pressing = Callable[..., ForeignPresses]
-"""`foreign_presses` or `foreign_scans`."""
-
-
 def _as_lit(
-    pressing: Pressing, both: tuple[ProbeTables, ProbeTables], probe: World, noise: PressNoise, count: int, seed: int
+    setup: TrialSetup, lit: ProbeTables, probe: World, count: int, seed: int, *, are_scans: bool = False
 ) -> tuple[ForeignPresses, ForeignPresses]:
-    """Return presses of a probe with its own light and the same with the design's, of two tables in this order."""
-    own = pressing(both[0], probe, noise, count, seed=seed, jobs=1)
-    return own, own if both[0] is both[1] else pressing(both[1], probe, noise, count, seed=seed, jobs=1)
+    """Return presses or scans of a probe that is `lit` as its tables say, and the same with the design's light."""
+
+    def pressed(tables: ProbeTables) -> ForeignPresses:
+        noise = setup.model.answers.noise
+        return foreign_presses(tables, probe, noise, count, seed=seed, jobs=1, are_scans=are_scans)
+
+    own = pressed(lit)
+    return own, own if lit is setup.tables else pressed(setup.tables)
 
 
 def true_directions(world: World) -> Array:

@@ -17,7 +17,6 @@ from host_tools.press_models.press_derivatives import load_derivatives, world_ch
 from host_tools.press_models.recorded_presses import EXACT
 from host_tools.scores.foreign_presses import (
     foreign_presses,
-    foreign_scans,
     press_part,
     pressed_again,
     probe_part,
@@ -186,11 +185,12 @@ def test_a_further_press_of_a_scan_has_hand_and_light_of_its_own_on_the_same_pat
 
 
 def test_a_scan_is_two_presses_with_one_reference(model, tables):
-    scans = foreign_scans(tables, probe_part(foreign_world(1, 3)), model.answers.noise, 2, seed=4, jobs=1)
+    probe, asked = probe_part(foreign_world(1, 3)), {"seed": 4, "jobs": 1, "are_scans": True}
+    scans = foreign_presses(tables, probe, model.answers.noise, 2, **asked)
     assert len(scans.parameters) == len(scans.seen) == 2
     assert (scans.parameters[:, OFFSET] <= 2).all()
     quiet = replace(model.answers.noise, camera=1e-12 * np.eye(COLUMNS), levels=EXACT, forward=None)
-    (exact,) = foreign_scans(tables, probe_part(foreign_world(1, 3)), quiet, 1, seed=4, jobs=1).seen
+    (exact,) = foreign_presses(tables, probe, quiet, 1, **asked).seen
     middle = exact.rows[:, CONTRAST].reshape(2, FORCES, -1)[:, -1, 0]
     assert middle[1] < middle[0]  # it lies farther from the inclusion
     assert [seen.rows.shape for seen in scans.seen] == [(2, COLUMNS)] * 2
