@@ -25,7 +25,7 @@ from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
 from device.measurement.ramp_modes.commissioned.own_posterior import AXES, OwnPosterior, seen_covariance
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe
-from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, STD, RowDerivatives, owned_by
+from device.measurement.ramp_modes.commissioned.row_derivatives import MEAN, NAMES, STD, RowDerivatives, owned_by
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise
 from device.measurement.ramp_modes.radial_profile import RESPONSE
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
@@ -41,6 +41,7 @@ FLAT_FIELD_RATIO = 0.0047
 """Flat field of 0.2 % as the design's bundle has it, and 0.3 % of skin that differs from place to place, of both."""
 FLAT_FIELD_RATIOS = (FLAT_FIELD_RATIO, 0.006, 0.008)
 """The same of skin of 0.3, 0.4 and 0.55 %, weighed, too. No less: patients' skin is no smoother than a casting's."""
+SKIN = NAMES.index("skin_modulus_log_ratio")
 ONE_CASTING = 1 / 3
 """A phantom is one casting: over its inclusion it differs from beside by this part of a lesion's skin and tissue."""
 FLOOR = 0.3
@@ -363,4 +364,5 @@ def _of_presses(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:
     mean, std = np.array(MEAN), np.array(STD)
     mean[PROBE], std[PROBE] = 0.0, NEGLIGIBLE
     std[owned_by("lesion")] *= ONE_CASTING
+    mean[SKIN], std[SKIN] = 0.0, NEGLIGIBLE  # a casting is of one silicone up to its surface
     return OwnProbe(derivatives, mean, np.diag(std**2), levels)

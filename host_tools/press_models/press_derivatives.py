@@ -82,6 +82,7 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
         "albedo_log_ratio": lambda: World(lesion=OverLesion(albedo_ratio=math.exp(by))),
         "tissue_log_ratio": lambda: World(lesion=OverLesion(tissue_modulus_ratio=math.exp(by))),
         "relaxation_ratio": lambda: World(relaxation=Relaxation(lost_ratio=by)),
+        "skin_modulus_log_ratio": lambda: World(layers=LayerRatios(skin_modulus_ratio=math.exp(by))),
         "tilt_beside_deg": lambda: World(tilt=PressTilts(beside_x_deg=x, beside_y_deg=y)),
         "tilt_lesion_deg": lambda: World(tilt=PressTilts(lesion_x_deg=x, lesion_y_deg=y)),
         "light_along_ratio": lambda: World(light=TrueLight(lesion_side_ratio=(1 + x, 1 + y, 1 - x, 1 - y))),
@@ -90,7 +91,7 @@ def world_changed(name: str, by: float, direction_rad: float) -> World:
     return worlds[name]()
 
 
-NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/3"
+NAME, SCHEMA = "press_derivatives", "tsis.press_derivatives/4"
 ACTION = "run `host_tools table --part derivatives` to make it again"
 
 

@@ -2,7 +2,7 @@
 
 Each layer at two ratios, every second size and depth of the surface table and the ends of its mismatches; differences
 of two solves on one mesh, since meshes differ by more than a layer changes an inclusion's pressure. The waveguide's
-layers are then solved in other slabs, too: each a quarter stiffer.
+layers and the tissue's outermost are then solved in other slabs, too, at one stiffer ratio each.
 """
 
 from __future__ import annotations
@@ -71,9 +71,11 @@ class LayeredScene:
         tissue = Tissue(slab.youngs_modulus_kpa, slab.thickness_mm)
         if self.in_tissue:
             upper = TissueLayer("uppermost", SKIN_MM, slab.youngs_modulus_kpa * layers.skin_modulus_ratio)
-            bulk = TissueLayer("above_deep", DEEP_FROM_MM - SKIN_MM, slab.youngs_modulus_kpa)
-            deep_kpa = slab.youngs_modulus_kpa * layers.deep_modulus_ratio
-            tissue = replace(tissue, youngs_modulus_kpa=deep_kpa, layers=(upper, bulk))
+            tissue = replace(tissue, layers=(upper,))
+            if slab.thickness_mm > DEEP_FROM_MM:
+                bulk = TissueLayer("above_deep", DEEP_FROM_MM - SKIN_MM, slab.youngs_modulus_kpa)
+                deep_kpa = slab.youngs_modulus_kpa * layers.deep_modulus_ratio
+                tissue = replace(tissue, youngs_modulus_kpa=deep_kpa, layers=(upper, bulk))
         return Scene(inclusion, waveguide=waveguide, tissue=tissue)
 
 
@@ -148,19 +150,20 @@ def assembled(axes: InclusionAxes, baseline: Array, inclusions: Array, slabs: tu
 
 
 def nominal_tables(axes: InclusionAxes, change: Array) -> list[NominalTable]:
-    """Return what each of the waveguide's layers changes in the nominal slab at `IN_SLABS_RATIO`, of all changes."""
-    solved = list(SOLVED_RATIOS.values())[:WAVEGUIDE_LAYERS]
+    """Return what each of `IN_SLABS_RATIO` changes in the nominal slab, of all changes."""
     return [
-        NominalTable(axes, of_layer[ratios.index(IN_SLABS_RATIO)], FORCES_N)
-        for of_layer, ratios in zip(change, solved, strict=False)
+        NominalTable(axes, of_layer[SOLVED_RATIOS[name].index(ratio)], FORCES_N)
+        for of_layer, (name, ratio) in zip(change, IN_SLABS_RATIO.items(), strict=False)
     ]
 
 
-def scenes_in_slabs(waveguide: Waveguide) -> list[LayeredScene]:
-    """Return the probe as it is, then each of its layers at `IN_SLABS_RATIO`."""
-    names = list(SOLVED_RATIOS)[:WAVEGUIDE_LAYERS]
-    others = [replace(AS_TABULATED, **{name: IN_SLABS_RATIO}) for name in names]
-    return [LayeredScene(layers, in_tissue=False, waveguide=waveguide) for layers in (AS_TABULATED, *others)]
+def scenes_in_slabs(waveguide: Waveguide) -> tuple[list[LayeredScene], list[LayeredScene]]:
+    """Return the probe as it is on both meshes, and the scenes of `IN_SLABS_RATIO` in their order."""
+    others = [
+        LayeredScene(replace(AS_TABULATED, **{name: ratio}), layer >= WAVEGUIDE_LAYERS, waveguide)
+        for layer, (name, ratio) in enumerate(IN_SLABS_RATIO.items())
+    ]
+    return [LayeredScene(AS_TABULATED, in_tissue, waveguide) for in_tissue in (False, True)], others
 
 
 def layers_of_inclusion(
@@ -168,18 +171,23 @@ def layers_of_inclusion(
 ) -> Array:
     """Return what each layer changes of what an inclusion adds in a slab [layer, M, 2, F, R]."""
     at = one.size_mm, one.depth_mm, mismatches, SLAB_FORCES_N[:reached]
-    usual, *others = (inclusions_per_n_mm3(scene, slab, CHANGES, *at) for scene in scenes_in_slabs(waveguide))
-    return np.array(others) - usual
+    return _less_usual(waveguide, lambda scene: inclusions_per_n_mm3(scene, slab, CHANGES, *at))
 
 
 def layers_without_inclusion(waveguide: Waveguide, slab: Slab) -> Array:
     """Return what each layer changes in a slab without an inclusion [layer, 2, F, R], all on one level."""
 
     def on(level: Level) -> Array:
-        usual, *others = (bare_per_n(scene(slab), SLAB_FORCES_N, (level,)) for scene in scenes_in_slabs(waveguide))
-        return np.array(others) - usual
+        return _less_usual(waveguide, lambda scene: bare_per_n(scene(slab), SLAB_FORCES_N, (level,)))
 
     return first_that_can(on, WITHOUT_INCLUSION)
+
+
+def _less_usual(waveguide: Waveguide, solve: Callable[[LayeredScene], Array]) -> Array:
+    """Return what is solved [layer, ...] for each of `IN_SLABS_RATIO`, less the same of the probe as it is."""
+    usual, others = scenes_in_slabs(waveguide)
+    of_usual = [solve(scene) for scene in usual]
+    return np.array([solve(scene) - of_usual[scene.in_tissue] for scene in others])
 
 
 def _changes(fields: Array) -> Array:

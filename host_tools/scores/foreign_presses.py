@@ -37,6 +37,8 @@ PHANTOM_OFFSET_MM = 0.5
 """How far off the middle of a phantom's inclusion the probe is set down, standard deviation in x and y."""
 SURFACES = {"contact_pressure_kpa": (1.6, 2.4), "albedo": (0.42, 0.58), "spread_mm": (0.85, 1.2)}
 """Skins of two surfaces, the ends of their ranges: phantoms have one or the other."""
+STIFFEST_SKIN = 2.0
+"""Largest modulus of a patient's skin, its uppermost 1.5 mm, over that of the tissue below; a casting has none."""
 FURTHER_MM = 2.0, 5.0
 """Offsets of the second press of a scan."""
 OF_PATIENTS = RANGES | {"tissue_modulus_kpa": Range(2.4, 27.0, by_ratio=True)}
@@ -70,13 +72,16 @@ def press_part(probe: World, rng: np.random.Generator, *, on_phantom: bool = Fal
     lesion = 1 + about * np.array([0.03, 0.02, 0.05]) * np.clip(rng.standard_normal(3), -2, 2)
     lit = _sides(rng)
     lost, constant_s, beside, lesion_rate = rng.uniform((0.02, 2.0, 0.1, 0.1), (0.05, 10.0, 0.2, 0.2))
+    texture = replace(probe.texture, seed=int(rng.integers(2**31)))
+    stiffer = STIFFEST_SKIN ** (about * rng.uniform())
     return replace(
         probe,
         tilt=PressTilts(*map(float, tilts)),
         lesion=OverLesion(*map(float, lesion)),
         relaxation=Relaxation(float(lost), float(constant_s), float(beside), float(lesion_rate)),
         light=replace(probe.light, lesion_side_ratio=lit),
-        texture=replace(probe.texture, seed=int(rng.integers(2**31))),
+        layers=replace(probe.layers, skin_modulus_ratio=float(stiffer)),
+        texture=texture,
     )
 
 

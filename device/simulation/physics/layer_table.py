@@ -3,8 +3,9 @@
 A star: one layer's modulus apart from the default, solved in finite strain at two ratios, each as the
 difference of two solves on one mesh; quadratic in the logarithm of the ratio, and several layers add up. Kept at
 coarse sizes, depths and mismatches, of the nominal slab and on the axis: what a layer changes of the tilt and of the
-shape of a field off the axis is left out. In other slabs the waveguide's layers are known as `slab_changes` knows the
-face, from one stiffer ratio of each; the tissue's are not. Written by `host_tools table --part layers`.
+shape of a field off the axis is left out. In other slabs the waveguide's layers and the tissue's outermost are known as
+`slab_changes` knows the face, from one stiffer ratio of each; the tissue's deepest is not. Written by
+`host_tools table --part layers`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.slab_changes import OF_SLABS, SlabChanges, field_shapes, slab_arrays, slabs_of
 from device.simulation.physics.surface_table import PressRamps
 
-NAME, SCHEMA = "layer_table", "tsis.layer_table/2"
+NAME, SCHEMA = "layer_table", "tsis.layer_table/3"
 ACTION = "run `host_tools table --part layers` to make it again"
 SOLVED_RATIOS = {
     "face_modulus_ratio": (0.8, 1.25),
@@ -39,8 +40,13 @@ SOLVED_RATIOS = {
 SKIN_MM, DEEP_FROM_MM = 1.5, 20.0
 WAVEGUIDE_LAYERS = 3
 """The first of `SOLVED_RATIOS` are the waveguide's."""
-IN_SLABS_RATIO = 1.25
-"""That at which these are solved in other slabs than the nominal one."""
+IN_SLABS_RATIO = {
+    "face_modulus_ratio": 1.25,
+    "middle_modulus_ratio": 1.25,
+    "backing_modulus_ratio": 1.25,
+    "skin_modulus_ratio": 2.0,
+}
+"""Those, the first of `SOLVED_RATIOS`, that are solved in other slabs than the nominal one, at one ratio each."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +85,7 @@ class LayerTable:
 
     `inclusion_change_per_n_mm3` [layer, 2, 2, S, D, M, F, R]: the same of what an inclusion adds, also over size cubed
     and mismatch, and over `inclusion_scale` [layer, 2, 2] of its own largest. Both at `force_n` [F].
-    `slabs`: what other slabs change of these, one for each of the waveguide's layers, at `IN_SLABS_RATIO`.
+    `slabs`: what other slabs change of these, one for each of `IN_SLABS_RATIO`.
     """
 
     size_mm: Array
@@ -95,18 +101,21 @@ class LayerTable:
         """Return the ramps of an inclusion in a slab with other layers; refuses one outside the table.
 
         A field off the axis grows by as much as the centred one does with the layers. Raises `InvalidQuantity` for
-        other layers of the tissue far from the nominal slab.
+        other deep tissue far from the nominal slab.
         """
-        for name in (field.name for field in fields(layers)[WAVEGUIDE_LAYERS:]):
+        for name in (field.name for field in fields(layers)[len(IN_SLABS_RATIO) :]):
             if getattr(layers, name) != 1.0:
                 slab.require_near_nominal(f"world.layers.{name}")
         weights = layers.weights()
         baseline = np.tensordot(weights, self.bare_change_per_n, 2)
         change = self.axes.inclusion_per_n(self._weighted(weights), inclusion, slab)
         if slab != NOMINAL:
-            for layer in np.flatnonzero(weights[:WAVEGUIDE_LAYERS].any(axis=1)):
-                in_slabs, log_ratio = self.slabs[layer], math.log(astuple(layers)[layer])
-                baseline = baseline + log_ratio / math.log(IN_SLABS_RATIO) * in_slabs.baseline_per_n(slab)
+            for layer, in_slabs in enumerate(self.slabs):
+                if not weights[layer].any():
+                    continue
+                solved_ratio = list(IN_SLABS_RATIO.values())[layer]
+                share = math.log(astuple(layers)[layer]) / math.log(solved_ratio)
+                baseline = baseline + share * in_slabs.baseline_per_n(slab)
                 per_n_mm3 = self._weighted(weights, slice(layer, layer + 1))
                 shapes = field_shapes(self.axes, per_n_mm3, self.force_n, inclusion, slab)
                 change = change + in_slabs.inclusion_per_n(shapes, self.force_n, inclusion, slab)

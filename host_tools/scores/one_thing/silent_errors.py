@@ -2,7 +2,8 @@
 
 Rows of a world are the same presses as in `one_at_a_time`. Prolate inclusions are solved by finite elements, each under
 both presses of its scan, and carried on to the probe's own sphere; beside them balls of the same volume, as deep and on
-the same skins. The bound is on how much further off sizes and depths are than without the thing.
+the same skins. All tissue is of 4-6 kPa: a layer below is solved there alone. The bound is on how much further off
+sizes and depths are than without the thing.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def silent_errors_chapter(
 ) -> Chapter:
     """Return what each silent error leaves in sizes and depths, and how little of it is refused."""
     scans = scans_of(presses) if scans is None else scans
-    own, truths = with_tolerances(design, seed), random_design(presses, scans, seed)
+    own, truths = with_tolerances(design, seed), random_design(presses, scans, seed, ranges=NEAR_NOMINAL)
 
     def answered(of_design: TruthDesign, settings_of: SettingsOf) -> Scores:
         taken = tried_presses(of_design, settings_of, design.model.answers.noise, jobs=jobs)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import NEAR_NOMINAL
+from device.measurement.parameters import Range
 from device.measurement.quick_mode.profile import QuickPress, elongation_ratio
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import CONTRAST, SeenPresses, harmonic
@@ -26,7 +26,7 @@ from host_tools.press_models.press_samples import PressedRings, PressedScene, dr
 from host_tools.press_models.quick_training import QuickPressSet, force_weights, quick_rows
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
-from host_tools.scores.foreign_presses import FURTHER_MM, ForeignPresses, seen_presses
+from host_tools.scores.foreign_presses import FURTHER_MM, OF_PATIENTS, ForeignPresses, seen_presses
 
 SCANS_IN_TEN = 3
 
@@ -68,10 +68,10 @@ def scans_of(presses: int) -> int:
     return max(presses * SCANS_IN_TEN // 10, 1)
 
 
-def random_design(presses: int, scans: int, seed: int) -> TruthDesign:
-    """Return random truths over the trained ranges, in tissue where a stiffer skin was solved."""
+def random_design(presses: int, scans: int, seed: int, *, ranges: dict[str, Range] = OF_PATIENTS) -> TruthDesign:
+    """Return random truths over ranges, those of all patients unless given."""
     rng = np.random.default_rng(derived_seed(seed, "truths of one thing at a time"))
-    parameters = draw_parameters(presses, rng, ranges=NEAR_NOMINAL)
+    parameters = draw_parameters(presses, rng, ranges=ranges)
     return TruthDesign(parameters, parameters, rng.uniform(*FURTHER_MM, presses), scans, seed)
 
 

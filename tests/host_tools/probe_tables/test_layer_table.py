@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
-from device.simulation.physics.layer_table import SOLVED_RATIOS, LayerRatios
+from device.simulation.physics.layer_table import IN_SLABS_RATIO, SOLVED_RATIOS, LayerRatios
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.world import World
 from host_tools.probe_tables.force_ramps import CHANGES, fields, ramp
@@ -54,19 +54,21 @@ def test_what_a_layer_changes_is_that_of_fresh_solves_on_one_mesh(tables, name, 
 
 @pytest.mark.long
 @pytest.mark.parametrize("slab", [Slab(3.0, 22.0), Slab(18.0, 45.0)])
-@pytest.mark.parametrize("name", list(SOLVED_RATIOS)[:WAVEGUIDE_LAYERS])
+@pytest.mark.parametrize("name", list(IN_SLABS_RATIO))
 def test_in_other_slabs_the_change_of_deformation_is_nearly_that_of_fresh_solves(tables, name, slab):
     """A layer a tenth stiffer, in the central window and between what was solved: within a tenth of its change of w.
 
-    Pressures, which change by a hundredth at most, within 0.15 % of their peak.
+    Pressures, which change by a hundredth at most, within 0.15 % of their peak. Skin stiffer by half changes both by
+    1-3 % of their peaks: within a quarter of that of w, and 0.4 % of the peak of p.
     """
-    layers, inside = LayerRatios(**{name: 1.1}), tables.centred.r_mm <= 9.9
-    usual, other = (solved(LayeredScene(of, in_tissue=False), slab)[..., inside] for of in (LayerRatios(), layers))
+    in_tissue = list(SOLVED_RATIOS).index(name) >= WAVEGUIDE_LAYERS
+    layers, inside = LayerRatios(**{name: 1.5 if in_tissue else 1.1}), tables.centred.r_mm <= 9.9
+    usual, other = (solved(LayeredScene(of, in_tissue), slab)[..., inside] for of in (LayerRatios(), layers))
     change, known = (
         other - usual,
         (tabulated(tables, layers, slab) - tabulated(tables, LayerRatios(), slab))[..., inside],
     )
     missed, size = (np.sqrt(np.mean(one**2, axis=-1)) for one in (known - change, change))
-    ratio = missed / size
-    assert (ratio[..., 0] < 0.1).all(), ratio
-    assert (missed[..., 1] < 0.0015 * np.abs(usual).max(axis=-1)[..., 1]).all()
+    ratio, of_w, of_peak_p = missed / size, 0.25 if in_tissue else 0.1, 0.004 if in_tissue else 0.0015
+    assert (ratio[..., 0] < of_w).all(), ratio
+    assert (missed[..., 1] < of_peak_p * np.abs(usual).max(axis=-1)[..., 1]).all()

@@ -16,6 +16,7 @@ from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design
 from host_tools.press_models.press_derivatives import load_derivatives, world_changed
 from host_tools.press_models.recorded_presses import EXACT
 from host_tools.scores.foreign_presses import (
+    STIFFEST_SKIN,
     foreign_presses,
     press_part,
     pressed_again,
@@ -182,6 +183,16 @@ def test_a_further_press_of_a_scan_has_hand_and_light_of_its_own_on_the_same_pat
     assert again.light.side_ratio == first.light.side_ratio
     assert (again.tilt.beside_x_deg, again.tilt.beside_y_deg) == (first.tilt.beside_x_deg, first.tilt.beside_y_deg)
     assert again.tilt.lesion_x_deg != first.tilt.lesion_x_deg
+
+
+def test_patients_have_a_skin_of_their_own_and_a_casting_none():
+    probe = probe_part(foreign_world(1, 3))
+    found, other, casting = (
+        press_part(probe, np.random.default_rng(seed), on_phantom=seed == 3).layers for seed in (1, 2, 3)
+    )
+    assert 1 < found.skin_modulus_ratio < STIFFEST_SKIN
+    assert found.skin_modulus_ratio != other.skin_modulus_ratio
+    assert casting == probe.layers == replace(found, skin_modulus_ratio=1.0)
 
 
 def test_a_scan_is_two_presses_with_one_reference(model, tables):

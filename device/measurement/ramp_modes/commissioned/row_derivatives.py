@@ -61,6 +61,7 @@ DIRECTIONS: dict[str, BelievedDirection] = {
     "albedo_log_ratio": BelievedDirection("lesion", 0.02, 0.01),
     "tissue_log_ratio": BelievedDirection("lesion", 0.05, 0.02),
     "relaxation_ratio": BelievedDirection("lesion", 0.02, 0.02, 0.03),
+    "skin_modulus_log_ratio": BelievedDirection("lesion", 0.3, 0.35, 0.35),
     "tilt_beside_deg": BelievedDirection("beside", 0.3, 0.05),
     "tilt_lesion_deg": BelievedDirection("press", 0.3, 0.05),
     "light_along_ratio": BelievedDirection("press", 0.0035, 0.005),
@@ -70,7 +71,8 @@ DIRECTIONS: dict[str, BelievedDirection] = {
 
 Logarithms of the ratios of the layers' moduli and of the lesion's skin and tissue to those beside it; the cell's counts
 of a newton over those by which forces are told; the part of its motion with which the face is drawn; the part of its
-modulus that tissue loses in the end; light of the sides along the inclusion against those opposite, and of both pairs
+modulus that tissue loses in the end; the modulus of the uppermost 1.5 mm over that of the tissue, alike over the lesion
+and beside it; light of the sides along the inclusion against those opposite, and of both pairs
 against each other. The largest contact of skin has none: skin that wets less easily shows nearly the same, so that each
 press tells it by its own coordinates.
 """

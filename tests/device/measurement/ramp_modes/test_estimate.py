@@ -144,7 +144,7 @@ def test_gel_on_the_face_gets_no_numbers(pressed, ramp_model, calibration):
     assert estimate_ramp(wet, "standard", ramp_model, calibration).size_mm.value is None
 
 
-@pytest.mark.parametrize("tissue_kpa", [1.75, 50.0])
+@pytest.mark.parametrize("tissue_kpa", [pytest.param(1.75, marks=pytest.mark.long), 50.0])
 def test_tissue_softer_or_stiffer_than_trained_gets_no_numbers(pressed, ramp_model, calibration, tissue_kpa):
     """By finite elements: the tables hold no such tissue. Refused for it alone, another place is asked for."""
     scene = Scene(Inclusion(10.0, 5.0, 60.0), tissue=Tissue(youngs_modulus_kpa=tissue_kpa))

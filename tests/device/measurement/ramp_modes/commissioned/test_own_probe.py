@@ -42,7 +42,7 @@ PROBE = owned_by("probe")
 @pytest.fixture(scope="module")
 def derivatives():
     arrays, _ = load_table(
-        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/3", DERIVATIVE_ARRAYS, "make them again"
+        SIMULATED_PROBE, "press_derivatives", "tsis.press_derivatives/4", DERIVATIVE_ARRAYS, "make them again"
     )
     return row_derivatives_of(arrays)
 
