@@ -9,7 +9,7 @@ than all camera noise, because no number of pixels takes them out. Source: Kenne
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -59,6 +59,19 @@ class ErrorLevels:
     model_mm: float = 3.0
     model_shared_ratio: float = 0.5
     reference_ratio: float = 0.5
+
+    def on_coarser_skin(self, times: float) -> ErrorLevels:
+        """Return the levels where the skin's texture is so many times as large, and the flat field of the face is not.
+
+        Of a texture half is each press's own, so twice what presses do not share is the skin's.
+        """
+        of_skin = 2 * (1 - self.flat_field_shared_ratio)
+        grown = 1 + of_skin * (times**2 - 1)
+        return replace(
+            self,
+            flat_field_ratio=self.flat_field_ratio * grown**0.5,
+            flat_field_shared_ratio=1 - of_skin * times**2 / grown / 2,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +211,7 @@ def _slope_per_n() -> Array:
 _SLOPE_PER_N = _slope_per_n()
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def smooth_errors(levels: ErrorLevels) -> Array:
     """Return the covariance [P, P] of smooth errors of the light, for a light ratio of 1 everywhere."""
     covariance = np.zeros((COLUMNS, COLUMNS))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
-from device.measurement.parameters import HIGH, PARAMETERS, denormalise, is_possible
+from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS, denormalise, is_possible
 from device.measurement.ramp_modes.answers import UnlikeDesign
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place, turned_columns
@@ -85,6 +85,14 @@ class OwnPosterior:
     def log_volume(self) -> float:
         """Logarithm of the density at the middle of what is believed of noise, but for a constant."""
         return float(np.log(np.diag(self._whitening)).sum())
+
+    def log_evidence(self, at: Array) -> float:
+        """Return the logarithm of how likely what is seen is, but for a constant, by Laplace's approximation about the
+        best fit [8 + 2 N].
+        """
+        (residuals,), (jacobian,) = self.residuals_and_jacobian(at[None])
+        precision = jacobian.T @ jacobian + np.eye(self.dimensions) / EVEN_STD**2
+        return self.log_volume - 0.5 * float(residuals @ residuals) - 0.5 * float(np.linalg.slogdet(precision)[1])
 
     def whitened_changes(self, at: Array) -> Array:
         """Return what a unit of each direction of `DIRECTIONS` changes [S, COUNT], at coordinates [8 + 2 N]."""

@@ -171,6 +171,16 @@ def test_in_harmonics_too_the_flat_field_is_common_and_the_models_error_each_loa
     np.testing.assert_allclose(both, flat + model, rtol=1e-14)
 
 
+def test_coarser_skin_has_more_of_its_own_and_the_face_its_flat_field():
+    """A face of 0.3 and skin of 0.4 %, half of whose variance presses share: twice as coarse it is of 0.8 %."""
+    levels = ErrorLevels(flat_field_ratio=0.005, flat_field_shared_ratio=(0.3**2 + 0.4**2 / 2) / 0.5**2)
+    coarser = levels.on_coarser_skin(2.0)
+    assert coarser.flat_field_ratio == pytest.approx(np.hypot(0.003, 0.008))
+    assert coarser.flat_field_shared_ratio == pytest.approx((0.3**2 + 0.8**2 / 2) / (0.3**2 + 0.8**2))
+    assert levels.on_coarser_skin(1.0) == levels
+    assert ErrorLevels().on_coarser_skin(3.0) == ErrorLevels()  # the design's is the face's alone
+
+
 def test_contrast_and_the_harmonics_share_no_smooth_error():
     """Means and waves of an isotropic field around a circle are uncorrelated."""
     kinds = slice(0, CONTRAST_COLUMNS), RESPONSE, FIRST, SECOND
