@@ -38,7 +38,7 @@ RANGES: dict[str, Range] = {
 }
 """Tissue that people have; skin +-30 % in its contact law, +-20 % in its light."""
 NEAR_NOMINAL = RANGES | {"tissue_modulus_kpa": Range(4.0, 6.0, True), "slab_thickness_mm": Range(27.0, 33.0, True)}
-"""The same near the nominal tissue, where a stiffer skin and deep tissue were solved."""
+"""The same near the nominal tissue, where stiffer and softer deep tissue was solved."""
 ELASTIC_MISMATCHES = (0.1, 0.96)
 """Of an inclusion with its tissue: from 1.3 to 61 times as stiff. What is softer does not show as an inclusion."""
 ABOVE_BASE_MM = 1.0

@@ -42,10 +42,10 @@ def table(
     """Build the virtual probe's tables of the pressed face: force ramps of centred inclusions, inclusions off the
     axis, what other layers of waveguide and tissue change, and how far the face moves outwards.
 
-    All hold tissue of 2-30 kPa and 15-60 mm, but for a stiffer skin and deep tissue, which are of the nominal slab. Two
+    All hold tissue of 2-30 kPa and 15-60 mm, but for stiffer or softer deep tissue, which is of the nominal slab. Two
     and a half hours on two cores, most of it for other slabs.
     Part wide, some sixteen minutes of one core, is of inclusions around the trained ranges: `train --mode standard`
-    needs it. Part derivatives, some ten minutes on two, says how presses change with what a commissioning finds out;
+    needs it. Part derivatives, some twelve minutes on two, says how presses change with what a commissioning finds out;
     it needs the others.
     """
     from device.simulation.virtual_probe import ProbeTables

@@ -364,5 +364,12 @@ def _of_presses(derivatives: RowDerivatives, levels: ErrorLevels) -> OwnProbe:
     mean, std = np.array(MEAN), np.array(STD)
     mean[PROBE], std[PROBE] = 0.0, NEGLIGIBLE
     std[owned_by("lesion")] *= ONE_CASTING
-    mean[SKIN], std[SKIN] = 0.0, NEGLIGIBLE  # a casting is of one silicone up to its surface
-    return OwnProbe(derivatives, mean, np.diag(std**2), levels)
+    return on_castings(OwnProbe(derivatives, mean, np.diag(std**2), levels))
+
+
+def on_castings(own: OwnProbe) -> OwnProbe:
+    """Return what is believed of presses on castings, each of one silicone up to its surface: they have no skin."""
+    mean, covariance = np.array(own.mean), np.array(own.covariance)
+    mean[SKIN], covariance[SKIN], covariance[:, SKIN] = 0.0, 0.0, 0.0
+    covariance[SKIN, SKIN] = NEGLIGIBLE**2
+    return replace(own, mean=mean, covariance=covariance)

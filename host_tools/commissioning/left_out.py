@@ -14,7 +14,7 @@ from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
 from device.measurement.ramp_modes.radial_profile import SeenPresses
-from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe
+from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe, on_castings
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.press_models.mode_outcome import Guess
 from host_tools.press_models.recorded_presses import in_parallel
@@ -71,7 +71,8 @@ def left_out(
 
 
 def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
-    answer = answer_to_seen(answers, guess, ramp.seen)
+    of_phantoms = OwnAnswers(answers.surrogate, answers.noise, on_castings(answers.own))
+    answer = answer_to_seen(of_phantoms, guess, ramp.seen)
     low, high = (denormalise_unknowns(ends) for ends in answer.intervals[:2])
     truth, value = denormalise_unknowns(ramp.stated[:COUNT]), denormalise_unknowns(answer.mean)
     tolerance = denormalise_unknowns((ramp.stated + ramp.std)[:COUNT]) - truth

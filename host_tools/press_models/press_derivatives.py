@@ -1,8 +1,9 @@
 """Random presses, each in worlds that differ by one thing, to how profile rows change with what no parameter says.
 
-Differences of the virtual probe's own forward model, one step each way of none: rows are smooth to 1e-7, and steps are
-small against a tolerance. Harmonics are taken along the inclusion's true direction, for a tilt may turn the bright side
-of a weak inclusion round. Some ten minutes on two cores; once a design, not a probe.
+Differences of the virtual probe's own forward model, one step from none: rows are smooth to 1e-7, and steps are
+small against a tolerance, but for the skin's, which ends where it is expected to be. Harmonics are taken along the
+inclusion's true direction, for a tilt may turn the bright side of a weak inclusion round. Some twelve minutes on two
+cores; once a design, not a probe.
 """
 
 from __future__ import annotations

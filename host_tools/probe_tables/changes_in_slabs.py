@@ -38,7 +38,8 @@ REACHES = (3.0, 3.0, 4.0, 3.0, 3.0, 3.0), *[(2.0, 2.0, 3.0, 2.0, 2.0, 2.0)] * 4
 HIGHEST = (3, 3, 4, 3, 1, 3)
 """Of each shape, which terms count: as in `slab_changes`. Of places left out, changes of deformation are missed by
 4-9 % of themselves, where the nominal slab's would miss 24-40 %; those of pressure, themselves a hundredth of an
-inclusion's, by a fifth to two thirds. Of the mismatch only the ends are solved."""
+inclusion's, by a fifth to two thirds. So it is of the waveguide's layers; a skin's changes, of 1-5 % of both peaks, are
+missed by up to a quarter. Of the mismatch only the ends are solved."""
 
 InclusionSolve = Callable[[ScatteredInclusion, Slab, int], Array]
 """Fields [L, M, X, F, R] of L tables, of an inclusion in a slab at the first so many of `SLAB_FORCES_N`."""

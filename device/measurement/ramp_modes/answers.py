@@ -30,12 +30,14 @@ class UnlikeDesign:
     """Of a press of a commissioned probe: what is believed to shift its row [P], and what to widen it, factor [P, K].
 
     `row` [P]: the best fit's without the shift; `second_across` [Q]: second harmonics across the bright side, with it.
+    `skin_texture_ratio`: texture of the skin by which intervals are told, over the one that is believed.
     """
 
     row: Array
     shift: Array
     factor: Array
     second_across: Array
+    skin_texture_ratio: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

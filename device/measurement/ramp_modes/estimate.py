@@ -126,6 +126,8 @@ def _judged(
     """
     tissue = dict(zip(("tissue_modulus_kpa", "tissue_modulus_std_kpa"), answer.tissue_kpa, strict=True))
     features = with_critical(asdict(found), asdict(critical)) | {"residual": residual} | tissue
+    if answer.unlike:
+        features["skin_texture_ratio"] = answer.unlike.skin_texture_ratio
     block = departure.block if departure else None
     if departure:
         features |= _figures_of(departure)

@@ -1,9 +1,9 @@
 """What no test of a mode notices: relaxing tissue, a stiff layer below, an inclusion that is longer towards the depth.
 
-Rows of a world are the same presses as in `one_at_a_time`. Prolate inclusions are solved by finite elements, each under
-both presses of its scan, and carried on to the probe's own sphere; beside them balls of the same volume, as deep and on
-the same skins. All tissue is of 4-6 kPa: a layer below is solved there alone. The bound is on how much further off
-sizes and depths are than without the thing.
+Rows of a world are pressed as in `one_at_a_time`, the same presses in each. Prolate inclusions are solved by finite
+elements, each under both presses of its scan, and carried on to the probe's own sphere; beside them balls of the same
+volume, as deep and on the same skins. All tissue is of 4-6 kPa: a layer below is solved there alone. The bound is on
+how much further off sizes and depths are than without the thing.
 """
 
 from __future__ import annotations

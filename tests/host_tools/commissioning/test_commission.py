@@ -340,6 +340,7 @@ def test_presses_that_are_drawn_from_what_is_believed_are_explained_in_stiff_tis
     misfits = sorted(one.misfit_ratio for one in answers_to_seen(answers, model.first_guesses, stiff))
     assert len(misfits) > 15
     assert 0.85 < np.mean(misfits[: -len(misfits) // 10]) < 1.15
+    assert np.mean(np.array(misfits) > 1.8) < 0.1
 
 
 @pytest.mark.long

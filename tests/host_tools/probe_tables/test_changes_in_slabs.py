@@ -74,8 +74,19 @@ def test_what_cannot_be_pressed_so_far_is_no_number_there_and_refused_where_it_g
 
 
 def test_each_layer_of_the_waveguide_is_solved_a_quarter_stiffer():
-    usual, *others = scenes_in_slabs(Waveguide())
+    (usual, _), others = scenes_in_slabs(Waveguide())
     moduli = [scene(SLAB).waveguide.layer_moduli_kpa for scene in (usual, *others)]
     stiffer = np.array(moduli[1:]) / moduli[0]
-    np.testing.assert_allclose(stiffer, 1 + (IN_SLABS_RATIO - 1) * np.eye(3))
-    assert all(IN_SLABS_RATIO in SOLVED_RATIOS[name] for name in list(SOLVED_RATIOS)[:3])
+    np.testing.assert_allclose(stiffer, 1 + np.vstack([0.25 * np.eye(3), np.zeros(3)]))
+    assert all(ratio in SOLVED_RATIOS[name] for name, ratio in IN_SLABS_RATIO.items())
+
+
+@pytest.mark.parametrize("slab", [Slab(5.0, 30.0), Slab(8.0, 16.0)])
+def test_the_skin_is_solved_twice_as_stiff_on_the_mesh_of_tissue_as_it_is(slab):
+    (in_one_piece, layered), others = scenes_in_slabs(Waveguide())
+    usual, stiffer = layered(slab).tissue, others[-1](slab).tissue
+    assert (usual.layers[0].thickness_mm, usual.layers[0].youngs_modulus_kpa) == (1.5, slab.youngs_modulus_kpa)
+    assert usual.interface_depths_mm == stiffer.interface_depths_mm
+    assert stiffer.layers[0].youngs_modulus_kpa == 2 * slab.youngs_modulus_kpa
+    assert (stiffer.layers[1:], stiffer.youngs_modulus_kpa) == (usual.layers[1:], slab.youngs_modulus_kpa)
+    assert not in_one_piece(slab).tissue.layers

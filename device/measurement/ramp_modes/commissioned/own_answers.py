@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,18 @@ BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
 
 
+class _Settled(NamedTuple):
+    """A posterior that is linear about where its fit comes to, the best fit [8 + 2 N], and the skin that it is on."""
+
+    posterior: OwnPosterior
+    best: Array
+    skin_texture_ratio: float
+
+    @property
+    def log_evidence(self) -> float:
+        return self.posterior.log_evidence(self.best)
+
+
 class OwnAnswers(RampAnswers):
     """Forward model, noise, and what is believed of a commissioned probe."""
 
@@ -51,24 +63,18 @@ class OwnAnswers(RampAnswers):
     def answer_to(self, seen: SeenPresses, estimates: Array) -> RampAnswer:
         """Return the answer to what was read of presses with one reference; `estimates` [n, 3] are first guesses.
 
-        Its misfit is that on skin as it is believed, whose limit refuses what is no single round inclusion: a second
-        one looks like coarse skin, too.
+        Its best fit and misfit are those on skin as it is believed, whose limits refuse what is no single round
+        inclusion: a second one looks like coarse skin, too. All else is told on the likeliest skin.
         """
         reach_mm = self.reach_mm(len(seen.rows))
         at = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
-        posterior, at = self._settled(seen, at, reach_mm, self.noise)
-        fit = sample_press(posterior, at)
-        misfit_ratio = posterior.misfit_ratio(fit.best)
-        if misfit_ratio > BADLY_EXPLAINED:
-            coarser = [self._settled(seen, fit.best, reach_mm, noise) for noise in self._on_coarser_skins]
-            tried = [(posterior, fit.best), *coarser]
-            likeliest = int(np.argmax([one.log_evidence(best) for one, best in tried]))
-            if likeliest:
-                posterior, at = tried[likeliest]
-                fit = sample_press(posterior, at)
-        offset_mm = reach_mm * np.linalg.norm(fit.best[OFFSET:].reshape(-1, AXES), axis=1)
-        unlike = posterior.unlike(fit.best, int(np.argmin(offset_mm)))
-        return answer_of(fit, misfit_ratio, offset_mm, unlike)
+        believed = self._settled(seen, at, reach_mm, self.noise)
+        best, misfit_ratio = believed.best, believed.posterior.misfit_ratio(believed.best)
+        likeliest = believed if misfit_ratio < BADLY_EXPLAINED else self._on_likeliest_skin(seen, believed, reach_mm)
+        fit = replace(sample_press(likeliest.posterior, likeliest.best), best=best)
+        offset_mm = reach_mm * np.linalg.norm(best[OFFSET:].reshape(-1, AXES), axis=1)
+        unlike = believed.posterior.unlike(best, int(np.argmin(offset_mm)))
+        return answer_of(fit, misfit_ratio, offset_mm, replace(unlike, skin_texture_ratio=likeliest.skin_texture_ratio))
 
     def ordinary_shift(self, rows: Array) -> Array:
         """Return what is believed to move rows [n, P] of presses on an inclusion in the middle of all ranges [n, P]."""
@@ -84,14 +90,15 @@ class OwnAnswers(RampAnswers):
         to_mm = self.surrogate.to_mm
         ratio = self.reach_mm(len(seen.rows)) / to_mm
         at = np.concatenate([answer.fit.best[:OFFSET], ratio * answer.fit.best[OFFSET:]])
-        before = bound_of(self._posterior(seen, at, to_mm), at)
+        noise = self._on_skin(answer.unlike.skin_texture_ratio if answer.unlike else 1.0)
+        before = bound_of(self._posterior(seen, at, to_mm, noise), at)
         parts = []
         for place_mm in places_mm:
             further = np.append(at[:OFFSET], place_mm - 1.0)
             (row,) = self.surrogate.rows(further[None])
             row[RESPONSE] = seen.rows[0, RESPONSE]
             after = np.append(at, [place_mm / to_mm, 0.0])
-            parts.append(bound_of(self._posterior(_with_further(seen, row), after, to_mm), after) / before)
+            parts.append(bound_of(self._posterior(_with_further(seen, row), after, to_mm, noise), after) / before)
         return np.array(parts)
 
     def departure(self, seen: SeenPresses, answer: RampAnswer) -> Departure:
@@ -100,19 +107,38 @@ class OwnAnswers(RampAnswers):
         posterior = self._posterior(seen, best, self.reach_mm(len(seen.rows)))
         return Departure(posterior.misfit_by_block(best), posterior.tilt_deviations(best))
 
-    def _settled(self, seen: SeenPresses, at: Array, reach_mm: float, noise: PressNoise) -> tuple[OwnPosterior, Array]:
-        """Return the posterior about where the fit comes to from coordinates [8 + 2 N], and these."""
+    def _settled(
+        self, seen: SeenPresses, at: Array, reach_mm: float, noise: PressNoise, skin_texture_ratio: float = 1.0
+    ) -> _Settled:
+        """Return the posterior about where the fit comes to from coordinates [8 + 2 N]."""
         for _ in range(LOOKED_AGAIN):
-            at = best_fit(OwnPosterior(seen, self.surrogate, noise, self.own, reach_mm, at), at)
-        return OwnPosterior(seen, self.surrogate, noise, self.own, reach_mm, at), at
+            at = best_fit(self._posterior(seen, at, reach_mm, noise), at)
+        posterior = self._posterior(seen, at, reach_mm, noise)
+        return _Settled(posterior, best_fit(posterior, at), skin_texture_ratio)
 
-    @cached_property
-    def _on_coarser_skins(self) -> list[PressNoise]:
-        levels = self.noise.levels
-        return [replace(self.noise, levels=levels.on_coarser_skin(times)) for times in COARSER_SKINS]
+    def _on_likeliest_skin(self, seen: SeenPresses, believed: _Settled, reach_mm: float) -> _Settled:
+        """Return the posterior on skin as it is believed, or on the first coarser one that is likelier than the next.
 
-    def _posterior(self, seen: SeenPresses, at: Array, reach_mm: float) -> OwnPosterior:
-        return OwnPosterior(seen, self.surrogate, self.noise, self.own, reach_mm, at)
+        The evidence has one top: what follows is not fitted.
+        """
+        likeliest = believed
+        for ratio in COARSER_SKINS:
+            coarser = self._settled(seen, likeliest.best, reach_mm, self._on_skin(ratio), ratio)
+            if coarser.log_evidence <= likeliest.log_evidence:
+                break
+            likeliest = coarser
+        return likeliest
+
+    def _on_skin(self, texture_ratio: float) -> PressNoise:
+        """Return the noise on skin of so many times the texture that is believed."""
+        if texture_ratio == 1.0:
+            return self.noise
+        return replace(self.noise, levels=self.noise.levels.on_coarser_skin(texture_ratio))
+
+    def _posterior(
+        self, seen: SeenPresses, at: Array, reach_mm: float, noise: PressNoise | None = None
+    ) -> OwnPosterior:
+        return OwnPosterior(seen, self.surrogate, noise or self.noise, self.own, reach_mm, at)
 
     def _begun(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:
         """Return coordinates [8 + 2 N] to begin at: of several the one that explains the presses best."""

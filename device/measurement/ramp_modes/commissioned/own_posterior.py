@@ -88,11 +88,12 @@ class OwnPosterior:
 
     def log_evidence(self, at: Array) -> float:
         """Return the logarithm of how likely what is seen is, but for a constant, by Laplace's approximation about the
-        best fit [8 + 2 N].
+        best fit [8 + 2 N]: against noise as it is believed, of scans too.
         """
-        (residuals,), (jacobian,) = self.residuals_and_jacobian(at[None])
+        (residuals,), (jacobian,) = (self._widened * one for one in self.residuals_and_jacobian(at[None]))
         precision = jacobian.T @ jacobian + np.eye(self.dimensions) / EVEN_STD**2
-        return self.log_volume - 0.5 * float(residuals @ residuals) - 0.5 * float(np.linalg.slogdet(precision)[1])
+        log_volume = self.log_volume + len(residuals) * np.log(self._widened)
+        return float(log_volume - 0.5 * residuals @ residuals - 0.5 * np.linalg.slogdet(precision)[1])
 
     def whitened_changes(self, at: Array) -> Array:
         """Return what a unit of each direction of `DIRECTIONS` changes [S, COUNT], at coordinates [8 + 2 N]."""

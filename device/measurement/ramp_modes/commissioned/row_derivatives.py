@@ -67,7 +67,8 @@ DIRECTIONS: dict[str, BelievedDirection] = {
     "light_along_ratio": BelievedDirection("press", 0.0035, 0.005),
     "light_pair_ratio": BelievedDirection("press", 0.0025, 0.005),
 }
-"""Standard deviations are a builder's tolerances and a hand's habits, as `host_tools worlds` draws them.
+"""Standard deviations are a builder's tolerances, a hand's habits and patients' skins, as `host_tools worlds` and
+`host_tools/scores/foreign_presses.py` draw them.
 
 Logarithms of the ratios of the layers' moduli and of the lesion's skin and tissue to those beside it; the cell's counts
 of a newton over those by which forces are told; the part of its motion with which the face is drawn; the part of its

@@ -78,10 +78,15 @@ def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
 
 @pytest.mark.long
 def test_presses_on_coarser_skin_than_is_believed_are_refused_or_covered(tables, quick):
-    """Of 1 % over 2 mm, where 0.3 % are believed; by these alone four fifths and three quarters were covered."""
+    """Of 1 % over 2 mm, where 0.3 % are believed; by these alone four fifths and three quarters were covered.
+
+    Unknowns that are not determined, whose interval is the whole range, do not count.
+    """
     for found in with_tolerances_on(
         lambda rng: World(texture=SkinTexture(1.0, 2.0, int(rng.integers(2**31)))), tables, quick, 36
     ):
-        assert found.is_answered.any()
-        assert (found.covered().mean(axis=0) >= 0.86).all()
-        assert (replace(found, is_answered=np.ones_like(found.is_answered)).covered().mean(axis=0) >= 0.86).all()
+        assert found.is_answered.mean() > 0.3
+        everything = replace(found, is_answered=np.ones_like(found.is_answered))
+        for one in (found, everything):
+            assert one.determined()[:, :2].mean() > 0.5
+            assert (one.determined_covered() >= 0.86).all()
