@@ -9,6 +9,7 @@ from device.files.shipped import SIMULATED_PROBE
 from device.files.table_file import load_table
 from device.measurement.parameters import HIGH, PARAMETERS, normalise
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.ramp_modes.commissioned import own_answers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import (
     AXES,
@@ -289,6 +290,33 @@ def test_where_to_press_next_is_told_of_a_commissioned_probe_too(foreign, deriva
     parts = own.worth(foreign, answer, (2.0, 4.0))
     assert parts.shape == (2, 3)
     assert np.all((parts > 0) & (parts <= SCAN_VARIANCE**0.5 + 1e-9))
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_coarse_skin_widens_intervals_and_moves_no_limit(derivatives, ramp_model, monkeypatch, presses):
+    """Skin of three times the texture believed is told as such; what a press is refused or named for is as without."""
+    levels = ErrorLevels(flat_field_ratio=0.0047, flat_field_shared_ratio=0.6)
+    noise = replace(ramp_model.answers.noise, levels=levels)
+    own = OwnAnswers(ramp_model.answers.surrogate, noise, replace(believed(derivatives), levels=levels))
+    parameters = np.tile(TRUTH, (presses, 1))
+    parameters[:, -1] = np.array([1.0, 3.0])[:presses]
+    at, rows = rows_at(ramp_model, parameters)
+    straight = turned_columns(rows, 0.0) + own.own.changes(Place(at, np.zeros(presses), np.zeros(presses)), rows).shift
+    straight[1:, RESPONSE] = straight[0, RESPONSE]
+    coarse = replace(noise, levels=levels.on_coarser_skin(3.0))
+    seen = to_bright_side(seen_with_noise(straight, coarse, np.random.default_rng(3)), np.zeros(presses))
+    guess = ramp_model.first_guesses(seen.rows - own.ordinary_shift(seen.rows))
+    answer = own.answer_to(seen, guess)
+    monkeypatch.setattr(own_answers, "BADLY_EXPLAINED", np.inf)
+    as_believed = own.answer_to(seen, guess)
+    assert as_believed.misfit_ratio > 1.1
+    assert answer.unlike.skin_texture_ratio in (2.5, 3.7)
+    assert as_believed.unlike.skin_texture_ratio == 1.0
+    assert np.all(answer.spread[:2] > 1.2 * as_believed.spread[:2])
+    limits, limits_as_believed = (ramp_model.found(one, seen) for one in (answer, as_believed))
+    told = "misfit_ratio", "elongation_deviations", "outside_log_odds"
+    assert [getattr(limits, name) for name in told] == [getattr(limits_as_believed, name) for name in told]
+    assert own.departure(seen, answer) == own.departure(seen, as_believed)
 
 
 def test_a_bundle_keeps_what_is_the_probes_own(derivatives, ramp_model):
