@@ -95,7 +95,8 @@ def test_one_that_is_frozen_whole_is_ended_by_the_watchdog_and_darkened(rig: Rig
     rig.press_until_lit()
     daemon.process.send_signal(signal.SIGSTOP)
     assert rig.world.is_lit()
-    assert rig.kill_when_not_fed() == -signal.SIGABRT
+    # Tracing threads that the freeze caught within a call can end in a segmentation fault (cpython issue 116008).
+    assert rig.kill_when_not_fed() in (-signal.SIGABRT, -signal.SIGSEGV)
     assert "Fatal Python error: Aborted" in daemon.log_text()
     assert rig.led_off().returncode == 0
     assert rig.world.is_dark()

@@ -35,6 +35,7 @@ class Unit:
         os.set_blocking(self.master, False)
         self.path = os.ttyname(slave)
         self.requests: list[bytes] = []
+        self.answered = threading.Event()
         self._replies: deque[bytes] = deque()
         self._ended = threading.Event()
         self.cell = open_load_cell(self.path, 115_200, "mantracourt", 1)
@@ -54,6 +55,7 @@ class Unit:
                 for request in whole:
                     self.requests.append(request)
                     os.write(self.master, self._replies.popleft() if self._replies else b"")
+                    self.answered.set()
 
     def unplug(self) -> None:
         if not self._ended.is_set():
@@ -94,10 +96,12 @@ def test_a_partial_reply_waits_for_its_rest_and_the_sample_is_stamped_when_that_
     sent_s = []
 
     def send_the_rest():
+        unit.answered.wait()  # what comes before the request is thrown away
+        time.sleep(0.03)  # the part is read by itself, unless the machine is very busy
         sent_s.append(time.monotonic())
         os.write(unit.master, b"3456\r")
 
-    rest = threading.Timer(0.03, send_the_rest)
+    rest = threading.Thread(target=send_the_rest, daemon=True)
     rest.start()
     sample = unit.cell.read(timeout_s=30.0)
     rest.join()
