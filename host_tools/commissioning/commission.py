@@ -9,37 +9,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2, rayleigh
 
-from device.measurement.arrays import Array
-from device.measurement.parameters import normalise
-from device.measurement.quantities import UNKNOWNS, Bound
+from device.measurement.quantities import Bound
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
-from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
-from device.measurement.ramp_modes.commissioned.own_probe import Place, turned_columns
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, RowDerivatives
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
-from device.measurement.ramp_modes.radial_profile import RESPONSE, SEEN_COLUMNS, SeenPresses
-from device.measurement.ramp_modes.surrogate import OFFSET
+from device.measurement.ramp_modes.radial_profile import SEEN_COLUMNS
 from host_tools.calibration.gates import Gate, require_all
+from host_tools.commissioning.believed_presses import BelievedAnswers, believed_answers, believed_presses
 from host_tools.commissioning.joint_fit import PROBE, Design, ProbeFit, fit_probe
-from host_tools.commissioning.left_out import LeftOut, answers_of, answers_to_seen, left_out
+from host_tools.commissioning.left_out import LeftOut, answers_of, left_out
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.commissioning.probe_prior import LABELS, OF_DESIGN, ProbePrior
-from host_tools.press_models.mode_outcome import CRITICAL_RATIO, EvaluatedPresses, evaluated
-from host_tools.press_models.press_samples import draw_parameters
-from host_tools.press_models.ramp_training import further_offsets_mm
+from host_tools.press_models.mode_outcome import CRITICAL_RATIO
 from host_tools.press_models.seeds import derived_seed
 
 MARGIN = 1.3
 """The misfit's limit over the largest of the phantoms left out: so few do not show the largest there is."""
 LARGEST_MISFIT_RATIO, WORST_PHANTOM = 1.8, 2.5
 """The limit is never above the first. Tilts are not linear: one press in twenty of a known probe has 1.5 and more."""
-PRESSES, SCANS = 160, 40
-"""Believed presses that are answered for the model card."""
+PRESSES = SCANS = 160
+"""Believed presses and scans that are answered for the model card; forty scans of each number of ramps."""
 ODDS_PRESSES = 1_000
 FEWEST_COVERED, MOST_TOLERANCES = 0.7, 6.0
 """Share of the statements on phantoms left out that must hold, of which nine in ten do of an honest probe's; and how
@@ -54,8 +49,8 @@ class CommissionedProbe:
     answers: OwnAnswers
     critical: CriticalValues
     phantoms: list[LeftOut]
-    presses: EvaluatedPresses
-    scans: EvaluatedPresses
+    presses: BelievedAnswers
+    scans: BelievedAnswers
     gates: list[Gate] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     """Of all phantoms and bare blocks, in the order of the fit's."""
@@ -85,8 +80,9 @@ def commission(
     answers = answers_of(design, fit)
     critical = limits(answers, model, phantoms, derived_seed(seed, "odds of a commissioned probe"))
     say(f"{PRESSES} presses and {SCANS} scans of the probe that is believed in")
-    presses = believed_answers(answers, model, PRESSES, derived_seed(seed, "believed presses"), jobs)
-    scans = believed_answers(answers, model, SCANS, derived_seed(seed, "believed scans"), jobs, are_scans=True)
+    answered = partial(believed_answers, answers, model, critical, jobs=jobs)
+    presses = answered(PRESSES, derived_seed(seed, "believed presses"))
+    scans = answered(SCANS, derived_seed(seed, "believed scans"), are_scans=True)
     names = [ramp.name for ramp in ramps]
     return CommissionedProbe(fit, answers, critical, phantoms, presses, scans, gates, names)
 
@@ -130,39 +126,3 @@ def limits(answers: OwnAnswers, model: RampModel, phantoms: Sequence[LeftOut], s
     misfit = min(max(believed, own), LARGEST_MISFIT_RATIO)
     tissue = max(critical.tissue_from_middle_ratio for critical in model.critical.values())
     return CriticalValues(misfit, elongation, float(np.quantile(odds, CRITICAL_RATIO)), tissue)
-
-
-def believed_presses(
-    answers: OwnAnswers, count: int, seed: int, *, are_scans: bool = False
-) -> tuple[list[SeenPresses], Array]:
-    """Return what is seen of presses or scans drawn from what is believed, and their coordinates [n, 9]."""
-    rng = np.random.default_rng(seed)
-    truth = normalise(draw_parameters(count, rng))
-    further = further_offsets_mm(count, rng) if are_scans else [np.zeros(0)] * count
-    return [_drawn(answers, at, mm, rng) for at, mm in zip(truth, further, strict=True)], truth
-
-
-def _drawn(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.random.Generator) -> SeenPresses:
-    """Return one press or scan that is as believed."""
-    each = np.tile(at, (1 + len(further_mm), 1))
-    each[1:, OFFSET] = further_mm - 1
-    direction_rad = rng.uniform(0, 2 * np.pi, len(each))
-    rows = answers.surrogate.rows(each, direction_rad)
-    rows[1:, RESPONSE] = rows[0, RESPONSE]
-    place, straight = Place(each, np.zeros(len(each)), direction_rad), turned_columns(rows, 0.0)
-    changes = answers.own.changes(place, rows)
-    drawn = rng.standard_normal(changes.factor.shape[2])
-    leaning = straight + changes.shift + changes.factor @ drawn
-    changes = answers.own.changes(place, rows, leaning)  # how far each leans tells what its tilts' squares do
-    seen = straight + changes.shift + changes.factor @ drawn
-    seen[1:, RESPONSE] = seen[0, RESPONSE]
-    return to_bright_side(seen_with_noise(seen, answers.noise, rng), direction_rad)
-
-
-def believed_answers(
-    answers: OwnAnswers, model: RampModel, count: int, seed: int, jobs: int, *, are_scans: bool = False
-) -> EvaluatedPresses:
-    """Return the answers to presses drawn from what is believed."""
-    seen, truth = believed_presses(answers, count, seed, are_scans=are_scans)
-    found = answers_to_seen(answers, model.first_guesses, seen, jobs)
-    return evaluated(truth[:, : len(UNKNOWNS)], found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,9 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
+from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
+from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
 from device.measurement.ramp_modes.radial_profile import SeenPresses
 from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe, on_castings
 from host_tools.commissioning.phantom_ramps import PhantomRamp
@@ -79,11 +82,19 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
     return LeftOut(ramp.name, truth, tolerance, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
 
 
-def answers_to_seen(
-    answers: RampAnswers, guess: Guess, seen: Sequence[SeenPresses], jobs: int = -1
-) -> list[RampAnswer]:
-    """Return the answers to what was read of presses or scans."""
-    return in_parallel(lambda number: answer_to_seen(answers, guess, seen[number]), len(seen), jobs)
+class GivenAnswer(NamedTuple):
+    """An answer to one press or scan, and whether it is given: something stands out, and nothing is refused."""
+
+    answer: RampAnswer
+    is_given: bool
+
+
+def given_answer(answers: RampAnswers, model: RampModel, critical: CriticalValues, seen: SeenPresses) -> GivenAnswer:
+    """Return the answer to what was read of a press or scan; `critical` says what is refused."""
+    answer = answer_to_seen(answers, model.first_guesses, seen)
+    is_seen = any(stands_out(row, model.answers.noise) for row in seen.rows)
+    found = found_values(answer, seen, answers, model.ranges.log_odds)
+    return GivenAnswer(answer, is_seen and not rejections(found, critical))
 
 
 def answer_to_seen(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:

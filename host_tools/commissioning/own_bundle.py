@@ -21,15 +21,17 @@ import numpy as np
 
 from device.measurement.bundle import CARD_FILE
 from device.measurement.calibration import Calibration, written
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import Bound, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE
+from host_tools.commissioning.believed_presses import BelievedAnswers, believed_dial
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE
 from host_tools.commissioning.page import PAGE_FILE, commissioning_page
 from host_tools.paper_network.export import write_folder
-from host_tools.press_models.mode_statistics import reachable_half_width, statistics
+from host_tools.press_models.mode_statistics import half_width_by_ramps, reachable_half_width, statistics
 
 VALID_DAYS = Bound(1.0, 730.0, "days")
 """How long a commissioning may hold: silicone stiffens, LEDs fade."""
@@ -71,10 +73,10 @@ def write_own_bundle(
         "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
         "commissioned": commissioned_record(done, made_at, origin),
     }
-    for mode, presses in (("standard", done.presses), ("precise", done.scans)):
+    of_modes: dict[Mode, BelievedAnswers] = {"standard": done.presses, "precise": done.scans}
+    for mode, presses in of_modes.items():
         kept = {name: value for name, value in card["modes"][mode].items() if name not in OF_DESIGN}
-        card["modes"][mode] = kept | asdict(done.critical) | {"simulated": statistics(presses)}
-    card["modes"]["precise"]["reachable_half_width"] = reachable_half_width(done.scans)
+        card["modes"][mode] = kept | asdict(done.critical) | _worth(mode, presses)
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
     page = commissioning_page(done, card, advice, is_simulated=is_simulated).encode()
     names = (*(name for name in files if name.endswith(".onnx")),)
@@ -82,6 +84,18 @@ def write_own_bundle(
     kept_files = {name: files[name] for name in names}
     kept_files |= {SURROGATE_FILE: surrogate, CARD_FILE: text, PAGE_FILE: page}
     write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))
+
+
+def _worth(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:
+    """Return what the card says of a mode's answers: to presses that are as commissioning believes."""
+    dial = believed_dial(mode, found)
+    worth = {"simulated": statistics(found.evaluated)} | ({"dial": dial} if dial else {})
+    if not FRAMES[mode].is_scan:
+        return worth
+    return worth | {
+        "reachable_half_width": reachable_half_width(found.evaluated),
+        "half_width_by_ramps": half_width_by_ramps(found.evaluated, found.ramps),
+    }
 
 
 def commissioned_record(done: CommissionedProbe, made_at: datetime, origin: dict[str, str]) -> dict[str, Any]:

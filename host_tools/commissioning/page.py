@@ -19,6 +19,7 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE
 from host_tools.commissioning import page_pictures as pictures
+from host_tools.commissioning.believed_presses import BelievedAnswers
 from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, CommissionedProbe
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
 from host_tools.commissioning.probe_prior import LABELS
@@ -66,7 +67,7 @@ def commissioning_page(
         largest_misfit=LARGEST_MISFIT_RATIO,
         phantoms=done.phantoms,
         unknown_labels=list(pictures.UNKNOWN_LABELS.values()),
-        modes=[_mode("standard, one press", done.presses), _mode("precise, a scan", done.scans)],
+        modes=[_mode(name, answers.evaluated) for name, answers in _believed(done)],
         silicone=SILICONE,
         advice=list(advice) or [NOTHING_MORE],
         pictures=dict(_pictures(done)),
@@ -80,7 +81,12 @@ def _pictures(done: CommissionedProbe) -> Iterator[tuple[str, str]]:
     yield "posterior", pictures.probe_posterior(done.fit)
     yield "left_out", pictures.left_out_intervals(done.phantoms)
     yield "misfits", pictures.left_out_misfits(done.phantoms, done.critical.misfit_ratio, WORST_PHANTOM)
-    yield "coverage", pictures.believed_coverage([("standard", done.presses), ("precise", done.scans)])
+    coverage = [(name.partition(",")[0], answers.evaluated) for name, answers in _believed(done)]
+    yield "coverage", pictures.believed_coverage(coverage)
+
+
+def _believed(done: CommissionedProbe) -> tuple[tuple[str, BelievedAnswers], ...]:
+    return ("standard, one press", done.presses), ("precise, a scan", done.scans)
 
 
 def _covered(done: CommissionedProbe) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from device.measurement.arrays import Array
 from device.measurement.parameters import denormalise_unknowns, normalise
 from device.measurement.quantities import UNKNOWNS
-from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
-from device.measurement.ramp_modes.estimate import rejections, stands_out
-from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
-from device.measurement.ramp_modes.radial_profile import SeenPresses
+from device.measurement.ramp_modes.estimate import stands_out
+from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from host_tools.commissioning.joint_fit import (
     FLAT_FIELD_RATIO,
     USUAL_MODEL_RATIO,
@@ -27,7 +26,7 @@ from host_tools.commissioning.joint_fit import (
     levels_on_skin,
     tolerances_only,
 )
-from host_tools.commissioning.left_out import answer_to_seen
+from host_tools.commissioning.left_out import GivenAnswer, given_answer
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.scores.foreign_presses import ForeignPresses
@@ -97,29 +96,16 @@ def scored(
     shown = np.array([i for i, one in enumerate(taken.seen) if any(stands_out(row, noise) for row in one.rows)], int)
     truth = normalise(taken.parameters[shown])[:, : len(UNKNOWNS)]
 
-    def one(place: int) -> _PressScore:
-        return _score_of(answers, model, critical, taken.seen[shown[place]])
+    def one(place: int) -> GivenAnswer:
+        return given_answer(answers, model, critical, taken.seen[shown[place]])
 
     found = in_parallel(one, len(shown), jobs)
     return ScoredPresses(
         evaluated(truth, [one.answer for one in found]),
         np.array([one.answer.misfit_ratio for one in found]),
-        np.array([one.is_answered for one in found], bool),
+        np.array([one.is_given for one in found], bool),
         shown,
     )
-
-
-class _PressScore(NamedTuple):
-    """An answer to one press or scan, and whether it is given."""
-
-    answer: RampAnswer
-    is_answered: bool
-
-
-def _score_of(answers: RampAnswers, model: RampModel, critical: CriticalValues, seen: SeenPresses) -> _PressScore:
-    answer = answer_to_seen(answers, model.first_guesses, seen)
-    values = found_values(answer, seen, answers, model.ranges.log_odds)
-    return _PressScore(answer, not rejections(values, critical))
 
 
 def tolerant(design: Design) -> OwnAnswers:

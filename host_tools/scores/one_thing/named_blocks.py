@@ -19,7 +19,7 @@ from device.measurement.ramp_modes.misfit_blocks import BLOCKS, BlockMisfit, Row
 from device.measurement.ramp_modes.model import CriticalValues
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
-from host_tools.commissioning.left_out import answers_to_seen
+from host_tools.commissioning.left_out import answer_to_seen
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
@@ -107,7 +107,8 @@ def named_blocks_chapter(
 def named_in(seen: Sequence[SeenPresses], by: Answering, design: DesignToTry, jobs: int) -> NamedBlocks:
     """Return what is named of the presses in which something stands out."""
     shown = [one for one in seen if stands_out(one.rows[0], design.model.answers.noise)]
-    found = answers_to_seen(by.answers, design.model.first_guesses, shown, jobs)
+    guess = design.model.first_guesses
+    found = in_parallel(lambda number: answer_to_seen(by.answers, guess, shown[number]), len(shown), jobs)
     departures = [by.answers.departure(*pair) for pair in zip(shown, found, strict=True)]
     is_refused = [one.misfit_ratio > by.critical.misfit_ratio for one in found]
     named = Counter(one.block for one, refused in zip(departures, is_refused, strict=True) if refused)

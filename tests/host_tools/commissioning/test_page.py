@@ -14,6 +14,7 @@ from device.measurement.ramp_modes.model import CriticalValues
 from device.measurement.ramp_modes.noise import ErrorLevels
 from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE
 from host_tools.calibration.gates import Gate
+from host_tools.commissioning.believed_presses import BelievedAnswers
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE, BelievedErrors, ProbeFit
 from host_tools.commissioning.left_out import LeftOut
@@ -70,6 +71,10 @@ def presses(covered):
     return EvaluatedPresses(truth, middle, middle - 0.2, middle + 0.2, known)
 
 
+def answered(count):
+    return BelievedAnswers(presses(count), np.ones(count, int), np.ones(count, bool), np.ones(count))
+
+
 def found(names=("A1", "A2", "block"), **believed):
     """Return a commissioning of two phantoms and a bare block, made on paper."""
     left = np.zeros((len(names), RESPONSE.stop))
@@ -90,7 +95,7 @@ def found(names=("A1", "A2", "block"), **believed):
     gates = [Gate("largest misfit", 1.1, Bound(0.0, 2.5, ""), "record it again")]
     critical = CriticalValues(1.43, 3.21, 4.56, 0.87)
     left_alone = [left_out(names[0]), missed]
-    return CommissionedProbe(fit, None, critical, left_alone, presses(9), presses(7), gates, list(names))
+    return CommissionedProbe(fit, None, critical, left_alone, answered(9), answered(7), gates, list(names))
 
 
 def page(done=None, advice=(), **more):
