@@ -289,7 +289,7 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
     expect(page.locator("#until")).to_be_hidden()
     page.locator("#modes label").filter(has_text="precise").click()
     steps = page.locator("#until label")
-    expect(steps).to_have_text(["possible", "± 1 mm8 of 10", "± 0.5 mm", "± 0.2 mm"])
+    expect(steps).to_have_text(["possible", "± 1 mm8 of 10", "± 0.5 mm0.80 at best", "± 0.2 mm"])
     expect(steps.nth(2).locator("input")).to_be_disabled()
     expect(steps.nth(3).locator("input")).to_be_disabled()
     expect(page.locator("#status-reason")).to_have_text(

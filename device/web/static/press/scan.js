@@ -21,11 +21,8 @@ const offerOf = (mode) => offers.find((offer) => offer.mode === mode && isScan(o
 /** A half width with the digits that tell it from another: 0.45, 1.2, 14. */
 const width = (halfWidth) => figure(halfWidth, halfWidth < 0.995 ? 2 : halfWidth < 9.95 ? 1 : 0);
 
-/** Whether a scan can be as sure as that, as far as the probe knows; only the sizes in mm are asked for here. */
-function canReach(offer, step) {
-  const reachable = offer.reachable_half_width ?? {};
-  return ASKED.every((key) => !(step < reachable[key]));
-}
+/** How sure a scan can be at best (mm), as far as the probe knows; only the sizes in mm are asked for here. */
+const nearest = ({ reachable_half_width: reachable }) => Math.max(...ASKED.map((key) => reachable?.[key] ?? 0));
 
 /** In how many of ten inclusions a scan of all its presses is as sure as that at most; null where nobody knows. */
 function reachedOfTen({ half_width_by_ramps: byRamps, most_ramps: most }, step) {
@@ -35,16 +32,28 @@ function reachedOfTen({ half_width_by_ramps: byRamps, most_ramps: most }, step) 
   return Math.floor(10 * Math.min(...shares));
 }
 
-function choice(step, isPossible, ofTen = null) {
+function choice(step, isPossible, told = "") {
   const label = element("label", "until-step");
   const input = element("input", "");
   const words = step === null ? say("until.any") : say("until.mm", { mm: figure(step, step < 1 ? 1 : 0) });
   Object.assign(input, { type: "radio", name: "until", value: step ?? "", checked: step === null, disabled: !isPossible });
-  const shown = element("span", "", words);
-  if (isPossible && ofTen !== null) shown.append(element("small", "", say("until.of_ten", { n: ofTen })));
+  const shown = element("span", "");
+  shown.append(element("b", "", words));
+  if (told) shown.append(element("small", "", told));
   label.append(input, shown);
   if (!isPossible) setAttribute(label, "title", say("until.not"));
   return label;
+}
+
+/** The choices in mm: in how many of ten each is reached; the first that cannot be had tells the nearest that can. */
+function steps(offer) {
+  const best = nearest(offer);
+  const tooSure = STEPS_MM.find((step) => step < best);
+  return STEPS_MM.map((step) => {
+    if (step < best) return choice(step, false, step === tooSure ? say("until.nearest", { mm: width(best) }) : "");
+    const ofTen = reachedOfTen(offer, step);
+    return choice(step, true, ofTen === null ? "" : say("until.of_ten", { n: ofTen }));
+  });
 }
 
 /** Offer how sure a scan is to be; what was chosen stays so while it can be had. */
@@ -55,7 +64,7 @@ export function offerAccuracy(modes) {
   box.querySelectorAll("label, .until-words").forEach((one) => one.remove());
   if (!offer) return;
   box.append(element("span", "until-words", say("until.words")));
-  box.append(choice(null, true), ...STEPS_MM.map((step) => choice(step, canReach(offer, step), reachedOfTen(offer, step))));
+  box.append(choice(null, true), ...steps(offer));
   const again = [...box.querySelectorAll("input")].find(({ value, disabled }) => value === chosen && !disabled);
   if (again) again.checked = true;
 }
