@@ -23,14 +23,18 @@ from device.measurement.paper_mode.features import extract_features
 from device.measurement.quantities import Inclusion
 from device.measurement.quick_mode.model import estimate_quick
 from device.measurement.ramp_modes.estimate import estimate_ramp
+from device.measurement.ramp_modes.model import RampModel
 from device.measurement.recording.tactile_image import reference, tactile_image
 from device.simulation.physics.pressed_face import ProbePlacement
 from device.simulation.scenario import Scenario
 from device.simulation.virtual_probe import ProbeTables, VirtualProbe
 from host_tools.calibration.phantom import CAMERA, LIT, phantom_recording
+from host_tools.commissioning.joint_fit import Design
 from host_tools.forward.solve import solve
+from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.press_models.recorded_presses import recorded_press
 from host_tools.scenes.scene import Scene
+from host_tools.scores.scored_presses import tolerant
 
 CHAPTER = "work on a frame, a press and a scene"
 PRESS = np.array([12.0, 6.0, 60.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
@@ -38,6 +42,11 @@ PRESS = np.array([12.0, 6.0, 60.0, 5.0, 30.0, 2.0, 0.5, 1.0, 1.0])
 SECOND_MM = 5.0
 """Mode precise is a scan of two ramps here, the fewest that it answers: the second lies so far beside."""
 BOUNDS: dict[Mode, float] = {"quick": 24.0, "standard": 380.0, "precise": 600.0}
+OF_OWN_PROBE: dict[str, tuple[Mode, tuple[float, ...], float]] = {
+    "press, mode standard, of a commissioned probe": ("standard", (), 600.0),
+    "scan of five, of a commissioned probe": ("precise", (3.0, 5.0, 6.0, 7.0), 3700.0),
+}
+"""Mode, offsets of further presses (mm) and bound: what is unlike the design is marginalised, too."""
 Works = dict[str, tuple[Callable[[], object], float | None]]
 MODELS = Path(__file__).resolve().parents[1] / "models"
 
@@ -89,7 +98,25 @@ def _press_works(tables: ProbeTables, calibration: Calibration) -> Works:
             return lambda: estimate_quick(recorded[mode], quick, calibration)
         return lambda: estimate_ramp(recorded[mode], mode, ramp, calibration)
 
-    return {f"press, mode {mode}: frames to an estimate": (estimate(mode), BOUNDS[mode]) for mode in BOUNDS}
+    return {
+        **{f"press, mode {mode}: frames to an estimate": (estimate(mode), BOUNDS[mode]) for mode in BOUNDS},
+        **_own_works(ramp, tables, calibration),
+    }
+
+
+def _own_works(design: RampModel, tables: ProbeTables, calibration: Calibration) -> Works:
+    """Return the same estimates of a probe of which only the builder's tolerances are known."""
+    answers = tolerant(Design(design.answers, load_derivatives(MODELS / "simulated_probe")))
+    own = RampModel(design.bundle, answers, design.ranges)
+
+    def estimate(mode: Mode, further_mm: tuple[float, ...]) -> Callable[[], object]:
+        recording = recorded_press(tables, PRESS, mode, seed=3, further_mm=further_mm)
+        return lambda: estimate_ramp(recording, mode, own, calibration)
+
+    return {
+        f"{name}: frames to an estimate": (estimate(mode, further_mm), bound)
+        for name, (mode, further_mm, bound) in OF_OWN_PROBE.items()
+    }
 
 
 def _next_frame(light: str, tables: ProbeTables) -> Callable[[], object]:

@@ -41,15 +41,19 @@ class _Problems:
 def least_squares(residuals: Residuals, start: Array, low: float, high: float, tolerance: float, steps: int) -> Array:
     """Return the points [n, k] from `low` to `high` where n sums of squares are least, begun at points [n, k].
 
-    A problem ends when a step lowers its cost by no more than `tolerance` of it, when none can, or after `steps`.
+    A problem ends when a step lowers its cost by no more than `tolerance` of it or, where the step raises it, was not
+    foretold to lower it by more; when none can; or after `steps`.
     """
     found = np.clip(start, low, high)
     problems = _evaluated(residuals, np.arange(len(found)), found, np.full(len(found), DAMPING))
     for _ in range(steps):
         if not len(problems.number):
             break
-        tried = _evaluated(residuals, problems.number, _next(problems, low, high), problems.damping)
-        problems, ended = _better(problems, tried, tolerance)
+        at = _next(problems, low, high)
+        least = tolerance * problems.cost
+        is_worth_it = np.abs(_foretold(problems, at)) > least
+        tried = _evaluated(residuals, problems.number, at, problems.damping)
+        problems, ended = _better(problems, tried, least, is_worth_it)
         found[problems.number] = problems.at
         problems = problems.only(~ended)
     return found
@@ -60,10 +64,22 @@ def _evaluated(residuals: Residuals, number: NDArray[np.intp], at: Array, dampin
     return _Problems(number, at, residual, jacobian, np.sum(residual**2, axis=1), damping)
 
 
-def _better(before: _Problems, tried: _Problems, tolerance: float) -> tuple[_Problems, NDArray[np.bool_]]:
-    """Return of each problem the better one of both, and which of them have ended."""
+def _foretold(problems: _Problems, at: Array) -> Array:
+    """Return by how much the cost [m] would fall at points [m, k], were residuals linear.
+
+    It may rise where bounds hold a step, which a shorter one then mends.
+    """
+    step = (at - problems.at)[:, :, None]
+    linear = problems.residual + (problems.jacobian @ step)[:, :, 0]
+    return np.asarray(problems.cost - np.sum(linear**2, axis=1))
+
+
+def _better(
+    before: _Problems, tried: _Problems, least: Array, is_worth_it: NDArray[np.bool_]
+) -> tuple[_Problems, NDArray[np.bool_]]:
+    """Return of each problem the better one of both, and which of them have ended; a gain below `least` [m] is none."""
     lower = tried.cost <= before.cost
-    ended = np.where(lower, before.cost - tried.cost <= tolerance * before.cost, before.damping > LARGEST_DAMPING)
+    ended = np.where(lower, before.cost - tried.cost <= least, ~is_worth_it | (before.damping > LARGEST_DAMPING))
     parts = {
         name: np.where(lower.reshape(-1, *[1] * (part.ndim - 1)), part, getattr(before, name))
         for name, part in vars(tried).items()

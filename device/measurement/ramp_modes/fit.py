@@ -105,8 +105,7 @@ class PressPosterior:
         """Return changes [..., S, k] of the rows, or one change [S], in standard deviations of the noise."""
         if change.ndim == 1:
             return np.asarray(self._whitening @ change)
-        parts = [self._whitening[own, : own.stop] @ change[..., : own.stop, :] for own in self._columns]
-        return np.concatenate(parts, axis=-2)
+        return lower_product(self._whitening, change, self._columns)
 
     def residuals_and_jacobian(self, at: Array) -> tuple[Array, Array]:
         """Return the same [n, S] at coordinates [n, 8 + N], and their derivatives [n, S, 8 + N]."""
@@ -171,6 +170,11 @@ def whitening(covariance: Array, columns: Sequence[slice]) -> Array:
     return found
 
 
+def lower_product(lower: Array, change: Array, columns: Sequence[slice]) -> Array:
+    """Return the product of a lower triangular matrix [S, S] and changes [..., S, k], without the zeros above it."""
+    return np.concatenate([lower[own, : own.stop] @ change[..., : own.stop, :] for own in columns], axis=-2)
+
+
 def _extended(found: Array, shared: Array, own: Array) -> Array:
     """Return what whitens p columns more, of covariance `own` [p, p] and `shared` [S, p] with those of `found`."""
     before, count = len(found), len(found) + len(own)
@@ -182,9 +186,9 @@ def _extended(found: Array, shared: Array, own: Array) -> Array:
     return extended
 
 
-def best_fit(posterior: Explained, start: Array) -> Array:
+def best_fit(posterior: Explained, start: Array, *, tolerance: float = TOLERANCE) -> Array:
     """Return the coordinates [8 + N] that explain a row best, each held weakly to the middle of its range."""
-    (best,) = best_fits(posterior, start[None], np.ones(len(start), dtype=bool))
+    (best,) = best_fits(posterior, start[None], np.ones(len(start), dtype=bool), tolerance=tolerance)
     return np.asarray(best)
 
 

@@ -77,10 +77,13 @@ def test_presses_that_are_drawn_from_what_is_believed_are_explained_in_stiff_tis
 
 @pytest.mark.long
 def test_scans_that_are_drawn_from_what_is_believed_are_covered(model, derivatives):
-    """Of two to five presses; with a `SCAN_VARIANCE` of 1 only 77 % of determined sizes are."""
+    """Of two to five presses, within what chance does; with a `SCAN_VARIANCE` of 1 only 77 % of determined sizes are.
+
+    Of 200 scans with this seed 90 % of sizes, 85 % of depths and 88 % of regions are.
+    """
     answers = tolerant(Design(model.answers, derivatives))
-    found = believed_answers(answers, model, model.critical["precise"], 60, 5, jobs=-1, are_scans=True).evaluated
+    found = believed_answers(answers, model, model.critical["precise"], 120, 5, jobs=-1, are_scans=True).evaluated
     covered, known = found.is_covered[:, :2], found.is_known[:, :2]
     assert found.in_region is not None
-    assert [covered[known[:, k], k].mean() for k in range(2)] == pytest.approx([0.9, 0.9], abs=0.05)
-    assert found.in_region[:, 0].mean() == pytest.approx(0.9, abs=0.05)
+    for held in (covered[known[:, 0], 0], covered[known[:, 1], 1], found.in_region[:, 0]):
+        assert held.mean() == pytest.approx(0.9, abs=2.5 * np.sqrt(0.9 * 0.1 / len(held)))

@@ -33,6 +33,9 @@ from device.measurement.ramp_modes.surrogate import OFFSET, ScanSurrogate
 
 LOOKED_AGAIN = 2
 """How often what the probe changes is taken anew, where the fit has come to."""
+ROUGHLY, WELL = 1e-4, 1e-5
+"""By which part of the cost, of 200 to 900, a step has to lower it: before what the probe changes is taken anew, and at
+last. A cost of 1 moves an unknown by its spread."""
 COARSER_SKINS = 1.6, 2.5, 3.7
 """Textures of skin over the believed one, of 0.3 % mostly, that are weighed for presses that it explains badly."""
 BADLY_EXPLAINED = 1.0
@@ -68,7 +71,9 @@ class OwnAnswers(RampAnswers):
         """
         reach_mm = self.reach_mm(len(seen.rows))
         at = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
-        believed = self._settled(seen, at, reach_mm, self.noise)
+        for _ in range(LOOKED_AGAIN):
+            at = best_fit(self._posterior(seen, at, reach_mm), at, tolerance=ROUGHLY)
+        believed = self._settled(seen, at, reach_mm)
         best, misfit_ratio = believed.best, believed.posterior.misfit_ratio(believed.best)
         likeliest = believed if misfit_ratio < BADLY_EXPLAINED else self._on_likeliest_skin(seen, believed, reach_mm)
         fit = replace(sample_press(likeliest.posterior, likeliest.best), best=best)
@@ -107,14 +112,10 @@ class OwnAnswers(RampAnswers):
         posterior = self._posterior(seen, best, self.reach_mm(len(seen.rows)))
         return Departure(posterior.misfit_by_block(best), posterior.tilt_deviations(best))
 
-    def _settled(
-        self, seen: SeenPresses, at: Array, reach_mm: float, noise: PressNoise, skin_texture_ratio: float = 1.0
-    ) -> _Settled:
-        """Return the posterior about where the fit comes to from coordinates [8 + 2 N]."""
-        for _ in range(LOOKED_AGAIN):
-            at = best_fit(self._posterior(seen, at, reach_mm, noise), at)
-        posterior = self._posterior(seen, at, reach_mm, noise)
-        return _Settled(posterior, best_fit(posterior, at), skin_texture_ratio)
+    def _settled(self, seen: SeenPresses, at: Array, reach_mm: float, skin_texture_ratio: float = 1.0) -> _Settled:
+        """Return the posterior on skin of so many times the texture, linear about coordinates [8 + 2 N], and fit."""
+        posterior = self._posterior(seen, at, reach_mm, self._on_skin(skin_texture_ratio))
+        return _Settled(posterior, best_fit(posterior, at, tolerance=WELL), skin_texture_ratio)
 
     def _on_likeliest_skin(self, seen: SeenPresses, believed: _Settled, reach_mm: float) -> _Settled:
         """Return the posterior on skin as it is believed, or on the first coarser one that is likelier than the next.
@@ -123,7 +124,7 @@ class OwnAnswers(RampAnswers):
         """
         likeliest = believed
         for ratio in COARSER_SKINS:
-            coarser = self._settled(seen, likeliest.best, reach_mm, self._on_skin(ratio), ratio)
+            coarser = self._settled(seen, likeliest.best, reach_mm, ratio)
             if coarser.log_evidence <= likeliest.log_evidence:
                 break
             likeliest = coarser
@@ -144,7 +145,7 @@ class OwnAnswers(RampAnswers):
         """Return coordinates [8 + 2 N] to begin at: of several the one that explains the presses best."""
         starts = self._scan_starts(seen, inside, reach_mm) if len(seen.rows) > 1 else _single_starts(inside)
         posterior = self._posterior(seen, starts[0], reach_mm)
-        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool))
+        found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=WELL)
         return np.asarray(found[np.argmin(np.sum(posterior.residuals(found) ** 2, axis=1))])
 
     def _scan_starts(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:

@@ -15,6 +15,7 @@ from device.measurement.parameters import EVEN_STD, HIGH, PARAMETERS, denormalis
 from device.measurement.ramp_modes.answers import UnlikeDesign
 from device.measurement.ramp_modes.commissioned.discrepancy import Discrepancy
 from device.measurement.ramp_modes.commissioned.own_probe import OwnProbe, Place, turned_columns
+from device.measurement.ramp_modes.fit import lower_product, whitening
 from device.measurement.ramp_modes.misfit_blocks import BLOCK_OF_COLUMN, BlockMisfit, RowBlock, misfit_by_block
 from device.measurement.ramp_modes.noise import FURTHER, LOADS, PressNoise, light_ratio, smooth_errors
 from device.measurement.ramp_modes.radial_profile import (
@@ -36,7 +37,7 @@ OF_FIRST, OF_SECOND = (slice(one.start - COLUMNS, one.stop - COLUMNS) for one in
 SCAN_VARIANCE = 1.4
 """By how much the covariance of a scan's presses counts as larger. What is unlike the design is taken at the best fit,
 but changes with tissue and place, and a scan tells these closely: of scans drawn from what is believed 77 % of sizes
-that are determined were covered without it (`tests/host_tools/commissioning/test_commission.py`)."""
+that are determined were covered without it (`tests/host_tools/commissioning/test_believed_presses.py`)."""
 LEAST = 1e-4
 """An offset this small is on the axis, in units of the reach: there its direction means nothing."""
 BLOCK_OF_SEEN = np.concatenate([BLOCK_OF_COLUMN, *(BLOCK_OF_COLUMN[along] for along in (FIRST, SECOND))])
@@ -71,7 +72,8 @@ class OwnPosterior:
         factor = _joined(changes.factor.transpose(2, 0, 1)).T
         covariance = seen_covariance(seen.rows, seen.across, noise) + factor @ factor.T
         self._widened = SCAN_VARIANCE**0.5 if self.presses > 1 else 1.0
-        self._whitening = np.linalg.inv(np.linalg.cholesky(covariance)) / self._widened
+        self._columns = [slice(one[0], one[-1] + 1) for one in _places(self.presses)]
+        self._whitening = whitening(covariance, self._columns) / self._widened
 
     def unlike(self, at: Array, number: int) -> UnlikeDesign:
         """Return what makes one of the presses another than the forward model's, at coordinates [8 + 2 N]."""
@@ -149,15 +151,17 @@ class OwnPosterior:
         around = _by_angle(rows, place.angle_rad) / self._from_axis(at)[:, None]
         along = outwards * np.cos(angle) - around * np.sin(angle)
         across = outwards * np.sin(angle) + around * np.cos(angle)
-        parts = np.zeros((len(at), self.presses, SEEN_COLUMNS, self.dimensions))
-        parts[..., :OFFSET] = shared[..., :OFFSET].reshape(*parts.shape[:3], OFFSET)
-        for number in range(self.presses):
+        of_presses = len(at), self.presses, SEEN_COLUMNS
+        jacobian = np.zeros((len(at), len(self._seen), self.dimensions))
+        alike = _joined(shared[..., :OFFSET].reshape(*of_presses, OFFSET))
+        jacobian[..., :OFFSET] = lower_product(self._whitening, alike, self._columns)
+        places = np.stack([along, across], axis=-1).reshape(*of_presses, AXES)
+        for number, own in enumerate(self._columns):  # a press's place moves no other press
+            moved = places[:, number, OF_FURTHER if number else slice(None)]
             first = OFFSET + AXES * number
-            for axis, slope in enumerate((along, across)):
-                parts[:, number, :, first + axis] = slope.reshape(parts.shape[:3])[:, number]
-        jacobian = np.stack([_joined(parts[..., k]) for k in range(self.dimensions)], axis=2)
-        residuals = (_joined(seen.reshape(parts.shape[:3])) - self._seen) @ self._whitening.T
-        return residuals, self._whitening @ jacobian
+            jacobian[:, own.start :, first : first + AXES] = self._whitening[own.start :, own] @ moved
+        residuals = (_joined(seen.reshape(of_presses)) - self._seen) @ self._whitening.T
+        return residuals, jacobian
 
     def weighted(self, whitened: Array) -> Array:
         """Return residuals over their covariance [S], of whitened ones [S]."""
@@ -260,9 +264,10 @@ def _places(presses: int) -> list[NDArray[np.intp]]:
 
 
 def _joined(seen: Array) -> Array:
-    """Return what is seen of N presses [n, N, S] as one row of each [n, ...]."""
+    """Return what is seen of N presses [n, N, S, ...] as one row of each [n, ...]."""
     further = seen[:, 1:, OF_FURTHER]
-    return np.concatenate([seen[:, 0], further.reshape(len(seen), further.shape[1] * further.shape[2])], axis=1)
+    count = further.shape[1] * further.shape[2]
+    return np.concatenate([seen[:, 0], further.reshape(len(seen), count, *seen.shape[3:])], axis=1)
 
 
 def _turned(rows: Array, angle_rad: Array) -> Array:
