@@ -1,13 +1,14 @@
 """What a refusal names: which block of the row is said to depart, of presses that differ in one thing.
 
 Only presses that are refused for their misfit count; sizes are such that some are. Two inclusions and gel on the face
-are recorded by the whole camera, all else are rows with noise as it is believed.
+are recorded by the whole camera, all else are rows with noise as it is believed. Those two are no single round
+inclusion, so it stands beside what their answers are worth where no test refuses them.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,12 +24,14 @@ from host_tools.commissioning.left_out import answer_to_seen
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
 from host_tools.press_models.recorded_presses import in_parallel, recorded_press
 from host_tools.press_models.seeds import derived_seed, press_seed
+from host_tools.scores.foreign_presses import ForeignPresses
 from host_tools.scores.one_thing.causes import NOTHING, CauseToName, causes_to_name
 from host_tools.scores.one_thing.press_answers import SHIPPED, TOLERANT, DesignToTry, with_tolerances
 from host_tools.scores.one_thing.tried_presses import Setting, TruthDesign, random_design, tried_presses
 from host_tools.scores.outside import WET_RATIO, draw_clear, neighbour_beside
+from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, scored
 
-PRESSES = 16
+PRESSES, RECORDED_PRESSES = 16, 40
 NAMED_AT_LEAST = 0.9
 SPOKEN: dict[RowBlock, str] = {block: block.replace("_", " ") for block in BLOCKS}
 HEADER = ("what differs", "by", "answered by", "stand out", "refused", *SPOKEN.values(), "none", "is of")
@@ -63,12 +66,13 @@ def named_blocks_chapter(
     design: DesignToTry,
     *,
     presses: int = PRESSES,
+    recorded: int = RECORDED_PRESSES,
     things: Sequence[CauseToName] | None = None,
     seed: int = 1,
     jobs: int = -1,
 ) -> Chapter:
     """Return what is named of presses that differ in each of `causes_to_name`, or of those given, and of two inclusions
-    and gel."""
+    and gel; and how well such are answered where they are, of so many `recorded`."""
     own, model = with_tolerances(design, seed), design.model
     answering = (
         Answering(SHIPPED, model.answers, model.critical["standard"]),
@@ -87,8 +91,14 @@ def named_blocks_chapter(
 
     for thing in things or causes_to_name():
         add(thing.cause.quantity, thing.cause.size, thing.block, _tried(thing, design, truths, jobs))
+    outside = {name: _recorded(name, design, recorded, seed, jobs) for name in RECORDED}
     for name, block in RECORDED.items():
-        add(name, "", block, _recorded(name, design, presses, seed, jobs))
+        add(name, "", block, outside[name].seen)
+    scores = {
+        (name, by.name): scored(by.answers, model, by.critical, taken, jobs)
+        for name, taken in outside.items()
+        for by in answering
+    }
     as_believed = _tried(CauseToName(NOTHING, None), design, truths, jobs)
     nothing = {one.name: named_in(as_believed, one, design, jobs) for one in answering}
     return Chapter(
@@ -98,9 +108,10 @@ def named_blocks_chapter(
         benchmarks=tuple(_benchmarks(found)),
         tables=(
             Table("Blocks named of the presses that are refused for their misfit", HEADER, tuple(rows)),
+            _answered(scores),
             _medians(nothing),
         ),
-        facts={"presses": presses},
+        facts={"presses": presses, "recorded": recorded, "two": _facts(scores[TWO, TOLERANT])},
     )
 
 
@@ -124,7 +135,7 @@ def _tried(thing: CauseToName, design: DesignToTry, truths: TruthDesign, jobs: i
     ).single.seen
 
 
-def _recorded(name: str, design: DesignToTry, presses: int, seed: int, jobs: int) -> list[SeenPresses]:
+def _recorded(name: str, design: DesignToTry, presses: int, seed: int, jobs: int) -> ForeignPresses:
     """Return what is read of recordings of inclusions that show well, with a second one beside or gel on the face."""
     rng = np.random.default_rng(derived_seed(seed, name))
     parameters = draw_clear(presses, rng)
@@ -143,7 +154,21 @@ def _recorded(name: str, design: DesignToTry, presses: int, seed: int, jobs: int
         )
         return seen_presses(press_profiles(recording))
 
-    return in_parallel(read, presses, jobs)
+    return ForeignPresses(parameters, in_parallel(read, presses, jobs))
+
+
+def _answered(scores: Mapping[tuple[str, str], ScoredPresses]) -> Table:
+    """Return how many of what is no single round inclusion are answered, and how well: as the first inclusion."""
+    rows = ((*case, *figures_of(found)) for case, found in scores.items())
+    return Table(
+        "Answers where no test refuses, in mode standard", ("what differs", "answered by", *FIGURES), tuple(rows)
+    )
+
+
+def _facts(found: ScoredPresses) -> dict[str, float | None]:
+    """Return the shares of presses that are answered, and of these of sizes that are covered."""
+    covered = float(found.covered()[:, 0].mean()) if found.is_answered.any() else None
+    return {"answered": float(found.is_answered.mean()), "size_covered": covered}
 
 
 def _cells(found: NamedBlocks, block: RowBlock | None) -> tuple[str, ...]:
