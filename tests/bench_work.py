@@ -86,7 +86,8 @@ def _paper_works(tables: ProbeTables, calibration: Calibration) -> Works:
 
 
 def _press_works(tables: ProbeTables, calibration: Calibration) -> Works:
-    """Return the estimates that the operator waits for; bounds: 6, 95 and 150 ms where the yardstick takes 0.25."""
+    """Return the estimates that the operator waits for; bounds: 6, 95 and 150 ms where the yardstick takes 0.25,
+    and 150 and 925 ms of a commissioned probe."""
     quick, ramp = read_quick_model(MODELS / "quick"), read_ramp_model(MODELS / "standard")
     further_mm: dict[Mode, tuple[float, ...]] = {"precise": (SECOND_MM,)}
     recorded = {

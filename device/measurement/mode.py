@@ -50,7 +50,8 @@ FRAMES: dict[Mode, Frames] = {
 
 @dataclass(frozen=True)
 class ModeWorth:
-    """What a mode's answers are worth, as its model card says: measured on random presses of the simulated probe.
+    """What a mode's answers are worth, as its model card says: measured on random presses of the simulated probe, or of
+    a commissioned one as it is believed to be.
 
     `compute_s`: the time of an answer on the machine that measured. `answered_ratio`: the share of presses that got
     numbers; of those, by unknown, the median error in percent and the share that was called determined.

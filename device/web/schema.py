@@ -276,8 +276,9 @@ class OfferedMode(_Body):
 
     `answer_s`: from the last frame to the answer, median of `answer_presses` on this probe; when there was none yet,
     what is expected by the model card and the other modes' presses. Errors and shares are the model card's, of
-    simulated presses; null where it says nothing. `reachable_half_width`: half of the narrowest 90 % interval that can
-    be had, by unknown in its own unit; `half_width_by_ramps`: what 5, 10, ... 95 % of the inclusions have at most.
+    simulated or believed presses; null where it says nothing. `reachable_half_width`: half of the narrowest 90 %
+    interval that can be had, by unknown in its own unit; `half_width_by_ramps`: what 5, 10, ... 95 % of the inclusions
+    have at most.
     """
 
     mode: Mode

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import platform
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -22,10 +23,11 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.commissioned.own_probe import Place, turned_columns
+from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET
-from host_tools.commissioning.left_out import GivenAnswer, given_answer
+from host_tools.commissioning.left_out import CheckedAnswer, checked_answer
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.ramp_training import further_offsets_mm
@@ -34,14 +36,14 @@ from host_tools.press_models.recorded_presses import in_parallel
 
 @dataclass(frozen=True, eq=False)
 class BelievedAnswers:
-    """Answers to presses or scans of so many `ramps` [n], which of them are given [n], and what each took (s) [n].
+    """Answers to presses or scans of so many `ramps` [n], which of them have numbers [n], and what each took (s) [n].
 
     The time is the answering thread's, without the reading of its frames.
     """
 
     evaluated: EvaluatedPresses
     ramps: NDArray[np.intp]
-    is_given: NDArray[np.bool_]
+    is_answered: NDArray[np.bool_]
     seconds: Array
 
 
@@ -82,40 +84,48 @@ def believed_answers(
     jobs: int,
     are_scans: bool = False,
 ) -> BelievedAnswers:
-    """Return the answers to presses or scans drawn from what is believed; `critical` says which are given."""
+    """Return the answers to presses or scans drawn from what is believed; `critical` says which are refused.
+
+    As on the probe, those in which nothing stands out from its noise have no numbers either.
+    """
     seen, truth = believed_presses(answers, count, seed, are_scans=are_scans)
 
     def timed(number: int) -> _TimedAnswer:
         began = time.thread_time()  # another process that has the core does not count
-        found = given_answer(answers, model, critical, seen[number])
+        found = checked_answer(answers, model, critical, seen[number])
         return _TimedAnswer(found, time.thread_time() - began)
 
     found = in_parallel(timed, count, jobs)
     return BelievedAnswers(
         evaluated(truth[:, : len(UNKNOWNS)], [one.found.answer for one in found]),
         np.array([len(one.rows) for one in seen], np.intp),
-        np.array([one.found.is_given for one in found], bool),
+        np.array([not one.found.is_refused for one in found], bool) & _stand_out(seen, answers),
         np.array([one.seconds for one in found]),
     )
 
 
 class _TimedAnswer(NamedTuple):
-    found: GivenAnswer
+    found: CheckedAnswer
     seconds: float
+
+
+def _stand_out(seen: Sequence[SeenPresses], answers: OwnAnswers) -> NDArray[np.bool_]:
+    """Return in which presses or scans [n] something stands out from the probe's noise."""
+    return np.array([any(stands_out(row, answers.noise) for row in one.rows) for one in seen], bool)
 
 
 def believed_dial(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:
     """Return what a probe's card says of speed and accuracy of a mode, of scans of the fewest ramps it answers.
 
-    The entry has the form of the design's (`host_tools.scores.dial`), which is measured on recordings.
-    Shares and errors are of what is given. Returns {} where that is none of them: then nothing is known.
+    The entry has what the daemon reads of the design's (`host_tools.scores.dial`), which is measured on recordings.
+    Shares and errors are of what has numbers. Returns {} where that is none of them: then nothing is known.
     """
     fewest = found.ramps == FRAMES[mode].fewest_ramps
-    given = found.evaluated.part(fewest & found.is_given)
-    if not len(given.truth):
+    answered = found.evaluated.part(fewest & found.is_answered)
+    if not len(answered.truth):
         return {}
-    truth, mean = denormalise_unknowns(given.truth), denormalise_unknowns(given.mean)
-    error, known = np.median(100 * np.abs(mean / truth - 1), axis=0), given.is_known.mean(axis=0)
+    truth, mean = denormalise_unknowns(answered.truth), denormalise_unknowns(answered.mean)
+    error, known = np.median(100 * np.abs(mean / truth - 1), axis=0), answered.is_known.mean(axis=0)
     return {
         "presses": int(fewest.sum()),
         "answered": len(truth),

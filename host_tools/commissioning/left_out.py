@@ -13,7 +13,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
-from device.measurement.ramp_modes.estimate import rejections, stands_out
+from device.measurement.ramp_modes.estimate import rejections
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
 from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
 from device.measurement.ramp_modes.radial_profile import SeenPresses
@@ -82,19 +82,20 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
     return LeftOut(ramp.name, truth, tolerance, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
 
 
-class GivenAnswer(NamedTuple):
-    """An answer to one press or scan, and whether it is given: something stands out, and nothing is refused."""
+class CheckedAnswer(NamedTuple):
+    """An answer to one press or scan, and whether a limit refuses it."""
 
     answer: RampAnswer
-    is_given: bool
+    is_refused: bool
 
 
-def given_answer(answers: RampAnswers, model: RampModel, critical: CriticalValues, seen: SeenPresses) -> GivenAnswer:
+def checked_answer(
+    answers: RampAnswers, model: RampModel, critical: CriticalValues, seen: SeenPresses
+) -> CheckedAnswer:
     """Return the answer to what was read of a press or scan; `critical` says what is refused."""
     answer = answer_to_seen(answers, model.first_guesses, seen)
-    is_seen = any(stands_out(row, model.answers.noise) for row in seen.rows)
     found = found_values(answer, seen, answers, model.ranges.log_odds)
-    return GivenAnswer(answer, is_seen and not rejections(found, critical))
+    return CheckedAnswer(answer, bool(rejections(found, critical)))
 
 
 def answer_to_seen(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:

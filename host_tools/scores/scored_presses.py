@@ -1,6 +1,8 @@
 """Answers to presses beside their truths, and the figures that say how good they are.
 
-Only presses in which something stands out count: where nothing does, every mode says so and gives no numbers.
+Only presses in which something stands out count: where nothing does, every mode says so and gives no numbers. It is by
+the design's noise for all who answer, so that they answer the same ones; a commissioned probe believes in more noise,
+and says of some of these that nothing stands out, which count as answered here.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from host_tools.commissioning.joint_fit import (
     levels_on_skin,
     tolerances_only,
 )
-from host_tools.commissioning.left_out import GivenAnswer, given_answer
+from host_tools.commissioning.left_out import CheckedAnswer, checked_answer
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.scores.foreign_presses import ForeignPresses
@@ -96,14 +98,14 @@ def scored(
     shown = np.array([i for i, one in enumerate(taken.seen) if any(stands_out(row, noise) for row in one.rows)], int)
     truth = normalise(taken.parameters[shown])[:, : len(UNKNOWNS)]
 
-    def one(place: int) -> GivenAnswer:
-        return given_answer(answers, model, critical, taken.seen[shown[place]])
+    def one(place: int) -> CheckedAnswer:
+        return checked_answer(answers, model, critical, taken.seen[shown[place]])
 
     found = in_parallel(one, len(shown), jobs)
     return ScoredPresses(
         evaluated(truth, [one.answer for one in found]),
         np.array([one.answer.misfit_ratio for one in found]),
-        np.array([one.is_given for one in found], bool),
+        np.array([not one.is_refused for one in found], bool),
         shown,
     )
 

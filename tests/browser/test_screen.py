@@ -156,7 +156,7 @@ def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     Size and depth cannot be surer than 0.8 mm, the size is that sure in four inclusions of five, and the modulus is not
     known by the first press.
     """
-    reachable = {"size_mm": 0.8, "depth_mm": 0.8, "youngs_modulus_kpa": 9.0}
+    reachable = {"size_mm": 0.503, "depth_mm": 0.4, "youngs_modulus_kpa": 9.0}
     errors = {"size_mm": 2.0, "depth_mm": 2.2, "youngs_modulus_kpa": 19.0}
     widths = {"size_mm": (0.8,) * 16 + (5.2,) * 3, "depth_mm": (0.8,) * 19, "youngs_modulus_kpa": (9.0,) * 19}
     worth = {"precise": ModeWorth(0.4, 0.9, errors, {}, reachable, {5: widths})}
@@ -289,7 +289,7 @@ def test_the_operator_scans_reads_how_sure_it_is_after_each_press_and_says_when_
     expect(page.locator("#until")).to_be_hidden()
     page.locator("#modes label").filter(has_text="precise").click()
     steps = page.locator("#until label")
-    expect(steps).to_have_text(["possible", "± 1 mm8 of 10", "± 0.5 mm0.80 at best", "± 0.2 mm"])
+    expect(steps).to_have_text(["possible", "± 1 mm8 of 10", "± 0.5 mm0.51 at best", "± 0.2 mm"])
     expect(steps.nth(2).locator("input")).to_be_disabled()
     expect(steps.nth(3).locator("input")).to_be_disabled()
     expect(page.locator("#status-reason")).to_have_text(

@@ -4,7 +4,7 @@ The time of a press is that of one of those that make a measurement, from when i
 to the answer, from the last frame until it is kept, is measured by the presses themselves: nothing else has frames to
 answer, and only they count the disk. A mode that was not pressed yet is expected to be as much slower than its model
 card says as the longest one that was; before the first press, to take what the card says. Errors are the card's,
-measured on simulated presses: docs/modes.md.
+measured on simulated presses (docs/modes.md) or on those that commissioning believes in (docs/own_probe.md).
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from device.measurement.ramp_modes.noise import FURTHER, PressNoise, as_one_row
 from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 
 TOLERANCE, STEPS = 1e-6, 100
-"""A fit ends when a step lowers its cost by so little of it.
+"""A fit ends when a step lowers its cost by so little of it, or raises it where no more was foretold to be gained.
 
 Further steps, nearly half of all, move answers by less than the posterior's samples scatter.
 """

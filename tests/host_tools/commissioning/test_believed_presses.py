@@ -8,6 +8,8 @@ import pytest
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.parameters import denormalise, normalise_unknowns
+from device.measurement.ramp_modes.estimate import stands_out
+from device.measurement.ramp_modes.model import CriticalValues
 from device.measurement.ramp_modes.surrogate import TISSUE
 from host_tools.commissioning.believed_presses import (
     BelievedAnswers,
@@ -32,16 +34,16 @@ def derivatives():
     return load_derivatives(SIMULATED_PROBE)
 
 
-def answers(ramps, is_given):
+def answers(ramps, is_answered):
     """Inclusions of 10 mm, 5 mm deep, of 80 kPa, the first read 10 % too large, the second 20 %, the third 40 %."""
     truth = normalise_unknowns(np.tile([10.0, 5.0, 80.0], (3, 1)))
     mean = normalise_unknowns(np.array([[11.0, 5.0, 80.0], [12.0, 5.0, 80.0], [14.0, 5.0, 80.0]]))
     known = np.array([[True, True, False], [True, True, True], [True, False, False]])
     evaluated = EvaluatedPresses(truth, mean, mean - 0.1, mean + 0.1, known)
-    return BelievedAnswers(evaluated, np.array(ramps), np.array(is_given), np.array([0.1, 0.2, 0.9]))
+    return BelievedAnswers(evaluated, np.array(ramps), np.array(is_answered), np.array([0.1, 0.2, 0.9]))
 
 
-def test_errors_and_shares_are_of_what_is_given():
+def test_errors_and_shares_are_of_what_has_numbers():
     dial = believed_dial("standard", answers([1, 1, 1], [True, True, False]))
     assert (dial["presses"], dial["answered"], dial["frames"]) == (3, 2, 10)
     assert dial["median_percent"] == pytest.approx({"size_mm": 15.0, "depth_mm": 0.0, "youngs_modulus_kpa": 0.0})
@@ -54,10 +56,20 @@ def test_of_scans_those_of_the_fewest_ramps_count():
     assert (dial["presses"], dial["frames"], dial["compute_ms"]) == (2, 20, 150.0)
 
 
-def test_where_nothing_is_given_nothing_is_said():
+def test_where_nothing_has_numbers_nothing_is_said():
     nothing = answers([1, 1, 1], [False] * 3)
     assert believed_dial("standard", nothing) == {}
-    assert believed_dial("precise", replace(nothing, is_given=np.array([True] * 3))) == {}
+    assert believed_dial("precise", replace(nothing, is_answered=np.array([True] * 3))) == {}
+
+
+def test_what_does_not_stand_out_from_the_probes_own_noise_has_no_numbers(model, derivatives):
+    """No limit refuses anything here; of the same presses fewer stand out from a smooth error ten times as large."""
+    answers, nothing = tolerant(Design(model.answers, derivatives)), CriticalValues(*[np.inf] * 4)
+    seen, _ = believed_presses(answers, 12, 3)
+    stand_out = [stands_out(one.rows[0], answers.noise) for one in seen]
+    found = believed_answers(answers, model, nothing, 12, 3, jobs=1)
+    assert found.is_answered.tolist() == stand_out
+    assert 0 < sum(stand_out) < 12
 
 
 @pytest.mark.long
@@ -79,7 +91,7 @@ def test_presses_that_are_drawn_from_what_is_believed_are_explained_in_stiff_tis
 def test_scans_that_are_drawn_from_what_is_believed_are_covered(model, derivatives):
     """Of two to five presses, within what chance does; with a `SCAN_VARIANCE` of 1 only 77 % of determined sizes are.
 
-    Of 200 scans with this seed 90 % of sizes, 85 % of depths and 88 % of regions are.
+    Of these 120 scans 91 % of sizes, 83 % of depths and 89 % of regions are, of another 200 90, 85 and 88 %.
     """
     answers = tolerant(Design(model.answers, derivatives))
     found = believed_answers(answers, model, model.critical["precise"], 120, 5, jobs=-1, are_scans=True).evaluated

@@ -34,8 +34,8 @@ from device.measurement.ramp_modes.surrogate import OFFSET, ScanSurrogate
 LOOKED_AGAIN = 2
 """How often what the probe changes is taken anew, where the fit has come to."""
 ROUGHLY, WELL = 1e-4, 1e-5
-"""By which part of the cost, of 200 to 900, a step has to lower it: before what the probe changes is taken anew, and at
-last. A cost of 1 moves an unknown by its spread."""
+"""By which part of the cost, of 200 to 900, a step has to lower it: where what the probe changes is taken anew, and
+where fits are compared. A cost of 1 moves an unknown by its spread. Where it is sampled, the fit goes on."""
 COARSER_SKINS = 1.6, 2.5, 3.7
 """Textures of skin over the believed one, of 0.3 % mostly, that are weighed for presses that it explains badly."""
 BADLY_EXPLAINED = 1.0
@@ -45,7 +45,10 @@ BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 
 
 class _Settled(NamedTuple):
-    """A posterior that is linear about where its fit comes to, the best fit [8 + 2 N], and the skin that it is on."""
+    """A posterior that is linear near its best fit [8 + 2 N], that fit, and the skin that it is on.
+
+    On coarser skin it is linear about the best fit on the skin before: fits on both lie near each other.
+    """
 
     posterior: OwnPosterior
     best: Array

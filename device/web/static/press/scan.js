@@ -18,8 +18,12 @@ export const isScan = ({ most_ramps: most }) => most > 1;
 
 const offerOf = (mode) => offers.find((offer) => offer.mode === mode && isScan(offer));
 
-/** A half width with the digits that tell it from another: 0.45, 1.2, 14. */
-const width = (halfWidth) => figure(halfWidth, halfWidth < 0.995 ? 2 : halfWidth < 9.95 ? 1 : 0);
+/** The digits that tell a half width from another, and a half width with them: 0.45, 1.2, 14. */
+const digits = (halfWidth) => (halfWidth < 0.995 ? 2 : halfWidth < 9.95 ? 1 : 0);
+const width = (halfWidth) => figure(halfWidth, digits(halfWidth));
+
+/** A half width that can be had, rounded up: what is named is not refused. */
+const atLeast = (halfWidth) => width(Math.ceil(halfWidth * 10 ** digits(halfWidth)) / 10 ** digits(halfWidth));
 
 /** How sure a scan can be at best (mm), as far as the probe knows; only the sizes in mm are asked for here. */
 const nearest = ({ reachable_half_width: reachable }) => Math.max(...ASKED.map((key) => reachable?.[key] ?? 0));
@@ -50,7 +54,7 @@ function steps(offer) {
   const best = nearest(offer);
   const tooSure = STEPS_MM.find((step) => step < best);
   return STEPS_MM.map((step) => {
-    if (step < best) return choice(step, false, step === tooSure ? say("until.nearest", { mm: width(best) }) : "");
+    if (step < best) return choice(step, false, step === tooSure ? say("until.nearest", { mm: atLeast(best) }) : "");
     const ofTen = reachedOfTen(offer, step);
     return choice(step, true, ofTen === null ? "" : say("until.of_ten", { n: ofTen }));
   });

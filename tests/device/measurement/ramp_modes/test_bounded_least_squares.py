@@ -89,6 +89,19 @@ def test_the_cost_never_rises_and_the_steps_are_counted():
     assert cost[-1] < 1e-12
 
 
+def test_where_no_step_is_foretold_to_gain_none_is_tried_again():
+    """At its best a problem ends with the first step that rounding lets raise the cost, without ever smaller ones."""
+    calls = []
+
+    def residuals(at, which):
+        calls.append(len(at))
+        level = np.full_like(at, 1 + 1e-9 * (len(calls) > 1))
+        return np.concatenate([level, at], axis=1), np.array([[[0.0], [1.0]]])
+
+    least_squares(residuals, np.full((1, 1), 1e-6), -1, 1, tolerance=1e-6, steps=50)
+    assert calls == [1, 1]
+
+
 def test_a_start_outside_the_bounds_is_brought_inside():
     found = least_squares(rosenbrock, np.array([[5.0, -7.0]]), -2, 2, tolerance=0.0, steps=0)
     np.testing.assert_array_equal(found, [[2.0, -2.0]])

@@ -149,7 +149,7 @@ def test_turning_to_the_bright_side_keeps_what_is_seen(ramp_model):
     assert once.direction_rad[0] == pytest.approx(1.4)
 
 
-@pytest.mark.parametrize("presses", [1, 2])
+@pytest.mark.parametrize("presses", [1, 2, 3])
 def test_derivatives_of_the_posterior_are_its_differences(derivatives, ramp_model, presses):
     """But for what the direction itself changes of the light, which is left out of them."""
     rng = np.random.default_rng(3)
