@@ -59,7 +59,8 @@ def robustness(
     scheduler: Scheduler = None,
 ) -> None:
     """Measure how presses of probes that somebody built are answered, before and after commissioning: of random
-    tolerances, of other optics, with one thing at a time, and with what no test notices; and what a refusal names.
+    tolerances, of other optics, with one thing at a time, with what no test notices, and on skins that are solved anew;
+    and what a refusal names.
 
     Half an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
     """
@@ -73,6 +74,7 @@ def robustness(
     from host_tools.scores.one_thing.one_at_a_time import one_at_a_time_chapter
     from host_tools.scores.one_thing.press_answers import DesignToTry
     from host_tools.scores.one_thing.silent_errors import silent_errors_chapter
+    from host_tools.scores.one_thing.solved_skins import solved_skins_chapter
     from host_tools.scores.robustness import PRESSES, other_optics_chapter, robustness_chapter
 
     require("probes", probes, Bound(1, 99, "probes"), "ask for at least one")
@@ -92,6 +94,7 @@ def robustness(
         ),
         "one at a time": lambda: one_at_a_time_chapter(design, stated, presses=presses or OF_EACH, seed=seed),
         "silent errors": lambda: silent_errors_chapter(design, presses=presses or OF_EACH, seed=seed),
+        "skins": lambda: solved_skins_chapter(design, seed=seed),
         "named": lambda: named_blocks_chapter(design, seed=seed),
     }
     with workers(scheduler):

@@ -1,7 +1,7 @@
 """What each thing alone costs in which a probe or its presses differ from what the models believe, in every mode.
 
 Modules in reading order: `causes`, `tried_presses`, `press_answers`, `cost_figure`, `one_at_a_time`, `silent_errors`,
-`named_blocks`, `other_tissue`.
+`solved_skins`, `named_blocks`, `other_tissue`.
 
 All is simulated; worlds of everything at once are in `foreign_probes`, beside this room.
 """

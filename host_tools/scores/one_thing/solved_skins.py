@@ -1,0 +1,159 @@
+"""Skin of other thickness than the tables know, solved anew: what answers are worth there.
+
+The virtual probe has skin of 1.5 mm, and so have all who learn from it. Here each press has the tables' face and what
+a skin adds to it: the difference of two finite-element solutions of its scene, with the skin and with tissue in its
+place. The error of the mesh is in both and drops out, and nothing that a model knows has told the skin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from device.measurement.arrays import Array
+from device.measurement.quantities import UNKNOWNS, Inclusion
+from device.measurement.ramp_modes.radial_profile import SeenPresses
+from device.measurement.ramp_modes.surrogate import OFFSET
+from device.simulation.physics.slab import Slab
+from device.simulation.physics.slab_changes import resampling
+from device.simulation.physics.surface_table import PressRamps
+from device.simulation.physics.world import AS_BELIEVED
+from host_tools.forward.press_model import PressFailed
+from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
+from host_tools.press_models.press_samples import PressedScene, draw_parameters
+from host_tools.press_models.recorded_presses import in_parallel
+from host_tools.press_models.seeds import derived_seed
+from host_tools.probe_tables.force_ramps import CHANGES, bare_per_n, per_n, ramp, scene_in
+from host_tools.probe_tables.slab_changes import SLAB_FORCES_N
+from host_tools.scenes.scene import Scene, TissueLayer
+from host_tools.scores.foreign_presses import OF_PATIENTS, ForeignPresses, seen_presses
+from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry, with_tolerances
+from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, scored
+
+
+class SolvedSkin(NamedTuple):
+    """A skin: its thickness (mm), and its modulus over that of the tissue below."""
+
+    thickness_mm: float
+    modulus_ratio: float
+
+    @property
+    def words(self) -> str:
+        """As a row of a table names it."""
+        return f"{self.thickness_mm:g} mm, {self.modulus_ratio:g} times"
+
+
+SKINS = SolvedSkin(1.0, 3.0), SolvedSkin(2.0, 2.0), SolvedSkin(2.0, 4.0)
+PRESSES = 24
+COVERED_AT_LEAST = 0.86
+ON_AXIS_MM = 0.1
+"""Presses are on the middle: scenes are axisymmetric, and no table of inclusions aside is asked."""
+REACHES = SLAB_FORCES_N, SLAB_FORCES_N[:-1]
+"""Forces that are solved; soft tissue does not bear the last."""
+
+
+def solved_skins_chapter(
+    design: DesignToTry,
+    *,
+    presses: int = PRESSES,
+    skins: Sequence[SolvedSkin] = SKINS,
+    seed: int = 1,
+    jobs: int = -1,
+) -> Chapter:
+    """Return how presses on each skin are answered by a probe that allows for tolerances; minutes."""
+    own, parameters = with_tolerances(design, seed), _on_axis(presses, derived_seed(seed, "solved skins"))
+    seen_on = partial(pressed_on_skins, design, skins=skins)
+    pressed = in_parallel(lambda i: seen_on(parameters[i], seed=[seed, i]), presses, jobs)
+    solved = [number for number, on_skins in enumerate(pressed) if on_skins]
+    found = {
+        skin: scored(
+            own.answers,
+            design.model,
+            own.critical,
+            ForeignPresses(parameters[solved], [pressed[number][place] for number in solved]),
+            jobs,
+        )
+        for place, skin in enumerate(skins)
+    }
+    return Chapter(
+        title="Skins solved anew",
+        claim=f"{len(solved)} random presses on the middle of an inclusion, in mode standard.",
+        source="host_tools/scores/one_thing/solved_skins.py; host_tools/probe_tables/force_ramps.py",
+        benchmarks=tuple(one for skin in skins for one in _benchmarks(skin, found[skin])),
+        tables=(
+            Table(
+                "Skin, its modulus over that of the tissue below",
+                ("skin", "answered by", *FIGURES),
+                tuple((skin.words, TOLERANT, *figures_of(of_one)) for skin, of_one in found.items()),
+            ),
+        ),
+        facts={"presses": len(solved), "asked": presses},
+    )
+
+
+def _on_axis(count: int, seed: int) -> Array:
+    parameters = draw_parameters(count, np.random.default_rng(seed), ranges=OF_PATIENTS)
+    parameters[:, OFFSET] = ON_AXIS_MM
+    return parameters
+
+
+def pressed_on_skins(
+    design: DesignToTry, parameters: Array, *, skins: Sequence[SolvedSkin], seed: Sequence[int]
+) -> list[SeenPresses]:
+    """Return what is seen of a press with parameters [9] on each skin, with one draw of noise; [] where no solver
+    reaches its forces."""
+    slab, inclusion = Slab(*map(float, parameters[3:5])), Inclusion(*map(float, parameters[:3]))
+    as_tabled = design.tables.ramps(inclusion, slab, AS_BELIEVED)
+    try:
+        on_skins = [with_skin(as_tabled, slab, inclusion, skin) for skin in skins]
+    except PressFailed:
+        return []
+    direction_rad, noise = np.random.default_rng(seed).uniform(0, 2 * np.pi, 1), design.model.answers.noise
+    pressed = [PressedScene(design.tables, ramps).press(parameters, float(direction_rad[0])) for ramps in on_skins]
+    return [seen_presses([one], direction_rad, noise, np.random.default_rng([*seed, 1])) for one in pressed]
+
+
+def with_skin(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: SolvedSkin) -> PressRamps:
+    """Return how the face deforms on a skin: as tabled, and by what two solutions differ.
+
+    Raises `PressFailed` where the forces cannot be reached.
+    """
+    try:
+        return _changed(as_tabled, slab, inclusion, skin, REACHES[0])
+    except PressFailed:
+        return _changed(as_tabled, slab, inclusion, skin, REACHES[1])
+
+
+def _changed(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: SolvedSkin, forces_n: Array) -> PressRamps:
+    baseline, field = as_tabled.baseline, as_tabled.inclusion_field
+    without, of_skin = skin._replace(modulus_ratio=1.0), skin
+    bare = [bare_per_n(scene_on(one, slab), forces_n, CHANGES) for one in (without, of_skin)]
+    added = [per_n(ramp(scene_on(one, slab, inclusion), forces_n, CHANGES), forces_n)[1] for one in (without, of_skin)]
+    to_table = resampling(forces_n, baseline.force_n)
+
+    def moved(pair: Sequence[Array]) -> Array:
+        return np.asarray(np.einsum("gf,xfr->xgr", to_table, pair[1] - pair[0]))
+
+    return as_tabled._replace(
+        baseline=replace(baseline, fields_per_n=baseline.fields_per_n + moved(bare)),
+        inclusion_field=replace(field, fields_per_n=field.fields_per_n + moved(added)),
+    )
+
+
+def scene_on(skin: SolvedSkin, slab: Slab, inclusion: Inclusion | None = None) -> Scene:
+    """Return the scene of a slab whose uppermost layer is a skin."""
+    scene = scene_in(slab, inclusion)
+    layer = TissueLayer("skin", skin.thickness_mm, slab.youngs_modulus_kpa * skin.modulus_ratio)
+    return replace(scene, tissue=replace(scene.tissue, layers=(layer,)))
+
+
+def _benchmarks(skin: SolvedSkin, found: ScoredPresses) -> list[Benchmark]:
+    """Return how often intervals hold of what is answered."""
+    if not found.is_answered.any():
+        return []
+    shares = zip(UNKNOWNS[:2], found.covered().mean(axis=0), strict=True)
+    return [at_least(skin.words, f"{name} covered", float(share), COVERED_AT_LEAST) for name, share in shares]

@@ -1,0 +1,57 @@
+"""A skin that is solved anew: the scene it is of, what it changes of a face, and a chapter of few presses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from device.files.bundle_file import read_quick_model, read_ramp_model
+from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.quantities import Inclusion
+from device.simulation.physics.layer_table import LayerRatios
+from device.simulation.physics.slab import Slab
+from device.simulation.physics.world import World
+from host_tools.press_models.press_derivatives import load_derivatives
+from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry
+from host_tools.scores.one_thing.solved_skins import SolvedSkin, scene_on, solved_skins_chapter, with_skin
+
+SLAB, INCLUSION = Slab(6.0, 32.0), Inclusion(11.0, 6.0, 90.0)
+
+
+def test_a_skin_is_the_tissues_uppermost_layer():
+    (layer,) = scene_on(SolvedSkin(2.0, 3.0), SLAB, INCLUSION).tissue.layers
+    assert (layer.thickness_mm, layer.youngs_modulus_kpa) == (2.0, 18.0)
+    assert SolvedSkin(2.0, 3.0).words == "2 mm, 3 times"
+
+
+@pytest.mark.long
+def test_skin_like_the_tissue_changes_nothing_and_that_of_the_tables_is_as_tabled(tables):
+    """The tables' own skin was solved in other scenes: both miss the mesh's error and what lies between slabs."""
+    as_tabled = tables.ramps(INCLUSION, SLAB, World())
+    alike = with_skin(as_tabled, SLAB, INCLUSION, SolvedSkin(1.5, 1.0))
+    assert np.array_equal(alike.baseline.fields_per_n, as_tabled.baseline.fields_per_n)
+    anew = with_skin(as_tabled, SLAB, INCLUSION, SolvedSkin(1.5, 2.0))
+    tabled = tables.ramps(INCLUSION, SLAB, World(layers=replace(LayerRatios(), skin_modulus_ratio=2.0)))
+    for one, other, before in zip(
+        *((of.baseline, of.inclusion_field) for of in (anew, tabled, as_tabled)), strict=True
+    ):
+        changed = other.fields_per_n[0] - before.fields_per_n[0]
+        missed = one.fields_per_n[0] - other.fields_per_n[0]
+        assert np.linalg.norm(missed) < 0.25 * np.linalg.norm(changed)
+
+
+@pytest.mark.long
+def test_a_few_presses_become_a_table(tables):
+    design = DesignToTry(
+        read_ramp_model(MODELS / "standard"),
+        read_quick_model(MODELS / "quick"),
+        load_derivatives(SIMULATED_PROBE),
+        tables,
+    )
+    skins = SolvedSkin(1.0, 2.0), SolvedSkin(1.0, 60.0)
+    chapter = solved_skins_chapter(design, presses=3, skins=skins, seed=2, jobs=1)
+    (table,) = chapter.tables
+    assert [row[:2] for row in table.rows] == [("1 mm, 2 times", TOLERANT), ("1 mm, 60 times", TOLERANT)]
+    assert int(table.rows[0][3]) > 0
+    assert int(table.rows[1][3]) == 0  # no skin is so stiff: what is believed does not reach there
+    assert {one.case for one in chapter.benchmarks} == {"1 mm, 2 times"}
