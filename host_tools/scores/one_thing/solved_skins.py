@@ -131,7 +131,7 @@ def with_skin(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: Sol
 def _changed(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: SolvedSkin, forces_n: Array) -> PressRamps:
     baseline, field = as_tabled.baseline, as_tabled.inclusion_field
     without, of_skin = skin._replace(modulus_ratio=1.0), skin
-    bare = [bare_per_n(scene_on(one, slab), forces_n, CHANGES) for one in (without, of_skin)]
+    of_baseline = [bare_per_n(scene_on(one, slab), forces_n, CHANGES) for one in (without, of_skin)]
     added = [per_n(ramp(scene_on(one, slab, inclusion), forces_n, CHANGES), forces_n)[1] for one in (without, of_skin)]
     to_table = resampling(forces_n, baseline.force_n)
 
@@ -139,7 +139,7 @@ def _changed(as_tabled: PressRamps, slab: Slab, inclusion: Inclusion, skin: Solv
         return np.asarray(np.einsum("gf,xfr->xgr", to_table, pair[1] - pair[0]))
 
     return as_tabled._replace(
-        baseline=replace(baseline, fields_per_n=baseline.fields_per_n + moved(bare)),
+        baseline=replace(baseline, fields_per_n=baseline.fields_per_n + moved(of_baseline)),
         inclusion_field=replace(field, fields_per_n=field.fields_per_n + moved(added)),
     )
 
