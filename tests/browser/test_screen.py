@@ -153,8 +153,8 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
 def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     """To be asked for before the probe: each further press on the lesion makes the intervals narrower.
 
-    Size and depth cannot be surer than 0.8 mm, the size is that sure in four inclusions of five, and the modulus is not
-    known by the first press.
+    No size can be surer than 0.503 mm and no depth than 0.4 mm, the size is surer than 1 mm in four inclusions of five,
+    and the modulus is not known by the first press.
     """
     reachable = {"size_mm": 0.503, "depth_mm": 0.4, "youngs_modulus_kpa": 9.0}
     errors = {"size_mm": 2.0, "depth_mm": 2.2, "youngs_modulus_kpa": 19.0}

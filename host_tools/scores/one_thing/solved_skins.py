@@ -91,7 +91,7 @@ def solved_skins_chapter(
                 tuple((skin.words, TOLERANT, *figures_of(of_one)) for skin, of_one in found.items()),
             ),
         ),
-        facts={"presses": len(solved), "asked": presses},
+        facts={"presses": len(solved)},
     )
 
 

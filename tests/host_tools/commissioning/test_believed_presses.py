@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from device.files.bundle_file import read_ramp_model
-from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.parameters import denormalise, normalise_unknowns
 from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues
@@ -20,18 +18,7 @@ from host_tools.commissioning.believed_presses import (
 from host_tools.commissioning.joint_fit import Design
 from host_tools.commissioning.left_out import answer_to_seen
 from host_tools.press_models.mode_outcome import EvaluatedPresses
-from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scores.scored_presses import tolerant
-
-
-@pytest.fixture(scope="module")
-def model():
-    return read_ramp_model(MODELS / "standard")
-
-
-@pytest.fixture(scope="module")
-def derivatives():
-    return load_derivatives(SIMULATED_PROBE)
 
 
 def answers(ramps, is_answered):

@@ -47,7 +47,6 @@ from host_tools.commissioning.page import PAGE_FILE
 from host_tools.commissioning.phantom_ramps import phantom_ramps
 from host_tools.commissioning.probe_prior import LAYERS, OF_DESIGN, ProbePrior
 from host_tools.commissioning.report import SILICONE, phantom_lines, probe_lines
-from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scores.foreign_presses import foreign_phantoms
@@ -55,16 +54,6 @@ from host_tools.scores.foreign_presses import foreign_phantoms
 EXPONENT = NAMES[PROBE[0]], 0
 RAMP_N = tuple(np.linspace(0.1, 0.64, 8))
 FOREIGN = World(contact=ContactLaw(exponent=0.9), layers=LayerRatios(face_modulus_ratio=1.1))
-
-
-@pytest.fixture(scope="module")
-def model():
-    return read_ramp_model(MODELS / "standard")
-
-
-@pytest.fixture(scope="module")
-def derivatives():
-    return load_derivatives(SIMULATED_PROBE)
 
 
 @pytest.fixture(scope="module")
