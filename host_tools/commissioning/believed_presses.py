@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -23,7 +22,6 @@ from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.commissioned.own_probe import Place, turned_columns
-from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET
@@ -99,7 +97,7 @@ def believed_answers(
     return BelievedAnswers(
         evaluated(truth[:, : len(UNKNOWNS)], [one.found.answer for one in found]),
         np.array([len(one.rows) for one in seen], np.intp),
-        np.array([not one.found.is_refused for one in found], bool) & _stand_out(seen, answers),
+        np.array([one.found.has_numbers for one in found], bool),
         np.array([one.seconds for one in found]),
     )
 
@@ -107,11 +105,6 @@ def believed_answers(
 class _TimedAnswer(NamedTuple):
     found: CheckedAnswer
     seconds: float
-
-
-def _stand_out(seen: Sequence[SeenPresses], answers: OwnAnswers) -> NDArray[np.bool_]:
-    """Return in which presses or scans [n] something stands out from the probe's noise."""
-    return np.array([any(stands_out(row, answers.noise) for row in one.rows) for one in seen], bool)
 
 
 def believed_dial(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:

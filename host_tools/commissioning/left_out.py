@@ -13,7 +13,7 @@ from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
-from device.measurement.ramp_modes.estimate import rejections
+from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
 from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
 from device.measurement.ramp_modes.radial_profile import SeenPresses
@@ -83,10 +83,19 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
 
 
 class CheckedAnswer(NamedTuple):
-    """An answer to one press or scan, and whether a limit refuses it."""
+    """An answer to one press or scan, whether a limit refuses it, and whether anything stands out from the noise.
+
+    The noise is that of whoever answers: a probe that believes in more of it says sooner that nothing stands out.
+    """
 
     answer: RampAnswer
     is_refused: bool
+    stands_out: bool
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether the probe shows numbers: as on its screen, a faint press has none either."""
+        return self.stands_out and not self.is_refused
 
 
 def checked_answer(
@@ -95,7 +104,8 @@ def checked_answer(
     """Return the answer to what was read of a press or scan; `critical` says what is refused."""
     answer = answer_to_seen(answers, model.first_guesses, seen)
     found = found_values(answer, seen, answers, model.ranges.log_odds)
-    return CheckedAnswer(answer, bool(rejections(found, critical)))
+    shown = any(stands_out(row, answers.noise) for row in seen.rows)
+    return CheckedAnswer(answer, bool(rejections(found, critical)), shown)
 
 
 def answer_to_seen(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:

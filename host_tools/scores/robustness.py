@@ -253,7 +253,7 @@ def _chapter(
         facts={
             "probes": len(trials),
             "presses": [len(one.scores[COMMISSIONED].is_answered) for one in trials],
-            "refused_as_it_ships": round(1 - float(_whole(trials, SHIPPED).is_answered.mean()), 3),
+            "refused_as_it_ships": round(1 - _whole(trials, SHIPPED).share_answered(), 3),
             "groups": {group: _facts(of_one) for group, of_one in pressed.items()},
         },
     )

@@ -1,8 +1,8 @@
 """Answers to presses beside their truths, and the figures that say how good they are.
 
-Only presses in which something stands out count: where nothing does, every mode says so and gives no numbers. It is by
-the design's noise for all who answer, so that they answer the same ones; a commissioned probe believes in more noise,
-and says of some of these that nothing stands out, which count as answered here.
+Where nothing stands out from noise, every mode says so and gives no numbers. Presses in which nothing does by the
+design's noise are left out for all who answer, so that they answer the same ones. A commissioned probe believes in more
+noise: what it says of faint ones is no answer, and counts as none where it is held against a probe known exactly.
 """
 
 from __future__ import annotations
@@ -40,21 +40,28 @@ FIGURES = (
 )  # fmt: skip
 """An unknown that is not determined has its whole range as an interval, which covers; so those determined stand apart.
 
-"Both covered" is the rectangle of the two intervals; the joint region is that of `joint_region`.
+Of those that stand out by the noise of who answers: "answered", and "refused", their share that is not. "Both covered"
+is the rectangle of the two intervals; the joint region is that of `joint_region`.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredPresses:
-    """Answers to presses in which something stands out: in coordinates, misfit [n], and which are not refused [n].
+    """Answers to presses in which something stands out by the design's noise: in coordinates, and misfit [n].
 
-    `number` [n]: which of the presses that were taken.
+    `stands_out` [n]: where something does so by the noise of who answers. `is_answered` [n]: which of these are not
+    refused. `number` [n]: which of the presses that were taken.
     """
 
     evaluated: EvaluatedPresses
     misfit_ratio: Array
+    stands_out: NDArray[np.bool_]
     is_answered: NDArray[np.bool_]
     number: NDArray[np.intp]
+
+    def share_answered(self) -> float:
+        """Return the share answered of what stands out to who answers; NaN where nothing does."""
+        return float(self.is_answered[self.stands_out].mean()) if self.stands_out.any() else np.nan
 
     def error_mm(self) -> Array:
         """Return errors of size and depth [n, 2] of what is answered (mm)."""
@@ -105,7 +112,8 @@ def scored(
     return ScoredPresses(
         evaluated(truth, [one.answer for one in found]),
         np.array([one.answer.misfit_ratio for one in found]),
-        np.array([not one.is_refused for one in found], bool),
+        np.array([one.stands_out for one in found], bool),
+        np.array([one.has_numbers for one in found], bool),
         shown,
     )
 
@@ -135,7 +143,7 @@ def paired(found: ScoredPresses, others: ScoredPresses) -> tuple[ScoredPresses, 
 
 def figures_of(found: ScoredPresses) -> tuple[str, ...]:
     """Return the cells under `FIGURES`, empty where nothing is answered."""
-    shown, answered = len(found.is_answered), int(found.is_answered.sum())
+    shown, answered = int(found.stands_out.sum()), int(found.is_answered.sum())
     if not shown:
         return ("0", *[""] * (len(FIGURES) - 1))
     misfit = "" if np.isnan(found.misfit_ratio).all() else f"{np.median(found.misfit_ratio):.2f}"

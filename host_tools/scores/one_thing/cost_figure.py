@@ -45,7 +45,7 @@ def cost_figure(
 
 def _values(found: ScoredPresses) -> tuple[float, float, float, float]:
     """Return what the panels show of presses; nothing where none is answered."""
-    answered = 100 * float(found.is_answered.mean())
+    answered = 100 * found.share_answered()
     if not answered:
         return np.nan, np.nan, np.nan, answered
     size_mm, depth_mm = map(float, np.sqrt((found.error_mm() ** 2).mean(axis=0)))

@@ -116,8 +116,8 @@ def named_blocks_chapter(
 
 
 def named_in(seen: Sequence[SeenPresses], by: Answering, design: DesignToTry, jobs: int) -> NamedBlocks:
-    """Return what is named of the presses in which something stands out."""
-    shown = [one for one in seen if stands_out(one.rows[0], design.model.answers.noise)]
+    """Return what is named of the presses in which something stands out to who answers."""
+    shown = [one for one in seen if stands_out(one.rows[0], by.answers.noise)]
     guess = design.model.first_guesses
     found = in_parallel(lambda number: answer_to_seen(by.answers, guess, shown[number]), len(shown), jobs)
     departures = [by.answers.departure(*pair) for pair in zip(shown, found, strict=True)]
@@ -168,7 +168,7 @@ def _answered(scores: Mapping[tuple[str, str], ScoredPresses]) -> Table:
 def _facts(found: ScoredPresses) -> dict[str, float | None]:
     """Return the shares of presses that are answered, and of these of sizes that are covered."""
     covered = float(found.covered()[:, 0].mean()) if found.is_answered.any() else None
-    return {"answered": float(found.is_answered.mean()), "size_covered": covered}
+    return {"answered": found.share_answered(), "size_covered": covered}
 
 
 def _cells(found: NamedBlocks, block: RowBlock | None) -> tuple[str, ...]:

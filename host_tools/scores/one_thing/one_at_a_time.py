@@ -127,7 +127,7 @@ def _of_row(mode: Mode, cause: Cause, found: ScoredPresses) -> list[Benchmark]:
     if mode == "quick" and not is_answered:
         return []
     covered = found.covered().mean(axis=0) if is_answered else np.full(2, np.nan)
-    shares = [] if mode == "quick" else [at_least(case, "answered", float(found.is_answered.mean()), ANSWERED)]
+    shares = [] if mode == "quick" else [at_least(case, "answered", found.share_answered(), ANSWERED)]
     names = zip(UNKNOWNS[:2], map(float, covered), strict=True)
     return [*shares, *(at_least(case, f"{name} covered", share, COVERED) for name, share in names)]
 
@@ -149,7 +149,7 @@ def holds(found: ScoredPresses, *, may_refuse: bool = False) -> bool:
 
     A mode that `may_refuse` needs to cover what it answers.
     """
-    count, answered = len(found.is_answered), int(found.is_answered.sum())
+    count, answered = int(found.stands_out.sum()), int(found.is_answered.sum())
     if not answered:
         return may_refuse
     covers = bool((found.covered().mean(axis=0) >= _but_for_chance(COVERED, answered)).all())

@@ -108,7 +108,8 @@ def quick_scores(parameters: Array, held: Sequence[QuickPress], model: QuickMode
         for number in shown
     ]
     nothing, number = np.full(len(shown), np.nan), np.array(shown, int)
-    return ScoredPresses(EvaluatedPresses(truth, mean, low, high, known), nothing, np.array(answered), number)
+    evaluated, all_stand_out = EvaluatedPresses(truth, mean, low, high, known), np.ones(len(shown), bool)
+    return ScoredPresses(evaluated, nothing, all_stand_out, np.array(answered, bool), number)
 
 
 def _shows(row: Array, model: QuickModel) -> bool:

@@ -205,7 +205,7 @@ def _facts(found: ScoredPresses) -> dict[str, float | list[float]]:
     """Return what is refused of presses, and how often sizes and depths of the others are covered."""
     covered = found.covered().mean(axis=0) if found.is_answered.any() else np.zeros(0)
     return {
-        "refused": round(1 - float(found.is_answered.mean()), 3),
+        "refused": round(1 - found.share_answered(), 3),
         "covered": [round(float(one), 3) for one in covered],
     }
 

@@ -8,6 +8,7 @@ from told_answers import scored_presses, told_presses
 
 from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.simulation.physics.world import AS_BELIEVED
 from host_tools.commissioning.joint_fit import Design
 from host_tools.press_models.press_derivatives import load_derivatives
@@ -56,6 +57,14 @@ def test_joint_regions_are_counted_of_what_is_answered():
     assert figures_of(of_quick)[FIGURES.index("joint region holds")] == ""
 
 
+def test_a_press_that_is_too_faint_for_who_answers_is_neither_answered_nor_refused():
+    found = told_presses(good=6, refused=2, faint=4)
+    assert (len(found.number), found.share_answered()) == (12, 0.75)
+    cells = dict(zip(FIGURES, figures_of(found), strict=True))
+    assert (cells["stand out"], cells["answered"], cells["refused"]) == ("8", "6", "25 %")
+    assert np.isnan(told_presses(good=0, faint=2).share_answered())
+
+
 def test_pairs_are_of_the_same_numbers_whatever_stands_out_beside_them():
     first = replace(scored_presses([(8.0, 6.0), (9.0, 6.0)], [(8.0, 6.0)] * 2), number=np.array([3, 5]))
     second = replace(scored_presses([(8.1, 6.0), (9.1, 6.0)], [(8.0, 6.0)] * 2), number=np.array([5, 4]))
@@ -74,6 +83,9 @@ def test_presses_are_scored_where_they_are_answered(tables):
     found = scored(known, model, critical, taken, 1)
     assert found.is_answered.sum() >= 3
     assert 0 <= found.region_holds() <= 1
+    levels = replace(known.noise.levels, model_ratio=1.0)
+    blind = OwnAnswers(known.surrogate, replace(known.noise, levels=levels), known.own)
+    assert not scored(blind, model, critical, taken.first(1), 1).stands_out.any()
     none = scored(known, model, replace(critical, misfit_ratio=0.0), taken, 1)
     assert np.isnan(none.region_holds())
     assert not none.is_answered.any()
