@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
+from math import inf, isfinite
 from typing import Any, Literal
 
 from host_tools.forward.accuracy import Level
@@ -100,10 +100,10 @@ class Climb:
             return _departs_by_more(self.tolerance, self.departure)
         if self.reached <= self.tolerance:
             return ""
-        return (
-            f"tolerance is {100 * self.tolerance:.3g} %, but {self.feature} is only good to {100 * self.reached:.3g} % "
-            f"({self.ended}): {self.advice}."
-        )
+        known = f"{self.feature} is only good to {100 * self.reached:.3g} %"
+        if not isfinite(self.reached):
+            known = "what this press errs is not known"
+        return f"tolerance is {100 * self.tolerance:.3g} %, but {known} ({self.ended}): {self.advice}."
 
 
 class ToleranceMissed(PressFailed):
@@ -142,7 +142,7 @@ def climb(
         try:
             found = rung.solved(level, told)
         except PressFailed as failed:
-            reached = rung.at_widest_rim(reached, failed)
+            reached = rung.at_widest_rim(reached, failed, level)
             break
         reached = min((one for one in (reached, found) if one), key=lambda one: one.reached)
         if found.reached <= aim:
@@ -230,25 +230,39 @@ class _Rung:
         feature, reached = max((worst_error(one) for one in solutions), key=lambda pair: pair[1])
         return Climb(solutions, self.tolerance, reached, feature, self.was_chosen)
 
-    def at_widest_rim(self, best: Climb | None, failed: PressFailed) -> Climb:
+    def at_widest_rim(self, best: Climb | None, failed: PressFailed, level: Level) -> Climb:
         """Return what is best where a rung gave way: its rim slips too far, and wider ones may still hold.
 
-        Raise the failure that got furthest where nothing can be had.
+        These are not told to make haste: the widest takes seconds, and is the last resort. Where one finds a press, and
+        not what it errs, that is infinite. Raise the failure that got furthest where nothing can be had.
         """
         furthest = failed
-        for level in self._wider(best):
+        for wider in self._wider(best):
             try:
-                found = self.solved(level, f"finer rims give way: {failed}")
+                found = self.solved(wider, f"finer rims give way: {failed}")
             except PressFailed as another:
-                furthest = max(furthest, another, key=lambda one: one.reached_mm)
+                if another.reached_mm > furthest.reached_mm:
+                    furthest, level = another, wider
                 break  # higher orders reach less far
             best = min((one for one in (best, found) if one), key=lambda one: one.reached)
             if best.reached <= self.tolerance:
                 break
-        if best is None:
-            raise furthest
-        ended = f"the next level gives way: {str(furthest).removesuffix('.')}"
-        return replace(best, ended=ended, advice=f"{best.advice} or press less")
+        if best:
+            ended = f"the next level gives way: {str(furthest).removesuffix('.')}"
+            return replace(best, ended=ended, advice=f"{best.advice} or press less")
+        if furthest.has_solution:
+            return self._of_unknown_error(level, str(furthest).removesuffix(": press less."))
+        raise furthest
+
+    def _of_unknown_error(self, level: Level, ended: str) -> Climb:
+        """Return presses at a level whose errors are not known: infinite, but for what was prescribed."""
+        plan = self._plan(level, "what it errs is not known")
+        prescribed = "force_n" if self.presses[0].force_n is not None else "indentation_mm"
+        solutions = solve_ramp(self.scene, self.presses, plan)
+        stated = dict.fromkeys(numbers(solutions[0].rays, solutions[0].pressed, solutions[0].baseline), inf)
+        unknown = tuple(replace(one, stated_error=stated | {prescribed: 0.0}) for one in solutions)
+        feature, reached = worst_error(unknown[-1])
+        return Climb(unknown, self.tolerance, reached, feature, self.was_chosen, ended, "press less")
 
     def _wider(self, best: Climb | None) -> list[Level]:
         """Return the levels of the widest rim that are left to try; none where a finer rim has an answer."""

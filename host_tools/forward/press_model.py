@@ -21,6 +21,8 @@ class PressFailed(RuntimeError):  # noqa: N818 - reads as what it says
 
     reached_mm = 0.0
     """The indentation that it got to, where a load path was followed."""
+    has_solution = False
+    """Whether the press itself was found, and only what it errs was not."""
 
 
 class Loaded(NamedTuple):

@@ -60,6 +60,16 @@ class PathEnded(PressFailed):
         return type(self), (self.asked, self.reached_mm, self.reached_n, self.why)
 
 
+class ErrorUnknown(PathEnded):
+    """A load that was reached, where a correction at the next order does not converge: what it errs is not known."""
+
+    has_solution = True
+
+    def __str__(self) -> str:
+        """Return what is not known, and what to do."""
+        return f"at {self.reached_mm:.4g} mm and {self.reached_n:.4g} N {self.asked} ({self.why}): press less."
+
+
 class EquilibriumPath:
     """Follows one contact, from the undeformed state on; it always stands in equilibrium at `indentation_mm`."""
 
@@ -116,6 +126,11 @@ class EquilibriumPath:
     def failed(self, asked: str, status: NewtonStatus) -> PathEnded:
         """Return the exception that says what was asked for, where the path stands and how Newton's method ended."""
         return PathEnded(asked, self.indentation_mm, self.force_n, f"Newton's method: {status}")
+
+    def without_error(self, order: int, status: NewtonStatus) -> ErrorUnknown:
+        """Return the exception that says where the path stands, and that it is not known what it errs there."""
+        asked = f"the press was found, but nothing near it at order {order}"
+        return ErrorUnknown(asked, self.indentation_mm, self.force_n, f"Newton's method: {status}")
 
     def _motion(self) -> tuple[Any, float]:
         """Return how all unknowns move per mm of the back, and the stiffness in N/mm."""

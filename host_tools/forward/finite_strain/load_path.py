@@ -114,7 +114,7 @@ class _Press:
         self.finer.copy_from(self.path.contact)
         descent = EnergyNewton(self.finer.fast_energy, self.finer.u, self.finer.free).descend(REFINING_ITERATIONS)
         if descent.status in (NewtonStatus.FOLDED, NewtonStatus.STALLED):
-            raise self.path.failed(f"its error at order {self.finer.order} is asked for", descent.status)
+            raise self.path.without_error(self.finer.order, descent.status)
         return face_state(self.finer, self.path.indentation_mm, self.sampler)
 
 

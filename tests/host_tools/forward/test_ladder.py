@@ -1,6 +1,7 @@
 """A tolerance that was asked for is held by what is stated, or it is said what was reached."""
 
 from dataclasses import replace
+from math import inf
 
 import pytest
 
@@ -57,7 +58,7 @@ def test_where_the_levels_are_used_up_or_give_way_more_time_is_no_advice(monkeyp
     assert climbed.missed.endswith("(no level holds more): allow a larger tolerance.")
     deep = Scene(SCENE.inclusion, Press(indentation_mm=1.0))
     rung = module._Rung(deep, [deep.press], climbed.solutions[0].plan, 1e-9)
-    gave_way = rung.at_widest_rim(climbed, PressFailed("the contact folded: press less."))
+    gave_way = rung.at_widest_rim(climbed, PressFailed("the contact folded: press less."), Level("graded", 3))
     assert gave_way.missed.endswith("the contact folded: press less): allow a larger tolerance or press less.")
 
 
@@ -118,6 +119,21 @@ def test_a_force_out_of_reach_is_refused_with_the_furthest_that_any_rim_reaches(
     deep = Scene(SCENE.inclusion, Press(force_n=2.0))
     with pytest.raises(PressFailed, match=r"only to 8\.87 mm"):
         climb(deep, [deep.press], tolerance=0.005, strain="finite")
+
+
+@pytest.mark.long
+def test_a_press_whose_error_nobody_finds_is_answered_when_the_best_is_asked_for_and_says_so():
+    """2 N of the default scene are reached on the widest rim alone, at order 2, and order 3 finds nothing near it."""
+    deep = Scene(SCENE.inclusion, Press(force_n=2.0))
+    climbed = climb(deep, [deep.press], tolerance=0.5, strain="finite")
+    assert climbed.solutions[0].force_n == pytest.approx(2.0)
+    stated = climbed.solutions[0].stated_error
+    assert {name for name, error in stated.items() if error == 0.0} == {"force_n"}
+    assert {error for name, error in stated.items() if name != "force_n"} == {inf}
+    assert climbed.missed.startswith("tolerance is 50 %, but what this press errs is not known (at 8.8")
+    assert climbed.missed.endswith("(Newton's method: stalled)): press less.")
+    with pytest.raises(ToleranceMissed, match=r"press less, or take the best as it is \(--best\)\.$"):
+        held(climbed, best=False)
 
 
 def test_finite_strain_is_taken_where_small_strain_departs_by_more_than_the_tolerance():
