@@ -24,6 +24,15 @@ def test_each_feature_states_three_times_its_own_error_or_its_step_and_half_of_t
     assert stated["indentation_mm"] == 0.0
 
 
+def test_what_small_strain_foretells_nothing_of_states_half_of_the_largest_unless_it_is_prescribed_or_zero():
+    """The area of a deep inclusion is all of the window in small strain, and less where finite strain lifts it."""
+    true = TRUE | {"deformation_area_mm2": 200.0, "total_deformation_mm3": 0.0}
+    same_mesh = true | {"force_n": 0.202}
+    stated = foretold_error(same_mesh, true, STEPS | {"deformation_area_mm2": 0.0, "total_deformation_mm3": 0.0})
+    assert stated["deformation_area_mm2"] == pytest.approx(0.015)
+    assert (stated["total_deformation_mm3"], stated["indentation_mm"]) == (0.0, 0.0)
+
+
 def test_under_a_force_the_integral_states_a_quarter_more():
     same_mesh = TRUE | {"indentation_mm": 1.01, "max_deformation_mm": 0.0201, "central_deformation_mm3": 3.09}
     stated = foretold_error(same_mesh, TRUE, STEPS | {"force_n": 0.0})
