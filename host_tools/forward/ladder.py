@@ -45,7 +45,7 @@ WIDEST_RIM = (Level("sliding_coarse", 2), Level("sliding_coarse", 3), Level("sli
 furthest: at 2 N of the default scene 8.9 mm, the next one 8.1 mm and the last one 6 mm."""
 FIRST_ORDERS = {0.01: 3, 1e-3: 4, 1e-4: 5, 0.0: 6}
 """By the tolerance from which on it is worth beginning there."""
-FIRST_SOLID = {0.04: 3, 0.005: 4, 0.001: 5, 0.0: 6}
+FIRST_SOLID = {0.025: 3, 0.005: 4, 0.001: 5, 0.0: 6}
 """The same in 3-D, whose lower orders state far more than they err: a rung that cannot hold costs half of the next."""
 FIRST_FINITE = {0.15: 0, 0.02: 1, 0.005: 2, 0.002: 3, 0.0: 4}
 """The same for the rungs of finite strain."""

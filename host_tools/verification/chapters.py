@@ -71,7 +71,7 @@ def effectivity_chapter() -> Chapter:
     """Return the chapter on stated against true errors; many minutes."""
     from host_tools.verification.effectivity import DEPARTED_SCENES, chapter_of, measure_effectivity
 
-    return chapter_of(measure_effectivity(departed_scenes=DEPARTED_SCENES))
+    return chapter_of(measure_effectivity(departed_scenes=DEPARTED_SCENES, jobs=-1))
 
 
 def tolerances_chapter(scenes: int | None = None, seed: int | None = None, keep: Path | None = None) -> Chapter:

@@ -17,7 +17,7 @@ from joblib import Parallel, delayed
 from device.measurement.quantities import Inclusion
 from host_tools.forward.accuracy import Level, prescribed
 from host_tools.forward.error_estimates.stated_error import numbers
-from host_tools.forward.ladder import FINITE_RUNGS, solved_at
+from host_tools.forward.ladder import DOMED_ORDERS, FINITE_RUNGS, FLAT_ORDERS, WIDEST_RIM, solved_at
 from host_tools.forward.model_departures import strain_departure
 from host_tools.forward.plan import BLUNT, GRADED, STANDARD, StrainModel, model_plan
 from host_tools.forward.press_model import PressFailed
@@ -42,7 +42,8 @@ DEPARTED_SCENES, DEPARTED_LEVEL = 24, Level("sliding", 3)
 """What small strain is said to depart by is compared with what it does on one mesh of this level."""
 LIGHTEST, HEAVIEST = 0.02, 0.5
 """Shares of a random press at which it is: where small strain may be what is chosen."""
-SLIDING_LEVELS = (BLUNT, *FINITE_RUNGS[:4])
+FLAT_LEVELS = tuple(Level(GRADED, order) for order in FLAT_ORDERS)
+SLIDING_LEVELS = (BLUNT, *WIDEST_RIM, *FINITE_RUNGS[2:4])
 FINEST_SLIDING = FINITE_RUNGS[4], FINITE_RUNGS[3]
 """Truths of finite strain, the first that can be had: corrected by what the same mesh errs in small strain."""
 
@@ -108,8 +109,15 @@ def corner_scene(rng: np.random.Generator) -> Scene:
 
 
 def domed_scene(rng: np.random.Generator) -> Scene:
-    """Return a scene of the training box under a dome of 0.2-1 mm."""
-    return replace(box_scene(rng), waveguide=Waveguide(dome_mm=float(rng.uniform(0.2, 1.0))))
+    """Return a scene of the training box under a dome of 0.1-0.55 mm, which touches everywhere."""
+    return replace(box_scene(rng), waveguide=Waveguide(dome_mm=float(rng.uniform(0.1, 0.55))))
+
+
+def lifted_scene(rng: np.random.Generator) -> Scene:
+    """Return a scene of the training box under a dome of 0.2-1 mm, pressed by so little of it that its rim is off."""
+    dome_mm, share = rng.uniform((0.2, 0.05), (1.0, 0.7))
+    press = Press(indentation_mm=float(share * dome_mm))
+    return replace(box_scene(rng), waveguide=Waveguide(dome_mm=float(dome_mm)), press=press)
 
 
 def locking_scene(rng: np.random.Generator) -> Scene:
@@ -162,15 +170,16 @@ def light_scene(rng: np.random.Generator) -> Scene:
 
 
 KINDS = (
-    ModelKind("small strain, box", box_scene, 20, _graded(3, 4, 5, 6), _graded(8)),
-    ModelKind("small strain, corners of the box", corner_scene, 20, _graded(3, 4, 5, 6), _graded(8)),
-    ModelKind("small strain, far beyond the box", random_scene, 20, _graded(3, 4, 5, 6), _graded(8)),
+    ModelKind("small strain, box", box_scene, 20, FLAT_LEVELS, _graded(11)),
+    ModelKind("small strain, corners of the box", corner_scene, 20, FLAT_LEVELS, _graded(11)),
+    ModelKind("small strain, far beyond the box", random_scene, 20, FLAT_LEVELS, _graded(11)),
     ModelKind("small strain, level of data sets", box_scene, 20, (STANDARD,), _graded(7)),
-    ModelKind("dome", domed_scene, 8, _graded(3, 4, 5), _graded(6)),
-    ModelKind("Poisson ratio above 0.499", locking_scene, 8, _graded(3, 4, 5, 6), _graded(8)),
+    ModelKind("dome that touches everywhere", domed_scene, 8, _graded(*DOMED_ORDERS), _graded(7)),
+    ModelKind("dome that lifts off", lifted_scene, 8, _graded(*DOMED_ORDERS), _graded(8)),
+    ModelKind("Poisson ratio above 0.499", locking_scene, 8, FLAT_LEVELS, _graded(11)),
     ModelKind("finite strain, by indentation", by_indentation, 4, SLIDING_LEVELS, FINEST_SLIDING, is_finite=True),
     ModelKind("finite strain, under a force", under_force, 4, SLIDING_LEVELS, FINEST_SLIDING, is_finite=True),
-    ModelKind("3-D, off the axis", solid_scene, 2, (STANDARD, *_graded(3, 4)), _graded(5)),
+    ModelKind("3-D, off the axis", solid_scene, 4, (STANDARD, *_graded(3, 4, 5)), _graded(6)),
 )
 """`standard 3` and `blunt 3` are the levels of data sets. The dearest kinds have the fewest scenes."""
 

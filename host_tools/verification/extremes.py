@@ -1,7 +1,8 @@
 """Scenes at the edge of what can be asked: each ends in a result with its error or in a named refusal.
 
-Every scene runs in a process of its own under a time limit, so that a hang or a crash is seen as what it is. A result
-counts only when its numbers are finite, its forces balance and its stated error is not missing.
+Every scene climbs as `host_tools simulate` does without a tolerance, in a process of its own under a time limit, so
+that a hang or a crash is seen as what it is. A result counts only when its numbers are finite, its forces balance and
+its stated error is not missing, or said not to be known.
 """
 
 from __future__ import annotations
@@ -12,20 +13,23 @@ from dataclasses import asdict
 from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Literal, NamedTuple, cast
+from typing import NamedTuple, cast
 
 from device.measurement.quantities import Inclusion, InvalidQuantity
-from host_tools.forward.plan import model_plan
+from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE
+from host_tools.forward.ladder import AskedStrain, Climb, climb
+from host_tools.forward.plan import DEFAULT_TOLERANCE
 from host_tools.forward.press_model import PressFailed
-from host_tools.forward.solve import solve
 from host_tools.scenes.scene import Placement, Press, Scene, Tissue, TissueLayer, Waveguide
 
 TIME_LIMIT_S = 300.0
 BALANCE = 1e-5
 """Largest relative difference of the contact force and the reaction."""
 
+CLIMBED_S = 30.0
+"""Time to climb in: a scene at the edge ends with the best that was had."""
+
 Build = Callable[[], Scene]
-StrainName = Literal["small", "finite"]
 
 
 class Extreme(NamedTuple):
@@ -54,7 +58,7 @@ def run_extremes(*, on_step: Callable[[Extreme], None] = lambda case: None) -> l
     return found
 
 
-def _in_own_process(name: str, build: Build, strain: StrainName) -> Extreme:
+def _in_own_process(name: str, build: Build, strain: AskedStrain) -> Extreme:
     context = get_context("forkserver")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_send_attempt, args=(sender, name, build, strain))
@@ -71,32 +75,39 @@ def _in_own_process(name: str, build: Build, strain: StrainName) -> Extreme:
         process.join()
 
 
-def _send_attempt(sender: Connection, name: str, build: Build, strain: StrainName) -> None:
+def _send_attempt(sender: Connection, name: str, build: Build, strain: AskedStrain) -> None:
     sender.send(attempt(name, build, strain))
 
 
-def attempt(name: str, build: Build, strain: StrainName) -> Extreme:
+def attempt(name: str, build: Build, strain: AskedStrain) -> Extreme:
     """Build and solve one scene; what is not a result or a named refusal is a failure."""
     try:
         scene = build()
-        plan = model_plan(scene, strain=strain)
+        climbed = climb(scene, [scene.press], tolerance=DEFAULT_TOLERANCE, strain=strain, within_s=CLIMBED_S)
     except InvalidQuantity as refusal:
         return Extreme(name, "refused", str(refusal))
-    try:
-        solution = solve(scene, plan, estimate_error=True)
     except PressFailed as failed:
         return Extreme(name, "gave up", str(failed))
     except Exception as error:  # noqa: BLE001 - a study of what escapes: the traceback itself is the finding
         return Extreme(name, "failure", f"{type(error).__name__}: {error}")
-    stated = {key: value for key, value in solution.stated_error.items() if key != "total_deformation_mm3"}
-    numbers = [solution.force_n, *asdict(solution.inclusion_field).values(), *stated.values()]
+    return _found(name, climbed)
+
+
+def _found(name: str, climbed: Climb) -> Extreme:
+    [solution] = climbed.solutions
+    stated = {key: value for key, value in solution.stated_error.items() if key != CANCELLING_UNDER_FORCE}
+    numbers = [solution.force_n, *asdict(solution.inclusion_field).values()]
     balance = abs(solution.pressed.contact_force_n / solution.force_n - 1)
-    sound = all(map(math.isfinite, numbers)) and balance < BALANCE and stated
-    kind = f"{plan.formulation}, {plan.mesh}, {solution.elements} elements"
+    is_known = all(map(math.isfinite, stated.values())) or climbed.missed
+    sound = all(map(math.isfinite, numbers)) and balance < BALANCE and stated and is_known
+    plan = solution.plan
+    kind = f"{plan.strain} strain, {plan.formulation}, {plan.grading} {plan.order}, {solution.elements} elements"
     return Extreme(
         name,
         "result" if sound else "failure",
-        kind if sound else f"numbers {numbers}, forces out of balance by {balance:.1e}",
+        f"{kind}{f'; {climbed.missed}' if climbed.missed else ''}"
+        if sound
+        else f"numbers {numbers}, errors {stated}, forces out of balance by {balance:.1e}",
         solution.force_n,
         solution.inclusion_field.max_deformation_mm,
         max(stated.values()),
@@ -148,9 +159,9 @@ def _placed(place: Placement, size_mm: float = 10.0) -> Scene:
     return Scene(Inclusion(size_mm, 6.0, 80.0), placement=place)
 
 
-def extreme_scenes() -> Iterator[tuple[str, Build, StrainName]]:
-    """Yield name, scene and strain of every extreme."""
-    small: list[tuple[str, Build]] = [
+def extreme_scenes() -> Iterator[tuple[str, Build, AskedStrain]]:
+    """Yield name, scene and strain of every extreme: strain is chosen as for anyone, or asked for."""
+    chosen: list[tuple[str, Build]] = [
         *((f"size {d:g} mm", partial(_centred, d, 6.0)) for d in (0.0, 1e-3, 1e-2, 0.1, 1.0, 18.0, 23.0, 23.99)),
         ("tangent to the base", partial(_centred, 24.0, 6.0)),
         ("one micron above the base", partial(_centred, 24.0 - 1e-6, 6.0)),
@@ -180,7 +191,7 @@ def extreme_scenes() -> Iterator[tuple[str, Build, StrainName]]:
         ("inclusion 30 mm off the axis", partial(_placed, Placement(offset_x_mm=30.0))),
         ("inclusion beyond the slab", partial(_placed, Placement(offset_x_mm=58.0))),
     ]
-    yield from ((name, build, "small") for name, build in small)
+    yield from ((name, build, "auto") for name, build in chosen)
     for mm in (0.01, 3.0, 6.0):
         yield f"finite strain, {mm:g} mm", partial(_centred, 10.0, 6.0, 80.0, mm), "finite"
     yield "finite strain, shallow inclusion, 3 mm", partial(_centred, 15.0, 2.0, 120.0, 3.0), "finite"

@@ -1,9 +1,9 @@
 """Two orders on one mesh to the error that a solution states of its force and of O1-O3.
 
 In axisymmetry the other order is higher: what is left to gain is about as much as the last step gained, since the
-singular rims converge algebraically. In finite strain and in 3-D the step of a single feature may cross zero by chance,
-so each is given the largest of all; in 3-D the other order is lower, its step far too large, and a share of it is
-enough. `host_tools verify --effectivity` measures how often the true error lies within.
+singular rims converge algebraically. Where the other order is lower its step is far too large, and a share of it is
+enough. The step of a single feature may cross zero by chance, so each is given a part of the largest, or all of it.
+`host_tools verify --effectivity` measures how often the true error lies within.
 Source: Babuska & Suri, SIAM Review 36(4), 1994, on the p version.
 """
 
@@ -27,14 +27,20 @@ STEP_DOWN_FACTOR = 0.4
 """Stated error over the largest step, of any feature, from the next lower order."""
 CLIMBED_FACTOR = 2.0
 """Stated error over the largest step from the next lower order, on a mesh whose rims are in layers."""
-LOW_ORDERS, LOW_FACTOR = (3, 4), 0.5
-"""The same at low orders, where the next step is a tenth of the last."""
-MIXED_FACTORS, MIXED_FACTOR = {3: 0.15, 4: 0.4}, 1.0
-"""The same where a pressure is solved for in axisymmetry, by order, and above."""
+LOW_ORDER, LOW_FACTOR = 4, 0.5
+"""The same up to this order, where the next step is a tenth of the last."""
+OWN_SHARE, SOLID_SHARE = 0.25, 0.5
+"""Of the largest step each feature's own counts as at least in the kinds below, in axisymmetry and in 3-D."""
+MIXED_FACTORS, MIXED_FACTOR = {3: 0.12, 4: 0.5}, 1.5
+"""Stated error over a feature's own step where a pressure is solved for in axisymmetry, by order, and above."""
+CLOSED_FACTORS, CLOSED_FACTOR = {3: 0.13, 4: 0.32}, 0.75
+"""The same under a dome that touches everywhere."""
+SOLID_FACTORS = {3: 0.3}
+"""The same in 3-D, where from order 4 on the largest step is stated."""
 CORRECTED_FACTOR = 4.0
 """Stated error over a feature's own step by one Newton correction, where small strain foretells what it cannot see."""
 CONTACT_FACTORS, CONTACT_FACTOR = {3: 1.0, 4: 3.0}, 4.0
-"""The same under a dome, by order, and above: at the edge of the contact errors fall less from order to order."""
+"""Over the largest step under a dome that lifts off: at the contact's edge errors fall less from order to order."""
 EDGE_ERROR = 2e-3
 """Least stated error where a dome lifts off: its edge lies inside an element, which no order sees."""
 LIFTED_RATIO = 1e-3
@@ -67,8 +73,11 @@ def stated_error(
     if plan.symmetry == "axisymmetric" and plan.strain == "small" and plan.grading != GRADED:
         return {name: STEP_UP_FACTOR * step for name, step in steps.items()}
     largest = max(step for name, step in steps.items() if name not in CANCELLING)
-    least = EDGE_ERROR if plan.contact == "unilateral" and _lifts_off(pressed.state) else 0.0
-    stated = max(_factor(plan) * largest, least)
+    lifts_off = plan.contact == "unilateral" and _lifts_off(pressed.state)
+    if (own := _own_factor(plan)) and not lifts_off:
+        share = OWN_SHARE if plan.symmetry == "axisymmetric" else SOLID_SHARE
+        return {name: own * max(step, share * largest) if step else 0.0 for name, step in steps.items()}
+    stated = max(_factor(plan) * largest, EDGE_ERROR if lifts_off else 0.0)
     shares = {INTEGRAL: INTEGRAL_FACTOR} if by_force and plan.strain == "finite" else {}
     return {name: shares.get(name, 1.0) * stated if step else 0.0 for name, step in steps.items()}
 
@@ -81,14 +90,23 @@ def at_force(corrected: FaceState, force_n: float) -> FaceState:
     return corrected.scaled(force_n / corrected.force_n)
 
 
+def _own_factor(plan: ModelPlan) -> float | None:
+    """Return stated error over a feature's own step; None where the largest step of all is stated."""
+    if plan.grading != GRADED:
+        return None
+    if plan.contact == "unilateral":
+        return CLOSED_FACTORS.get(plan.order, CLOSED_FACTOR)
+    if plan.symmetry != "axisymmetric":
+        return SOLID_FACTORS.get(plan.order)
+    return MIXED_FACTORS.get(plan.order, MIXED_FACTOR) if plan.formulation == "mixed" else None
+
+
 def _factor(plan: ModelPlan) -> float:
     """Return stated error over the largest step."""
     if plan.grading == GRADED and plan.contact == "unilateral":
         return CONTACT_FACTORS.get(plan.order, CONTACT_FACTOR)
-    if plan.grading == GRADED and plan.formulation == "mixed" and plan.symmetry == "axisymmetric":
-        return MIXED_FACTORS.get(plan.order, MIXED_FACTOR)
     if plan.grading == GRADED:
-        return LOW_FACTOR if plan.order in LOW_ORDERS else CLIMBED_FACTOR
+        return LOW_FACTOR if plan.order <= LOW_ORDER else CLIMBED_FACTOR
     return BLUNT_FACTOR if plan.symmetry == "axisymmetric" else STEP_DOWN_FACTOR
 
 

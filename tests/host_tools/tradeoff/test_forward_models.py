@@ -1,20 +1,26 @@
 """The front of the forward models: levels that commands choose, timed with and without their stated error."""
 
+import os
+
 import pytest
 
 from host_tools.forward.ladder import FINITE_RUNGS
 from host_tools.forward.plan import BLUNT, GRADED, STANDARD
 from host_tools.tradeoff.forward_models import (
     CALCULIX,
+    FULL,
     SHORT,
     STATING,
     WITHOUT,
     cases,
     equal_errors,
+    in_calculix,
     measured,
 )
 from host_tools.tradeoff.fronts import Panel
 from host_tools.tradeoff.pareto import Choice
+from host_tools.verification.cross_check.calculix import ccx_available
+from host_tools.verification.truths import true_numbers
 
 
 def test_every_level_is_one_that_a_command_can_choose():
@@ -45,3 +51,19 @@ def test_calculix_is_compared_with_ours_where_neither_states_an_error():
     )
     found = equal_errors([Panel("a scene", "error", choices)])
     assert found == [("a scene", 0.02, 2.0, 5.0), ("a scene", 0.01, 2.0, 8.0), ("a scene", 0.005, 2.0, 8.0)]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(
+    not ccx_available() and "TSIS_REQUIRE_PEERS" not in os.environ,  # there its absence is a failure
+    reason="CalculiX (Debian: calculix-ccx) is not installed",
+)
+def test_calculix_is_given_the_elements_that_serve_it_best():
+    """Reduced integration errs less and takes less; finer rims err less."""
+    case = cases()[0]
+    points = {
+        (one.name, one.family): one for one in in_calculix(case, true_numbers(case.scene, case.truths, "small")[1])
+    }
+    full, reduced, finest = points["rim 0.3", FULL], points["rim 0.3", CALCULIX], points["rim 0.02", CALCULIX]
+    assert reduced.error < full.error
+    assert finest.error < reduced.error < 0.1

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from host_tools.forward.accuracy import Level
-from host_tools.forward.ladder import FINITE_RUNGS
+from host_tools.forward.ladder import DOMED_ORDERS, FINITE_RUNGS, FLAT_ORDERS, WIDEST_RIM
 from host_tools.verification.effectivity import (
+    FINEST_SLIDING,
     KINDS,
     ErrorStatement,
     ModelKind,
@@ -41,10 +42,16 @@ def test_what_small_strain_departs_by_is_a_kind_of_its_own():
     assert all(one.is_held for one in found)
 
 
-def test_every_level_that_a_climb_begins_with_is_measured():
-    levels = {level for kind in KINDS for level in kind.levels}
-    assert {*FINITE_RUNGS[:4]} < levels
-    assert {Level("graded", order) for order in (3, 4, 5, 6)} < levels
+def test_every_level_of_a_climb_is_measured_but_for_those_that_are_the_truth():
+    levels = {kind.name: {*kind.levels} for kind in KINDS}
+    for kind in KINDS:
+        assert not {*kind.truths} & {*kind.levels[:-1]}
+        if kind.is_finite:
+            assert {*FINITE_RUNGS, *WIDEST_RIM} - {*FINEST_SLIDING, FINITE_RUNGS[-1]} <= levels[kind.name]
+    flat = {Level("graded", order) for order in FLAT_ORDERS}
+    for name in ("small strain, box", "small strain, far beyond the box", "Poisson ratio above 0.499"):
+        assert levels[name] == flat
+    assert levels["dome that lifts off"] == {Level("graded", order) for order in DOMED_ORDERS}
 
 
 def test_statements_of_a_scene_in_the_box_hold():
