@@ -20,7 +20,7 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.radial_profile import CONTRAST, RESPONSE
 from host_tools.commissioning import page_pictures as pictures
 from host_tools.commissioning.believed_presses import BelievedAnswers
-from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, WORST_PHANTOM, CommissionedProbe
+from host_tools.commissioning.commission import WORST_PHANTOM, CommissionedProbe
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
 from host_tools.commissioning.probe_prior import LABELS
 from host_tools.commissioning.report import SILICONE
@@ -64,7 +64,6 @@ def commissioning_page(
         levels=done.fit.levels,
         believed=done.fit.believed,
         critical=done.critical,
-        largest_misfit=LARGEST_MISFIT_RATIO,
         phantoms=done.phantoms,
         unknown_labels=list(pictures.UNKNOWN_LABELS.values()),
         modes=[_mode(name, answers.evaluated) for name, answers in _believed(done)],

@@ -21,12 +21,12 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD, RowDerivatives
-from device.measurement.ramp_modes.model import CriticalValues, RampModel
+from device.measurement.ramp_modes.model import RampModel
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
+from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design, ProbeFit, fit_probe
-from host_tools.commissioning.left_out import answers_of, left_out
+from host_tools.commissioning.left_out import answers_of
 from host_tools.optics.other_light import other_optics
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
 from host_tools.press_models.recorded_presses import in_parallel
@@ -157,8 +157,7 @@ def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> Tr
     ramps = foreign_phantoms(lit, probe, noise, setup.phantoms, seed=own, jobs=jobs)
     fit = fit_probe(ramps, design)
     answers, known = answers_of(design, fit), known_probe(design, probe)
-    critical = limits(answers, model, left_out(ramps, design, model.first_guesses, fit, jobs), setup.seed)
-    critical_of_known = known_limits(known, model, setup.seed)
+    critical, critical_of_known = (limits(one, model, setup.seed) for one in (answers, known))
     few = taken.first(FEW)
     scores = {
         SHIPPED: scored(model.answers, model, model.critical["standard"], few, jobs),
@@ -211,18 +210,13 @@ def known_probe(design: Design, world: World) -> OwnAnswers:
     return OwnAnswers(believed.surrogate, believed.noise, replace(believed.own, mean=mean, covariance=covariance))
 
 
-def known_limits(answers: OwnAnswers, model: RampModel, seed: int) -> CriticalValues:
-    """Return above what its presses are refused; of the misfit the largest that commissioning allows any probe."""
-    return replace(limits(answers, model, [], seed), misfit_ratio=LARGEST_MISFIT_RATIO)
-
-
 def _of_design(setup: TrialSetup, count: int) -> ScoredPresses:
     """Return presses of the design's own probe, known exactly, by the same hands on the same patients."""
     probe = replace(AS_BELIEVED, texture=probe_part(foreign_world(setup.seed, 1)).texture)
     own = derived_seed(setup.seed, "presses of a known probe")
     taken = foreign_presses(setup.tables, probe, setup.model.answers.noise, count, seed=own, jobs=setup.jobs)
     known = known_probe(setup.design, probe)
-    return scored(known, setup.model, known_limits(known, setup.model, setup.seed), taken, setup.jobs)
+    return scored(known, setup.model, limits(known, setup.model, setup.seed), taken, setup.jobs)
 
 
 def _chapter(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -101,17 +102,19 @@ def found_values(
 ) -> CriticalValues:
     """Return how far presses are from one round inclusion in the ranges.
 
-    Round and inside are told by the press that lies nearest; one that lies beside the inclusion tells neither.
+    Round and inside are told by the press that lies nearest; one that lies beside the inclusion tells neither. A
+    commissioned probe fits both components of the offset, each in its range. Up to the corner of these a press tells
+    whether the inclusion is round: two of them close together are mostly read as one that lies there.
     """
-    at = answer.best
-    if denormalise(at)[OFFSET] > HIGH[OFFSET]:
+    at, beside = answer.best, denormalise(answer.best)[OFFSET] / HIGH[OFFSET]
+    if beside > (sqrt(2) if answer.unlike else 1):
         return CriticalValues(answer.misfit_ratio, 0.0, NOT_TOLD_LOG_ODDS, answer.tissue_from_middle_ratio)
     nearest = slice(answer.nearest, answer.nearest + 1)
     second, rows, unlike = seen.second_harmonics[answer.nearest], seen.rows[nearest], answer.unlike
     if unlike:
         left = np.stack([second[0], second[1] - unlike.second_across.reshape(second[1].shape)])
         elongation = elongation_deviations(left, unlike.row + unlike.shift, answers.noise, unlike.factor)
-        odds = float(log_odds(rows - unlike.shift)[0])
+        odds = float(log_odds(rows - unlike.shift)[0]) if beside <= 1 else NOT_TOLD_LOG_ODDS
         return CriticalValues(answer.misfit_ratio, elongation, odds, answer.tissue_from_middle_ratio)
     (round_row,) = answers.surrogate.rows(at[None], seen.direction_rad[nearest])
     elongation = elongation_deviations(second, round_row, answers.noise)

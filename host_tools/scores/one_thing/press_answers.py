@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from device.measurement.ramp_modes.commissioned.row_derivatives import RowDeriva
 from device.measurement.ramp_modes.model import RAMP_MODES, CriticalValues, RampModel
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commissioning.commission import LARGEST_MISFIT_RATIO, limits
+from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import Design, fit_probe
 from host_tools.commissioning.left_out import answers_of
 from host_tools.press_models.mode_outcome import EvaluatedPresses
@@ -60,7 +59,8 @@ class OwnLimits(NamedTuple):
 
 def with_tolerances(design: DesignToTry, seed: int) -> OwnLimits:
     """Return what answers presses of a probe that has not been commissioned."""
-    return _limited(tolerant(design.shared), design.model, seed)
+    answers = tolerant(design.shared)
+    return OwnLimits(answers, limits(answers, design.model, seed))
 
 
 def commissioned(
@@ -74,14 +74,9 @@ def commissioned(
         probe = causes[number].probe
         ramps = foreign_phantoms(design.tables, probe, noise, phantoms, seed=of_phantoms, jobs=1)
         answers = answers_of(design.shared, fit_probe(ramps, design.shared))
-        return _limited(answers, design.model, seed)
+        return OwnLimits(answers, limits(answers, design.model, seed))
 
     return in_parallel(own, len(causes), jobs)
-
-
-def _limited(answers: OwnAnswers, model: RampModel, seed: int) -> OwnLimits:
-    """Return the limits; that of the misfit is the largest that commissioning allows, for no phantom is left out."""
-    return OwnLimits(answers, replace(limits(answers, model, [], seed), misfit_ratio=LARGEST_MISFIT_RATIO))
 
 
 def ramp_scores(tried: TriedPresses, design: DesignToTry, own: OwnLimits, jobs: int) -> dict[str, ScoredPresses]:

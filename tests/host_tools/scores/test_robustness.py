@@ -12,6 +12,7 @@ from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.ramp_modes.commissioned.row_derivatives import DIRECTIONS, MEAN, NAMES, STD
 from device.measurement.ramp_modes.radial_profile import COLUMNS, CONTRAST, FORCES
 from device.measurement.ramp_modes.surrogate import OFFSET
+from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design
 from host_tools.press_models.press_derivatives import load_derivatives, world_changed
 from host_tools.press_models.recorded_presses import EXACT
@@ -35,7 +36,6 @@ from host_tools.scores.robustness import (
     TriedProbe,
     _chapter,
     benchmarks,
-    known_limits,
     known_probe,
     of_group,
     pairs_of,
@@ -213,7 +213,7 @@ def test_presses_of_its_own_fit_it_better_than_the_probe_beside_it(model, design
     taken = foreign_presses(tables, world, model.answers.noise, 6, seed=2, jobs=1)
     own = known_probe(design, world)
     other = known_probe(design, replace(world, contact=probe_part(foreign_world(1, 4)).contact, cell_span_ratio=1.02))
-    critical = known_limits(own, model, seed=1)
+    critical = limits(own, model, seed=1)
     misfits = [scored(answers, model, critical, taken, 1).misfit_ratio.mean() for answers in (own, other)]
     assert misfits[0] < misfits[1]
     assert misfits[0] == pytest.approx(1.0, abs=0.5)

@@ -10,10 +10,11 @@ from device.files.bundle_file import read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.simulation.physics.world import AS_BELIEVED
+from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import Design
 from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scores.foreign_presses import foreign_presses
-from host_tools.scores.robustness import known_limits, known_probe
+from host_tools.scores.robustness import known_probe
 from host_tools.scores.scored_presses import FIGURES, figures_of, joined, paired, scored
 
 
@@ -79,7 +80,7 @@ def test_presses_are_scored_where_they_are_answered(tables):
     design = Design(model.answers, load_derivatives(SIMULATED_PROBE))
     taken = foreign_presses(tables, AS_BELIEVED, model.answers.noise, 6, seed=5, jobs=1)
     known = known_probe(design, AS_BELIEVED)
-    critical = known_limits(known, model, seed=1)
+    critical = limits(known, model, seed=1)
     found = scored(known, model, critical, taken, 1)
     assert found.is_answered.sum() >= 3
     assert 0 <= found.region_holds() <= 1

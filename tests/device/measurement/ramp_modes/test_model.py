@@ -6,7 +6,7 @@ from small_surrogate import COLUMNS, REACH_MM, LinearRows, random_scan_surrogate
 
 from device.measurement.parameters import COUNT, HIGH, PARAMETERS, RANGES
 from device.measurement.ramp_modes import answers as answers_module
-from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
+from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers, UnlikeDesign
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.model import NOT_TOLD_LOG_ODDS, found_values
 from device.measurement.ramp_modes.noise import light_ratio
@@ -113,9 +113,9 @@ def test_a_scans_fit_begins_where_its_presses_are_explained_in_their_own_directi
     assert begun == [direction_rad, None]
 
 
-def answer_at(offset_mm: float, nearest: int) -> RampAnswer:
+def answer_at(offset_mm: float, nearest: int, unlike: UnlikeDesign | None = None) -> RampAnswer:
     at = np.append(SHARED, 2 * offset_mm / HIGH[OFFSET] - 1)
-    return RampAnswer(None, None, 1.25, nearest, at, (24.49, 0.5))
+    return RampAnswer(None, None, 1.25, nearest, at, (24.49, 0.5), unlike)
 
 
 def test_round_and_inside_are_told_by_the_nearest_press():
@@ -153,3 +153,19 @@ def test_presses_that_all_lie_beside_tell_neither_round_nor_inside():
     assert found.misfit_ratio == 1.25
     assert (found.elongation_deviations, found.outside_log_odds) == (0.0, NOT_TOLD_LOG_ODDS)
     assert found.tissue_from_middle_ratio == pytest.approx(0.85, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("offset_mm", "is_round_told", "is_inside_told"), [(1.9, True, True), (2.8, True, False), (2.9, False, False)]
+)
+def test_a_commissioned_probe_tells_round_up_to_the_corner_of_both_axes(offset_mm, is_round_told, is_inside_told):
+    """Of 40 pairs of inclusions close together 24 were read as one there, and none of those was asked whether it is."""
+    answers = RampAnswers(random_scan_surrogate(), white_noise(STD))
+    seen = SeenPresses(np.zeros((1, COLUMNS)), np.ones((1, 2, len(PROFILE_FORCES_N), RINGS - 2)), np.zeros(1))
+    row = np.random.default_rng(3).normal(0, 0.1, COLUMNS)
+    unlike = UnlikeDesign(row, np.zeros(COLUMNS), np.zeros((COLUMNS, 1)), np.zeros(len(row[SECOND])))
+    found = found_values(answer_at(offset_mm, 0, unlike), seen, answers, lambda of: of[:, 0] + 9)
+    expected = elongation_deviations(seen.second_harmonics[0], row, answers.noise) if is_round_told else 0.0
+    assert found.elongation_deviations == expected
+    assert (expected > 0) == is_round_told
+    assert found.outside_log_odds == (9 if is_inside_told else NOT_TOLD_LOG_ODDS)
