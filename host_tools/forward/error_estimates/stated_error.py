@@ -34,7 +34,7 @@ OWN_SHARE, SOLID_SHARE = 0.25, 0.5
 MIXED_FACTORS, MIXED_FACTOR = {3: 0.12, 4: 0.5}, 1.5
 """Stated error over a feature's own step where a pressure is solved for in axisymmetry, by order, and above."""
 CLOSED_FACTORS, CLOSED_FACTOR = {3: 0.13, 4: 0.32}, 0.75
-"""The same under a dome that touches everywhere."""
+"""The same under a dome that touches everywhere, of displacements alone in axisymmetry."""
 SOLID_FACTORS = {3: 0.3}
 """The same in 3-D, where from order 4 on the largest step is stated."""
 CORRECTED_FACTOR = 4.0
@@ -43,8 +43,9 @@ CONTACT_FACTORS, CONTACT_FACTOR = {3: 1.0, 4: 3.0}, 4.0
 """Over the largest step under a dome that lifts off: at the contact's edge errors fall less from order to order."""
 EDGE_ERROR = 2e-3
 """Least stated error where a dome lifts off: its edge lies inside an element, which no order sees."""
-LIFTED_RATIO = 1e-3
-"""Pressure at the rim over the largest below which the face is off the tissue there."""
+CLOSED_RATIO = 30.0
+"""Pressure at the rim over the mean from which on a dome counts as closed: a flat face has 100, one that all but lifts
+off 15, and one that does so 0. A closed contact's pressure has no bound at the rim."""
 ROUNDING = 1e-12
 """A step below it is no step: that press was prescribed."""
 CANCELLING = ("total_deformation_mm3", "deformation_area_mm2")
@@ -73,7 +74,7 @@ def stated_error(
     if plan.symmetry == "axisymmetric" and plan.strain == "small" and plan.grading != GRADED:
         return {name: STEP_UP_FACTOR * step for name, step in steps.items()}
     largest = max(step for name, step in steps.items() if name not in CANCELLING)
-    lifts_off = plan.contact == "unilateral" and _lifts_off(pressed.state)
+    lifts_off = plan.contact == "unilateral" and not all(_is_closed(one.state) for one in (pressed, baseline))
     if (own := _own_factor(plan)) and not lifts_off:
         share = OWN_SHARE if plan.symmetry == "axisymmetric" else SOLID_SHARE
         return {name: own * max(step, share * largest) if step else 0.0 for name, step in steps.items()}
@@ -94,11 +95,12 @@ def _own_factor(plan: ModelPlan) -> float | None:
     """Return stated error over a feature's own step; None where the largest step of all is stated."""
     if plan.grading != GRADED:
         return None
-    if plan.contact == "unilateral":
-        return CLOSED_FACTORS.get(plan.order, CLOSED_FACTOR)
+    is_domed, is_mixed = plan.contact == "unilateral", plan.formulation == "mixed"
     if plan.symmetry != "axisymmetric":
-        return SOLID_FACTORS.get(plan.order)
-    return MIXED_FACTORS.get(plan.order, MIXED_FACTOR) if plan.formulation == "mixed" else None
+        return None if is_domed or is_mixed else SOLID_FACTORS.get(plan.order)
+    if is_domed:
+        return None if is_mixed else CLOSED_FACTORS.get(plan.order, CLOSED_FACTOR)
+    return MIXED_FACTORS.get(plan.order, MIXED_FACTOR) if is_mixed else None
 
 
 def _factor(plan: ModelPlan) -> float:
@@ -110,9 +112,9 @@ def _factor(plan: ModelPlan) -> float:
     return BLUNT_FACTOR if plan.symmetry == "axisymmetric" else STEP_DOWN_FACTOR
 
 
-def _lifts_off(state: FaceState) -> bool:
-    """Return whether nothing presses on the rim, where the pressure of a closed contact is largest."""
-    return bool((state.p_kpa[:, -1] <= LIFTED_RATIO * state.p_kpa.max()).any())
+def _is_closed(state: FaceState) -> bool:
+    """Return whether a face presses well on all of its rim, where the pressure of a closed contact is largest."""
+    return bool((state.p_kpa[:, -1] > CLOSED_RATIO * state.p_kpa.mean()).all())
 
 
 def _step(value: float, other: float) -> float:

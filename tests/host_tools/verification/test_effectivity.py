@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from host_tools.forward.accuracy import Level
-from host_tools.forward.ladder import DOMED_ORDERS, FINITE_RUNGS, FLAT_ORDERS, WIDEST_RIM
+from host_tools.forward.ladder import DOMED_ORDERS, FINITE_RUNGS, FLAT_ORDERS, SOLID_ORDERS, WIDEST_RIM
 from host_tools.verification.effectivity import (
-    FINEST_SLIDING,
     KINDS,
     ErrorStatement,
     ModelKind,
@@ -42,16 +41,16 @@ def test_what_small_strain_departs_by_is_a_kind_of_its_own():
     assert all(one.is_held for one in found)
 
 
-def test_every_level_of_a_climb_is_measured_but_for_those_that_are_the_truth():
-    levels = {kind.name: {*kind.levels} for kind in KINDS}
-    for kind in KINDS:
-        assert not {*kind.truths} & {*kind.levels[:-1]}
-        if kind.is_finite:
-            assert {*FINITE_RUNGS, *WIDEST_RIM} - {*FINEST_SLIDING, FINITE_RUNGS[-1]} <= levels[kind.name]
-    flat = {Level("graded", order) for order in FLAT_ORDERS}
-    for name in ("small strain, box", "small strain, far beyond the box", "Poisson ratio above 0.499"):
-        assert levels[name] == flat
-    assert levels["dome that lifts off"] == {Level("graded", order) for order in DOMED_ORDERS}
+def test_every_level_of_a_climb_is_measured_but_for_the_finest_of_finite_strain_and_of_3d():
+    of_finite = {level for kind in KINDS if kind.is_finite for level in kind.levels}
+    assert {*FINITE_RUNGS, *WIDEST_RIM} - of_finite == {Level("sliding_fine", 4), Level("sliding_fine", 5)}
+    levels = {kind.name: {level.order for level in kind.levels if level.grading == "graded"} for kind in KINDS}
+    assert levels["small strain, box"] | levels["small strain, highest orders"] == {*FLAT_ORDERS}
+    of_mixed = (levels[f"Poisson ratio above 0.499{more}"] for more in ("", ", highest orders"))
+    assert set().union(*of_mixed) == {*FLAT_ORDERS}
+    for name in ("dome that touches everywhere", "dome that lifts off"):
+        assert levels[name] == {*DOMED_ORDERS}
+    assert {*SOLID_ORDERS} - levels["3-D, off the axis"] == {SOLID_ORDERS[-1]}
 
 
 def test_statements_of_a_scene_in_the_box_hold():

@@ -21,6 +21,8 @@ def face(force_n, peak_mm):
     return FaceState(1.0, peak_mm * BUMP_MM, BUMP_MM, 50.0 * peak_mm, force_n, force_n)
 
 
+CLOSED_KPA = np.where(RAYS.r_mm < RAYS.r_mm[0, -1], 1.0, 200.0)
+"""A closed contact's pressure has no bound at the rim; the mean of these is 2."""
 PRESSED = Loaded(face(0.200, 0.0200), other=face(0.202, 0.0201))  # 1 % in force, 0.5 % in the inclusion field
 BASELINE = Loaded(face(0.19, 0.0), other=face(0.19, 0.0))
 
@@ -61,8 +63,8 @@ def test_elsewhere_every_feature_states_the_largest_step(plan, factor):
 def test_from_the_order_below_each_feature_states_a_share_of_its_own_step_or_of_a_part_of_the_largest(
     plan, factor, share
 ):
-    pressed = Loaded(replace(PRESSED.state, p_kpa=np.ones_like(BUMP_MM)), other=face(0.202, 0.020001))
-    stated = stated_error(plan, RAYS, pressed, BASELINE)
+    pressed = Loaded(replace(PRESSED.state, p_kpa=CLOSED_KPA), other=face(0.202, 0.020001))
+    stated = stated_error(plan, RAYS, pressed, BASELINE._replace(state=replace(BASELINE.state, p_kpa=CLOSED_KPA)))
     assert stated["force_n"] == pytest.approx(factor * 0.01)
     assert stated["max_deformation_mm"] == pytest.approx(factor * share * 0.01)
     assert (stated["indentation_mm"], stated["deformation_area_mm2"]) == (0.0, 0.0)
@@ -78,15 +80,20 @@ def test_in_finite_strain_under_a_force_orders_are_compared_at_that_force():
     assert under_force["central_deformation_mm3"] == 2.5 * under_force["max_deformation_mm"]
 
 
-def test_a_dome_that_lifts_off_states_what_no_order_sees_at_its_edge():
+@pytest.mark.parametrize(("rim_kpa", "times"), [(200.0, 0.75), (20.0, 4.0), (0.0, 4.0)])
+def test_a_dome_that_all_but_lifts_off_states_the_largest_step_and_what_no_order_sees_at_its_edge(rim_kpa, times):
     """Orders 4 and 5 once agreed to 7e-5 where both were 1.7e-3 off."""
     domed = replace(PLAN, contact="unilateral", grading=GRADED, order=5)
-    closed = replace(PRESSED.state, p_kpa=np.ones_like(BUMP_MM))
-    near = Loaded(closed, other=face(0.200, 0.020001))
-    assert stated_error(domed, RAYS, near, BASELINE)["max_deformation_mm"] == pytest.approx(0.75 * 5e-5)
-    touching = BUMP_MM * (RAYS.r_mm < 8.0)
-    lifted = near._replace(state=replace(closed, p_kpa=touching))
-    assert stated_error(domed, RAYS, lifted, BASELINE)["max_deformation_mm"] == 2e-3
+    pressures_kpa = np.where(CLOSED_KPA > 1, rim_kpa, 1.0)
+    near = Loaded(replace(PRESSED.state, p_kpa=pressures_kpa), other=face(0.200, 0.020001))
+    base = BASELINE._replace(state=replace(BASELINE.state, p_kpa=CLOSED_KPA))
+    least = 0.0 if rim_kpa == 200.0 else 2e-3
+    assert stated_error(domed, RAYS, near, base)["max_deformation_mm"] == pytest.approx(max(times * 5e-5, least))
+    far = near._replace(other=face(0.202, 0.020001))
+    stated = stated_error(domed, RAYS, far, base)["max_deformation_mm"]
+    assert stated == pytest.approx(times * (0.25 * 0.01 if rim_kpa == 200.0 else 0.01))
+    open_without_it = stated_error(domed, RAYS, far._replace(state=replace(far.state, p_kpa=CLOSED_KPA)), BASELINE)
+    assert open_without_it["max_deformation_mm"] == pytest.approx(4 * 0.01)
 
 
 def test_what_was_prescribed_has_no_error():
