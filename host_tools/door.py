@@ -53,7 +53,8 @@ def solve(
     says where it is missed. `strain` "auto" takes finite strain where small
     strain departs by more than that; "small" is the paper's model, whose departure is then not counted. Raise
     `InvalidQuantity` for a scene that no model serves, `PressFailed` for a press that cannot be reached, and
-    `ToleranceMissed` where no level holds what was asked for; `best` returns the best instead.
+    `ToleranceMissed` where no level holds what was asked for; `best` returns the best instead. Of a press that was
+    found without what it errs, stated errors are infinite.
     """
     return solve_ramp(scene, [scene.press], tolerance=tolerance, strain=strain, within_s=within_s, best=best)[0]
 

@@ -241,7 +241,7 @@ class _Rung:
             try:
                 found = self.solved(wider, f"finer rims give way: {failed}")
             except PressFailed as another:
-                if another.reached_mm > furthest.reached_mm:
+                if (another.has_solution, another.reached_mm) > (furthest.has_solution, furthest.reached_mm):
                     furthest, level = another, wider
                 break  # higher orders reach less far
             best = min((one for one in (best, found) if one), key=lambda one: one.reached)
@@ -255,8 +255,9 @@ class _Rung:
         raise furthest
 
     def _of_unknown_error(self, level: Level, ended: str) -> Climb:
-        """Return presses at a level whose errors are not known: infinite, but for what was prescribed."""
-        plan = self._plan(level, "what it errs is not known")
+        """Return presses at a level whose errors are not known: infinite for all, but for what was prescribed."""
+        plan = self._plan(level, "")
+        plan = replace(plan, reasons=plan.reasons | {"level": "it finds the press, and nobody knows what it errs"})
         prescribed = "force_n" if self.presses[0].force_n is not None else "indentation_mm"
         solutions = solve_ramp(self.scene, self.presses, plan)
         stated = dict.fromkeys(numbers(solutions[0].rays, solutions[0].pressed, solutions[0].baseline), inf)

@@ -31,8 +31,8 @@ the pressure rings between both signs while its sum is right."""
 class Solution:
     """What one scene does to the probe. Rays are those of the face; a single one in axisymmetry.
 
-    `stated_error` is relative and estimated (docs/forward_model.md), empty where no estimate was asked for. `scene` is
-    what was solved, with its press.
+    `stated_error` is relative and estimated (docs/forward_model.md), empty where no estimate was asked for, infinite
+    where it is not known. `scene` is what was solved, with its press.
     """
 
     rays: Rays

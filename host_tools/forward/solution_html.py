@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Iterable, Iterator
 from html import escape
+from math import isfinite
 
 from host_tools.forward.plan import ModelPlan
 from host_tools.forward.plots import png_of
@@ -28,7 +29,13 @@ def _values(solution: Solution) -> Iterator[tuple[str, ...]]:
     for name, value in solution.as_record().items():
         if isinstance(value, float):
             error = solution.stated_error.get(name)
-            yield name, f"{value:.6g}", unit_of(name), f"{100 * error:.2g} %" if error is not None else ""
+            yield name, f"{value:.6g}", unit_of(name), _known(error)
+
+
+def _known(error: float | None) -> str:
+    if error is None:
+        return ""
+    return f"{100 * error:.2g} %" if isfinite(error) else "unknown"
 
 
 def _choices(plan: ModelPlan) -> Iterator[tuple[str, ...]]:

@@ -60,8 +60,8 @@ class ScoredPresses:
     number: NDArray[np.intp]
 
     def share_answered(self) -> float:
-        """Return the share answered of what stands out to who answers; NaN where nothing does."""
-        return float(self.is_answered[self.stands_out].mean()) if self.stands_out.any() else np.nan
+        """Return the share answered of what stands out to who answers; none of nothing."""
+        return float(self.is_answered[self.stands_out].mean()) if self.stands_out.any() else 0.0
 
     def error_mm(self) -> Array:
         """Return errors of size and depth [n, 2] of what is answered (mm)."""
@@ -136,7 +136,7 @@ def joined(parts: Sequence[ScoredPresses]) -> ScoredPresses:
 
 
 def paired(found: ScoredPresses, others: ScoredPresses) -> tuple[ScoredPresses, ScoredPresses]:
-    """Return the presses that stand out in both, in one order: the same number is the same press."""
+    """Return the presses that are in both, in one order: the same number is the same press."""
     _, mine, theirs = np.intersect1d(found.number, others.number, return_indices=True)
     return found.part(mine), others.part(theirs)
 
@@ -146,7 +146,8 @@ def figures_of(found: ScoredPresses) -> tuple[str, ...]:
     shown, answered = int(found.stands_out.sum()), int(found.is_answered.sum())
     if not shown:
         return ("0", *[""] * (len(FIGURES) - 1))
-    misfit = "" if np.isnan(found.misfit_ratio).all() else f"{np.median(found.misfit_ratio):.2f}"
+    misfits = found.misfit_ratio[found.stands_out]
+    misfit = "" if np.isnan(misfits).all() else f"{np.median(misfits):.2f}"
     counts = (f"{shown}", f"{answered}", f"{100 * (1 - answered / shown):.0f} %")
     if not answered:
         return (*counts, *[""] * (len(FIGURES) - len(counts) - 1), misfit)

@@ -98,8 +98,8 @@ def _found(name: str, climbed: Climb) -> Extreme:
     stated = {key: value for key, value in solution.stated_error.items() if key != CANCELLING_UNDER_FORCE}
     numbers = [solution.force_n, *asdict(solution.inclusion_field).values()]
     balance = abs(solution.pressed.contact_force_n / solution.force_n - 1)
-    is_known = all(map(math.isfinite, stated.values())) or climbed.missed
-    sound = all(map(math.isfinite, numbers)) and balance < BALANCE and stated and is_known
+    is_told = all(not math.isnan(error) and (error < math.inf or climbed.missed) for error in stated.values())
+    sound = all(map(math.isfinite, numbers)) and balance < BALANCE and stated and is_told
     plan = solution.plan
     kind = f"{plan.strain} strain, {plan.formulation}, {plan.grading} {plan.order}, {solution.elements} elements"
     return Extreme(

@@ -104,7 +104,7 @@ def found_values(
 
     Round and inside are told by the press that lies nearest; one that lies beside the inclusion tells neither. A
     commissioned probe fits both components of the offset, each in its range. Up to the corner of these a press tells
-    whether the inclusion is round: two of them close together are mostly read as one that lies there.
+    whether the inclusion is round, and so does a scan's: two of them close together are mostly read as one there.
     """
     at, beside = answer.best, denormalise(answer.best)[OFFSET] / HIGH[OFFSET]
     if beside > (sqrt(2) if answer.unlike else 1):

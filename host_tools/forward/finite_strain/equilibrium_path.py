@@ -48,12 +48,11 @@ class State(NamedTuple):
 class PathEnded(PressFailed):
     """A load that cannot be reached; says how far the press got (`reached_mm`, `reached_n`) and what to do."""
 
+    said = "{asked}, but the press could be followed only to {mm:.4g} mm and {n:.4g} N ({why}): press less."
+
     def __init__(self, asked: str, reached_mm: float, reached_n: float, why: str) -> None:
         self.asked, self.reached_mm, self.reached_n, self.why = asked, reached_mm, reached_n, why
-        super().__init__(
-            f"{asked}, but the press could be followed only to {reached_mm:.4g} mm and {reached_n:.4g} N ({why}): "
-            "press less."
-        )
+        super().__init__(self.said.format(asked=asked, mm=reached_mm, n=reached_n, why=why))
 
     def __reduce__(self) -> tuple[type[PathEnded], tuple[str, float, float, str]]:
         """Carry the error to another process: an exception alone forgets what it was made of."""
@@ -64,10 +63,7 @@ class ErrorUnknown(PathEnded):
     """A load that was reached, where a correction at the next order does not converge: what it errs is not known."""
 
     has_solution = True
-
-    def __str__(self) -> str:
-        """Return what is not known, and what to do."""
-        return f"at {self.reached_mm:.4g} mm and {self.reached_n:.4g} N {self.asked} ({self.why}): press less."
+    said = "{asked} at {mm:.4g} mm and {n:.4g} N ({why}): press less."
 
 
 class EquilibriumPath:
@@ -129,7 +125,7 @@ class EquilibriumPath:
 
     def without_error(self, order: int, status: NewtonStatus) -> ErrorUnknown:
         """Return the exception that says where the path stands, and that it is not known what it errs there."""
-        asked = f"the press was found, but nothing near it at order {order}"
+        asked = f"the press was found, but nothing near it at order {order},"
         return ErrorUnknown(asked, self.indentation_mm, self.force_n, f"Newton's method: {status}")
 
     def _motion(self) -> tuple[Any, float]:

@@ -42,7 +42,8 @@ def press_along(
     """Return the face at every one of ascending indentations (mm), with its refined copy if errors are wanted.
 
     `edge_force` asks for the other reading of the rim (`sliding.py`), which only comparisons
-    need. Raises `InvalidQuantity` for indentations that do not ascend from above 0, `PathEnded` for one out of reach.
+    need. Raises `InvalidQuantity` for indentations that do not ascend from above 0, `PathEnded` for one out of reach,
+    and `ErrorUnknown` for one whose refined copy is.
     """
     _require_ascending("indentations_mm", indentations_mm)
     press = _Press(SlidingContact(mesh, elasticity, order, edge_force=edge_force), rays, estimate_error)
@@ -129,7 +130,7 @@ class FiniteStrainModel:
         self._arrivals: dict[float, State] = {}
 
     def press(self, elasticity: Elasticity, presses: Sequence[Press], *, estimate_error: bool) -> tuple[Loaded, ...]:
-        """Return the face at every press; raise `PressFailed` for one that is out of reach."""
+        """Return the face at every press; raise `PathEnded` or `ErrorUnknown` as `press_along` does."""
         indentations_mm = [press.indentation_mm for press in presses if press.indentation_mm is not None]
         forces_n = [press.force_n for press in presses if press.force_n is not None]
         mesh, order, rays = self.mesh, self.order, self.rays

@@ -8,6 +8,7 @@ import pytest
 from device.measurement.quantities import Inclusion
 from host_tools.forward import ladder as module
 from host_tools.forward.accuracy import Level
+from host_tools.forward.finite_strain.equilibrium_path import ErrorUnknown, PathEnded
 from host_tools.forward.ladder import ToleranceMissed, climb, held
 from host_tools.forward.press_model import PressFailed
 from host_tools.scenes.scene import Placement, Press, Scene, Tissue
@@ -121,6 +122,27 @@ def test_a_force_out_of_reach_is_refused_with_the_furthest_that_any_rim_reaches(
         climb(deep, [deep.press], tolerance=0.005, strain="finite")
 
 
+def test_a_press_that_was_found_is_kept_whichever_rim_gets_further_without_finding_it(monkeypatch):
+    """The widest rim ends at 9 mm short of the force; a finer one found the press at 8 mm, and not what it errs."""
+
+    def solved(scene, presses, plan, *, estimate_error=False):
+        if not estimate_error:
+            return climb(SCENE, [SCENE.press], tolerance=0.05, strain="small").solutions
+        if Level(plan.grading, plan.order) == Level("sliding", 3):
+            raise ErrorUnknown("found, but nothing near it", 8.0, 2.0, "stalled")
+        raise PathEnded("force_n is 2", 9.0, 1.9, "folded")
+
+    def either(scene, presses, plan, **asked):
+        return (original if plan.strain == "small" else solved)(scene, presses, plan, **asked)
+
+    original = module.solve_ramp
+    monkeypatch.setattr(module, "solve_ramp", either)
+    deep = Scene(SCENE.inclusion, Press(force_n=2.0))
+    climbed = climb(deep, [deep.press], tolerance=0.005, strain="finite")
+    assert climbed.reached == inf
+    assert climbed.missed.endswith("not known (found, but nothing near it at 8 mm and 2 N (stalled)): press less.")
+
+
 @pytest.mark.long
 def test_a_press_whose_error_nobody_finds_is_answered_when_the_best_is_asked_for_and_says_so():
     """2 N of the default scene are reached on the widest rim alone, at order 2, and order 3 finds nothing near it."""
@@ -130,8 +152,10 @@ def test_a_press_whose_error_nobody_finds_is_answered_when_the_best_is_asked_for
     stated = climbed.solutions[0].stated_error
     assert {name for name, error in stated.items() if error == 0.0} == {"force_n"}
     assert {error for name, error in stated.items() if name != "force_n"} == {inf}
-    assert climbed.missed.startswith("tolerance is 50 %, but what this press errs is not known (at 8.8")
-    assert climbed.missed.endswith("(Newton's method: stalled)): press less.")
+    assert climbed.missed.startswith(
+        "tolerance is 50 %, but what this press errs is not known (the press was found, but "
+    )
+    assert climbed.missed.endswith("at 8.866 mm and 2 N (Newton's method: stalled)): press less.")
     with pytest.raises(ToleranceMissed, match=r"press less, or take the best as it is \(--best\)\.$"):
         held(climbed, best=False)
 

@@ -63,7 +63,10 @@ def test_a_press_that_is_too_faint_for_who_answers_is_neither_answered_nor_refus
     assert (len(found.number), found.share_answered()) == (12, 0.75)
     cells = dict(zip(FIGURES, figures_of(found), strict=True))
     assert (cells["stand out"], cells["answered"], cells["refused"]) == ("8", "6", "25 %")
-    assert np.isnan(told_presses(good=0, faint=2).share_answered())
+    assert cells["median misfit"] == "1.00"
+    nothing = told_presses(good=0, faint=2)
+    assert nothing.share_answered() == 0.0
+    assert figures_of(nothing) == ("0", *[""] * (len(FIGURES) - 1))
 
 
 def test_pairs_are_of_the_same_numbers_whatever_stands_out_beside_them():
