@@ -263,15 +263,16 @@ def chapter_of(found: Sequence[ErrorStatement]) -> Chapter:
     judged, rows, overstated = [], [], []
     for kind, level in dict.fromkeys((one.kind, one.level) for one in found):
         mine = [one for one in found if (one.kind, one.level) == (kind, level)]
-        ratios = [one.ratio for one in mine if one.true > UNRESOLVED] or [np.nan]
-        held, median = float(np.mean([one.is_held for one in mine])), float(np.median(ratios))
-        case = f"{kind}: {level}"
+        ratios = [one.ratio for one in mine if one.true > UNRESOLVED]
+        held, case = float(np.mean([one.is_held for one in mine])), f"{kind}: {level}"
         judged.append(at_least(case, f"share of {len(mine)} statements held", held, REQUIRED_SHARE))
-        judged.append(at_most(case, "median of stated over true error", median, REQUIRED_MEDIAN))
-        if median > REQUIRED_MEDIAN:
-            overstated.append(f"{case}, {median:.1f}")
-        shown = (f"{held:.3f}", f"{median:.1f}", f"{min(ratios):.2g}", f"{max(one.true for one in mine):.1e}")
-        rows.append((kind, level, str(len(mine)), *shown))
+        of_ratios = ("", "")
+        if ratios:  # else nothing of what was stated is resolved
+            median = float(np.median(ratios))
+            judged.append(at_most(case, "median of stated over true error", median, REQUIRED_MEDIAN))
+            overstated += [f"{case}, {median:.1f}"] if median > REQUIRED_MEDIAN else []
+            of_ratios = (f"{median:.1f}", f"{min(ratios):.2g}")
+        rows.append((kind, level, str(len(mine)), f"{held:.3f}", *of_ratios, f"{max(one.true for one in mine):.1e}"))
     header = ("kind", "level", "statements", "held", "median of stated over true", "least", "worst true error")
     return Chapter(
         "Stated errors",

@@ -35,6 +35,12 @@ def test_a_chapter_judges_what_held_level_by_level_and_names_what_is_overstated(
     assert found.facts == {"statements": 102, "held": 101, "overstated": ["kind: graded 5, 6.0"]}
 
 
+def test_a_level_that_errs_by_less_than_is_resolved_has_no_median():
+    found = chapter_of([UNRESOLVED] * 3)
+    assert [one.quantity for one in found.benchmarks] == ["share of 3 statements held (at least)"]
+    assert found.tables[0].rows[0][3:6] == ("1.000", "", "")
+
+
 def test_what_small_strain_departs_by_is_a_kind_of_its_own():
     found = measure_effectivity([], seed=2, departed_scenes=1)
     assert {(one.kind, one.level) for one in found} == {("small strain against finite", "light press")}
