@@ -109,8 +109,8 @@ check: .venv/all.stamp ## lint, format, types, import arrows, systemd's units, s
 fuzz: .venv/all.stamp ## send some three thousand requests that schemathesis makes of the API's document to a simulated probe (four minutes): make fuzz [EXAMPLES=55]
 	$(PY) tests/schema_fuzz.py $(or $(EXAMPLES),55)
 
-bench: .venv/all.stamp ## time everything that somebody waits for, in one table that fails where a bound is missed: make bench [ONLY="work darkness"] [JSON=FILE] [COMPARE=FILE]
-	$(PY) tests/bench.py $(ONLY) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE))
+bench: .venv/all.stamp ## time everything that somebody waits for, in one table that fails where a bound is missed: make bench [ONLY="work darkness"] [RUNS=3] [JSON=FILE] [COMPARE=FILE] [OUT=docs/speed.md]
+	$(PY) tests/bench.py $(ONLY) $(if $(RUNS),--runs $(RUNS)) $(if $(JSON),--json $(JSON)) $(if $(COMPARE),--compare $(COMPARE)) $(if $(OUT),--out $(OUT))
 
 verify: .venv/all.stamp ## check forward model and light against known answers; write docs/verification.md and optics.md
 	$(HOST_TOOLS) optics verify --mitsuba --out docs/optics.md

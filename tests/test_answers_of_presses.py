@@ -2,6 +2,7 @@
 
 import copy
 import json
+from functools import partial
 
 import answers_of_presses as script
 import numpy as np
@@ -45,8 +46,22 @@ def test_what_moved_by_more_than_a_hundredth_of_its_spread_fails(main, answers, 
     (tmp_path / "before.json").write_text(json.dumps(before))
     assert main(["--compare", str(tmp_path / "before.json")]) == code
     standard, precise = capsys.readouterr().out.splitlines()
-    assert standard == f"standard  {COUNT} presses: largest 0, 95 % 0 spreads"
+    assert standard == f"standard  {COUNT} presses: largest 0, 95 % 0, RMS 0 spreads"
     assert f"largest {by:.2g}," in precise
+
+
+def test_other_samples_of_the_same_posteriors_move_answers(model, answers, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(script.posterior, "SEED", script.posterior.SEED)
+    monkeypatch.setattr(script, "read_ramp_model", lambda folder: model)
+    monkeypatch.setattr(script, "answers", partial(script.answers, count=COUNT))
+    before = tmp_path / "before.json"
+    before.write_text(json.dumps(answers))
+    assert script.main(["--compare", str(before)]) == 0
+    assert "largest 0," in capsys.readouterr().out
+    assert script.main(["--sampler-seed", "7", "--compare", str(before)]) == 0
+    assert "largest 0," not in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        script.main(["--sampler-seed", "7"])
 
 
 def test_what_is_written_can_be_compared(main, tmp_path):
