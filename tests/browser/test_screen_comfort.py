@@ -8,6 +8,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from opened_screen import SIZES, named, opened, shoot
 from playwright.sync_api import Browser, Page, expect
+from scanned import scan
 from screen_layout import wrong_in
 from served_probe import ServedProbe, served_probe
 
@@ -249,8 +250,7 @@ def test_nothing_can_be_pressed_under_the_curtain(browser: Browser, tmp_path: Pa
     expect(page.locator("#connection-lost")).to_be_visible()
     for id in ("main", "header", "footer"):
         expect(page.locator(f"#{id}")).to_have_js_property("inert", value=True)
-    page.keyboard.type("A-17", delay=5)  # a scanner
-    page.keyboard.press("Enter")
+    scan(page, "A-17")
     expect(page.locator("dialog[open]")).to_have_count(0)
     shoot(page, "comfort/lost")
     assert wrong_in(page) == []

@@ -13,6 +13,7 @@ from axe_playwright_python.sync_playwright import Axe
 from daemon_process import QUICK_HAND, Daemon
 from opened_screen import shoot
 from playwright.sync_api import Page, expect
+from scanned import scan
 from screen_layout import wrong_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
@@ -104,8 +105,7 @@ def test_a_day(page: Page, tmp_path: Path):
     expect(page.locator("#exam-who")).to_have_text("Choose patient")
     expect(page.locator("#result")).to_be_hidden()
     # the second patient, from a scanner
-    page.keyboard.type("B-22", delay=5)
-    page.keyboard.press("Enter")
+    scan(page, "B-22")
     expect(page.locator("#patient-ref")).to_have_value("B-22")
     nurse.begin_exam("B-22", "right", 2)
     nurse.press()

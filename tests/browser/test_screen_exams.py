@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from daemon_process import QUICK_HAND, Daemon
 from playwright.sync_api import Page, expect
+from scanned import scan
 from screen_layout import wrong_in
 
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
@@ -106,8 +107,7 @@ def test_a_scanner_fills_in_the_patient_and_its_enter_presses_nothing(page: Page
     make(daemon, patient_ref="B-22")
     open_exam(page, daemon, "B-22")
     page.locator("#press-button").focus()
-    page.keyboard.type("A-17", delay=4)
-    page.keyboard.press("Enter")
+    scan(page, "A-17")
     expect(page.locator("#scanned")).to_have_text("Scanned: A-17")
     expect(page.locator(".recent")).to_have_count(1)
     assert daemon.ask("/api/v1/status").json["press"] is None

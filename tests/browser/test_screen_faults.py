@@ -38,6 +38,7 @@ def test_every_fault_is_whole_and_said_once(browser: Browser, probe: ServedProbe
         else:
             probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, fault=None, warnings=(error,))
         expect(page.locator(".fault-code")).to_have_text([code])
+        expect(page.locator(".fault-remedy")).to_have_count(1)
         wrong[code] = wrong_in(page)
         remedy = page.locator(".fault-remedy").inner_text()
         assert len(remedy) > 5
