@@ -100,7 +100,7 @@ def _frames_beside_requests(folder: Path) -> Iterator[Figure]:
             run = acquisition._run(capture, hand, SECONDS)
     for what, frames, bound in ((f"beside {found['asked']} requests", run, 1.0), ("beside none", alone, None)):
         for figure in acquisition._of_run(frames):
-            if figure.name.startswith(("frames that came", "longest gap")):
+            if figure.name.startswith(("share of frames that came", "longest gap")):
                 said = replace(figure, chapter=CHAPTER, name=f"{what}: {figure.name}")
                 yield replace(said, bound=bound if figure.at_least else None)
     answered = found["answered"] / found["asked"]
