@@ -6,16 +6,10 @@ inclusions.
 
 from __future__ import annotations
 
-import os
-
-# A 2-D solve gains nothing from threads and a sweep loses by them; a 3-D one gains a little on an idle machine, but
-# NGSolve's threads wait by spinning, and on a busy one it then takes ten times as long.
-os.environ.setdefault("NGS_NUM_THREADS", "1")
-
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ngsolve import SetNumThreads, ngsglobals
+from ngsolve import ngsglobals
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.forward.error_estimates.dual_error import dual_error
@@ -30,7 +24,6 @@ from host_tools.forward.tiers import Meshed, build
 from host_tools.scenes.scene import Press, Scene
 
 ngsglobals.msg_level = 0
-SetNumThreads(1)
 
 
 def solve(scene: Scene, plan: ModelPlan | None = None, *, estimate_error: bool = False) -> Solution:

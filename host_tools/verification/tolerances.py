@@ -91,10 +91,15 @@ def measure(
 ) -> list[list[ToleranceAnswer]]:
     """Return every scene's answers, one a tolerance; a process a scene.
 
-    A folder to `keep` them in lets an interrupted run go on. It knows a scene again, not a change of the model.
+    A folder to `keep` them in lets an interrupted run go on. It knows a scene again, not a change of the model. True
+    numbers, which take most of the time, are kept apart there: what states errors may change without them.
     """
-    answered = Memory(keep, verbose=0).cache(answers) if keep else answers
-    return list(Parallel(n_jobs=jobs)(delayed(answered)(drawn_scene(seed, number)) for number in range(scenes)))
+    answered, true_of = answers, true_numbers_of
+    if keep:
+        memory = Memory(keep, verbose=0)
+        answered, true_of = memory.cache(answers, ignore=["true_of"]), memory.cache(true_numbers_of)
+    drawn = (drawn_scene(seed, number) for number in range(scenes))
+    return list(Parallel(n_jobs=jobs)(delayed(answered)(scene, true_of) for scene in drawn))
 
 
 def drawn_scene(seed: int, number: int) -> Scene:
@@ -104,7 +109,18 @@ def drawn_scene(seed: int, number: int) -> Scene:
     return moved(scene, rng) if number % 2 else scene
 
 
-def answers(scene: Scene) -> list[ToleranceAnswer]:
+def true_numbers_of(scene: Scene, highest_order: int) -> dict[str, float]:
+    """Return numbers as good as true, none where they cannot be had; off the axis orders of answers matter."""
+    if not scene.placement.offset_mm:
+        return true_numbers(scene, TRUE_FINITE, "finite")[1]
+    true_order = min(highest_order + FINER, HIGHEST_SOLID)
+    return true_numbers(scene, [Level(GRADED, true_order)], "small")[1] if true_order > highest_order else {}
+
+
+TrueNumbers = Callable[[Scene, int], dict[str, float]]
+
+
+def answers(scene: Scene, true_of: TrueNumbers = true_numbers_of) -> list[ToleranceAnswer]:
     """Return what is answered at each tolerance, from the loosest on; what is refused at one is not tried tighter."""
     found: list[tuple[Solution | None, ToleranceAnswer]] = []
     for tolerance in TOLERANCES:
@@ -114,7 +130,8 @@ def answers(scene: Scene) -> list[ToleranceAnswer]:
         else:
             found.append(_answer(scene, tolerance))
     given = [solution for solution, _ in found if solution]
-    truth = _truth(scene, max(solution.plan.order for solution in given)) if given else {}
+    highest_order = max((one.plan.order for one in given), default=0) if scene.placement.offset_mm else 0
+    truth = true_of(scene, highest_order) if given else {}
     return [replace(one, stated_and_true=_pairs(solution, truth)) if solution else one for solution, one in found]
 
 
@@ -127,14 +144,6 @@ def _answer(scene: Scene, tolerance: float) -> tuple[Solution | None, ToleranceA
         return None, ToleranceAnswer(tolerance, place, "", time.perf_counter() - began, {}, str(failed))
     solution = climbed.solutions[0]
     return solution, ToleranceAnswer(tolerance, place, solution.plan.level, time.perf_counter() - began, {})
-
-
-def _truth(scene: Scene, order: int) -> dict[str, float]:
-    """Return numbers as good as true, none where they cannot be had; `order` is that of the tightest answer."""
-    if not scene.placement.offset_mm:
-        return true_numbers(scene, TRUE_FINITE, "finite")[1]
-    true_order = min(order + FINER, HIGHEST_SOLID)
-    return true_numbers(scene, [Level(GRADED, true_order)], "small")[1] if true_order > order else {}
 
 
 def _pairs(solution: Solution, truth: dict[str, float]) -> dict[str, tuple[float, float]]:

@@ -9,40 +9,54 @@ Source: Babuska & Suri, SIAM Review 36(4), 1994, on the p version.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
+from types import MappingProxyType
+from typing import NamedTuple
 
 from host_tools.forward.deformation import deformation
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.plan import GRADED, SLIDING, ModelPlan
 from host_tools.forward.press_model import Loaded
 
-STEP_UP_FACTOR = 3.0
-"""Stated error over a feature's own step to the next higher order."""
-BLUNT_FACTOR = 3.0
-"""Stated error over the largest step to the next higher order, in finite strain."""
+
+class Rule(NamedTuple):
+    """What a kind of model states: a factor, by order where it differs, of steps to the other order."""
+
+    factor: float
+    share: float
+    """Of the largest step of all, which each feature's own counts as at least: 0 is its own alone, 1 the largest."""
+    by_order: Mapping[int, float] = MappingProxyType({})
+    """Factors of the orders whose next step is far smaller, or larger, than the last."""
+
+    def error(self, order: int, step: float, largest: float) -> float:
+        """Return what is stated of a feature by its own relative step and the largest; of what is prescribed, 0."""
+        return self.by_order.get(order, self.factor) * max(step, self.share * largest) if step else 0.0
+
+
+ONE_MESH = Rule(3.0, 0.0)
+"""Axisymmetry in small strain on the mesh that data sets share, from the next higher order."""
+BLUNT = Rule(3.0, 1.0)
+"""Finite strain on the meshes that data sets share, from the next higher order."""
+CORRECTED = Rule(4.0, 0.0)
+"""Finite strain in a climb, by one Newton correction at the next order; small strain foretells what it cannot see."""
+SOLID_ONE_MESH = Rule(0.4, 1.0)
+"""3-D on the mesh that data sets share, from the next lower order."""
+CLIMBED = Rule(2.0, 1.0, {3: 0.5, 4: 0.5})
+"""Flat faces on rims in layers, from the next lower order, as all that follow."""
+SOLID_ORDER, SOLID = 3, Rule(0.3, 0.5)
+"""The same in 3-D at `SOLID_ORDER`, whose next step is far smaller than in axisymmetry."""
+MIXED = Rule(1.5, 0.25, {3: 0.12, 4: 0.5})
+"""Axisymmetry where a pressure is solved for."""
+CLOSED = Rule(0.75, 0.25, {3: 0.13, 4: 0.32})
+"""A dome that touches everywhere, of displacements alone in axisymmetry."""
+DOMED = Rule(4.0, 1.0, {3: 1.0, 4: 3.0})
+"""Any other dome: at the edge of a contact that lifts off errors fall less from order to order."""
+EDGE_ERROR = 2e-3
+"""Least stated error where a dome lifts off: its edge lies inside an element, which no order sees."""
 INTEGRAL, INTEGRAL_FACTOR = "central_deformation_mm3", 2.5
 """In finite strain under a force O2, what the face's lifted middle and lowered border leave of each other, states so
 much more: the blunt rim moves both."""
-STEP_DOWN_FACTOR = 0.4
-"""Stated error over the largest step, of any feature, from the next lower order."""
-CLIMBED_FACTOR = 2.0
-"""Stated error over the largest step from the next lower order, on a mesh whose rims are in layers."""
-LOW_ORDER, LOW_FACTOR = 4, 0.5
-"""The same up to this order, where the next step is a tenth of the last."""
-OWN_SHARE, SOLID_SHARE = 0.25, 0.5
-"""Of the largest step each feature's own counts as at least in the kinds below, in axisymmetry and in 3-D."""
-MIXED_FACTORS, MIXED_FACTOR = {3: 0.12, 4: 0.5}, 1.5
-"""Stated error over a feature's own step where a pressure is solved for in axisymmetry, by order, and above."""
-CLOSED_FACTORS, CLOSED_FACTOR = {3: 0.13, 4: 0.32}, 0.75
-"""The same under a dome that touches everywhere, of displacements alone in axisymmetry."""
-SOLID_FACTORS = {3: 0.3}
-"""The same in 3-D, where from order 4 on the largest step is stated."""
-CORRECTED_FACTOR = 4.0
-"""Stated error over a feature's own step by one Newton correction, where small strain foretells what it cannot see."""
-CONTACT_FACTORS, CONTACT_FACTOR = {3: 1.0, 4: 3.0}, 4.0
-"""Over the largest step under a dome that lifts off: at the contact's edge errors fall less from order to order."""
-EDGE_ERROR = 2e-3
-"""Least stated error where a dome lifts off: its edge lies inside an element, which no order sees."""
 CLOSED_RATIO = 30.0
 """Pressure at the rim over the mean from which on a dome counts as closed: a flat face has 100, one that all but lifts
 off 15, and one that does so 0. A closed contact's pressure has no bound at the rim."""
@@ -69,18 +83,29 @@ def stated_error(
         others = at_force(pressed.other, pressed.state.force_n), at_force(baseline.other, baseline.state.force_n)
     found, other = numbers(rays, pressed.state, baseline.state), numbers(rays, *others)
     steps = {name: _step(value, other[name]) for name, value in found.items()}
-    if plan.grading in SLIDING:
-        return {name: CORRECTED_FACTOR * step for name, step in steps.items()}
-    if plan.symmetry == "axisymmetric" and plan.strain == "small" and plan.grading != GRADED:
-        return {name: STEP_UP_FACTOR * step for name, step in steps.items()}
     largest = max(step for name, step in steps.items() if name not in CANCELLING)
     lifts_off = plan.contact == "unilateral" and not all(_is_closed(one.state) for one in (pressed, baseline))
-    if (own := _own_factor(plan)) and not lifts_off:
-        share = OWN_SHARE if plan.symmetry == "axisymmetric" else SOLID_SHARE
-        return {name: own * max(step, share * largest) if step else 0.0 for name, step in steps.items()}
-    stated = max(_factor(plan) * largest, EDGE_ERROR if lifts_off else 0.0)
-    shares = {INTEGRAL: INTEGRAL_FACTOR} if by_force and plan.strain == "finite" else {}
-    return {name: shares.get(name, 1.0) * stated if step else 0.0 for name, step in steps.items()}
+    rule = _rule(plan, lifts_off=lifts_off)
+    stated = {name: rule.error(plan.order, step, largest) for name, step in steps.items()}
+    if lifts_off:
+        stated = {name: max(error, EDGE_ERROR) if error else 0.0 for name, error in stated.items()}
+    if rule is BLUNT and by_force:
+        stated[INTEGRAL] *= INTEGRAL_FACTOR
+    return stated
+
+
+def _rule(plan: ModelPlan, *, lifts_off: bool) -> Rule:
+    """Return the rule of a kind of model."""
+    is_round, is_mixed = plan.symmetry == "axisymmetric", plan.formulation == "mixed"
+    if plan.grading in SLIDING:
+        return CORRECTED
+    if plan.grading != GRADED:
+        return SOLID_ONE_MESH if not is_round else BLUNT if plan.strain == "finite" else ONE_MESH
+    if plan.contact == "unilateral":
+        return CLOSED if is_round and not is_mixed and not lifts_off else DOMED
+    if is_round:
+        return MIXED if is_mixed else CLIMBED
+    return SOLID if plan.order == SOLID_ORDER and not is_mixed else CLIMBED
 
 
 def at_force(corrected: FaceState, force_n: float) -> FaceState:
@@ -89,27 +114,6 @@ def at_force(corrected: FaceState, force_n: float) -> FaceState:
     At slightly different forces what an inclusion adds would be lost in what the force does.
     """
     return corrected.scaled(force_n / corrected.force_n)
-
-
-def _own_factor(plan: ModelPlan) -> float | None:
-    """Return stated error over a feature's own step; None where the largest step of all is stated."""
-    if plan.grading != GRADED:
-        return None
-    is_domed, is_mixed = plan.contact == "unilateral", plan.formulation == "mixed"
-    if plan.symmetry != "axisymmetric":
-        return None if is_domed or is_mixed else SOLID_FACTORS.get(plan.order)
-    if is_domed:
-        return None if is_mixed else CLOSED_FACTORS.get(plan.order, CLOSED_FACTOR)
-    return MIXED_FACTORS.get(plan.order, MIXED_FACTOR) if is_mixed else None
-
-
-def _factor(plan: ModelPlan) -> float:
-    """Return stated error over the largest step."""
-    if plan.grading == GRADED and plan.contact == "unilateral":
-        return CONTACT_FACTORS.get(plan.order, CONTACT_FACTOR)
-    if plan.grading == GRADED:
-        return LOW_FACTOR if plan.order <= LOW_ORDER else CLIMBED_FACTOR
-    return BLUNT_FACTOR if plan.symmetry == "axisymmetric" else STEP_DOWN_FACTOR
 
 
 def _is_closed(state: FaceState) -> bool:

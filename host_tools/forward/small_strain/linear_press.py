@@ -5,16 +5,18 @@ Everything is linear in the press, so this one solution scales to any indentatio
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import Any
 
 from ngsolve import BilinearForm, GridFunction, InnerProduct
 
+from host_tools.forward.cores import factorising_in_3d
 from host_tools.forward.face_state import MN_PER_N, FaceState
 from host_tools.forward.materials import Elasticity
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import Body, ContactSpace, contact_pressure_kpa, integral_over_face
 from host_tools.forward.small_strain.elasticity import Stress, lame_modulus_kpa, shear_modulus_kpa, stress, work
-from host_tools.forward.symmetry import Expression, Symmetry
+from host_tools.forward.symmetry import SOLID, Expression, Symmetry
 
 INDENTATION_MM = 1.0
 
@@ -96,8 +98,9 @@ class SolvedPress:
         self._form = BilinearForm(space, symmetric=True, condense=True)
         for term in press.weak_form(elasticity, trial, test):
             self._form += term
-        self._form.Assemble()
-        self._inverse = self._form.mat.Inverse(space.FreeDofs(True), "sparsecholesky")
+        with factorising_in_3d() if press.symmetry is SOLID else nullcontext():
+            self._form.Assemble()
+            self._inverse = self._form.mat.Inverse(space.FreeDofs(True), "sparsecholesky")
         self.u = GridFunction(space)
         back = press.mesh.Boundaries("back")
         self.u.components[press.contact.normal_indices[0]].Set(-sinking_mm, definedon=back)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
+from host_tools.forward.cores import on_cores
 from host_tools.forward.deformation import deformation
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.materials import baseline, with_inclusion
@@ -122,3 +123,13 @@ def test_a_press_that_folds_the_tissue_is_refused():
     meshed = _built(ASIDE, 3)
     with pytest.raises(PressFailed, match="inside out"):
         meshed.model.press(with_inclusion(ASIDE), [Press(indentation_mm=25.0)], estimate_error=False)
+
+
+def test_two_cores_solve_it_as_one_does_but_for_rounding():
+    """And the next scene is solved on one again, to the last digit."""
+    plan = replace(model_plan(ASIDE, strain="small"), grading=GRADED, order=2, mesh="remeshed")
+    on_one = solve(ASIDE, plan)
+    with on_cores(2):
+        on_two = solve(ASIDE, plan)
+    np.testing.assert_allclose(on_two.w_mm, on_one.w_mm, rtol=1e-9)
+    np.testing.assert_array_equal(solve(ASIDE, plan).w_mm, on_one.w_mm)
