@@ -8,16 +8,21 @@ error cancelled another's. Source: Becker & Rannacher, Acta Numerica 10, 2001, s
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from ngsolve import GridFunction, Integrate, LinearForm
+from numpy.typing import NDArray
 
 from device.measurement.arrays import Array
 from host_tools.forward.face_state import MN_PER_N
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.elasticity import work
 from host_tools.forward.small_strain.linear_press import SolvedPress
+
+NEAR_MM = 2.0
+"""From a rim to the middles of the elements that count as near it."""
 
 
 class ElementResidual:
@@ -29,6 +34,14 @@ class ElementResidual:
         self._step.vec.data = high.u.vec - self._raised(low.u).vec
         self.force_n = self._work(self._step) / MN_PER_N
         """By how much each element makes the lower order too stiff [elements], in N for 1 mm."""
+
+    @cached_property
+    def is_near_rim(self) -> NDArray[np.bool_]:
+        """Whether each element [elements] lies near the rim of the face or of the back, where stress is singular."""
+        mesh = self._high.press.mesh
+        middles = np.array([np.mean([mesh[v].point for v in one.vertices], axis=0) for one in mesh.Elements()])
+        far_mm = np.min([np.hypot(*(middles - rim).T) for rim in _rims(mesh)], axis=0)
+        return np.asarray(far_mm < NEAR_MM)
 
     def of(self, per_sample: Array, per_total: float) -> Array:
         """Return each element's part [elements] of the step of a sum over the face, for 1 mm of indentation.
@@ -82,3 +95,11 @@ class ElementResidual:
         contact = solved.press.contact
         normal = contact.space.components[contact.normal_indices[0]]
         return [int(dof) for dof in np.flatnonzero(list(normal.GetDofs(contact.mesh.Boundaries("face"))))]
+
+
+def _rims(mesh: Any) -> list[tuple[float, float]]:
+    """Return the outer ends of the face and of the back in the half plane (mm)."""
+    return [
+        max(mesh[v].point for edge in mesh.Boundaries(name).Elements() for v in edge.vertices)
+        for name in ("face", "back")
+    ]
