@@ -37,8 +37,8 @@ ASKED, ASK_BOUND = 400, 40.0
 """10 ms where the yardstick takes 0.25: Linux puts off an acknowledgement for 40 ms, which an answer in two parts waits
 for when TCP_NODELAY is lost."""
 ANSWERED_PRESSES = 5
-ANSWER_BOUNDS = {"quick": 200.0, "standard": 850.0, "precise": 2000.0}
-"""0.05, 0.2 and 0.5 s where the yardstick takes a quarter of a millisecond; the hand's scan is one of five presses."""
+ANSWER_BOUNDS = {"quick": 150.0, "standard": 650.0, "precise": 1600.0}
+"""0.04, 0.16 and 0.4 s where the yardstick takes a quarter of a millisecond; the hand's scan is one of five presses."""
 REST_S, SETTLE_S = 20.0, 15.0
 QUICK_PRESSES = 30
 """A hand in real time takes three seconds for each: chapter `endurance` has a thousand."""

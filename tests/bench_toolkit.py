@@ -43,7 +43,7 @@ trace(LightBlock(), TracedFace(x, x, np.zeros((45, 45)), np.zeros((45, 45))), Sk
 
 def figures() -> Iterator[Figure]:
     """Yield the ramp and the starts, each the least of some rounds over the least of what it is compared with."""
-    yield timed(CHAPTER, "finite strain: four forces with baseline", _ramp, bound=16_000.0, repeats=ROUNDS)
+    yield timed(CHAPTER, "finite strain: four forces with baseline", _ramp, bound=12_000.0, repeats=ROUNDS)
     yield from _wide_table()
     _started_s("-c", TRACED)  # compiled, if it was not
     starts = {
