@@ -27,6 +27,8 @@ from device.measurement.ramp_modes.estimate import estimate_ramp
 from device.measurement.recording.recording import GEOMETRY
 from device.settings.layers import read_config
 from host_tools.commissioning import commission as commission_module
+from host_tools.commissioning import own_quick as own_quick_module
+from host_tools.press_models.quick_training import QuickBudget
 from host_tools.scenes.phantom_set import StatedPhantom, read_phantoms
 from host_tools.scenes.probe_file import read_probe
 
@@ -34,6 +36,8 @@ SERIAL, WORLD = "TSIS-0007", ROOT / "scenarios/worlds/world_02.toml"
 CAST = ("phantom1", "phantom2", "phantom4", "phantom5", "phantom7", "phantom8", "block1", "block2", "block3")
 TISSUES_KPA = 4.6, 5.4
 PRESSES = 2
+SHORT_BUDGET = QuickBudget(recordings=24, trained_on=2_000, members=2, steps=600, evaluated=3_200)
+"""Of mode quick, whose intervals are then wider than a commissioned probe's and as honest."""
 NOT_CAST = {"size_mm": 11.0, "depth_mm": 5.5, "youngs_modulus_kpa": 90.0}
 
 
@@ -68,6 +72,8 @@ def bench(tmp_path_factory):
     toolkit("phantom", *castings, *pressed, "--out", folder / "ramps")
     others = ("--phantoms", folder / "not_cast.toml", "--ramp", "--seed", 900, "--camera-of", folder / "probe.toml")
     toolkit("phantom", *others, *pressed, "--out", folder / "presses")
+    held = [one for one in others if one != "--ramp"]
+    toolkit("phantom", *held, *pressed, "--out", folder / "holds")
     return folder
 
 
@@ -89,10 +95,11 @@ def analysed(capsys, *arguments: object) -> tuple[int, str, str]:
 
 @pytest.fixture(scope="module")
 def own(bench):
-    """The words of the command and the bundle's folder; its card is made of fewer presses than usual."""
+    """The words of the command and the bundle's folder; card and mode quick are made of fewer presses than usual."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(commission_module, "PRESSES", 12)
         patched.setattr(commission_module, "SCANS", 4)
+        patched.setattr(own_quick_module, "OWN_BUDGET", SHORT_BUDGET)
         ramps, out = sorted((bench / "ramps").iterdir()), bench / SERIAL
         files = ("--probe", bench / "probe.toml", "--phantoms", bench / "phantoms.toml")
         return toolkit("commission", *ramps, *files, "--out", out), out
@@ -116,13 +123,30 @@ def test_a_probe_that_somebody_built_is_commissioned_and_answers_presses_that_no
 
 
 @pytest.mark.long
+def test_a_press_that_is_held_is_answered_by_mode_quick_of_the_probe(bench, own, capsys):
+    told, folder = own
+    quick = folder.with_name(f"{SERIAL}-quick")
+    assert "set quick_model to it" in told
+    of_probe = settings(bench, standard_model=folder, quick_model=quick, calibration=folder / "calibration.json")
+    holds = sorted((bench / "holds").iterdir())[:PRESSES]
+    code, out, err = analysed(capsys, "--config", of_probe, "analyse", "--mode", "quick", *holds)
+    assert code == 0, err
+    for estimate in map(json.loads, out.splitlines()):
+        assert estimate["status"] == "partly_identifiable", estimate["reason"]
+        assert (estimate["mode"], estimate["model"]) == ("quick", quick.name)
+        assert estimate["size_mm"]["low"] <= NOT_CAST["size_mm"] <= estimate["size_mm"]["high"]
+
+
+@pytest.mark.long
 def test_the_daemon_takes_up_bundle_and_certificate_and_offers_what_they_are_for(bench, own):
     _, folder = own
-    config = read_config(settings(bench, standard_model=folder, calibration=folder / "calibration.json"))
+    quick = folder.with_name(f"{SERIAL}-quick")
+    paths = {"standard_model": folder, "quick_model": quick, "calibration": folder / "calibration.json"}
+    config = read_config(settings(bench, **paths))
     paper = read_paper_model(config.paper_model)
     calibration = active_calibration(config, paper)
     answers = answers_for(config, paper, calibration)
-    assert answers.modes == ("standard", "precise")
+    assert answers.modes == ("quick", "standard", "precise")
     assert answers.expires_at == calibration.validity.expires_at
     moved = replace(config, camera=replace(config.camera, axis_x_mm=0.0))
     with pytest.raises(ForeignCalibration, match=r"camera\.axis_x_mm is 0, but must be -0\.2"):

@@ -39,8 +39,9 @@ class ModeModels(NamedTuple):
 
     @property
     def expires_at(self) -> str | None:
-        """Until when the model of force ramps holds (RFC 3339); None of one that was not commissioned, or none."""
-        return self.ramp.bundle.card.get("expires_at") if self.ramp else None
+        """Until when all commissioned models hold (RFC 3339); None where none is one."""
+        cards = [model.bundle.card for model in (self.quick, self.ramp) if model]
+        return min((card["expires_at"] for card in cards if card.get("expires_at")), default=None)
 
     @property
     def flat_field_ratio(self) -> float | None:

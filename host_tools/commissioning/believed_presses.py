@@ -57,6 +57,15 @@ def believed_presses(
 
 def _drawn(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.random.Generator) -> SeenPresses:
     """Return one press or scan that is as believed."""
+    seen, direction_rad = without_noise(answers, at, further_mm, rng)
+    return to_bright_side(seen_with_noise(seen, answers.noise, rng), direction_rad)
+
+
+def without_noise(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return what is seen [N, S] of one press or scan that is as believed, but for noise, and its directions [N].
+
+    `at` are coordinates [9], of a press whose further ones lie at offsets `further_mm` [N - 1].
+    """
     each = np.tile(at, (1 + len(further_mm), 1))
     each[1:, OFFSET] = further_mm - 1
     direction_rad = rng.uniform(0, 2 * np.pi, len(each))
@@ -69,7 +78,7 @@ def _drawn(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.random.Gen
     changes = answers.own.changes(place, rows, leaning)  # how far each leans tells what its tilts' squares do
     seen = straight + changes.shift + changes.factor @ drawn
     seen[1:, RESPONSE] = seen[0, RESPONSE]
-    return to_bright_side(seen_with_noise(seen, answers.noise, rng), direction_rad)
+    return seen, direction_rad
 
 
 def believed_answers(

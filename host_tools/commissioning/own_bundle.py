@@ -1,9 +1,10 @@
-"""A commissioned probe to the bundle of its modes standard and precise: the design's, with what is its own.
+"""A commissioned probe to its bundles: one of modes standard and precise, and one of mode quick.
 
-Its certificate stands in the same folder, and both hold until the same moment.
+The certificate stands beside the former, and all hold until the same moment.
 
-Networks, polynomials and the camera's noise are the design's, to the byte. Serial, what is believed of the probe,
-limits, and what the answers are worth are its own. Source of the format: the model bundle of docs/contracts.md.
+Networks of ramps, polynomials and the camera's noise are the design's, to the byte. Serial, what is believed of the
+probe, limits, what the answers are worth and all of mode quick are its own.
+Source of the format: the model bundle of docs/contracts.md.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from device import __version__
 from device.measurement.bundle import CARD_FILE
 from device.measurement.calibration import Calibration, written
 from device.measurement.mode import FRAMES, Mode
@@ -29,8 +31,10 @@ from device.measurement.ramp_modes.range_classifier import RANGE_FILE
 from host_tools.commissioning.believed_presses import BelievedAnswers, believed_dial
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE
+from host_tools.commissioning.own_quick import OwnQuick
 from host_tools.commissioning.page import PAGE_FILE, commissioning_page
 from host_tools.paper_network.export import write_folder
+from host_tools.press_models.export import export_quick
 from host_tools.press_models.mode_statistics import half_width_by_ramps, reachable_half_width, statistics
 
 VALID_DAYS = Bound(1.0, 730.0, "days")
@@ -70,7 +74,7 @@ def write_own_bundle(
         "serials": [serial],
         "training_command": command,
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
-        "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
+        "expires_at": expiry(certificate, made_at, valid_days),
         "commissioned": commissioned_record(done, made_at, origin),
     }
     of_modes: dict[Mode, BelievedAnswers] = {"standard": done.presses, "precise": done.scans}
@@ -84,6 +88,34 @@ def write_own_bundle(
     kept_files = {name: files[name] for name in names}
     kept_files |= {SURROGATE_FILE: surrogate, CARD_FILE: text, PAGE_FILE: page}
     write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))
+
+
+def quick_folder(folder: Path) -> Path:
+    """Return where the bundle of mode quick stands, beside that of ramps."""
+    return folder.with_name(f"{folder.name}-quick")
+
+
+def write_own_quick(
+    made: OwnQuick, done: CommissionedProbe, folder: Path, *, serial: str, expires_at: str, command: str
+) -> None:
+    """Write the bundle of a commissioned probe's mode quick to a new folder, whole or not at all."""
+    surrogate = _archive(surrogate_arrays(done.answers))
+    dial = believed_dial("quick", made.believed)
+    export_quick(
+        made.trained,
+        folder,
+        surrogate_sha256=hashlib.sha256(surrogate).hexdigest(),
+        serials=(serial,),
+        software_version=__version__,
+        training_command=command,
+        more={"expires_at": expires_at},
+        worth={"dial": dial} if dial else {},
+    )
+
+
+def expiry(certificate: Calibration | None, made_at: datetime, valid_days: float) -> str:
+    """Return until when a commissioned probe's bundles hold: as long as its certificate, else so many days."""
+    return certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days))
 
 
 def _worth(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:

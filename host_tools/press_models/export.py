@@ -12,6 +12,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,6 @@ from host_tools.press_models.onnx_networks import (
 )
 from host_tools.press_models.quick_training import QuickOutcome, TrainedQuick
 from host_tools.press_models.ramp_training import TrainedRamp
-from host_tools.press_models.seeds import derived_seed
 
 GOLDEN_ROWS = 8
 
@@ -82,8 +82,13 @@ def export_quick(
     serials: tuple[str, ...],
     software_version: str,
     training_command: str,
+    more: Mapping[str, Any] = MappingProxyType({}),
+    worth: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_ramp`."""
+    """Write the bundle of mode quick, learnt from the surrogate of that hash; as `export_ramp`.
+
+    Of a commissioned probe its card says `more`, and of the mode what its answers are `worth`.
+    """
     rows = trained.training_set.rows[:GOLDEN_ROWS]
     network = build_network(trained.ensemble)
     card = {
@@ -91,29 +96,22 @@ def export_quick(
         "seed": trained.seed,
         "dataset_sha256": hashlib.sha256(trained.training_set.rows.tobytes()).hexdigest(),
         "surrogate_sha256": surrogate_sha256,
+        **more,
         "effort": budget_entry(asdict(trained.budget)),
         "features": [{"name": name, "unit": unit} for name, unit in QUICK_UNITS.items()],
-        "training_range": _training_range(dict(zip(QUICK_UNITS, _usual(trained).T, strict=True))),
+        "training_range": _training_range(dict(zip(QUICK_UNITS, trained.usual_rows.T, strict=True))),
         "modes": {
             "quick": {
                 "faintest_contrast": list(trained.faintest_contrast),
                 "elongation_ratio": trained.outcome.elongation_ratio,
                 "bands": _belts(trained.outcome.belts),
                 **_answers(trained.outcome),
+                **worth,
             }
         },
         "golden": golden_vectors(trained.ensemble, network, rows.astype(np.float64)),
     }
     write_folder(folder, {MODEL_FILE: network, CARD_FILE: _text(card)})
-
-
-def _usual(trained: TrainedQuick) -> Array:
-    """Return the ends [2, 12] between which rows with noise lie, but for one in two thousand at each."""
-    training_set = trained.training_set
-    noisy = training_set.noisy(
-        np.arange(len(training_set.rows)), np.random.default_rng(derived_seed(trained.seed, "usual rows of quick"))
-    )
-    return np.quantile(noisy.astype(np.float64), [0.0005, 0.9995], axis=0)
 
 
 def _card(
@@ -179,4 +177,5 @@ def _belts(belts: tuple[Belt, ...]) -> dict[str, Any]:
 
 def _answers(outcome: ModeOutcome | QuickOutcome) -> dict[str, Any]:
     """Return the statistics of a mode."""
-    return {"simulated": statistics(outcome.simulated), "recorded": statistics(outcome.recorded)}
+    recorded = {} if outcome.recorded is None else {"recorded": statistics(outcome.recorded)}
+    return {"simulated": statistics(outcome.simulated)} | recorded

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -53,12 +54,15 @@ class QuickBudget:
 
 @dataclass(frozen=True, eq=False)
 class QuickOutcome:
-    """Belts and critical elongation; `simulated` presses that the belts have not seen, and `recorded` ones."""
+    """Belts and critical elongation; `simulated` presses that the belts have not seen, and `recorded` ones.
+
+    Of a commissioned probe none were recorded but on phantoms.
+    """
 
     belts: tuple[Belt, ...]
     elongation_ratio: float
     simulated: EvaluatedPresses
-    recorded: EvaluatedPresses
+    recorded: EvaluatedPresses | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,13 @@ class TrainedQuick:
     outcome: QuickOutcome
     budget: QuickBudget
     seed: int
+
+    @cached_property
+    def usual_rows(self) -> Array:
+        """Return the ends [2, 12] between which rows with noise lie, but for one in two thousand at each."""
+        every = np.arange(len(self.training_set.rows))
+        rng = np.random.default_rng(derived_seed(self.seed, "usual rows of quick"))
+        return np.quantile(self.training_set.noisy(every, rng).astype(np.float64), [0.0005, 0.9995], axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,19 +111,24 @@ def train_quick(
         return quick_press_set(random_press_set(surrogate, noise, count, drawn), camera, drawn)
 
     say(f"{asked.recordings} recordings of held presses")
-    camera = _camera(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)
+    camera = camera_of_a_hold(tables, asked.recordings, derived_seed(seed, "camera of quick"), jobs)
     say(f"{asked.members} networks")
     training_set = press_set(asked.trained_on, "training presses of quick")
     ensemble = train_ensemble(training_set, seed=seed, members=asked.members, steps=asked.steps, jobs=jobs)
     say(f"{asked.evaluated} presses and {asked.test_recordings} recordings for the limits")
     fresh = press_set(asked.evaluated, "judged presses of quick")
     noisy = fresh.noisy(np.arange(asked.evaluated), np.random.default_rng(derived_seed(seed, "judged noise of quick")))
-    simulated = _evaluated(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
+    simulated = spread_answers(ensemble, noisy.astype(np.float64), fresh.normalised.astype(np.float64))
     recording = derived_seed(seed, "judged recordings of quick")
     recorded = recorded_holds(tables, asked.test_recordings, recording, ErrorLevels(), jobs)
-    none = training_set.typical_noise()[:RINGS, :RINGS]
-    faintest = tuple(VISIBLE_DEVIATIONS * float(np.sqrt(weights @ none @ weights)) for weights in SEEN_BY.values())
+    faintest = faintest_contrast(training_set)
     return TrainedQuick(ensemble, training_set, faintest, _outcome(ensemble, simulated, recorded), asked, seed)
+
+
+def faintest_contrast(training_set: QuickPressSet) -> tuple[float, ...]:
+    """Return the contrast of each of `SEEN_BY` below which nothing stands out from the noise."""
+    none = training_set.typical_noise()[:RINGS, :RINGS]
+    return tuple(VISIBLE_DEVIATIONS * float(np.sqrt(weights @ none @ weights)) for weights in SEEN_BY.values())
 
 
 def recorded_holds(tables: ProbeTables, count: int, seed: int, levels: ErrorLevels, jobs: int) -> RecordedHolds:
@@ -126,7 +142,7 @@ def recorded_holds(tables: ProbeTables, count: int, seed: int, levels: ErrorLeve
     return RecordedHolds(parameters, np.array(rows), np.array(elongation))
 
 
-def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
+def camera_of_a_hold(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
     """Return the covariance [11, 11] of recorded contrast about the exact one, at the force that was reported."""
     recorded = recorded_holds(tables, count, seed, EXACT, jobs)
     ramps = exact_rows(tables, recorded.parameters, seed=seed, jobs=jobs)
@@ -137,7 +153,8 @@ def _camera(tables: ProbeTables, count: int, seed: int, jobs: int) -> Array:
 def _outcome(ensemble: DenseEnsemble, simulated: SpreadAnswers, recorded: RecordedHolds) -> QuickOutcome:
     """Return belts and limits of the first halves, and the second halves to count on; as `mode_outcome`."""
     half, usual = len(simulated.truth) // 2, slice(len(recorded.rows) // 2)
-    seen, evaluated = simulated.part(slice(half)), _evaluated(ensemble, recorded.rows, normalise(recorded.parameters))
+    seen = simulated.part(slice(half))
+    evaluated = spread_answers(ensemble, recorded.rows, normalise(recorded.parameters))
     first = evaluated.part(usual)
     belts = confidence_belts(seen.truth, seen.mean, seen.spread, seen.truth[:, MODULUS])
     belts = widened(belts, first.truth, first.mean, first.spread)
@@ -149,7 +166,8 @@ def _outcome(ensemble: DenseEnsemble, simulated: SpreadAnswers, recorded: Record
     )
 
 
-def _evaluated(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> SpreadAnswers:
+def spread_answers(ensemble: DenseEnsemble, rows: Array, normalised: Array) -> SpreadAnswers:
+    """Return what networks say of rows [n, 12] at coordinates [n, 9]."""
     return SpreadAnswers(normalised[:, : len(UNKNOWNS)], *ensemble.estimate(rows))
 
 
