@@ -1,7 +1,8 @@
 """One thing at a time: the same presses in worlds that differ in one, in every mode, before and after.
 
 "As it ships" is as if the simulated probe's bundles were this probe's own. "After" is by what allows for a builder's
-tolerances and a hand's habits; where a thing is the probe's, after commissioning on phantoms that the probe pressed.
+tolerances and a hand's habits; where a thing is the probe's, modes of ramps are commissioned on phantoms that it
+pressed. Mode quick is trained once, on tolerances and habits alone: each training takes minutes.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from device.measurement.mode import Mode
 from device.measurement.quantities import UNKNOWNS
+from device.measurement.quick_mode.model import QuickModel
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_least
 from host_tools.scenes.phantom_set import PhantomSet
 from host_tools.scores.one_thing.causes import Cause, CauseOwner, causes
@@ -25,6 +27,7 @@ from host_tools.scores.one_thing.press_answers import (
     OwnLimits,
     commissioned,
     quick_scores,
+    quick_with_tolerances,
     ramp_scores,
     with_tolerances,
 )
@@ -40,10 +43,11 @@ TITLES = {
     "standard after": "Mode standard, after",
     f"precise {SHIPPED}": "Mode precise, a scan of two, as it ships",
     "precise after": "Mode precise, a scan of two, after",
-    "quick": "Mode quick, as it ships",
+    f"quick {SHIPPED}": "Mode quick, as it ships",
+    "quick after": "Mode quick, after",
 }
-AFTER: dict[Mode, str] = {"quick": "quick", "standard": "standard after", "precise": "precise after"}
-"""Modes to the answers that have bounds; nothing commissions mode quick."""
+AFTER: dict[Mode, str] = {"quick": "quick after", "standard": "standard after", "precise": "precise after"}
+"""Modes to the answers that have bounds."""
 HOLDS: dict[CauseOwner, str] = {
     "probe": "builder; phantoms tell it",
     "camera": "builder; a grid target undoes it",
@@ -51,13 +55,8 @@ HOLDS: dict[CauseOwner, str] = {
     "patient": "nobody",
     "nobody": "",
 }
-OF_RAMPS: tuple[CauseOwner, ...] = ("nobody", "probe", "press", "patient")
-BOUNDED_OWNERS: dict[Mode, tuple[CauseOwner, ...]] = {
-    "quick": ("nobody", "press", "patient"),
-    "standard": OF_RAMPS,
-    "precise": OF_RAMPS,
-}
-"""Whose things have bounds in each mode: a grid undoes a camera, and mode quick refuses every probe but its own."""
+BOUNDED_OWNERS: tuple[CauseOwner, ...] = ("nobody", "probe", "press", "patient")
+"""Whose things have bounds: a grid undoes a camera."""
 Found = dict[str, list[ScoredPresses]]
 """Each of `TITLES` to its answers, cause by cause."""
 
@@ -69,18 +68,23 @@ def one_at_a_time_chapter(
     presses: int = PRESSES,
     scans: int | None = None,
     tried: Sequence[Cause] | None = None,
+    own_quick: QuickModel | None = None,
     seed: int = 1,
     jobs: int = -1,
 ) -> Chapter:
-    """Return what each thing of `causes`, or of those given, costs alone; the first is that nothing differs."""
+    """Return what each thing of `causes`, or of those given, costs alone; the first is that nothing differs.
+
+    `own_quick` is mode quick by tolerances and habits; it is trained unless given.
+    """
     all_of_them = list(tried or causes())
     of_probe = [cause for cause in all_of_them if cause.owner == "probe"]
     own = dict(zip((one.name for one in of_probe), commissioned(design, of_probe, phantoms, seed, jobs), strict=True))
     scans = scans_of(presses) if scans is None else scans
     unknown, truths = with_tolerances(design, seed), random_design(presses, scans, seed)
+    quick = own_quick or quick_with_tolerances(design, seed, jobs)
     found: Found = {name: [] for name in TITLES}
     for cause in all_of_them:
-        for name, one in _answered(design, truths, cause, own.get(cause.name, unknown), jobs).items():
+        for name, one in _answered(design, truths, cause, own.get(cause.name, unknown), quick, jobs).items():
             found[name].append(one)
     return Chapter(
         title="One thing at a time",
@@ -99,7 +103,7 @@ def one_at_a_time_chapter(
 
 
 def _answered(
-    design: DesignToTry, truths: TruthDesign, cause: Cause, own: OwnLimits, jobs: int
+    design: DesignToTry, truths: TruthDesign, cause: Cause, own: OwnLimits, own_quick: QuickModel, jobs: int
 ) -> dict[str, ScoredPresses]:
     taken = tried_presses(
         truths,
@@ -107,16 +111,18 @@ def _answered(
         design.model.answers.noise,
         jobs=jobs,
     )
-    return ramp_scores(taken, design, own, jobs) | {"quick": quick_scores(truths.parameters, taken.held, design.quick)}
+    models = {f"quick {SHIPPED}": design.quick, "quick after": own_quick}
+    quick = {name: quick_scores(truths.parameters, taken.held, model) for name, model in models.items()}
+    return ramp_scores(taken, design, own, jobs) | quick
 
 
 def _benchmarks(tried: Sequence[Cause], found: Mapping[str, Sequence[ScoredPresses]]) -> list[Benchmark]:
-    """Return what each row reaches of what is asked for, in each mode that has to do with it."""
+    """Return what each row reaches of what is asked for, in each mode."""
     return [
         one
         for mode, name in AFTER.items()
         for cause, of_cause in zip(tried, found[name], strict=True)
-        if cause.owner in BOUNDED_OWNERS[mode]
+        if cause.owner in BOUNDED_OWNERS
         for one in _of_row(mode, cause, of_cause)
     ]
 
@@ -136,7 +142,8 @@ def _table(name: str, tried: Sequence[Cause], found: Sequence[ScoredPresses]) ->
     if not name.endswith("after"):
         rows = [(one.quantity, one.size, *figures_of(of_one)) for one, of_one in zip(tried, found, strict=True)]
         return Table(TITLES[name], ("what differs", "by", *FIGURES), tuple(rows))
-    by = (COMMISSIONED if one.owner == "probe" else TOLERANT for one in tried)
+    is_commissioned = not name.startswith("quick")
+    by = (COMMISSIONED if is_commissioned and one.owner == "probe" else TOLERANT for one in tried)
     rows = [
         (one.quantity, one.size, of_by, *figures_of(of_one))
         for one, of_by, of_one in zip(tried, by, found, strict=True)
@@ -158,7 +165,7 @@ def holds(found: ScoredPresses, *, may_refuse: bool = False) -> bool:
 
 def _rows_held(mode: Mode, tried: Sequence[Cause], found: Sequence[ScoredPresses]) -> dict[str, int]:
     """Return how many rows have bounds in a mode, how many reach all bounds, and how many do but for chance."""
-    bounded = [(cause, one) for cause, one in zip(tried, found, strict=True) if cause.owner in BOUNDED_OWNERS[mode]]
+    bounded = [(cause, one) for cause, one in zip(tried, found, strict=True) if cause.owner in BOUNDED_OWNERS]
     reached = [all(one.passed for one in _of_row(mode, *row)) for row in bounded]
     but_for_chance = [holds(one, may_refuse=mode == "quick") for _, one in bounded]
     return {"bounded": len(bounded), "reached": sum(reached), "but_for_chance": sum(but_for_chance)}

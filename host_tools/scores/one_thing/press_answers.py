@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
+from device import __version__
+from device.files.bundle_file import read_quick_model
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import ends_in_belts
 from device.measurement.estimate import outside_training
@@ -22,6 +26,8 @@ from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import Design, fit_probe
 from host_tools.commissioning.left_out import answers_of
+from host_tools.commissioning.own_quick import train_own_quick
+from host_tools.press_models.export import export_quick
 from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
@@ -77,6 +83,23 @@ def commissioned(
         return OwnLimits(answers, limits(answers, design.model, seed))
 
     return in_parallel(own, len(causes), jobs)
+
+
+def quick_with_tolerances(design: DesignToTry, seed: int, jobs: int) -> QuickModel:
+    """Return mode quick as `commission` trains it, of a probe of which only the builder's tolerances are known."""
+    answers = tolerant(design.shared)
+    own = train_own_quick(answers, design.tables, design.quick.bundle, seed=seed, jobs=jobs)
+    with TemporaryDirectory(prefix="tsis-") as folder:
+        bundle = Path(folder) / "tolerances"
+        export_quick(
+            own.trained,
+            bundle,
+            surrogate_sha256=design.model.bundle.card["surrogate_sha256"],
+            serials=(),
+            software_version=__version__,
+            training_command="",
+        )
+        return read_quick_model(bundle)
 
 
 def ramp_scores(tried: TriedPresses, design: DesignToTry, own: OwnLimits, jobs: int) -> dict[str, ScoredPresses]:

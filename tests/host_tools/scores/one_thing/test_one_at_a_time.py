@@ -67,19 +67,19 @@ def test_each_row_has_bounds_of_its_own_in_the_modes_that_have_to_do_with_it():
     found = dict.fromkeys(AFTER.values(), of_mode)
     judged = {(one.case, one.quantity.removesuffix(" (at least)")): one for one in _benchmarks(tried, found)}
     assert {case for case, _ in judged} == {
-        "quick, nothing", "standard, nothing", "standard, load cell's span +2 %", "precise, nothing",
-        "precise, load cell's span +2 %",
+        "quick, nothing", "quick, load cell's span +2 %", "standard, nothing", "standard, load cell's span +2 %",
+        "precise, nothing", "precise, load cell's span +2 %",
     }  # fmt: skip
     assert ("quick, nothing", "answered") not in judged
     missed = [key for key, one in judged.items() if not one.passed]
-    assert missed == [(f"{mode}, load cell's span +2 %", "size_mm covered") for mode in ("standard", "precise")]
+    assert missed == [(f"{mode}, load cell's span +2 %", "size_mm covered") for mode in AFTER]
     assert _rows_held("standard", tried, of_mode) == {"bounded": 2, "reached": 1, "but_for_chance": 2}
 
 
 def test_mode_quick_may_refuse_a_row():
     (tilted,) = [one for one in causes() if one.name == "tilt on the lesion 0.5 degrees"]
     ramps = {name: [told_presses(40)] for name in AFTER.values()}
-    cases = {one.case for one in _benchmarks([tilted], ramps | {"quick": [told_presses(0, refused=40)]})}
+    cases = {one.case for one in _benchmarks([tilted], ramps | {"quick after": [told_presses(0, refused=40)]})}
     assert cases == {f"{mode}, {tilted.name}" for mode in ("standard", "precise")}
     assert _rows_held("quick", [tilted], [told_presses(0, refused=40)])["reached"] == 1
 
@@ -96,7 +96,7 @@ def test_a_few_things_become_tables_and_a_figure(tables, tmp_path):
     tried = [
         one for one in causes() if one.name in ("nothing", "load cell's span +2 %", "tilt on the lesion 0.5 degrees")
     ]
-    chapter = one_at_a_time_chapter(design, phantoms, presses=12, scans=6, tried=tried, jobs=1)
+    chapter = one_at_a_time_chapter(design, phantoms, presses=12, scans=6, tried=tried, own_quick=design.quick, jobs=1)
     assert [table.caption for table in chapter.tables[1:]] == list(TITLES.values())
     tightness, as_it_ships, after, *_ = chapter.tables
     assert [row[0] for row in tightness.rows] == ["load cell's span", "tilt on the lesion"]
