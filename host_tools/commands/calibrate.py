@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -212,6 +213,7 @@ def commission(
             )
             done = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=seed, say=note.print)
             own_quick = train_own_quick(done.answers, *of_quick, seed=seed, say=note.print) if of_quick else None
+            done = replace(done, held=own_quick.believed if own_quick else None)
     except CalibrationRejected as rejection:
         if not as_json:
             raise

@@ -53,6 +53,8 @@ class CommissionedProbe:
     gates: list[Gate] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     """Of all phantoms and bare blocks, in the order of the fit's."""
+    held: BelievedAnswers | None = None
+    """Presses of mode quick, where it was trained."""
 
 
 def commission(

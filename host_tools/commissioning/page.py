@@ -84,8 +84,9 @@ def _pictures(done: CommissionedProbe) -> Iterator[tuple[str, str]]:
     yield "coverage", pictures.believed_coverage(coverage)
 
 
-def _believed(done: CommissionedProbe) -> tuple[tuple[str, BelievedAnswers], ...]:
-    return ("standard, one press", done.presses), ("precise, a scan", done.scans)
+def _believed(done: CommissionedProbe) -> list[tuple[str, BelievedAnswers]]:
+    held = [("quick, one hold", done.held)] if done.held else []
+    return [*held, ("standard, one press", done.presses), ("precise, a scan", done.scans)]
 
 
 def _covered(done: CommissionedProbe) -> list[dict[str, Any]]:

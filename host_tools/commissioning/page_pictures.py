@@ -226,10 +226,10 @@ def believed_coverage(modes: Sequence[tuple[str, EvaluatedPresses]]) -> str:
             for place, unknown in enumerate(UNKNOWNS):
                 at, known = len(labels), presses.is_known[:, place]
                 labels.append(f"{name}: {UNKNOWN_LABELS[unknown].partition(' (')[0]}")
-                determined.barh(at, 100 * known.mean(), height=0.55, color=FOUND, alpha=1 - 0.45 * number)
+                determined.barh(at, 100 * known.mean(), height=0.55, color=FOUND, alpha=1 - 0.3 * number)
                 if known.any():
                     low, share, high = shares(int(presses.is_covered[known, place].sum()), int(known.sum()))
-                    covered.plot([100 * low, 100 * high], [at, at], color=FOUND, lw=3, alpha=1 - 0.45 * number)
+                    covered.plot([100 * low, 100 * high], [at, at], color=FOUND, lw=3, alpha=1 - 0.3 * number)
                     covered.plot(100 * share, at, "o", color=FOUND, ms=5)
         determined.set_yticks(range(len(labels)), labels)
         determined.set_ylim(len(labels) - 0.4, -0.6)
@@ -239,7 +239,7 @@ def believed_coverage(modes: Sequence[tuple[str, EvaluatedPresses]]) -> str:
         covered.axvline(100 * COVERAGE, color="0.3", lw=1, ls="--")
         covered.set_xlabel("of these covered (%)")
 
-    return svg("coverage", 2.1, draw)
+    return svg("coverage", 0.7 * len(modes) + 0.7, draw)
 
 
 def shares(held: int, count: int) -> tuple[float, float, float]:

@@ -155,6 +155,15 @@ def test_phantoms_left_out_limits_and_levels_are_told():
     assert "precise, a scan 10 100 % 70 %" in shown.words["all"]
 
 
+def test_a_mode_quick_of_its_own_stands_beside_the_others():
+    shown = page(replace(found(), held=answered(8)))
+    assert "modes quick, standard and precise of serial number TSIS-0007" in shown.words["verdict"]
+    assert "quick, one hold 10 100 % 80 %" in shown.words["all"]
+    assert shown.words["all"].count("quick: size") == 1  # in the picture
+    assert "not trained" not in shown.words["verdict"]
+    assert "mode quick, which was not trained" in page().words["verdict"]
+
+
 def test_advice_is_told_and_its_absence_too():
     assert "All phantoms have one surface." in page(advice=["All phantoms have one surface."]).words["all"]
     assert NOTHING_MORE in page().words["all"]
