@@ -31,7 +31,7 @@ CHAPTER = "keeping a press, and showing it again"
 KEPT_BOUNDS: dict[Mode, float] = {"quick": 60.0, "standard": 80.0, "precise": 80.0}
 DRAWN_BOUNDS: dict[Mode, float] = {"quick": 60.0, "standard": 80.0, "precise": 80.0}
 SERVED_BOUND = 20.0
-"""In yardsticks: 15 to 50 ms, and 5 ms, where that takes 0.25."""
+"""In yardsticks: 15 to 20 ms, and 5 ms, where that takes 0.25."""
 REPEATS = 7
 CLOCKS = {"processor": PROCESSOR, "wall": WALL}
 

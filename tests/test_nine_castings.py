@@ -148,6 +148,9 @@ def test_the_daemon_takes_up_bundle_and_certificate_and_offers_what_they_are_for
     answers = answers_for(config, paper, calibration)
     assert answers.modes == ("quick", "standard", "precise")
     assert answers.expires_at == calibration.validity.expires_at
+    cards = [json.loads((one / "model.json").read_text()) for one in (folder, quick)]
+    assert {card["expires_at"] for card in cards} == {answers.expires_at}
+    assert len({card["surrogate_sha256"] for card in cards}) == 1
     moved = replace(config, camera=replace(config.camera, axis_x_mm=0.0))
     with pytest.raises(ForeignCalibration, match=r"camera\.axis_x_mm is 0, but must be -0\.2"):
         active_calibration(moved, paper)

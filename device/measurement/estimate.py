@@ -113,7 +113,7 @@ def require_trained_for(recording: Recording, bundle: ModelBundle, calibration: 
     serials = bundle.card.get("serials", [])
     if recording.serial not in serials:
         expected = f"one of {', '.join(serials)}, which {bundle.name} is trained for"
-        action = "commission this probe with `host_tools commission`, and press in mode standard"
+        action = "commission this probe with `host_tools commission`"
         raise InvalidQuantity("serial", recording.serial, expected, action)
     expires_at = bundle.card.get("expires_at")
     if expires_at is not None and moment(recording.started_at, "started_at") > moment(expires_at, "expires_at"):

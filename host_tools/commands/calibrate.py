@@ -189,7 +189,7 @@ def commission(
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.probe_file import simulated_probe
 
-    for folder in (out, quick_folder(out)):
+    for folder in (out, *([quick_folder(out)] if quick else [])):
         if folder.exists():
             raise InvalidQuantity("bundle", folder, "a new folder", "a bundle is written once: give another name")
     require("valid_days", valid_days, Bound(1.0, 730.0, "days"), "commission again before that")
@@ -197,6 +197,8 @@ def commission(
     model, derivatives = read_ramp_model(design), load_derivatives(table)
     of_quick = (ProbeTables.load(table), read_quick_model(quick_design).bundle) if quick else None
     made_at = datetime.now(UTC)
+    command = f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}"
+    command += f" --design {design} --valid-days {valid_days:g}" + ("" if quick else " --no-quick")
     try:
         with workers(scheduler):
             bench = read_bench(recordings, probe, phantoms, simulated_probe())
@@ -219,11 +221,6 @@ def commission(
             raise
         print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in rejection.problems]}))
         raise typer.Exit(1) from rejection
-    command = f"host_tools commission --probe {probe} --phantoms {phantoms} --out {out} --seed {seed}"
-    if own_quick:
-        until = expiry(certificate, made_at, valid_days)
-        serial = bench.probe.serial
-        write_own_quick(own_quick, done, quick_folder(out), serial=serial, expires_at=until, command=command)
     write_own_bundle(
         done,
         design,
@@ -237,6 +234,10 @@ def commission(
         advice=list(bench.phantoms.advice()),
         is_simulated=any(recording.simulated for recording in bench.recordings),
     )
+    if own_quick:
+        until = expiry(certificate, made_at, valid_days)
+        serial = bench.probe.serial
+        write_own_quick(own_quick, done, quick_folder(out), serial=serial, expires_at=until, command=command)
     if as_json:
         gates = [gate.as_record() for gate in done.gates]
         path = str(out / CERTIFICATE_FILE) if certificate else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite
@@ -27,7 +28,7 @@ IDEALISATIONS = {
     "half_width_departure": "a slab twice as wide",
     "dome_departure": "a first layer as much thicker as the dome is on average",
 }
-CORES = 2
+MOST_CORES = 2
 """To factorise stiffness with in 3-D: a scene then takes three quarters of the time; more were not tried."""
 CANCELS = "not compared with the tolerance: what the centre gains under a force the rim loses"
 UNITS = {"_n": "N", "_mm": "mm", "_mm2": "mm2", "_mm3": "mm3"}
@@ -179,7 +180,7 @@ def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within
 
     aim = DEFAULT_TOLERANCE if tolerance is None else ratio_of(tolerance)
     takes_best = best or tolerance is None
-    with on_cores(CORES):
+    with on_cores(min(MOST_CORES, len(os.sched_getaffinity(0)))):
         climbed = climb(scene, [scene.press], tolerance=aim, strain=strain, within_s=within_s, best=takes_best)
     return held(climbed, best=takes_best)
 

@@ -30,8 +30,8 @@ def verify(
     keep: Annotated[
         Path | None,
         typer.Option(
-            help="Folder that keeps scenes of tolerances, so that an interrupted run goes on. "
-            "Empty it when the forward model changes."
+            help="Folder that keeps true numbers of the scenes of tolerances, so that an interrupted run goes on. "
+            "Empty it when what solves a scene changes; what states errors may."
         ),
     ] = None,
     tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,

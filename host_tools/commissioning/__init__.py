@@ -1,7 +1,8 @@
-"""Commissioning: ramps on phantoms to the modes standard and precise of a probe that somebody built.
+"""Commissioning: ramps on phantoms to the modes quick, standard and precise of a probe that somebody built.
 
 Modules in reading order: `phantom_ramps`, `probe_prior`, `bench_files`, `prior_discrepancy`, `joint_fit`, `left_out`,
-`believed_presses`, `commission`, `report`, `page_pictures`, `page`, `own_certificate`, `own_bundle`.
+`believed_presses`, `commission`, `own_quick`, `report`, `page_pictures`, `page`, `own_certificate`, `own_bundle`.
 
-Nothing that simulates a probe may enter: what is read here are recordings, and the bundle of the design.
+Nothing that simulates a probe may enter, but for the camera's noise of one frame in `own_quick`: what is read here are
+recordings, and the bundles of the design.
 """

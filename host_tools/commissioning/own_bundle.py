@@ -92,6 +92,7 @@ def write_own_bundle(
 
 def quick_folder(folder: Path) -> Path:
     """Return where the bundle of mode quick stands, beside that of ramps."""
+    folder = folder.resolve()
     return folder.with_name(f"{folder.name}-quick")
 
 

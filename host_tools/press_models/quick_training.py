@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,22 @@ from device.measurement.confidence_belt import Belt
 from device.measurement.parameters import normalise
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import SEEN_BY
-from device.measurement.quick_mode.profile import QUICK_FORCES_N, QuickPress, quick_press
+from device.measurement.quick_mode.profile import QUICK_FORCES_N, QuickPress, elongation_ratio, quick_press
 from device.measurement.ramp_modes.estimate import VISIBLE_DEVIATIONS
 from device.measurement.ramp_modes.noise import ErrorLevels, PressNoise, smooth_ring_errors
-from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N
+from device.measurement.ramp_modes.radial_profile import (
+    CONTRAST,
+    FIRST,
+    FIRST_ACROSS,
+    PROFILE_FORCES_N,
+    SECOND,
+    SECOND_ACROSS,
+)
 from device.measurement.ramp_modes.surrogate import CONTRAST_COLUMNS, MODULUS, PressRows
 from device.measurement.recording.reference_light import EXPONENT
-from device.measurement.recording.ring_means import RINGS
+from device.measurement.recording.ring_means import RING_RADII_MM, RINGS
 from device.simulation.virtual_probe import ProbeTables
+from host_tools.calibration.phantom import TARGET_N
 from host_tools.press_models.confidence_belts import SpreadAnswers, confidence_belts, widened
 from host_tools.press_models.measured_noise import exact_rows, shrunk_covariance
 from host_tools.press_models.mode_outcome import EvaluatedPresses
@@ -204,6 +213,80 @@ class QuickPressSet:
     def _smooth(self) -> Array:
         flat, model = smooth_ring_errors(self.levels, harmonic=0)
         return flat + model + 1e-14 * np.eye(RINGS)
+
+
+class HeldHarmonics(NamedTuple):
+    """First and second harmonics of holds, as cosine and sine: [n, 2, J - 1], and [n, 2, J - 2] without the outermost
+    ring, which the frame cuts."""
+
+    first: Array
+    second: Array
+
+    def elongation_ratios(self) -> Array:
+        """Return how oblong each looks [n], as `quick_press` reads it of a frame with all rings."""
+        second, first = (_along_its_direction(part) for part in (self.second, self.first))
+        return np.array([elongation_ratio(*pair) for pair in zip(second, first, strict=True)])
+
+
+def _along_its_direction(waves: Array) -> Array:
+    cosine, sine = waves[:, 0], waves[:, 1]
+    r_mm = RING_RADII_MM[1 : 1 + waves.shape[2]]
+    angle = np.arctan2(sine @ r_mm, cosine @ r_mm)[:, None]
+    return np.asarray(cosine * np.cos(angle) + sine * np.sin(angle))
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicNoise:
+    """What the camera and smooth errors of the image do to the harmonics of one hold.
+
+    `noise` is of a ramp; `camera` [11, 11] is the covariance of a hold's contrast, over which the ramp's says by how
+    much less a frame tells than a ramp's polynomial.
+    """
+
+    noise: PressNoise
+    camera: Array
+
+    def add(self, exact: HeldHarmonics, contrast: Array, rng: np.random.Generator) -> HeldHarmonics:
+        """Return harmonics with noise, for the contrast [n, 11] of the same holds."""
+        parts = zip(exact, self._factors, (slice(1, None), slice(1, -1)), strict=True)
+        return HeldHarmonics(
+            *(
+                part + (1 + contrast[:, None, rings]) * (rng.standard_normal(part.shape) @ factor.T)
+                for part, factor, rings in parts
+            )
+        )
+
+    @cached_property
+    def _factors(self) -> tuple[Array, Array]:
+        ratio = float(np.mean(np.diag(self.camera) / np.diag(self._of_ramp(CONTRAST))))
+
+        def factor(order: int, columns: slice, rings: slice) -> Array:
+            flat, model = (part[rings, rings] for part in smooth_ring_errors(self.noise.levels, harmonic=order))
+            covariance = ratio * self._of_ramp(columns) + flat + model + 1e-14 * np.eye(len(flat))
+            return np.asarray(np.linalg.cholesky(covariance))
+
+        return factor(1, FIRST, slice(1, None)), factor(2, SECOND, slice(1, -1))
+
+    def _of_ramp(self, columns: slice) -> Array:
+        """Return the covariance of columns of a ramp at 0.5 N, ring by ring."""
+        (weights,) = force_weights(np.array([TARGET_N]))
+        camera = self.noise.camera[columns, columns]
+        of_forces = camera.reshape(2 * (len(weights), len(camera) // len(weights)))
+        return np.asarray(np.einsum("k,kjlm,l->jm", weights, of_forces, weights))
+
+
+def held_harmonics(seen: Array, force_n: Array) -> HeldHarmonics:
+    """Return the harmonics at forces [n] of what is seen of ramps [n, S], along and across their bright side."""
+    weights = force_weights(force_n)
+
+    def at_force(columns: slice) -> Array:
+        of_forces = seen[:, columns].reshape(len(seen), len(PROFILE_FORCES_N), -1)
+        return np.asarray(np.einsum("nk,nkj->nj", weights, of_forces))
+
+    first, second = (
+        np.stack([at_force(part) for part in pair], axis=1) for pair in ((FIRST, FIRST_ACROSS), (SECOND, SECOND_ACROSS))
+    )
+    return HeldHarmonics(first, second)
 
 
 def quick_press_set(training_set: PressSet, camera: Array, seed: int) -> QuickPressSet:

@@ -91,15 +91,12 @@ def measure(
 ) -> list[list[ToleranceAnswer]]:
     """Return every scene's answers, one a tolerance; a process a scene.
 
-    A folder to `keep` them in lets an interrupted run go on. It knows a scene again, not a change of the model. True
-    numbers, which take most of the time, are kept apart there: what states errors may change without them.
+    A folder to `keep` true numbers in, which take most of the time, lets an interrupted run go on, and another
+    statement of errors be counted without them. It knows a scene again, not a change of what solves it.
     """
-    answered, true_of = answers, true_numbers_of
-    if keep:
-        memory = Memory(keep, verbose=0)
-        answered, true_of = memory.cache(answers, ignore=["true_of"]), memory.cache(true_numbers_of)
+    true_of = Memory(keep, verbose=0).cache(true_numbers_of) if keep else true_numbers_of
     drawn = (drawn_scene(seed, number) for number in range(scenes))
-    return list(Parallel(n_jobs=jobs)(delayed(answered)(scene, true_of) for scene in drawn))
+    return list(Parallel(n_jobs=jobs)(delayed(answers)(scene, true_of) for scene in drawn))
 
 
 def drawn_scene(seed: int, number: int) -> Scene:

@@ -28,6 +28,8 @@ EASY_RATIO = 0.5
 """A hand that is not driven takes this part of the largest rate of a ramp."""
 KEPT_TIMES = 9
 """So many of the last presses of a mode tell how long its answer takes."""
+LEAST_STATED_S = 1e-4
+"""Cards round what an answer takes; one that says 0 takes less than this."""
 LONGEST_ANSWER_S = 600.0
 
 
@@ -121,7 +123,7 @@ class AnswerTimes:
         measured_s = {mode: round(median(times_s), 3) for mode, times_s in self._times_s.items() if times_s}
         stated_s = {mode: one.compute_s for mode, one in worth.items() if one}
         both = sorted(measured_s.keys() & stated_s.keys(), key=lambda mode: stated_s[mode])
-        slower = measured_s[both[-1]] / stated_s[both[-1]] if both else 1.0
+        slower = measured_s[both[-1]] / max(stated_s[both[-1]], LEAST_STATED_S) if both else 1.0
         expected_s = {mode: round(slower * one, 3) for mode, one in stated_s.items()}
         answer_s = {**expected_s, **measured_s}
         return [

@@ -32,7 +32,10 @@ UNTOUCHED_N = 0.01
 SOON_DAYS = 30.0
 OWN_WARNINGS = (CalibrationEndsSoon, SlightDriftError, UncheckedCalibration)
 CALIBRATE = "Calibrate the probe and activate the new certificate, then start the daemon again."
-COMMISSION = "Commission the probe again and set standard_model to the new bundle, then start the daemon again."
+COMMISSION = (
+    "Commission the probe again and set standard_model, quick_model and calibration to the new files, "
+    "then start the daemon again."
+)
 WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
 FREE = (
     "Let nothing touch the probe; if the force stays, the load cell's zero is off by it: "

@@ -20,10 +20,10 @@ from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FOR
 from host_tools.forward.face_state import Rays
 from host_tools.forward.press_model import Loaded
 
-NEAR_RIM = {3: 0.29, 4: 0.95, 5: 1.25, 6: 1.25}
+NEAR_RIM = {3: 0.5, 4: 1.25, 5: 1.25, 6: 1.25}
 """Stated over the sum of elements near a rim, by order."""
-ELSEWHERE = {3: 0.083, 4: 0.28}
-"""The same of all others at low orders: there the next step is a tenth of the last, at a singular rim a third."""
+ELSEWHERE = {3: 0.083, 4: 0.25}
+"""The same of all others at low orders: from order 3 to 4 a fortieth of what they owe is left, near a rim a ninth."""
 BEYOND = 2.0
 """Above order 6, where the layers around the rims are used up and errors fall less from order to order."""
 CANCELLING_FACTOR = 2.5

@@ -87,7 +87,7 @@ def stated_error(
     lifts_off = plan.contact == "unilateral" and not all(_is_closed(one.state) for one in (pressed, baseline))
     rule = _rule(plan, lifts_off=lifts_off)
     stated = {name: rule.error(plan.order, step, largest) for name, step in steps.items()}
-    if lifts_off:
+    if lifts_off and rule is not ONE_MESH:
         stated = {name: max(error, EDGE_ERROR) if error else 0.0 for name, error in stated.items()}
     if rule is BLUNT and by_force:
         stated[INTEGRAL] *= INTEGRAL_FACTOR

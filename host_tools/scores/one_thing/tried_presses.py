@@ -2,7 +2,7 @@
 
 Truths, directions and noise depend on seed and number alone: what two causes make of the same presses differs by the
 causes. Noise is as it is believed of the simulated probe. A held press is read at 0.5 N of the cubic through the ramp;
-its camera noise is that of the ramp's largest force, and its harmonics have none.
+its camera noise is that of the ramp's largest force.
 """
 
 from __future__ import annotations
@@ -14,16 +14,22 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import Range
-from device.measurement.quick_mode.profile import QuickPress, elongation_ratio
+from device.measurement.quick_mode.profile import QuickPress
 from device.measurement.ramp_modes.noise import PressNoise
-from device.measurement.ramp_modes.radial_profile import CONTRAST, SeenPresses, harmonic
+from device.measurement.ramp_modes.radial_profile import CONTRAST, SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.measurement.recording.ring_means import RINGS, RingMeans
 from device.simulation.physics.world import World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.calibration.phantom import TARGET_N
 from host_tools.press_models.press_samples import PressedRings, PressedScene, draw_parameters
-from host_tools.press_models.quick_training import QuickPressSet, force_weights, quick_rows
+from host_tools.press_models.quick_training import (
+    HarmonicNoise,
+    HeldHarmonics,
+    QuickPressSet,
+    force_weights,
+    quick_rows,
+)
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.scores.foreign_presses import FURTHER_MM, OF_PATIENTS, ForeignPresses, seen_presses
@@ -125,4 +131,6 @@ def held_press(pressed: PressedRings, noise: PressNoise, rng: np.random.Generato
     (weights,) = force_weights(force_n)
     rings = RingMeans(*(np.tensordot(weights, part, 1)[None] for part in pressed.rings))
     row = held.noisy(np.zeros(1, np.intp), rng)[0].astype(np.float64)
-    return QuickPress(row, elongation_ratio(harmonic(rings, 2), harmonic(rings, 1)))
+    first, second = (np.stack([rings.cosine[:, at, 1:], rings.sine[:, at, 1:]], axis=1) for at in (0, 1))
+    seen = HarmonicNoise(noise, camera).add(HeldHarmonics(first, second[:, :, :-1]), exact[:, :RINGS], rng)
+    return QuickPress(row, float(seen.elongation_ratios()[0]))

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from host_tools.calibration.gates import CalibrationRejected
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning.bench_files import read_bench
+from host_tools.commissioning.own_bundle import quick_folder
 from host_tools.commissioning.probe_prior import SPAN
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import probe_text, simulated_probe
@@ -161,3 +163,18 @@ def test_a_scheduler_that_is_not_there_is_told_before_anything_is_computed(bench
     assert done.returncode == 1
     assert "scheduler" in done.stderr
     assert not (bench / "own").exists()
+
+
+def test_neither_of_the_two_bundles_is_replaced_and_one_that_is_not_made_is_in_no_ones_way(bench):
+    (bench / "own-quick").mkdir()
+    done = commissioned(bench)
+    assert done.returncode == 1
+    assert f"bundle is {bench / 'own-quick'}, but must be a new folder" in done.stderr
+    replaced(bench, "phantom1", truth=Inclusion(14.0, 5.0, 60.0))
+    assert "truth of phantom1" in commissioned(bench, "--no-quick").stderr
+
+
+def test_the_bundle_of_mode_quick_stands_beside_the_other_wherever_that_is(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert quick_folder(Path(".")) == tmp_path.with_name(f"{tmp_path.name}-quick")
+    assert quick_folder(Path("models/own")) == tmp_path / "models" / "own-quick"

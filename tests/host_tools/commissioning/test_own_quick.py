@@ -13,10 +13,17 @@ from device.measurement.ramp_modes.radial_profile import PROFILE_FORCES_N, press
 from device.measurement.recording.ring_means import RINGS
 from host_tools.commissioning import own_quick
 from host_tools.commissioning.joint_fit import Design
-from host_tools.commissioning.own_quick import OwnQuick, believed_holds, elongation_ratios, train_own_quick
+from host_tools.commissioning.own_quick import (
+    OwnQuick,
+    believed_holds,
+    faintest_that_counts,
+    has_numbers,
+    train_own_quick,
+    with_noise,
+)
 from host_tools.press_models.export import export_quick
 from host_tools.press_models.press_samples import draw_parameters
-from host_tools.press_models.quick_training import QuickBudget
+from host_tools.press_models.quick_training import QuickBudget, held_harmonics
 from host_tools.press_models.recorded_presses import EXACT, recorded_press
 from host_tools.scores.scored_presses import tolerant
 
@@ -32,7 +39,7 @@ def answers(model, derivatives):
 def test_presses_are_the_same_however_many_workers_draw_them(answers, monkeypatch):
     monkeypatch.setattr(own_quick, "BLOCK", 4)
     one, two = (believed_holds(answers, 10, 5, jobs) for jobs in (1, 2))
-    for mine, others in zip(one, two, strict=True):
+    for mine, others in zip((*one[:2], *one.harmonics), (*two[:2], *two.harmonics), strict=True):
         np.testing.assert_array_equal(mine, others)
     assert one.rows.shape == (10, RINGS + 1)
     assert len(np.unique(one.normalised[:, 0])) == 10
@@ -63,7 +70,7 @@ def test_how_oblong_a_hold_looks_is_read_of_a_ramp_as_of_a_frame(tables):
     columns = np.hstack([seen.rows, seen.across])
     row, ratio = quick_press(held)
     assert PROFILE_FORCES_N[2] < row[RINGS] < PROFILE_FORCES_N[3]
-    assert elongation_ratios(columns, row[[RINGS]])[0] == pytest.approx(ratio, abs=0.1)
+    assert held_harmonics(columns, row[[RINGS]]).elongation_ratios()[0] == pytest.approx(ratio, abs=0.1)
 
 
 @pytest.fixture(scope="module")
@@ -101,9 +108,24 @@ def test_its_bundle_is_of_that_probe_alone_and_ends_with_the_commissioning(own, 
 def test_intervals_allow_for_all_that_the_builders_tolerances_leave_open(made):
     """Of presses that belts have not seen as many are covered as is promised, but for chance."""
     found = made.believed.evaluated
-    assert 0.3 < made.believed.is_answered.mean() < 1.0
+    assert 0.3 < made.believed.is_answered.mean() < 0.9
     for unknown in range(2):
         known = found.is_known[:, unknown]
-        if known.sum() > 60:
-            assert found.is_covered[known, unknown].mean() > 0.8
+        assert known.sum() > 60
+        assert found.is_covered[known, unknown].mean() > 0.8
     assert not found.is_known[:, 2].any()  # one force does not tell the modulus
+    assert 1e-4 < made.believed.seconds[0] < 1.0  # from frames on, not the network alone
+
+
+@pytest.mark.long
+def test_round_inclusions_are_seldom_called_oblong_and_tissue_without_one_seldom_gets_numbers(made, answers):
+    """One in sixty of each, as belief and noise of fresh presses have it; hands alone make contrast."""
+    trained, noise = made.trained, answers.noise
+    camera = trained.training_set.camera
+    fresh, empty = (
+        with_noise(believed_holds(answers, 800, 11, 1, are_inclusion_free=are_inclusion_free), camera, noise, 12)
+        for are_inclusion_free in (False, True)
+    )
+    assert (fresh.elongation > trained.outcome.elongation_ratio).mean() < 0.03
+    assert has_numbers(trained, empty).mean() < 0.03
+    assert max(faintest_that_counts(empty.rows)) == pytest.approx(max(trained.faintest_contrast), rel=0.15)

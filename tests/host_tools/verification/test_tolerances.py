@@ -53,21 +53,6 @@ def test_what_is_refused_loosely_is_not_tried_tighter():
     assert "turn probe or tissue inside out" in found[0].refusal
 
 
-def test_scenes_that_were_kept_are_not_answered_again(monkeypatch, tmp_path):
-    """And a further one is."""
-    answered = []
-
-    def answer(scene, true_of):
-        answered.append(scene)
-        return [scene.inclusion.size_mm, true_of(scene, 0)]
-
-    monkeypatch.setattr(tolerances, "answers", answer)
-    monkeypatch.setattr(tolerances, "true_numbers_of", lambda scene, highest_order: {"force_n": highest_order})
-    first = measure(2, jobs=1, keep=tmp_path)
-    assert measure(3, jobs=1, keep=tmp_path)[:2] == first
-    assert answered == [drawn_scene(SEED, number) for number in range(3)]
-
-
 def test_every_other_scene_may_lie_off_the_axis():
     centred, aside = drawn_scene(7, 0), drawn_scene(7, 1)
     assert centred.placement.offset_mm == 0
@@ -75,26 +60,26 @@ def test_every_other_scene_may_lie_off_the_axis():
     assert drawn_scene(7, 1) == aside != drawn_scene(8, 1)
 
 
-def test_true_numbers_that_were_kept_serve_another_statement(monkeypatch, tmp_path):
-    """They take hours; what is stated of an answer may change without them."""
-    solved = []
+def test_true_numbers_that_were_kept_are_not_solved_again_and_answers_are(monkeypatch, tmp_path):
+    """They take hours; what is stated of an answer may change without them. A further scene is solved."""
+    solved, answered = [], []
 
-    def numbers(scene, highest_order):
+    def true_numbers_of(scene, highest_order):
         solved.append(scene)
         return {"force_n": 1.0}
 
-    def one(scene, true_of):
+    def answers(scene, true_of):
+        answered.append(scene)
         return [true_of(scene, 0)]
 
-    def other(scene, true_of):
-        return [true_of(scene, 0), "stated anew"]
-
-    monkeypatch.setattr(tolerances, "true_numbers_of", numbers)
-    for statement in (one, other):
-        monkeypatch.setattr(tolerances, "answers", statement)
-        found = measure(2, jobs=1, keep=tmp_path)
-    assert found == [[{"force_n": 1.0}, "stated anew"]] * 2
-    assert solved == [drawn_scene(SEED, number) for number in range(2)]
+    monkeypatch.setattr(tolerances, "true_numbers_of", true_numbers_of)
+    monkeypatch.setattr(tolerances, "answers", answers)
+    for scenes in (2, 3):
+        found = measure(scenes, jobs=1, keep=tmp_path)
+    first, second, third = (drawn_scene(SEED, number) for number in range(3))
+    assert found == [[{"force_n": 1.0}]] * 3
+    assert solved == [first, second, third]
+    assert answered == [first, second, first, second, third]
 
 
 @pytest.mark.long

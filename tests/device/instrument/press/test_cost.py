@@ -104,3 +104,11 @@ def test_a_mode_that_was_not_pressed_here_is_expected_to_be_slower_than_its_card
     worth = {mode: replace(WORTH, compute_s=seconds) for mode, seconds in stated_s.items()}
     offers = times.offers([press_cost(mode, Config()) for mode in MODES], worth)
     assert [(one.answer_s, one.answer_presses) for one in offers] == [(0.1, 1), (0.4, 1), (3.6, 0), (None, 0)]
+
+
+def test_a_card_that_rounds_a_time_to_nothing_stops_no_answer(path):
+    """Of a bundle whose answer takes less than half of a tenth of a millisecond where it was made."""
+    times = AnswerTimes(path)
+    times.note("quick", 0.04)
+    offers = times.offers([press_cost("quick", Config())], {"quick": replace(WORTH, compute_s=0.0)})
+    assert offers[0].answer_s == 0.04

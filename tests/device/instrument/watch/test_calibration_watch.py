@@ -76,8 +76,9 @@ def test_a_commissioned_model_that_ends_before_the_certificate_is_warned_of_and_
     watch.require_valid("2026-06-20T00:00:00Z")
     assert codes(watch) == ["E407"]
     assert "commissioned model expires on 2026-07-01T00:00:00Z, in 11 days" in watch.warned(())[0].cause
-    with pytest.raises(ExpiredCalibration, match="commissioned model has expired on 2026-07-01"):
+    with pytest.raises(ExpiredCalibration, match="commissioned model has expired on 2026-07-01") as expired:
         watch.require_valid("2026-07-02T00:00:00Z")
+    assert "set standard_model, quick_model and calibration to the new files" in expired.value.remedy
 
 
 def test_where_certificate_and_commissioned_model_end_together_it_is_told_to_commission(watch):

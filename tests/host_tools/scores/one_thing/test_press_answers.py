@@ -41,7 +41,7 @@ def test_figures_of_a_row_are_of_what_is_answered():
 
 def test_quick_finds_most_presses_of_its_own_probe_inside_its_intervals(held, quick):
     found = quick_scores(DESIGN.parameters, held, quick)
-    assert found.is_answered.sum() >= len(found.is_answered) - 1  # one of a hundred is refused by chance
+    assert found.is_answered.sum() >= len(found.is_answered) - 2  # noise alone makes one in twenty look oblong
     assert 10 <= len(found.is_answered) <= 16
     assert found.covered().mean() >= 0.75
     assert np.abs(found.error_mm()).mean() < 1.5
