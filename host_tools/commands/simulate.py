@@ -174,9 +174,9 @@ def _climbed(scene: Scene, tolerance: str | None, strain: SimulateStrain, within
 
     Where none was asked for the default is aimed at, and missing it is no failure.
     """
-    from host_tools.forward.cores import on_cores
     from host_tools.forward.ladder import climb, held
     from host_tools.forward.plan import DEFAULT_TOLERANCE
+    from host_tools.forward.small_strain.cores import on_cores
 
     aim = DEFAULT_TOLERANCE if tolerance is None else ratio_of(tolerance)
     takes_best = best or tolerance is None

@@ -10,11 +10,11 @@ from typing import Any
 
 from ngsolve import BilinearForm, GridFunction, InnerProduct
 
-from host_tools.forward.cores import factorising_in_3d
 from host_tools.forward.face_state import MN_PER_N, FaceState
 from host_tools.forward.materials import Elasticity
 from host_tools.forward.sampling import FaceSampler
 from host_tools.forward.small_strain.contact import Body, ContactSpace, contact_pressure_kpa, integral_over_face
+from host_tools.forward.small_strain.cores import factorising_in_3d
 from host_tools.forward.small_strain.elasticity import Stress, lame_modulus_kpa, shear_modulus_kpa, stress, work
 from host_tools.forward.symmetry import SOLID, Expression, Symmetry
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from device.measurement.quantities import Inclusion
-from host_tools.forward.cores import on_cores
 from host_tools.forward.deformation import deformation
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.materials import baseline, with_inclusion
 from host_tools.forward.plan import GRADED, model_plan
 from host_tools.forward.press_model import PressFailed
+from host_tools.forward.small_strain.cores import on_cores
 from host_tools.forward.small_strain.linear_model import LinearModel
 from host_tools.forward.small_strain.linear_press import LinearPress, SolvedPress
 from host_tools.forward.small_strain.off_axis_inclusion import OffAxisModel, is_round_but_for_inclusion, round_strain
