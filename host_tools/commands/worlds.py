@@ -59,8 +59,8 @@ def robustness(
     scheduler: Scheduler = None,
 ) -> None:
     """Measure how presses of probes that somebody built are answered, before and after commissioning: of random
-    tolerances, of other optics, with one thing at a time, with what no test notices, and on skins that are solved anew;
-    and what a refusal names.
+    tolerances, in mode quick too, of other optics, with one thing at a time, with what no test notices, and on skins
+    that are solved anew; and what a refusal names.
 
     Half an hour on two cores. Exit code 1 when a figure misses its bound: the page says by how much.
     """
@@ -69,6 +69,8 @@ def robustness(
     from host_tools.pages.page import Results, write_page
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.phantom_set import BLOCKS_NEEDED, read_phantoms
+    from host_tools.scores.one_thing.held_presses import PRESSES as OF_HELD
+    from host_tools.scores.one_thing.held_presses import held_presses_chapter
     from host_tools.scores.one_thing.named_blocks import named_blocks_chapter
     from host_tools.scores.one_thing.one_at_a_time import PRESSES as OF_EACH
     from host_tools.scores.one_thing.one_at_a_time import one_at_a_time_chapter
@@ -89,6 +91,7 @@ def robustness(
         "tolerances": lambda: robustness_chapter(
             trained, derivatives, tables, stated, probes=probes, presses=presses or PRESSES, seed=seed
         ),
+        "held": lambda: held_presses_chapter(design, stated, presses=presses or OF_HELD, seed=seed),
         "other optics": lambda: other_optics_chapter(
             trained, derivatives, tables, stated, presses=presses or PRESSES, seed=seed
         ),

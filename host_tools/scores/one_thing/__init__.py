@@ -1,7 +1,8 @@
 """What each thing alone costs in which a probe or its presses differ from what the models believe, in every mode.
 
 Modules in reading order: `causes`, `tried_presses`, `press_answers`, `cost_figure`, `one_at_a_time`, `silent_errors`,
-`solved_skins`, `named_blocks`, `other_tissue`.
+`solved_skins`, `named_blocks`, `other_tissue`; of everything at once `held_presses`, of mode quick.
 
-All is simulated; worlds of everything at once are in `foreign_probes`, beside this room.
+All is simulated; worlds of everything at once are in `foreign_probes`, and modes of ramps on them in `robustness`,
+beside this room.
 """

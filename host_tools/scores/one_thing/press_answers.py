@@ -29,6 +29,7 @@ from host_tools.commissioning.left_out import answers_of
 from host_tools.commissioning.own_quick import train_own_quick
 from host_tools.press_models.export import export_quick
 from host_tools.press_models.mode_outcome import EvaluatedPresses
+from host_tools.press_models.quick_training import QuickBudget
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
 from host_tools.scenes.phantom_set import PhantomSet
@@ -87,10 +88,16 @@ def commissioned(
 
 def quick_with_tolerances(design: DesignToTry, seed: int, jobs: int) -> QuickModel:
     """Return mode quick as `commission` trains it, of a probe of which only the builder's tolerances are known."""
-    answers = tolerant(design.shared)
-    own = train_own_quick(answers, design.tables, design.quick.bundle, seed=seed, jobs=jobs)
+    return own_quick_model(design, tolerant(design.shared), seed, jobs=jobs)
+
+
+def own_quick_model(
+    design: DesignToTry, answers: OwnAnswers, seed: int, *, jobs: int, budget: QuickBudget | None = None
+) -> QuickModel:
+    """Return mode quick of the probe that `answers` are of, as `commission` trains it."""
+    own = train_own_quick(answers, design.tables, design.quick.bundle, budget=budget, seed=seed, jobs=jobs)
     with TemporaryDirectory(prefix="tsis-") as folder:
-        bundle = Path(folder) / "tolerances"
+        bundle = Path(folder) / "own"
         export_quick(
             own.trained,
             bundle,

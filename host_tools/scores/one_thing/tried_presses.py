@@ -122,11 +122,16 @@ def _first(seen: SeenPresses) -> SeenPresses:
     return SeenPresses(*(part[:1] for part in seen if part is not None))
 
 
-def held_press(pressed: PressedRings, noise: PressNoise, rng: np.random.Generator) -> QuickPress:
-    """Return what mode quick reads of a press that is held at 0.5 N, with noise."""
+def held_press(
+    pressed: PressedRings, noise: PressNoise, rng: np.random.Generator, camera: Array | None = None
+) -> QuickPress:
+    """Return what mode quick reads of a press that is held at 0.5 N, with noise.
+
+    `camera` [11, 11] is the covariance of the camera's noise, that of the ramp's largest force unless given.
+    """
     force_n = np.array([TARGET_N])
     exact = quick_rows(pressed.as_row()[None], force_n)
-    camera = noise.camera[CONTRAST, CONTRAST][-RINGS:, -RINGS:]
+    camera = noise.camera[CONTRAST, CONTRAST][-RINGS:, -RINGS:] if camera is None else camera
     held = QuickPressSet(np.zeros((1, 1), np.float32), exact.astype(np.float32), camera, noise.levels)
     (weights,) = force_weights(force_n)
     rings = RingMeans(*(np.tensordot(weights, part, 1)[None] for part in pressed.rings))
