@@ -80,7 +80,7 @@ def test_the_cameras_part_of_the_noise_is_that_of_recordings_without_drift(table
         return profile_rows(tables, parameters, direction_rad)
 
     monkeypatch.setattr(measured_noise, "profile_rows", exact)
-    std = np.sqrt(np.diag(quick_training._camera(tables, 3, 5, 1)))
+    std = np.sqrt(np.diag(quick_training.camera_of_a_hold(tables, 3, 5, 1)))
     assert std.shape == (RINGS,)
     assert (std > 1e-4).all()
     assert (std < ErrorLevels().gain_ratio).all()
