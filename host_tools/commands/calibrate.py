@@ -179,7 +179,6 @@ def commission(
     from host_tools.commissioning.commission import commission as run_commission
     from host_tools.commissioning.own_bundle import (
         CERTIFICATE_FILE,
-        expiry,
         quick_folder,
         write_own_bundle,
         write_own_quick,
@@ -235,9 +234,7 @@ def commission(
         is_simulated=any(recording.simulated for recording in bench.recordings),
     )
     if own_quick:
-        until = expiry(certificate, made_at, valid_days)
-        serial = bench.probe.serial
-        write_own_quick(own_quick, done, quick_folder(out), serial=serial, expires_at=until, command=command)
+        write_own_quick(own_quick, out)
     if as_json:
         gates = [gate.as_record() for gate in done.gates]
         path = str(out / CERTIFICATE_FILE) if certificate else None

@@ -74,7 +74,7 @@ def write_own_bundle(
         "serials": [serial],
         "training_command": command,
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
-        "expires_at": expiry(certificate, made_at, valid_days),
+        "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
         "commissioned": commissioned_record(done, made_at, origin),
     }
     of_modes: dict[Mode, BelievedAnswers] = {"standard": done.presses, "precise": done.scans}
@@ -96,27 +96,22 @@ def quick_folder(folder: Path) -> Path:
     return folder.with_name(f"{folder.name}-quick")
 
 
-def write_own_quick(
-    made: OwnQuick, done: CommissionedProbe, folder: Path, *, serial: str, expires_at: str, command: str
-) -> None:
-    """Write the bundle of a commissioned probe's mode quick to a new folder, whole or not at all."""
-    surrogate = _archive(surrogate_arrays(done.answers))
-    dial = believed_dial("quick", made.believed)
+def write_own_quick(made: OwnQuick, ramps: Path) -> None:
+    """Write the bundle of a commissioned probe's mode quick beside that of its `ramps`, whole or not at all.
+
+    Serial, command, forward model and until when it holds are the former's.
+    """
+    card, dial = json.loads((ramps / CARD_FILE).read_bytes()), believed_dial("quick", made.believed)
     export_quick(
         made.trained,
-        folder,
-        surrogate_sha256=hashlib.sha256(surrogate).hexdigest(),
-        serials=(serial,),
+        quick_folder(ramps),
+        surrogate_sha256=card["surrogate_sha256"],
+        serials=tuple(card["serials"]),
         software_version=__version__,
-        training_command=command,
-        more={"expires_at": expires_at},
+        training_command=card["training_command"],
+        more={"expires_at": card["expires_at"]},
         worth={"dial": dial} if dial else {},
     )
-
-
-def expiry(certificate: Calibration | None, made_at: datetime, valid_days: float) -> str:
-    """Return until when a commissioned probe's bundles hold: as long as its certificate, else so many days."""
-    return certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days))
 
 
 def _worth(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:

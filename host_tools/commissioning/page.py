@@ -66,6 +66,7 @@ def commissioning_page(
         critical=done.critical,
         phantoms=done.phantoms,
         unknown_labels=list(pictures.UNKNOWN_LABELS.values()),
+        has_quick=done.held is not None,
         modes=[_mode(name, answers.evaluated) for name, answers in _believed(done)],
         silicone=SILICONE,
         advice=list(advice) or [NOTHING_MORE],
