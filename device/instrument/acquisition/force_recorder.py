@@ -25,8 +25,8 @@ KEPT_SAMPLES = 1000
 FIRST_SAMPLE_S = 5.0
 """Opening the port resets an OpenScale: its banner may last three seconds."""
 SILENCE_S = 1.0
-REST_PAUSE_S = 0.04
-"""While nobody presses, three samples of 80 Hz are taken at a time; waking the thread for each is most of its work."""
+REST_PAUSE_S = 0.06
+"""While nobody presses, five samples of 80 Hz are taken at a time; waking the thread for each is most of its work."""
 RETRY_S = 0.2
 
 Zero = tuple[ForceScale, LoadLimit]
