@@ -63,6 +63,7 @@ class Scan:
         self._frames: list[Frame] = []
         self._ramps = self._failed = 0
         self._until_s = math.inf
+        self._advised: tuple[ScanAdvice, float] | None = None  # what all frames tell, and since when (s)
 
     def lead(self) -> ScanTaken:
         """Return what the scan took; ends with the hand lifting, in the dark.
@@ -71,28 +72,34 @@ class Scan:
         cancelled or the daemon stops.
         """
         fault = None
-        advice = self._press()
-        advised_s = time.monotonic()
-        while not self._is_over(advice):
-            try:
-                with self._capture.unless(self._is_enough):
-                    self._capture.lifted()
-                    advice = self._press()
-                    advised_s = time.monotonic()
-            except RampGivenUp:
-                break
-            except (PressEnded, NoContrastError, InvalidQuantity) as end:
-                if not self._tries_again(end, advice):
-                    break
-            except DeviceError as error:
-                fault = error
-                break
+        try:
+            self._press()
+            self._press_on()
+        except DeviceError as error:
+            if self._advised is None:
+                raise
+            fault = error
+        assert self._advised  # a press that is complete has advice, and one that is not has raised
         self._capture.drop_ramp()
+        advice, advised_s = self._advised
         reached = self._job.wanted.is_reached(advice.half_width)
         return ScanTaken(self._frames, advice, reached, time.monotonic() - advised_s, fault)
 
-    def _press(self) -> ScanAdvice:
-        """Return what all presses tell, one more of them; what the adviser refuses is no press."""
+    def _press_on(self) -> None:
+        """Lead through further presses, as many as it takes; raises the fault of the probe that ends them."""
+        while not self._is_over():
+            try:
+                with self._capture.unless(self._is_enough):
+                    self._capture.lifted()
+                    self._press()
+            except RampGivenUp:
+                return
+            except (PressEnded, NoContrastError, InvalidQuantity) as end:
+                if not self._tries_again(end):
+                    return
+
+    def _press(self) -> None:
+        """Take one more press, and what all tell; what the adviser refuses is no press."""
         frames = self._capture.loaded("press", self._job.mode, self._ramps)
         if not self._frames and self._job.within_s is not None:
             self._until_s = (self._capture.machine.touched_s or frames[0].t_s) + self._job.within_s
@@ -100,18 +107,21 @@ class Scan:
         self._board.update(guidance=Guidance.LIFT)
         self._darken()
         advice = self._advise([*self._frames, *frames])
-        self._frames += frames
+        self._frames, self._advised = [*self._frames, *frames], (advice, time.monotonic())
         self._ramps, self._failed = self._ramps + 1, 0
-        self._tell(advice)
+        self._tell()
         self._note(self._ramps)
-        return advice
 
-    def _tell(self, advice: ScanAdvice, failed: str = "") -> None:
+    def _tell(self, failed: str = "") -> None:
+        assert self._advised
+        advice, _ = self._advised
         offset_mm = USUAL_OFFSET_MM if advice.next_offset_mm is None else advice.next_offset_mm
         self._board.update(scan=ScanProgress(self._ramps, FRAMES[self._job.mode].most_ramps, advice, offset_mm, failed))
 
-    def _is_over(self, advice: ScanAdvice) -> bool:
+    def _is_over(self) -> bool:
         """Return whether no further press is to come."""
+        assert self._advised
+        advice, _ = self._advised
         of_mode = FRAMES[self._job.mode]
         if self._is_enough(False) or self._job.wanted.is_reached(advice.half_width):
             return True
@@ -122,7 +132,7 @@ class Scan:
         """Return whether the operator says so, or the time is over; a press that is under way is finished then."""
         return self._capture.finished.is_set() or (not is_touching and time.monotonic() >= self._until_s)
 
-    def _tries_again(self, end: Exception, advice: ScanAdvice) -> bool:
+    def _tries_again(self, end: Exception) -> bool:
         """Ask for a press again that failed, and return whether it is: not when nobody came, nor without end."""
         if isinstance(end, PressEnded) and end.state != "rejected":
             raise end
@@ -131,6 +141,6 @@ class Scan:
         if self._failed >= MAX_FAILED or self._capture.machine.touched_s is None:
             return False
         self._capture.drop_ramp()
-        self._tell(advice, str(end))
+        self._tell(str(end))
         self._board.update(guidance=Guidance.LIFT)
         return True

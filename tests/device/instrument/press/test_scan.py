@@ -9,7 +9,7 @@ from simulated_time_bench import CAMERA, SimulatedTimeProbe
 from stand_in_adviser import advice
 
 from device.config import Config
-from device.errors import CameraError
+from device.errors import CameraError, StorageError
 from device.instrument.acquisition import bench as bench_module
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.light_budget import LightBudget
@@ -41,6 +41,7 @@ class ScanRig:
             monkeypatch.setattr(module, "time", clock)
         self.bench = Bench(self.probe, self.probe, self.probe, budget=LightBudget(clock=lambda: self.probe.now_s))
         self.capture, self.at, self.offsets_mm = Capture(self.bench, CONFIG, self.board), {}, []
+        self.note = self.noted.append
         self.advises = lambda ramps: advice(2.0 / ramps)
         self.board.on_guidance(self._follow)
 
@@ -67,7 +68,7 @@ class ScanRig:
         self.told.clear()
         job = PressJob("p-1", "precise", **wanted)
         darken = lambda: self.bench.light(DARK)  # noqa: E731
-        scan = Scan(job, self.capture, self.board, advise=self._advise, darken=darken, note=self.noted.append)
+        scan = Scan(job, self.capture, self.board, advise=self._advise, darken=darken, note=self.note)
         self.began_s = self.probe.now_s
         return scan.lead()
 
@@ -218,6 +219,21 @@ def test_a_fault_in_a_later_press_leaves_the_answer_of_those_before_and_is_told(
     monkeypatch.setattr(rig.bench, "take", fail)
     taken = rig.scan()
     assert (frames_by_ramp(taken), taken.fault) == ({0: COUNT}, fault)
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_a_store_that_cannot_note_a_complete_press_ends_the_scan_with_that_press_and_what_it_tells(rig, presses):
+    fault, note = StorageError("The store cannot be written.", "Free some space."), rig.noted.append
+
+    def fail(ramps):
+        note(ramps)
+        if ramps == presses:
+            raise fault
+
+    rig.note = fail
+    taken = rig.scan()
+    assert (len(frames_by_ramp(taken)), taken.fault) == (presses, fault)
+    assert taken.advice.half_width == rig.advises(presses).half_width
 
 
 def test_a_fault_in_the_first_press_is_that_of_any_press(rig, monkeypatch):
