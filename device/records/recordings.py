@@ -17,7 +17,7 @@ from pathlib import Path
 from device.errors import DamagedRecordingError, OrphanedRecordings
 from device.files.durable import sync_directory
 from device.files.recording_file import remove_recording
-from device.records.manifest import ManifestEntry, fingerprint_of, manifest_of, note_kept
+from device.records.manifest import Fingerprint, ManifestEntry, fingerprint_of, manifest_of, note_kept
 
 log = logging.getLogger(__name__)
 RECORDINGS, ORPHANS = "recordings", "orphans"
@@ -82,7 +82,7 @@ class KeptRecordings:
         path = self._found(recording_id)
         if path is None:
             raise DamagedRecordingError(f"The recording {recording_id} is missing.", RESTORE)
-        if known and not _is_as_kept(path, known):
+        if known and _read(path) != known.fingerprint:
             raise damaged_recording(recording_id)
         return path
 
@@ -91,11 +91,11 @@ class KeptRecordings:
         with self._transaction() as db:
             known = manifest_of(db, recording_id).get(recording_id)
         path = self._found(recording_id)
-        if known:
-            return bool(known.removed) or (path is not None and _is_as_kept(path, known, from_disk=True))
-        if path is None:
-            return False
-        found = fingerprint_of(path, from_disk=True)
+        if known and known.removed:
+            return True
+        found = path and _read(path, from_disk=True)
+        if known or not found:
+            return bool(known and found == known.fingerprint)
         with self._transaction() as db:
             note_kept(db, recording_id, found)
         return True
@@ -167,12 +167,13 @@ class KeptRecordings:
         return folder if (folder / "recording.json").is_file() else None
 
 
-def _is_as_kept(path: Path, known: ManifestEntry, *, from_disk: bool = False) -> bool:
+def _read(path: Path, *, from_disk: bool = False) -> Fingerprint | None:
+    """Return the fingerprint of a recording, None where it cannot be read."""
     try:
-        return fingerprint_of(path, from_disk=from_disk) == known.fingerprint
+        return fingerprint_of(path, from_disk=from_disk)
     except OSError as error:
         log.error("%s cannot be read: %s", path, error)
-        return False
+        return None
 
 
 def _is_resized(path: Path, manifest: dict[str, ManifestEntry]) -> bool:

@@ -81,8 +81,8 @@ class RecordingsWatch:
         while not self._stopping.is_set():
             try:
                 self._look_at_all()
-            except DeviceError as error:  # of a store that is at fault the procedure tells
-                log.error("%s %s", error.code, error)
+            except (DeviceError, OSError) as error:  # of a store that is at fault the procedure tells
+                log.error("recordings are looked at again in %g s: %s", LATER_S, error)
                 self._stopping.wait(LATER_S)
 
     def _look_at_all(self) -> None:

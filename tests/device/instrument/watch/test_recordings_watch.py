@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -11,7 +12,9 @@ import pytest
 from daemon_process import wait_for
 from probe_card import add_measurement
 
+from device.instrument.watch import recordings_watch
 from device.instrument.watch.recordings_watch import RecordingsWatch
+from device.records import recordings
 from device.records.store import Store
 
 
@@ -66,3 +69,36 @@ def test_recordings_of_before_there_were_hashes_get_theirs_without_being_asked(s
     wait_for(store.recordings.unnoted, lambda names: not names)
     watch.close()
     assert watch.taken() == ()
+
+
+def test_a_disk_that_cannot_be_read_once_is_looked_at_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recordings_watch, "LATER_S", 0.01)
+    look_through, failures = store.recordings.newest, iter([OSError(errno.EIO, "Input/output error")])
+
+    def newest() -> list[str]:
+        for failure in failures:
+            raise failure
+        return look_through()
+
+    monkeypatch.setattr(store.recordings, "newest", newest)
+    spoil(store, "r-2")
+    watch = RecordingsWatch(store)
+    watch.start()
+    [warning] = wait_for(watch.taken, bool)
+    watch.close()
+    assert "r-2" in warning.cause
+
+
+def test_a_recording_of_before_there_were_hashes_that_cannot_be_read_is_damaged(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sqlite3.connect(store.folder / "tsis.sqlite") as db:
+        db.execute("DELETE FROM kept_recording")
+    db.close()
+
+    def fail(path: Path, **_: bool) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(recordings, "fingerprint_of", fail)
+    assert not store.recordings.check("r-1")
+    assert "r-1" in store.recordings.unnoted()
