@@ -6,7 +6,6 @@ Either is written once, or all that speaks against it is told.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,10 +20,13 @@ from host_tools.commands.probe import ProbeOption, probe_with_tables
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from device.measurement.calibration import Calibration
     from host_tools.calibration.calibrate import Calibrated
     from host_tools.calibration.gates import Gate
     from host_tools.calibration.known_bench import OnBench
+    from host_tools.commissioning.bench_files import StatedBench
     from host_tools.commissioning.commission import CommissionedProbe
 
 MODEL, STANDARD, QUICK = MODELS / "paper", MODELS / "standard", MODELS / "quick"
@@ -172,25 +174,18 @@ def commission(
     from datetime import UTC, datetime
 
     from device.files.bundle_file import read_quick_model, read_ramp_model
-    from device.measurement.calibration import written
     from device.simulation.virtual_probe import ProbeTables
     from host_tools.calibration.gates import CalibrationRejected
     from host_tools.commissioning.bench_files import read_bench
     from host_tools.commissioning.commission import commission as run_commission
-    from host_tools.commissioning.own_bundle import (
-        CERTIFICATE_FILE,
-        quick_folder,
-        write_own_bundle,
-        write_own_quick,
-    )
-    from host_tools.commissioning.own_certificate import own_certificate
+    from host_tools.commissioning.own_bundle import quick_folder, require_new, write_own_bundle, write_own_quick
     from host_tools.commissioning.own_quick import train_own_quick
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.probe_file import simulated_probe
 
-    for folder in (out, *([quick_folder(out)] if quick else [])):
-        if folder.exists():
-            raise InvalidQuantity("bundle", folder, "a new folder", "a bundle is written once: give another name")
+    quick_out = quick_folder(out) if quick else None
+    for folder in (out, quick_out) if quick_out else (out,):
+        require_new(folder)
     require("valid_days", valid_days, Bound(1.0, 730.0, "days"), "commission again before that")
     probe_with_tables(None, table)
     model, derivatives = read_ramp_model(design), load_derivatives(table)
@@ -201,17 +196,7 @@ def commission(
     try:
         with workers(scheduler):
             bench = read_bench(recordings, probe, phantoms, simulated_probe())
-            said_by = {"phantom_serial": bench.phantoms.serial, "operator": operator, "made_at": written(made_at)}
-            certificate = _or_why_not(
-                lambda: own_certificate(
-                    bench.recordings,
-                    bench.names,
-                    bench.probe,
-                    **said_by,
-                    valid_days=valid_days,
-                    block_names=bench.block_names,
-                )
-            )
+            certificate = _certificate_of(bench, operator, made_at, valid_days)
             done = run_commission(bench.ramps, model, derivatives, prior=bench.prior, seed=seed, say=note.print)
             own_quick = train_own_quick(done.answers, *of_quick, seed=seed, say=note.print) if of_quick else None
             done = replace(done, held=own_quick.believed if own_quick else None)
@@ -236,30 +221,52 @@ def commission(
     if own_quick:
         write_own_quick(own_quick, out)
     if as_json:
-        gates = [gate.as_record() for gate in done.gates]
-        path = str(out / CERTIFICATE_FILE) if certificate else None
-        of_quick_mode = str(quick_folder(out)) if own_quick else None
-        record = {"accepted": True, "path": str(out), "quick": of_quick_mode, "certificate": path, "gates": gates}
-        print(json.dumps(record))
+        print(json.dumps(_commissioned_record(done, out, quick_out, certificate)))
     else:
-        _show_commissioned(done, out, certificate)
-        if own_quick:
-            print(f"bundle of mode quick in {quick_folder(out)}: set quick_model to it")
+        _show_commissioned(done, out, quick_out, certificate)
         for line in bench.phantoms.advice():
             print(line)
 
 
-def _or_why_not(certify: Callable[[], Calibration]) -> Calibration | None:
+def _certificate_of(bench: StatedBench, operator: str, made_at: datetime, valid_days: float) -> Calibration | None:
     """Return the certificate; where recordings do not make one, tell everything that they lack."""
+    from device.measurement.calibration import written
+    from host_tools.commissioning.own_certificate import own_certificate
+
     try:
-        return certify()
+        return own_certificate(
+            bench.recordings,
+            bench.names,
+            bench.probe,
+            phantom_serial=bench.phantoms.serial,
+            operator=operator,
+            made_at=written(made_at),
+            valid_days=valid_days,
+            block_names=bench.block_names,
+        )
     except InvalidQuantity as refusal:
         note.print("The bundle gets no certificate, and the daemon takes no press without one:")
         note.print(str(refusal), soft_wrap=True)
         return None
 
 
-def _show_commissioned(done: CommissionedProbe, out: Path, certificate: Calibration | None) -> None:
+def _commissioned_record(
+    done: CommissionedProbe, out: Path, quick_out: Path | None, certificate: Calibration | None
+) -> dict[str, Any]:
+    from host_tools.commissioning.own_bundle import CERTIFICATE_FILE
+
+    return {
+        "accepted": True,
+        "path": str(out),
+        "quick": str(quick_out) if quick_out else None,
+        "certificate": str(out / CERTIFICATE_FILE) if certificate else None,
+        "gates": [gate.as_record() for gate in done.gates],
+    }
+
+
+def _show_commissioned(
+    done: CommissionedProbe, out: Path, quick_out: Path | None, certificate: Calibration | None
+) -> None:
     from host_tools.commissioning.joint_fit import PROBE
     from host_tools.commissioning.own_bundle import CERTIFICATE_FILE
     from host_tools.commissioning.page import PAGE_FILE
@@ -274,3 +281,5 @@ def _show_commissioned(done: CommissionedProbe, out: Path, certificate: Calibrat
     print(f"bundle in {out}: set standard_model to it, and serial to the probe's own; its page is {PAGE_FILE}")
     if certificate:
         print(f"certificate in it until {certificate.validity.expires_at}: set calibration to {out / CERTIFICATE_FILE}")
+    if quick_out:
+        print(f"bundle of mode quick in {quick_out}: set quick_model to it")

@@ -1,7 +1,8 @@
 """A probe's phantoms to what answers its presses: joint fit, proof on phantoms left out, and limits.
 
-Limits come from what is believed: presses drawn from it - probe, hand and noise - exceed each in one of eighty. That of
-the misfit also lets this probe's own phantoms pass, each answered with that phantom left out, up to a bound.
+One limit is drawn: presses of the probe, hand and noise that are believed exceed that of the odds in one of a hundred.
+That of the misfit is a constant, in the noise and discrepancy that are believed; a round inclusion's elongation is
+Rayleigh's by chance; how far tissue may lie from the middle of its range is the design's.
 Source: docs/own_probe.md.
 """
 
@@ -90,8 +91,12 @@ def commission(
 
 def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
     """Return what a commissioning must pass: phantoms answered, their truths covered, a probe near what its file
-    states."""
-    covered = [one.is_covered[:2] for one in phantoms]
+    states.
+
+    What is not determined has its whole range as an interval, which covers: it counts neither way.
+    """
+    known = np.array([one.is_determined[:2] for one in phantoms])
+    covered = np.array([one.is_covered[:2] for one in phantoms])
     away = np.abs(fit.tolerances_away)
     farthest, worst = int(np.argmax(away)), max(phantoms, key=lambda one: one.misfit_ratio)
     return [
@@ -102,8 +107,8 @@ def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
             f"record {worst.name} again, and measure it",
         ),
         Gate(
-            "covered sizes and depths of phantoms left out",
-            float(np.mean(covered)),
+            "covered, of determined sizes and depths of phantoms left out",
+            float(covered[known].mean()) if known.any() else 0.0,
             Bound(FEWEST_COVERED, 1.0, ""),
             "measure the phantoms again, or state larger tolerances",
         ),

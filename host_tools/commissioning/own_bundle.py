@@ -24,7 +24,7 @@ from device import __version__
 from device.measurement.bundle import CARD_FILE
 from device.measurement.calibration import Calibration, written
 from device.measurement.mode import FRAMES, Mode
-from device.measurement.quantities import Bound, require
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
 from device.measurement.ramp_modes.range_classifier import RANGE_FILE
@@ -66,6 +66,7 @@ def write_own_bundle(
     Raises `InvalidQuantity` for a validity outside `VALID_DAYS`, or a folder that is there.
     """
     require("valid_days", valid_days, VALID_DAYS, "commission again before that")
+    require_new(folder)
     files = {path.name: path.read_bytes() for path in design.iterdir()}
     card = json.loads(files[CARD_FILE])
     surrogate = _archive(surrogate_arrays(done.answers))
@@ -88,6 +89,12 @@ def write_own_bundle(
     kept_files = {name: files[name] for name in names}
     kept_files |= {SURROGATE_FILE: surrogate, CARD_FILE: text, PAGE_FILE: page}
     write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))
+
+
+def require_new(folder: Path) -> None:
+    """Raise `InvalidQuantity` for a folder of a bundle that is there."""
+    if folder.exists():
+        raise InvalidQuantity("bundle", folder, "a new folder", "a bundle is written once: give another name")
 
 
 def quick_folder(folder: Path) -> Path:

@@ -167,7 +167,8 @@ def with_noise(holds: BelievedHolds, camera: Array, noise: PressNoise, seed: int
 
 
 def faintest_that_counts(rows: Array) -> tuple[float, ...]:
-    """Return the contrasts of `SEEN_BY` that presses [n, 12] without an inclusion exceed in one of eighty, together."""
+    """Return the contrasts of `SEEN_BY` that presses [n, 12] without an inclusion exceed together in a share of
+    1 - `CRITICAL_RATIO` at most."""
     of_each = 1 - (1 - CRITICAL_RATIO) / len(SEEN_BY)
     return tuple(float(np.quantile(rows[:, :RINGS] @ weights, of_each)) for weights in SEEN_BY.values())
 

@@ -188,6 +188,15 @@ def test_a_probe_is_held_against_its_own_file(fit):
     assert list(probe_lines(stated, PROBE))[2].split()[-2:] == ["0.7000", "0.1"]
 
 
+def test_phantoms_of_which_nothing_is_determined_prove_nothing(fit):
+    told = LeftOut("A1", *np.full((5, 3), 10.0), np.full(3, True), 1.0)
+    missed = replace(told, truth=np.full(3, 20.0), tolerance=np.full(3, 0.1))
+    assert gates_of(fit, [told])[1].problem is None
+    assert gates_of(fit, [replace(told, is_determined=np.full(3, False))])[1].value == 0.0
+    assert gates_of(fit, [told, missed])[1].value == 0.5
+    assert gates_of(fit, [told, replace(missed, is_determined=np.full(3, False))])[1].value == 1.0
+
+
 def test_a_second_ramp_of_a_phantom_is_left_out_with_it(ramps, model, derivatives, fit, monkeypatch):
     kept = []
 
