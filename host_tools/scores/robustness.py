@@ -21,7 +21,7 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD, RowDerivatives
-from device.measurement.ramp_modes.model import RampModel
+from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import limits
@@ -144,11 +144,22 @@ def of_group(found: ScoredPresses, group: str) -> ScoredPresses:
 
 def _trials(setup: TrialSetup, lit: ProbeTables, probes: int, presses: int) -> list[TriedProbe]:
     """Return how presses of foreign probes are answered, each probe on a core of its own."""
-    return in_parallel(lambda one: _tried(setup, lit, one + 1, presses), probes, setup.jobs, smallest_batch=1)
+    allowing = tolerant(setup.design)
+    critical = limits(allowing, setup.model, setup.seed)
+
+    def tried(place: int) -> TriedProbe:
+        return _tried(setup, lit, place + 1, presses, (allowing, critical))
+
+    return in_parallel(tried, probes, setup.jobs, smallest_batch=1)
 
 
-def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> TriedProbe:
-    """Return how presses of one foreign probe, `lit` as its tables say, are answered by all who may."""
+def _tried(
+    setup: TrialSetup, lit: ProbeTables, number: int, presses: int, allowing: tuple[OwnAnswers, CriticalValues]
+) -> TriedProbe:
+    """Return how presses of one foreign probe, `lit` as its tables say, are answered by all who may.
+
+    `allowing`: what answers by a builder's tolerances alone, and above what it refuses.
+    """
     model, design, jobs = setup.model, setup.design, 1
     probe = probe_part(foreign_world(setup.seed, number))
     noise, own = model.answers.noise, derived_seed(setup.seed, f"probe {number}")
@@ -161,7 +172,7 @@ def _tried(setup: TrialSetup, lit: ProbeTables, number: int, presses: int) -> Tr
     few = taken.first(FEW)
     scores = {
         SHIPPED: scored(model.answers, model, model.critical["standard"], few, jobs),
-        TOLERANCES: scored(tolerant(design), model, critical, few, jobs),
+        TOLERANCES: scored(allowing[0], model, allowing[1], few, jobs),
         COMMISSIONED: scored(answers, model, critical, taken, jobs),
         KNOWN: scored(known, model, critical_of_known, of_design, jobs),
         SCANS: scored(answers, model, critical, scans, jobs),
@@ -343,15 +354,19 @@ def benchmarks(group: str, trials: Sequence[TriedProbe], goals: Mapping[str, flo
 
 def _benchmarks(case: str, trials: Sequence[TriedProbe], name: str, goals: Mapping[str, float]) -> Iterator[Benchmark]:
     whole, names, pairs = _whole(trials, name), UNKNOWNS[:2], pairs_of(trials, name)
-    each = np.array([_covered(trial.scores[name]) for trial in trials])
-    covered = _covered(whole)
+    each = np.array([trial.scores[name].determined_covered() for trial in trials])
+    covered = whole.determined_covered()
     least = {
         "answered": [
             ("answered, of what the probe known exactly answers", pairs.answered_ratio()),
             ("size and depth determined, of where the probe known exactly has both", pairs.determined_ratio()),
         ],
-        "pooled": [(f"{unknown} covered, pooled", covered[i]) for i, unknown in enumerate(names)],
-        "each probe": [(f"{unknown} covered, worst probe", each[:, i].min()) for i, unknown in enumerate(names)],
+        "pooled": [(f"{unknown} covered, determined, pooled", covered[i]) for i, unknown in enumerate(names)],
+        "each probe": [
+            (f"{unknown} covered, determined, worst probe", min(share for share in each[:, i] if share == share))
+            for i, unknown in enumerate(names)
+            if not np.isnan(each[:, i]).all()
+        ],
         "joint": [("joint region of size and depth holds", whole.region_holds())],
     }
     for goal, figures in least.items():
@@ -361,16 +376,11 @@ def _benchmarks(case: str, trials: Sequence[TriedProbe], name: str, goals: Mappi
         yield at_most(case, f"{unknown} RMSE over the same probe's known exactly", ratio, goals["rmse"])
 
 
-def _covered(found: ScoredPresses) -> Array:
-    """Return how often intervals of size and depth [2] hold; NaN without answers."""
-    return np.asarray(found.covered().mean(axis=0)) if found.is_answered.any() else np.full(2, np.nan)
-
-
 def _facts(trials: Sequence[TriedProbe]) -> dict[str, dict[str, float | None]]:
     """Return the shares of one group that the page's prose quotes; None without answers."""
 
     def of(found: ScoredPresses) -> dict[str, float | None]:
-        size, depth = _covered(found)
+        size, depth = found.determined_covered()
         both = found.covered().all(axis=1).mean() if found.is_answered.any() else np.nan
         shares = {"size": size, "depth": depth, "both": both, "region": found.region_holds()}
         return {name: None if np.isnan(one) else round(float(one), 3) for name, one in shares.items()}

@@ -29,6 +29,7 @@ from host_tools.commissioning.joint_fit import (
     tolerances_only,
 )
 from host_tools.commissioning.left_out import CheckedAnswer, checked_answer
+from host_tools.pages.benchmark import Benchmark, at_least
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.scores.foreign_presses import ForeignPresses
@@ -139,6 +140,15 @@ def paired(found: ScoredPresses, others: ScoredPresses) -> tuple[ScoredPresses, 
     """Return the presses that are in both, in one order: the same number is the same press."""
     _, mine, theirs = np.intersect1d(found.number, others.number, return_indices=True)
     return found.part(mine), others.part(theirs)
+
+
+def covered_at_least(case: str, found: ScoredPresses, bound: float) -> list[Benchmark]:
+    """Return how often intervals of determined sizes and depths hold; of one that is never determined nothing.
+
+    What is not determined has its whole range as an interval: counting that would reward who determines less.
+    """
+    shares = zip(UNKNOWNS[:2], map(float, found.determined_covered()), strict=True)
+    return [at_least(case, f"{name} covered, determined", share, bound) for name, share in shares if share == share]
 
 
 def figures_of(found: ScoredPresses) -> tuple[str, ...]:

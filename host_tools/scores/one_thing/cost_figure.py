@@ -49,4 +49,4 @@ def _values(found: ScoredPresses) -> tuple[float, float, float, float]:
     if not answered:
         return np.nan, np.nan, np.nan, answered
     size_mm, depth_mm = map(float, np.sqrt((found.error_mm() ** 2).mean(axis=0)))
-    return size_mm, depth_mm, 100 * float(found.covered().mean(axis=0).min()), answered
+    return size_mm, depth_mm, 100 * float(np.nanmin(found.determined_covered())), answered

@@ -166,9 +166,9 @@ def _answered(scores: Mapping[tuple[str, str], ScoredPresses]) -> Table:
 
 
 def _facts(found: ScoredPresses) -> dict[str, float | None]:
-    """Return the shares of presses that are answered, and of these of sizes that are covered."""
-    covered = float(found.covered()[:, 0].mean()) if found.is_answered.any() else None
-    return {"answered": found.share_answered(), "size_covered": covered}
+    """Return the shares of presses that are answered, and of determined sizes that are covered; None without any."""
+    covered = float(found.determined_covered()[0])
+    return {"answered": found.share_answered(), "size_covered": covered if covered == covered else None}
 
 
 def _cells(found: NamedBlocks, block: RowBlock | None) -> tuple[str, ...]:

@@ -13,7 +13,6 @@ from itertools import groupby
 import numpy as np
 
 from device.measurement.mode import Mode
-from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import QuickModel
 from host_tools.pages.benchmark import Benchmark, Chapter, Figure, Table, at_least
 from host_tools.scenes.phantom_set import PhantomSet
@@ -32,7 +31,7 @@ from host_tools.scores.one_thing.press_answers import (
     with_tolerances,
 )
 from host_tools.scores.one_thing.tried_presses import Setting, TruthDesign, random_design, scans_of, tried_presses
-from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of
+from host_tools.scores.scored_presses import FIGURES, ScoredPresses, covered_at_least, figures_of
 
 PRESSES = 40
 """Presses of each thing; `tried_presses.scans_of` says how many of them are scans of two in mode precise."""
@@ -132,10 +131,8 @@ def _of_row(mode: Mode, cause: Cause, found: ScoredPresses) -> list[Benchmark]:
     case, is_answered = f"{mode}, {cause.name}", bool(found.is_answered.any())
     if mode == "quick" and not is_answered:
         return []
-    covered = found.covered().mean(axis=0) if is_answered else np.full(2, np.nan)
     shares = [] if mode == "quick" else [at_least(case, "answered", found.share_answered(), ANSWERED)]
-    names = zip(UNKNOWNS[:2], map(float, covered), strict=True)
-    return [*shares, *(at_least(case, f"{name} covered", share, COVERED) for name, share in names)]
+    return [*shares, *covered_at_least(case, found, COVERED)]
 
 
 def _table(name: str, tried: Sequence[Cause], found: Sequence[ScoredPresses]) -> Table:
@@ -159,7 +156,9 @@ def holds(found: ScoredPresses, *, may_refuse: bool = False) -> bool:
     count, answered = int(found.stands_out.sum()), int(found.is_answered.sum())
     if not answered:
         return may_refuse
-    covers = bool((found.covered().mean(axis=0) >= _but_for_chance(COVERED, answered)).all())
+    determined = found.determined()[:, :2].sum(axis=0)
+    shares = zip(found.determined_covered(), determined, strict=True)
+    covers = all(share >= _but_for_chance(COVERED, count) for share, count in shares if count)
     return covers and (may_refuse or answered / count >= _but_for_chance(ANSWERED, count))
 
 

@@ -122,11 +122,11 @@ def ramp_scores(tried: TriedPresses, design: DesignToTry, own: OwnLimits, jobs: 
 def quick_scores(parameters: Array, held: Sequence[QuickPress], model: QuickModel) -> ScoredPresses:
     """Return the answers of mode quick to held presses, as if it had been trained for their probe."""
     shown = [number for number, one in enumerate(held) if _shows(one.row, model)]
-    rows = np.array([held[number].row for number in shown])
+    rows = np.array([held[number].row for number in shown]).reshape(len(shown), len(model.bundle.feature_names))
     raw = model.bundle.estimate(rows)
     mean = normalise_unknowns(raw.estimate)
     ends = [ends_in_belts(at, spread, model.belts) for at, spread in zip(mean, raw.spread, strict=True)]
-    low, high, known = (np.array(part) for part in zip(*ends, strict=True))
+    low, high, known = (np.array([one[part] for one in ends]).reshape(mean.shape) for part in range(3))
     truth = normalise(parameters[shown])[:, : len(UNKNOWNS)]
     answered = [
         held[number].elongation_ratio <= model.elongation_ratio and not outside_training(model.bundle, held[number].row)

@@ -202,11 +202,11 @@ def _benchmarks(found: Mapping[str, Scores], without: Mapping[str, Scores]) -> l
 
 
 def _facts(found: ScoredPresses) -> dict[str, float | list[float]]:
-    """Return what is refused of presses, and how often sizes and depths of the others are covered."""
-    covered = found.covered().mean(axis=0) if found.is_answered.any() else np.zeros(0)
+    """Return what is refused of presses, and how often determined sizes and depths of the others are covered."""
+    covered = found.determined_covered()
     return {
         "refused": round(1 - found.share_answered(), 3),
-        "covered": [round(float(one), 3) for one in covered],
+        "covered": [] if np.isnan(covered).any() else [round(float(one), 3) for one in covered],
     }
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.arrays import Array
-from device.measurement.quantities import UNKNOWNS, Inclusion
+from device.measurement.quantities import Inclusion
 from device.measurement.ramp_modes.radial_profile import SeenPresses
 from device.measurement.ramp_modes.surrogate import OFFSET
 from device.simulation.physics.slab import Slab
@@ -23,7 +23,7 @@ from device.simulation.physics.slab_changes import resampling
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.physics.world import AS_BELIEVED
 from host_tools.forward.press_model import PressFailed
-from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least
+from host_tools.pages.benchmark import Chapter, Table
 from host_tools.press_models.press_samples import PressedScene, draw_parameters
 from host_tools.press_models.recorded_presses import in_parallel
 from host_tools.press_models.seeds import derived_seed
@@ -32,7 +32,7 @@ from host_tools.probe_tables.slab_changes import SLAB_FORCES_N
 from host_tools.scenes.scene import Scene, TissueLayer
 from host_tools.scores.foreign_presses import OF_PATIENTS, ForeignPresses, seen_presses
 from host_tools.scores.one_thing.press_answers import TOLERANT, DesignToTry, with_tolerances
-from host_tools.scores.scored_presses import FIGURES, ScoredPresses, figures_of, scored
+from host_tools.scores.scored_presses import FIGURES, covered_at_least, figures_of, scored
 
 
 class SolvedSkin(NamedTuple):
@@ -83,7 +83,7 @@ def solved_skins_chapter(
         title="Skins solved anew",
         claim=f"{len(solved)} random presses on the middle of an inclusion, in mode standard.",
         source="host_tools/scores/one_thing/solved_skins.py; host_tools/probe_tables/force_ramps.py",
-        benchmarks=tuple(one for skin in skins for one in _benchmarks(skin, found[skin])),
+        benchmarks=tuple(one for skin in skins for one in covered_at_least(skin.words, found[skin], COVERED_AT_LEAST)),
         tables=(
             Table(
                 "Skin, its modulus over that of the tissue below",
@@ -149,11 +149,3 @@ def scene_on(skin: SolvedSkin, slab: Slab, inclusion: Inclusion | None = None) -
     scene = scene_in(slab, inclusion)
     layer = TissueLayer("skin", skin.thickness_mm, slab.youngs_modulus_kpa * skin.modulus_ratio)
     return replace(scene, tissue=replace(scene.tissue, layers=(layer,)))
-
-
-def _benchmarks(skin: SolvedSkin, found: ScoredPresses) -> list[Benchmark]:
-    """Return how often intervals hold of what is answered."""
-    if not found.is_answered.any():
-        return []
-    shares = zip(UNKNOWNS[:2], found.covered().mean(axis=0), strict=True)
-    return [at_least(skin.words, f"{name} covered", float(share), COVERED_AT_LEAST) for name, share in shares]

@@ -94,11 +94,15 @@ def test_a_press_is_paired_by_its_number_within_its_own_probe():
 def test_each_bound_is_named_and_missed_by_what_misses_it():
     good, worse = told_presses(20), told_presses(14, wrong=6)
     found = by_quantity([tried(good, good), tried(worse, good, number=2)])
-    assert found["size_mm covered, pooled"].measured == pytest.approx(34 / 40)
-    assert found["size_mm covered, worst probe"].measured == pytest.approx(0.7)
+    assert found["size_mm covered, determined, pooled"].measured == pytest.approx(34 / 40)
+    assert found["size_mm covered, determined, worst probe"].measured == pytest.approx(0.7)
     assert found["joint region of size and depth holds"].measured == pytest.approx(34 / 40)
     missed = {name for name, one in found.items() if not one.passed}
-    of_size = "covered, pooled", "covered, worst probe", "RMSE over the same probe's known exactly"
+    of_size = (
+        "covered, determined, pooled",
+        "covered, determined, worst probe",
+        "RMSE over the same probe's known exactly",
+    )
     assert missed == {f"size_mm {what}" for what in of_size}
 
 
@@ -107,7 +111,7 @@ def test_scans_are_held_against_scans_of_the_known_probe():
     trials = [tried(good, good, scans=scans)._replace(number=number) for number in (1, 2)]
     trials = [one._replace(scores=one.scores | {KNOWN_SCANS: told_presses(10)}) for one in trials]
     found = {one.quantity: one for one in benchmarks(GROUPS[0], trials, GOALS) if one.case == f"{SCANS}, {GROUPS[0]}"}
-    assert found["size_mm covered, pooled (at least)"].measured == pytest.approx(0.6)
+    assert found["size_mm covered, determined, pooled (at least)"].measured == pytest.approx(0.6)
     assert found["size_mm RMSE over the same probe's known exactly"].measured > 1
     assert found["answered, of what the probe known exactly answers (at least)"].measured == 1.0
 

@@ -15,7 +15,7 @@ from host_tools.commissioning.joint_fit import Design
 from host_tools.press_models.press_derivatives import load_derivatives
 from host_tools.scores.foreign_presses import foreign_presses
 from host_tools.scores.robustness import known_probe
-from host_tools.scores.scored_presses import FIGURES, figures_of, joined, paired, scored
+from host_tools.scores.scored_presses import FIGURES, covered_at_least, figures_of, joined, paired, scored
 
 
 def test_errors_are_found_less_true():
@@ -47,6 +47,15 @@ def test_what_is_not_determined_covers_with_its_whole_range_and_so_counts_apart(
     assert (cells["size covered"], cells["determined size covered"]) == ("67 %", "100 %")
     assert (cells["size, depth determined"], cells["E determined"]) == ("33 %", "33 %")
     assert (cells["size bias (mm)"], cells["depth bias (mm)"]) == ("+1.00", "+1.00")
+
+
+def test_a_bound_on_coverage_is_of_what_is_determined_alone():
+    found = scored_presses([(11.0, 6.0), (8.0, 6.0)], [(8.0, 6.0)] * 2)
+    assert [one.measured for one in covered_at_least("a", found, 0.9)] == pytest.approx([0.5, 1.0])
+    found.evaluated.is_known[:] = [[True, False, False], [False, False, False]]
+    [of_size] = covered_at_least("a", found, 0.9)
+    assert (of_size.measured, of_size.passed) == (0.0, False)
+    assert covered_at_least("a", scored_presses([(8.0, 6.0)], [(8.0, 6.0)], answered=False), 0.9) == []
 
 
 def test_joint_regions_are_counted_of_what_is_answered():

@@ -72,7 +72,7 @@ def test_each_row_has_bounds_of_its_own_in_the_modes_that_have_to_do_with_it():
     }  # fmt: skip
     assert ("quick, nothing", "answered") not in judged
     missed = [key for key, one in judged.items() if not one.passed]
-    assert missed == [(f"{mode}, load cell's span +2 %", "size_mm covered") for mode in AFTER]
+    assert missed == [(f"{mode}, load cell's span +2 %", "size_mm covered, determined") for mode in AFTER]
     assert _rows_held("standard", tried, of_mode) == {"bounded": 2, "reached": 1, "but_for_chance": 2}
 
 

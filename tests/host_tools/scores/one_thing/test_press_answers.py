@@ -47,6 +47,13 @@ def test_quick_finds_most_presses_of_its_own_probe_inside_its_intervals(held, qu
     assert np.abs(found.error_mm()).mean() < 1.5
 
 
+def test_quick_presses_in_which_nothing_stands_out_are_no_answers(held, quick):
+    faint = [one._replace(row=0 * one.row) for one in held]
+    found = quick_scores(DESIGN.parameters, faint, quick)
+    assert found.evaluated.mean.shape == (0, 3)
+    assert figures_of(found) == ("0", *[""] * (len(FIGURES) - 1))
+
+
 def test_quick_refuses_what_is_oblong_and_leaves_out_what_does_not_stand_out(held, quick):
     oblong = [one._replace(elongation_ratio=quick.elongation_ratio * 2) for one in held]
     faint = [one._replace(row=np.where(np.arange(RINGS + 1) < RINGS, 0.0, one.row)) for one in held]
