@@ -39,8 +39,12 @@ TOGETHER = (2, COUNT)
 """Size and depth, the first two of the unknowns, and all three."""
 EDGES = np.linspace(-1.0, 1.0, CELLS + 1)
 MIDDLES = (EDGES[1:] + EDGES[:-1]) / 2
-NEAR, MOST_STEPS = 1e-5, 4
-"""A cell's best fit needs to be near, not exact: the weights correct it. One that creeps would cost more than all."""
+NEAR, MOST_STEPS = 1e-5, 12
+"""A cell's best fit needs to be near, not exact: the weights correct it. One that creeps would cost more than all.
+
+Four steps were too few for some small inclusions: a cell whose fit was far from best seemed impossible, and the modulus
+was told with a third of its spread. After twelve nothing moves any more, and few fits need as many.
+"""
 
 
 @dataclass(frozen=True, eq=False)
