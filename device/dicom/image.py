@@ -17,6 +17,7 @@ from device.dicom.wording import rows, spoken_quantity
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
 from device.measurement.recording.frame_light import binned_scale
 from device.measurement.recording.recording import REPAIR, CameraSettings
+from device.measurement.recording.tactile_image import FULL_CONTRAST
 
 ROW_PX, MARGIN_PX, FONT_SCALE = 24, 12, 0.5
 COMMENT_LENGTH = 10240
@@ -35,7 +36,7 @@ def image_of(subject: DicomSubject, picture: bytes) -> Dataset:
     data.ConversionType = "WSD"
     data.SecondaryCaptureDeviceManufacturer = MANUFACTURER
     data.ImageType = ["DERIVED", "SECONDARY", "OTHER"]
-    data.DerivationDescription = "Mean contrast of the pressed frames, in false colours; scaled to its brightest spot"
+    data.DerivationDescription = f"Mean contrast of the pressed frames, 0 to {100 * FULL_CONTRAST:g} % in false colours"
     data.PatientOrientation = ""
     data.BurnedInAnnotation = "NO"
     data.LossyImageCompression = "00"

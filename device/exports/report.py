@@ -24,6 +24,7 @@ from device.exports.printed_text import paragraph, printable, register_fonts
 from device.exports.selection import Exported, Selection, local_time
 from device.files.recording_file import read_head
 from device.measurement.quantities import InvalidQuantity
+from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.measurement.repeats import repeats_by_unknown
 from device.records.listing import Wanted
 from device.records.store import Store, StoredRecord
@@ -208,7 +209,7 @@ def _picture(store: Store, measurement: StoredRecord, picture_of: _PictureOf) ->
         camera = read_head(path).camera
     except (DeviceError, InvalidQuantity, OSError) as error:
         return [paragraph(f"No picture: {error}", WARNING)]
-    said = f"{SCALE_MM:g} mm on the probe's face. Dark: no contrast; yellow: the largest of this press."
+    said = f"{SCALE_MM:g} mm on the probe's face. Dark: no contrast; yellow: {100 * FULL_CONTRAST:g} % and more."
     return [image, _scale(PICTURE / (camera.width_px * camera.mm_per_px_x)), paragraph(said, SMALL)]
 
 

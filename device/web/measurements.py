@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import FastAPI, Query, Response
 
+from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.records.store import Store
 from device.web.contract import PNG, ZIP, answers, media
 from device.web.exams import tagged
@@ -49,7 +50,7 @@ def add_measurements(app: FastAPI, api: str, store: Store) -> None:
     @app.get(
         f"{one}/image.png",
         response_class=Response,
-        responses=media(PNG, "The contrast in colours, from none to the brightest spot.", "ETag"),
+        responses=media(PNG, f"The contrast in colours, of every press from 0 to {100 * FULL_CONTRAST:g} %.", "ETag"),
         tags=["measurements"],
     )
     async def get_image(measurement_id: str) -> Response:

@@ -20,10 +20,9 @@ from device.measurement.recording.frame_light import lights_of
 from device.measurement.recording.pixel_scale import PixelScale
 from device.measurement.recording.recording import REPAIR, Recording
 from device.measurement.recording.reference_light import Image, reference_light
+from device.measurement.recording.tactile_image import FULL_CONTRAST
 
 WIDTH_PX = 480
-FULL_CONTRAST = 0.4
-"""Contrast of the brightest colour, on every picture the same: a shallow hard inclusion of 12 mm reaches it."""
 PNG_HEADER = 33
 """Bytes of a PNG's signature and IHDR."""
 SMOOTHED_PX = 1.0

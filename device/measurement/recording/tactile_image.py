@@ -26,6 +26,8 @@ LAST_RAMP = 7
 
 LED_STEP = 1 / 255
 """One step of the LED chip's brightness: sides may be off so much by rounding."""
+FULL_CONTRAST = 0.4
+"""Contrast of the brightest colour, on every picture the same: a shallow hard inclusion of 12 mm reaches it."""
 FLOOR_COUNTS = 6.0
 """A reference dimmer than this above dark (of 8 bits) divides noise by noise: the pixel is marked invalid."""
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from device.files.shipped import SIMULATED_PROBE
-from device.instrument.press.picture import FULL_CONTRAST, WIDTH_PX, tactile_png
+from device.instrument.press.picture import WIDTH_PX, tactile_png
 from device.measurement.parameters import HIGH, LOW
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.recording import Recording
+from device.measurement.recording.tactile_image import FULL_CONTRAST
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.press_models.recorded_presses import recorded_press
 
