@@ -20,7 +20,7 @@ from pynetdicom.dul import DULServiceProvider
 from pynetdicom.pdu import A_ASSOCIATE_RJ
 
 from device.config import DicomSection
-from device.dicom.subject import IMPLEMENTATION_UID
+from device.dicom.subject import IMPLEMENTATION_NAME, IMPLEMENTATION_UID
 from device.errors import ArchiveUnreachable
 
 logging.getLogger("pynetdicom").setLevel(logging.CRITICAL)
@@ -31,7 +31,6 @@ COMMITMENT, COMMITMENT_INSTANCE = UID("1.2.840.10008.1.20.1"), UID("1.2.840.1000
 """SOP classes of services, PS3.4; pynetdicom makes its names of them while it runs, where no check of types sees them.
 """
 CONNECT_S, ANSWER_S = 10.0, 30.0
-VERSION_NAME = "TSIS"
 
 
 class UnawaitedProvider(DULServiceProvider):
@@ -79,7 +78,7 @@ def worklist_of(settings: DicomSection) -> RemoteProgram | None:
 def application(settings: DicomSection) -> AE:
     """Return this probe as a program in DICOM's network."""
     own = AE(ae_title=settings.own_title)
-    own.implementation_class_uid, own.implementation_version_name = IMPLEMENTATION_UID, VERSION_NAME
+    own.implementation_class_uid, own.implementation_version_name = IMPLEMENTATION_UID, IMPLEMENTATION_NAME
     own.connection_timeout = own.acse_timeout = CONNECT_S
     own.dimse_timeout = own.network_timeout = ANSWER_S
     return own

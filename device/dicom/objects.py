@@ -27,9 +27,7 @@ class DicomWriter:
         """Take the store, who draws pictures, and the hospital's name."""
         self._store, self._picture_of, self._institution = store, picture_of, institution
 
-    def subject(
-        self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None, written_at: str
-    ) -> DicomSubject:
+    def subject(self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> DicomSubject:
         """Return what is written of a measurement as it was measured, of an exam as it is given.
 
         Raises `InvalidRequest` when an identifier of the exam cannot be written.
@@ -37,7 +35,7 @@ class DicomWriter:
         require_writable(exam)
         measurement = self._store.measurement(measurement_id)
         head = read_head(self._store.recording_path(measurement["recording_id"]))
-        return DicomSubject(measurement, exam, head, written_at, self._institution, order)
+        return DicomSubject(measurement, exam, head, self._institution, order)
 
     def image(self, subject: DicomSubject) -> Dataset:
         """Return the image of a measurement."""

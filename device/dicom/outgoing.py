@@ -7,7 +7,6 @@ archive as if it were right: each of its objects there gets a note that it is re
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from datetime import UTC, datetime
 from typing import Any, get_args
 
 from pydicom.dataset import Dataset
@@ -18,6 +17,7 @@ from device.dicom.subject import DicomSubject, ObjectKind, OrderedStudy, object_
 from device.errors import InvalidRequest
 from device.files.recording_file import RecordingHead
 from device.measurement.recording.recording import CameraSettings
+from device.records.audit import utc_now
 from device.records.outbox import OutboxItem
 from device.records.store import Store, StoredRecord
 
@@ -51,7 +51,7 @@ class Outgoing:
     def _item(
         self, kind: ObjectKind, measurement: StoredRecord, exam: StoredRecord, order: OrderedStudy | None
     ) -> OutboxItem:
-        subject = self._writer.subject(measurement["id"], exam, order, now())
+        subject = self._writer.subject(measurement["id"], exam, order)
         about = _about(kind, subject)
         return OutboxItem(
             subject.uid(kind), exam["id"], measurement["id"], exam["version"], measurement["version"], about
@@ -72,7 +72,8 @@ class Outgoing:
         order = OrderedStudy(**about["order"], patient=patient) if about["order"] else None
         head = RecordingHead(**{**about["head"], "camera": CameraSettings(**about["head"]["camera"])})
         measurement = self._store.measurement(row["measurement_id"])
-        return DicomSubject(measurement, about["exam"], head, about["written_at"], about["institution"], order)
+        rejected_at = about.get("rejected_at") or about.get("written_at", "")  # as it was called before
+        return DicomSubject(measurement, about["exam"], head, about["institution"], order, rejected_at)
 
     def take_back_what_is_wrong(self) -> int:
         """Withdraw or recall every object that is not right any more; return how many."""
@@ -82,7 +83,7 @@ class Outgoing:
                 versions = {"exam_version": exam["version"], "filing_version": filing["version"]}
                 self._store.outbox.hold_on(row["uid"], **versions)
                 continue
-            about = _about("rejection", replace(self._subject(row), written_at=now()))
+            about = _about("rejection", replace(self._subject(row), rejected_at=utc_now()))
             about |= {"rejects": {"uid": row["uid"], **row["about"]}, "why": why}
             ids = uid_of("rejection", row["uid"]), row["exam_id"], row["measurement_id"]
             recall = OutboxItem(*ids, exam["version"], filing["version"], about)
@@ -112,7 +113,7 @@ def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:
         "order": order,
         "head": asdict(subject.head),
         "institution": subject.institution,
-        "written_at": subject.written_at,
+        "rejected_at": subject.rejected_at,
         "study_uid": subject.study_uid,
         "series_uid": subject.series_uid(kind),
     }
@@ -131,8 +132,3 @@ def counting_measurements(store: Store, exam_id: str) -> list[dict[str, Any]]:
     if not counting:
         raise InvalidRequest(f"The exam {exam_id} has no measurement that counts.", "Measure first.")
     return counting
-
-
-def now() -> str:
-    """Return the time, RFC 3339 UTC."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

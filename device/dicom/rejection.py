@@ -26,7 +26,7 @@ def rejection_of(subject: DicomSubject, uid: str, rejected: dict[str, Any], why:
     The rejected object is told by its `kind`, `uid`, `series_uid` and `study_uid`.
     """
     kind: ObjectKind = rejected["kind"]
-    data = begun(subject, "rejection", KeyObjectSelectionDocumentStorage, "KO", subject.written_at)
+    data = begun(subject, "rejection", KeyObjectSelectionDocumentStorage, "KO", subject.rejected_at)
     data.SOPInstanceUID = uid
     data.ReferencedPerformedProcedureStepSequence = Sequence()
     series, study = Dataset(), Dataset()

@@ -42,7 +42,7 @@ CONCEPTS = {
 
 def report_of(subject: DicomSubject) -> Dataset:
     """Return the numbers of a measurement as an object, which refers to its image."""
-    data = begun(subject, "report", ComprehensiveSRStorage, "SR", subject.written_at)
+    data = begun(subject, "report", ComprehensiveSRStorage, "SR", subject.measurement["taken_at"])
     data.CompletionFlag, data.VerificationFlag, data.PreliminaryFlag = "COMPLETE", "UNVERIFIED", "PRELIMINARY"
     data.PerformedProcedureCodeSequence = data.ReferencedPerformedProcedureStepSequence = Sequence()
     data.CurrentRequestedProcedureEvidenceSequence = Sequence([evidence(subject)])

@@ -12,7 +12,7 @@ from pydicom.sequence import Sequence
 from pydicom.uid import UID, ExplicitVRLittleEndian
 
 from device.dicom.codes import BREAST, OWN_SCHEME, PHANTOM, CodedTerm
-from device.dicom.subject import IMPLEMENTATION_UID, DicomSubject, ObjectKind
+from device.dicom.subject import IMPLEMENTATION_NAME, IMPLEMENTATION_UID, DicomSubject, ObjectKind
 
 MANUFACTURER, MODEL = "TSIS", "Tactile imaging probe"
 SERIES_NUMBER = {"image": 1, "report": 2, "rejection": 3}
@@ -68,6 +68,7 @@ def begun(subject: DicomSubject, kind: ObjectKind, sop_class: str, modality: str
     data.file_meta = FileMetaDataset()
     data.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
     data.file_meta.ImplementationClassUID = UID(IMPLEMENTATION_UID)
+    data.file_meta.ImplementationVersionName = IMPLEMENTATION_NAME
     data.SpecificCharacterSet = "ISO_IR 192"
     data.SOPClassUID, data.SOPInstanceUID = sop_class, subject.uid(kind)
     data.TimezoneOffsetFromUTC = made.strftime("%z")[:5]

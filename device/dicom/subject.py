@@ -30,6 +30,7 @@ def uid_of(*names: object) -> str:
 
 
 IMPLEMENTATION_UID = uid_of("implementation")
+IMPLEMENTATION_NAME = "TSIS"
 
 
 @dataclass(frozen=True)
@@ -52,15 +53,16 @@ class OrderedStudy:
 class DicomSubject:
     """One measurement of an exam, as it is written: records of both, and what is not in them.
 
-    `written_at`: when somebody asked for it, RFC 3339.
+    `rejected_at`: when it was found that its objects are not right, RFC 3339; "" while they are. Other objects say when
+    the press was measured, so that they are the same whenever they are written.
     """
 
     measurement: dict[str, Any]
     exam: dict[str, Any]
     head: RecordingHead
-    written_at: str
     institution: str = ""
     order: OrderedStudy | None = None
+    rejected_at: str = ""
 
     @property
     def is_of_patient(self) -> bool:

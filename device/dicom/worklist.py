@@ -10,6 +10,7 @@ from datetime import date
 from typing import Any
 
 from pydicom.dataset import Dataset
+from pydicom.multival import MultiValue
 from pydicom.sequence import Sequence
 
 from device.config import DicomSection
@@ -114,8 +115,10 @@ def _step(data: Dataset) -> ScheduledStep | None:
 
 
 def _text(data: Dataset, keyword: str) -> str:
+    """Return a value as it was sent: one that a backslash makes several is put together again."""
     value = data.get(keyword)
-    return "" if value is None else str(value)
+    several = value if isinstance(value, MultiValue) else [value]
+    return "\\".join("" if one is None else str(one) for one in several)
 
 
 def _is_meant(step: ScheduledStep, query: WorklistQuery) -> bool:

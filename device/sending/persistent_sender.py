@@ -100,5 +100,6 @@ class PersistentSender(ABC):
 
     def _say(self, fault: DeviceError | None, waiting_s: float | None = None) -> None:
         next_at = datetime.now(UTC) + timedelta(seconds=waiting_s or 0.0)
-        self.state = SenderState(fault, next_at.isoformat(timespec="seconds") if waiting_s else None)
+        told = next_at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        self.state = SenderState(fault, told if waiting_s else None)
         self._tell(fault)

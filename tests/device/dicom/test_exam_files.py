@@ -48,6 +48,22 @@ def files_of(hospital, tmp_path):
     return files
 
 
+def test_what_is_written_twice_is_the_same_to_the_last_bit(store, hospital):
+    exam = begin(store)
+    measure(store, exam)
+    first = hospital.files_of(exam["id"])
+    time.sleep(0.01)  # an object knows its time to a millisecond
+    again = hospital.files_of(exam["id"])
+    contents = [
+        {name: archive.read(name) for name in archive.namelist()}
+        for archive in (zipfile.ZipFile(io.BytesIO(one)) for one in (first, again))
+    ]
+    assert len(contents[0]) == 2
+    assert contents[0] == contents[1]
+    for content in contents[0].values():
+        assert pydicom.dcmread(io.BytesIO(content)).file_meta.ImplementationVersionName == "TSIS"
+
+
 def items(data):
     """Every item of a report below another, with its concept's words."""
     for item in data.get("ContentSequence", ()):

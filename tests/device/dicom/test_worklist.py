@@ -8,9 +8,12 @@ import pydicom
 import pytest
 from ordered_step import ordered
 from orthanc import Orthanc, free_port, needs_orthanc
+from pydicom.dataset import Dataset
 from written_exam import measure, needs_dciodvfy, verdict
 
 from device.dicom.hospital import Hospital
+from device.dicom.subject import require_writable
+from device.dicom.worklist import _step
 from device.errors import ArchiveUnreachable, InvalidRequest, ReusedKey, UnknownResource
 from device.files.recording_file import read_picture
 from device.records.asked_once import AskedOnce
@@ -159,6 +162,15 @@ def test_a_name_of_an_exam_that_nobody_sends_does_not_stay(store, hospital):
     exam = hospital.begin_exam(step["id"], SAID)
     assert store.outbox.erase_patients(sent_before="2000", made_before="9999") == 1
     assert store.outbox.ordered(exam["id"])[1] == {}
+
+
+def test_a_reference_with_a_backslash_is_shown_as_it_was_sent_and_no_exam_is_made_of_it():
+    data = Dataset()
+    data.StudyInstanceUID, data.PatientID, data.AccessionNumber = "1.2.3", "P\\Q", "AC\\D"
+    order = _step(data).order
+    assert (order.patient_ref, order.order_number) == ("P\\Q", "AC\\D")
+    with pytest.raises(InvalidRequest, match="patient_ref of the exam has a backslash"):
+        require_writable({"patient_ref": order.patient_ref, "order_number": None})
 
 
 def test_a_worklist_that_is_not_there_or_refuses_is_told_as_such(archive, store):
