@@ -51,14 +51,17 @@ LightRatio = Annotated[float, Bound(0.01, 0.9, "")]
 NetworkHost = Annotated[str, Field(min_length=1)]
 DICOM_LINE = r"^[^\\\x00-\x1f\x7f]*$"
 """Text that DICOM takes for one value: a backslash would begin the next one (PS3.5 section 6.2)."""
-AeTitle = Annotated[str, Field(pattern=r"^[!-\[\]-~]([ -\[\]-~]{0,14}[!-\[\]-~])?$")]
+AE_WORDS = "1 to 16 characters of ASCII, no backslash, no space at its ends"
+AeTitle = Annotated[str, Field(pattern=r"^[!-\[\]-~]([ -\[\]-~]{0,14}[!-\[\]-~])?$", description=AE_WORDS)]
 """Name of a program in DICOM's network, 1 to 16 characters of ASCII without a backslash."""
 
 
-WebhookUrl = Annotated[str, Field(pattern=r'^https?://[!"$->A-\[\]-~]+$')]
+WEBHOOK_WORDS = "an address of http or https without user, password, query or fragment"
+WebhookUrl = Annotated[str, Field(pattern=r'^https?://[!"$->A-\[\]-~]+$', description=WEBHOOK_WORDS)]
 """An address without a user, a password or a query: the signature says who sends."""
-ContactUrl = Annotated[str, Field(pattern=r"^(mailto:|tel:|https://)[!-~]+$")]
-Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+CONTACT_WORDS = "mailto:, tel: or https:// and the rest, without a space"
+ContactUrl = Annotated[str, Field(pattern=r"^(mailto:|tel:|https://)[!-~]+$", description=CONTACT_WORDS)]
+Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$", description="a day, as 2031-12-31")]
 THIS_MACHINE = ("127.0.0.1", "::1", "localhost")
 
 
@@ -468,7 +471,9 @@ class DicomSection(Section):
         ),
     ] = None
     institution: Annotated[
-        str, Field(max_length=64, pattern=DICOM_LINE), Doc("Name of the hospital in every object.")
+        str,
+        Field(max_length=64, pattern=DICOM_LINE, description="one line without a backslash"),
+        Doc("Name of the hospital in every object."),
     ] = ""
     send_phantoms: Annotated[bool, Doc("Whether exams of phantoms, marked as such, may be sent, too.")] = False
     demographics_days: Annotated[

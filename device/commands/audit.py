@@ -12,8 +12,9 @@ from pathlib import Path
 from device.config import Config
 from device.errors import AuditChanged, StorageError
 from device.files.text_table import aligned
+from device.measurement.quantities import require
 from device.records.audit import AuditHead, recorded, require_head, verify_chain
-from device.records.listing import NEWEST
+from device.records.listing import NEWEST, ROWS
 from device.records.store import Store
 
 BUSY_S = 10.0
@@ -69,6 +70,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
 def _list(options: argparse.Namespace, config: Config) -> int:
     with closing(Store(config.data, to_read=True)) as store:
         times = {"since": getattr(options, "from"), "until": options.to}
+        require("limit", options.limit, ROWS, "ask for fewer, or for a time")
         entries = store.audit.entries(subject=options.subject, **times, before_seq=NEWEST, limit=options.limit)
     if options.json:
         print("\n".join(map(json.dumps, entries)))

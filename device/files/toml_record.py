@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from datetime import date, time
 from difflib import get_close_matches
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 
 from device.files.plain_settings import plain_table
 from device.measurement.quantities import InvalidQuantity
@@ -138,13 +139,28 @@ def _problem(kind: Any, error: ErrorDetails) -> InvalidQuantity:
         return InvalidQuantity(name, "missing", "given", "add it")
     if reason == "dataclass_type":
         return InvalidQuantity(name, value, "a table", f"write it as [{name}]")
+    if reason == "string_pattern_mismatch":
+        wanted = _described(kind, path) or f"of the form {error['ctx']['pattern']}"
+        return InvalidQuantity(name, value, wanted, "correct it")
     wanted = re.sub("^Input should be |^(Tuple|String) should have | after validation.*", "", error["msg"])
     return InvalidQuantity(name, value, wanted, "correct it")
 
 
 def _keys(kind: Any, path: Iterable[str | int]) -> list[str]:
     """Return the keys that the table at a path may have."""
+    return [field.name for field in fields(_table_at(kind, path))]
+
+
+def _table_at(kind: Any, path: Iterable[str | int]) -> Any:
     for step in path:
         if isinstance(step, str):
             kind = next(part for part in annotation_parts(get_type_hints(kind)[step]) if is_dataclass(part))
-    return [field.name for field in fields(kind)]
+    return kind
+
+
+def _described(kind: Any, path: Sequence[str | int]) -> str | None:
+    """Return in words what text must be like whose pattern is one of a key's annotations."""
+    *above, key = [step for step in path if isinstance(step, str)]
+    annotation = get_type_hints(_table_at(kind, above), include_extras=True)[key]
+    found = (part.description for part in annotation_parts(annotation) if isinstance(part, FieldInfo))
+    return next((words for words in found if words), None)

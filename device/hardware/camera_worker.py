@@ -70,7 +70,7 @@ def serve_camera(pipe: Connection, ring_name: str, shape: tuple[int, int], opene
     except (DeviceError, InvalidQuantity) as error:
         pipe.send(error)
         return
-    with closing(camera):
+    with closing(camera), suppress(BrokenPipeError):  # whoever opened it has gone again
         pipe.send(Ready())
         frames = FramesAhead(camera, ring)
         for request in _requests(pipe):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import re
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -20,6 +21,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 from device.errors import AuditChanged
+from device.measurement.quantities import InvalidQuantity
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +44,7 @@ CREATE TRIGGER IF NOT EXISTS audit_is_never_deleted BEFORE DELETE ON audit
   BEGIN SELECT RAISE(ABORT, 'an entry of the audit is never deleted'); END;
 """
 FIRST = "0" * 64
+HEAD = re.compile(r"\d{1,18}:[0-9a-f]{64}")
 """What stands before the first entry."""
 PROBE = "probe"
 CLIENT: ContextVar[str] = ContextVar("client", default=PROBE)
@@ -142,12 +145,17 @@ def verify_chain(db: sqlite3.Connection) -> AuditHead:
 
 
 def require_head(db: sqlite3.Connection, head: str) -> None:
-    """Raise `AuditChanged` unless the chain went through a head, `SEQ:HASH`, that was kept elsewhere."""
+    """Raise `AuditChanged` unless the chain went through a head, `SEQ:HASH`, that was kept elsewhere.
+
+    Raises `InvalidQuantity` for what is no head.
+    """
+    if not HEAD.fullmatch(head):
+        raise InvalidQuantity("head", repr(head[:80]), "SEQ:HASH", "give what was printed and kept, whole")
     seq, _, kept = head.partition(":")
-    row = db.execute("SELECT hash FROM audit WHERE seq = ?", (int(seq) if seq.isdecimal() else 0,)).fetchone()
+    row = db.execute("SELECT hash FROM audit WHERE seq = ?", (int(seq),)).fetchone()
     present = FIRST if seq == "0" else row and row[0]
     if present != kept:
-        raise _changed(f"Row {seq[:20]} of the audit has not the hash {kept[:64]}.")
+        raise _changed(f"Row {seq} of the audit has not the hash {kept}.")
 
 
 def _read(text: str) -> _Record | None:

@@ -13,12 +13,15 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from device.measurement.quantities import Bound
 from device.records.exams import exam_of, filed
 
 _Record = dict[str, Any]
 _MEASUREMENTS = "measurement LEFT JOIN filing ON measurement_id = id"
 NEWEST = 2**63 - 1
 """Above every number of a record: the largest integer SQLite holds."""
+ROWS = Bound(1, 100_000, "")
+"""How many a command may ask for at once."""
 
 
 @dataclass(frozen=True)

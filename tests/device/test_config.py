@@ -334,3 +334,16 @@ def test_frames_that_come_too_slowly_to_hold_the_enable_line_from_one_to_the_nex
     with pytest.raises(ConfigError, match=words):
         read(slow + "[light]\nenable_line = 17\n")
     assert CameraSection().late_frames / HELD_HZ < HOLD_S
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ('[webhook]\nurl = "https://a:b@hospital.example/x"', "webhook.url is .* without user, password, query or"),
+        ('[dicom]\nown_title = "A\\\\B"', r"dicom.own_title is .* must be 1 to 16 characters of ASCII, no backslash"),
+        ('[dicom]\ninstitution = "A\\nB"', "dicom.institution is .* must be one line without a backslash"),
+    ],
+)
+def test_text_of_another_form_is_refused_in_words(read, table, told):
+    with pytest.raises(ConfigError, match=told):
+        read(table)

@@ -11,7 +11,8 @@ from contextlib import closing
 
 from device.config import Config
 from device.files.text_table import aligned
-from device.records.listing import NEWEST, Wanted
+from device.measurement.quantities import require
+from device.records.listing import NEWEST, ROWS, Wanted
 from device.records.store import Store
 
 EXAMPLES = """examples:
@@ -34,6 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, config: Config) -> int:
     """Print the exams; return the exit code, or raise what keeps the store from being read."""
+    require("limit", options.limit, ROWS, "ask for fewer, or for one patient's")
     with closing(Store(config.data, to_read=True)) as store:
         page = store.listing.exams(
             Wanted(), kind=options.kind, patient_ref=options.patient, before=NEWEST, limit=options.limit

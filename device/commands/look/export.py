@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
+from typing import get_args
 
 from device.config import Config
 from device.errors import StorageError
@@ -19,6 +20,7 @@ from device.exports.lesions import lesion_table
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.files.durable import synced_file
+from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.listing import Wanted
 from device.records.store import Store
@@ -41,7 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     kinds = ", ".join(KINDS)
     parser.add_argument("--out", type=Path, default=SCREEN, metavar="FILE", help=f"a new file: {kinds}; else a table")
     parser.add_argument("--exam", metavar="ID", help="measurements of one exam")
-    parser.add_argument("--mode", help="measurements of one mode")
+    parser.add_argument("--mode", choices=get_args(Mode), help="measurements of one mode")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--long", action="store_true", help="a table with a row for each quantity")
     form.add_argument(
@@ -56,6 +58,8 @@ def run(options: argparse.Namespace, config: Config) -> int:
     if out != SCREEN and (out.suffix not in KINDS or out.exists()):
         raise InvalidQuantity("--out", out, f"a new file that ends with {' or '.join(KINDS)}", "choose another name")
     with closing(Store(config.data, to_read=True)) as store:
+        if options.exam:
+            store.exams.exam(options.exam)  # one that is not there has no measurements, and nobody would be told
         wanted = Wanted(exam_id=options.exam, mode=options.mode)
         selection = Selection.of_now(store, wanted, with_void=options.with_void)
         pieces = _pieces(selection, store, config.serial, out, options)

@@ -8,6 +8,7 @@ from contextlib import closing
 import pytest
 
 from device.errors import AuditChanged
+from device.measurement.quantities import InvalidQuantity
 from device.records.asked_once import ANSWERS_TABLE
 from device.records.audit import FIRST, done_for, require_head, verify_chain
 from device.records.exams import EXAM_TABLES, ExamContent
@@ -134,11 +135,17 @@ def test_a_chain_that_was_written_anew_is_found_by_a_head_that_was_kept_elsewher
     again.close()
 
 
-@pytest.mark.parametrize("head", ["", "x", "99:00", "-1:0", "1", "1:"])
-def test_what_is_no_head_is_none_of_the_chain(store, head):
+@pytest.mark.parametrize("head", ["", "x", "99:00", "-1:0", "1", "1:", "1:" + 64 * "x"])
+def test_what_is_no_head_is_a_slip_and_no_changed_audit(store, head):
     filled(store)
-    with store._transaction() as db, pytest.raises(AuditChanged):
+    with store._transaction() as db, pytest.raises(InvalidQuantity, match="must be SEQ:HASH"):
         require_head(db, head)
+
+
+def test_a_head_of_more_rows_than_there_are_is_none_of_the_chain(store):
+    filled(store)
+    with store._transaction() as db, pytest.raises(AuditChanged, match="Row 99 of the audit"):
+        require_head(db, f"99:{FIRST}")
 
 
 OF_FORM_4 = """

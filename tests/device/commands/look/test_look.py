@@ -53,6 +53,9 @@ def test_the_exams_are_listed_with_how_many_measurements_they_have(probe: Path) 
     [exam] = map(json.loads, device(probe, "--simulate", "exams", "--patient", "A-17", "--json").stdout.splitlines())
     assert exam["operator"] == "Ada"
     assert device(probe, "exams", "--kind", "phantom", "--json", "--simulate").stdout == ""
+    for count in ("0", "-1", "99999999999999999999"):
+        refused = device(probe, "exams", "--simulate", "--limit", count)
+        assert (refused.returncode, "limit is" in refused.stderr, "Traceback" in refused.stderr) == (1, True, False)
 
 
 @slow
@@ -69,6 +72,9 @@ def test_measurements_go_to_a_table_to_arrays_and_to_an_archive_that_are_never_w
     again = device(probe, "export", "--out", "all.csv", "--simulate")
     assert (again.returncode, "a new file" in again.stderr) == (1, True)
     assert device(probe, "export", "--out", "all.txt", "--simulate").returncode == 1
+    for wrong in (("--exam", "none"), ("--mode", "none")):
+        refused = device(probe, "export", "--out", "none.csv", "--simulate", *wrong)
+        assert (refused.returncode != 0, "none" in refused.stderr, (probe / "none.csv").exists()) == (True, True, False)
 
 
 @slow
