@@ -641,6 +641,8 @@ class TooManyTries(DeviceError):  # noqa: N818 - the name is what the caller rea
     code = "E823"
     title = "Too many wrong tries"
     status = 429
+    wait_s = 60
+    """After so long it may be tried again."""
 
 
 class UnencryptedRequest(DeviceError):  # noqa: N818 - the name is what the caller reads

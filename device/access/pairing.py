@@ -55,7 +55,10 @@ class TryLimit:
             recent = self._recent(address)
             if len(recent) >= TRIES_OF_ONE:
                 wait_s = max(1, round(recent[0] + TRIES_WITHIN_S - self._clock()))
-                raise TooManyTries(f"{address} was wrong {len(recent)} times.", f"Wait {wait_s} s.")
+                cause = f"{address} was wrong {len(recent)} times within {TRIES_WITHIN_S:g} s."
+                refusal = TooManyTries(cause, f"Wait {wait_s} s.")
+                refusal.wait_s = wait_s
+                raise refusal
 
     def note(self, address: str) -> None:
         """Count a wrong try."""

@@ -39,17 +39,21 @@ OF_A_PATIENT = ("patient_ref", "side", "clock_position", "nipple_distance_mm")
 
 def _one_line(text: str) -> str:
     """Return text that a screen shows whole, and that two programs compare alike; raise `ValueError` for any other."""
-    if not text.translate(dict.fromkeys(map(ord, JOINERS))).isprintable():
-        raise ValueError("must be of characters that can be printed, on one line")
+    for place, character in enumerate(text, start=1):
+        if not character.isprintable() and character not in JOINERS:
+            told = f"character {place} is {character!a}"
+            raise ValueError(f"must be of characters that can be printed, on one line: {told}")
     if text != text.strip():
         raise ValueError("must not begin or end with a space")
     return text
 
 
 def _lines(text: str) -> str:
-    for line in text.split("\n"):
+    """Return text of any number of lines, which end with a line feed, however the sender ends them."""
+    lines = text.replace("\r\n", "\n").split("\n")
+    for line in lines:
         _one_line(line.strip(" "))
-    return text
+    return "\n".join(lines)
 
 
 Identifier = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_one_line)]
@@ -183,12 +187,16 @@ class Exams:
     def move(self, measurement_id: str, exam_id: str | None, *, version: int, by: str, reason: str) -> None:
         """Say that a measurement belongs to another exam, or to none; what was measured stays.
 
+        Where it belongs there already, nothing changes and nobody is told.
+
         Raises `UnknownResource` for either, and `StaleVersion` when the measurement was moved or voided meanwhile.
         """
         with self._transaction() as db:
             filing = _filing(db, measurement_id, version)
             if exam_id is not None:
                 exam_of(db, exam_id)
+            if exam_id == filing["exam_id"]:
+                return
             _file(db, measurement_id, {**filing, "exam_id": exam_id})
             was, now = {"exam_id": filing["exam_id"]}, {"exam_id": exam_id}
             append(db, "measurement_moved", measurement_id, by=by, reason=reason, before=was, after=now)

@@ -312,8 +312,13 @@ def _unknown(what: str, identifier: str) -> UnknownResource:
 
 
 def _broken_off(job: StoredRecord) -> StoredRecord:
-    """Return a press as it has ended when the daemon did before it."""
-    return job | {"state": "failed", "code": InterruptedPress.code, "reason": f"{BROKEN_OFF} {PRESS_AGAIN}"}
+    """Return a press as it has ended when the daemon did before it; nobody knows how long its LEDs were on."""
+    return job | {
+        "state": "failed",
+        "light_on_s": None,
+        "code": InterruptedPress.code,
+        "reason": f"{BROKEN_OFF} {PRESS_AGAIN}",
+    }
 
 
 def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:

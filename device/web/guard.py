@@ -11,6 +11,7 @@ import json
 import logging
 from collections.abc import Callable, Coroutine
 from typing import Any
+from urllib.parse import parse_qsl
 
 from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
@@ -21,7 +22,7 @@ from device.access.known_hosts import KnownHosts, split_authority
 from device.access.request_rules import AskedRequest, BodyRule, joined, require_allowed, too_large
 from device.access.safe_headers import SAFE_HEADERS
 from device.access.scopes import OPEN_FOLDER, PAIRING_PAGE
-from device.errors import DeviceError, TokenNeeded, UnencryptedRequest
+from device.errors import DeviceError, InvalidRequest, TokenNeeded, UnencryptedRequest
 from device.records.audit import done_for
 from device.web.entrance.door import Door
 from device.web.entrance.network import ServedNetwork
@@ -31,6 +32,8 @@ from device.web.problems import problem
 
 log = logging.getLogger(__name__)
 NO_STORE = (b"cache-control", b"no-store")
+ENDLESS = ("/api/v1/events", "/api/v1/live.mjpeg")
+"""Answers that go on: of these HEAD is refused."""
 HEADERS = [(name.encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
 
 
@@ -56,8 +59,11 @@ class RequestGuard:
             return
         request, line = asked(scope), RequestLine()
         noting = line.noting(_with_safe_headers(send, request.path, line.id))
+        if scope["method"] == "HEAD" and request.path not in ENDLESS:
+            scope, noting = {**scope, "method": "GET"}, _without_body(noting)
         try:
             require_allowed(request, self._hosts)
+            _require_each_once(scope)
             client = self._door.require(request)
             line.client = client.name
             bounded = await _bounded(request, receive)
@@ -167,6 +173,22 @@ def _replayed(message: Message, receive: Receive) -> Receive:
         return read.pop() if read else await receive()
 
     return replaying
+
+
+def _require_each_once(scope: Scope) -> None:
+    """Raise `InvalidRequest` for a parameter that is there twice: routes take the last of them without a word."""
+    names = [name for name, _ in parse_qsl(scope.get("query_string", b"").decode("latin-1"), keep_blank_values=True)]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InvalidRequest(f"query.{twice} is there {names.count(twice)} times.", "Give it once.")
+
+
+def _without_body(send: Send) -> Send:
+    """Return what sends the headers of an answer alone, for HEAD (RFC 9110 section 9.3.2)."""
+
+    async def sending(message: Message) -> None:
+        await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
+
+    return sending
 
 
 def _with_safe_headers(send: Send, path: str, request_id: str) -> Send:

@@ -112,7 +112,7 @@ class ExamQuery(TimedQuery, PageQuery):
 class AuditQuery(TimedQuery, PageQuery):
     """A page of the audit, of all or of one subject, by when it was done."""
 
-    subject: str | None = None
+    subject: Annotated[str, Field(min_length=1)] | None = None
 
 
 def _recorded(moment: datetime | None) -> str | None:

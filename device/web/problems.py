@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
@@ -12,13 +13,17 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match, Route
 
-from device.errors import BusyError, DeviceError, InvalidRequest, UnknownPath
+from device.errors import BusyError, DeviceError, InvalidRequest, TooManyTries, UnknownPath
 from device.measurement.quantities import InvalidQuantity
 
 log = logging.getLogger(__name__)
 
 
 REMEDY = "The API is described at /api/v1/openapi.json."
+REMEDIES = {"If-Match": "Get the resource first, and send the ETag of that answer as If-Match."}
+"""What to do about a field that is missing."""
+LONGEST_ECHO = 80
+"""Characters of a value that is told again."""
 
 
 def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
@@ -35,6 +40,8 @@ def problem(error: DeviceError, status: int | None = None) -> JSONResponse:
     if isinstance(error, BusyError) and error.holder:
         body["holder"] = error.holder
     answer = JSONResponse(body, status_code=status, media_type="application/problem+json")
+    if isinstance(error, TooManyTries):
+        answer.headers["Retry-After"] = str(error.wait_s)
     if status == HTTPStatus.UNAUTHORIZED:
         answer.headers["WWW-Authenticate"] = "Bearer"
     return answer
@@ -49,17 +56,33 @@ def _invalid_quantity(request: Request, error: InvalidQuantity) -> JSONResponse:
 
 
 def _invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
+    told = "; ".join(dict.fromkeys(map(_told, error.errors())))
     first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"])
-    why = f" ({first['ctx']['error']})" if first["type"] == "json_invalid" else ""
-    return problem(InvalidRequest(f"{where}: {first['msg']}{why}.", f"Correct the field. {REMEDY}"))
+    remedy = REMEDIES.get(first["loc"][-1]) if first["type"] == "missing" else None
+    if first["loc"][0] == "query" and first["type"].startswith("datetime"):
+        remedy = "Give a time as 2026-11-23T08:00:00Z; in an address the + of an offset is written %2B."
+    return problem(InvalidRequest(f"{told}.", remedy or f"Correct the field. {REMEDY}"))
+
+
+def _told(wrong: Mapping[str, Any]) -> str:
+    """Return one thing that is wrong with a request: where, the value if it is short, and what it must be."""
+    where, value, kind = ".".join(str(part) for part in wrong["loc"]), wrong.get("input"), wrong["type"]
+    if kind == "json_invalid":
+        return f"{where}: {wrong['msg']} ({wrong['ctx']['error']})"
+    if kind == "missing":
+        return f"{where} is missing"
+    said = wrong["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if isinstance(value, str | int | float) and len(repr(value)) <= LONGEST_ECHO:
+        where = f"{where} is {value!r}"
+    return f"{where}: {said}" if said[:1].isupper() or said.startswith("must") else f"{where}, but must be {said}"
 
 
 def _http_error(request: Request, error: HTTPException) -> JSONResponse:
     unknown = UnknownPath(f"{request.method} {request.url.path}: {error.detail}.", REMEDY)
     answer = problem(unknown, error.status_code)
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        answer.headers["Allow"] = ", ".join(sorted(_methods(request)))
+        methods = _methods(request)
+        answer.headers["Allow"] = ", ".join(sorted(methods | ({"HEAD"} if "GET" in methods else set())))
     return answer
 
 

@@ -63,7 +63,8 @@ class PressResource(_Body):
     """A press; `code` is that of the fault that ended it.
 
     Of a scan: `ramps`, how many presses on the lesion are complete; `until`, how sure it is asked to be, as half of the
-    90 % interval by unknown; `within_s`, in how many seconds.
+    90 % interval by unknown; `within_s`, in how many seconds. `light_on_s`: how long the LEDs were on, null where the
+    daemon ended before the press did.
     """
 
     id: str
@@ -74,7 +75,7 @@ class PressResource(_Body):
     code: FaultCode | None
     measurement_id: str | None
     warnings: list[Fault]
-    light_on_s: float
+    light_on_s: float | None
     ramps: int
     until: dict[str, float] | None
     within_s: float | None

@@ -101,7 +101,7 @@ def test_a_press_that_was_broken_off_is_told_also_of_a_damaged_database(folder):
     store.close()
     spoil(folder, pages_of(folder, "measurement")[1])
     store = Store(folder)
-    assert [job["state"] for job in store.interrupted] == ["failed"]
+    assert [(job["state"], job["light_on_s"]) for job in store.interrupted] == [("failed", None)]
     store.close()
 
 

@@ -175,6 +175,21 @@ def test_a_measurement_is_moved_and_voided_beside_what_was_measured(store, exam)
     ]
 
 
+def test_a_measurement_that_is_moved_to_where_it_is_stays_as_it_is_and_nobody_is_told(store, exam):
+    kept = add_measurement(store, 1)
+    store.exams.move(kept["id"], exam["id"], version=1, **ACT)
+    moved, told = store.measurement(kept["id"]), store.audit.entries(**PAGE)
+    store.exams.move(kept["id"], exam["id"], version=2, **ACT)
+    assert (store.measurement(kept["id"]), store.audit.entries(**PAGE)) == (moved, told)
+
+
+def test_a_note_has_lines_however_they_end_and_what_cannot_be_printed_is_named(store):
+    said = {"kind": "patient", "patient_ref": "A-17", "operator": "Ada", "side": "left"}
+    assert ExamContent(**said, note="one\r\ntwo\nthree").note == "one\ntwo\nthree"
+    with pytest.raises(ValueError, match=r"character 4 is '\\t'"):
+        ExamContent(**said, note="one\ntwo\tthree")
+
+
 def test_the_measurements_of_an_exam_are_those_that_are_in_it_now(store, exam):
     first, second = add_measurement(store, 1), add_measurement(store, 2)
     other = of_phantom(store)

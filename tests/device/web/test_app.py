@@ -20,6 +20,7 @@ from device.measurement.wanted_accuracy import WantedAccuracy
 from device.records.calibrations import Calibrations
 from device.records.exams import AskedExam
 from device.web.app import create_app
+from device.web.guard import ENDLESS
 from device.web.schema import Device, PressResource, SelfTest, Tare
 
 OF_UNKNOWNS = {"size_mm": 3.3, "depth_mm": 3.0, "youngs_modulus_kpa": 47.0}
@@ -148,6 +149,28 @@ def test_a_press_with_a_key_is_asked_for_once_however_its_fields_are_ordered(ask
     assert len({(one.status_code, one.headers["location"], one.content) for one in answers}) == 1
 
 
+def test_all_that_is_wrong_with_a_request_is_told_at_once_with_its_values(ask):
+    told = ask("GET", "/api/v1/presses?limit=201&from=x").json()
+    assert "query.limit is '201', but must be less than or equal to 200" in told["detail"]
+    assert "query.from is 'x'" in told["detail"]
+    shifted = ask("GET", "/api/v1/presses?from=2026-11-23T08:00:00+02:00").json()
+    assert "%2B" in shifted["remedy"]
+
+
+def test_a_parameter_that_is_there_twice_is_refused(ask):
+    answer = ask("GET", "/api/v1/presses?limit=1&limit=2")
+    assert (answer.status_code, answer.json()["detail"]) == (422, "query.limit is there 2 times.")
+
+
+def test_head_is_answered_as_get_without_a_body_but_for_what_never_ends(ask):
+    got, head = (ask(method, "/api/v1/presses/p-1") for method in ("GET", "HEAD"))
+    assert (head.status_code, head.content) == (200, b"")
+    assert head.headers["content-length"] == got.headers["content-length"] == str(len(got.content))
+    assert ask("HEAD", "/api/v1/presses/p-1", headers={"host": "elsewhere"}).status_code == 421
+    for endless in ENDLESS:
+        assert ask("HEAD", endless).status_code == 405
+
+
 EXAM_ID = "0b0f7f2e-6a1f-4d53-9d5e-0a8a4a2f6c11"
 
 
@@ -186,7 +209,8 @@ def test_a_key_that_is_no_name_is_refused_and_nothing_is_done(ask, procedure, ke
 @pytest.mark.parametrize(
     ("method", "path", "allowed"),
     [
-        ("PATCH", "presses/p-1", "DELETE, GET"), ("DELETE", "presses", "GET, POST"), ("PUT", "self-test", "GET, POST"),
+        ("PATCH", "presses/p-1", "DELETE, GET, HEAD"), ("DELETE", "presses", "GET, HEAD, POST"),
+        ("PUT", "self-test", "GET, HEAD, POST"),
         ("POST", "openapi.json", "GET, HEAD"),
     ],
 )  # fmt: skip

@@ -6,7 +6,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from device.errors import CameraError, LightError, LoadCellError, ModelError, StorageError
+from device.errors import CameraError, LightError, LoadCellError, ModelError, StorageError, TooManyTries
 from device.measurement.quantities import InvalidQuantity
 from device.web.problems import install_problems
 
@@ -49,6 +49,13 @@ def test_a_fault_of_a_part_has_its_status_code_cause_and_remedy(ask, kind, statu
     assert answer.headers["content-type"] == "application/problem+json"
     body = answer.json()
     assert (body["status"], body["code"], body["detail"], body["remedy"]) == (status, code, "It broke.", "Mend it.")
+
+
+def test_who_tried_too_often_is_told_when_to_try_again(ask):
+    refusal = TooManyTries("192.0.2.7 was wrong 5 times.", "Wait 40 s.")
+    refusal.wait_s = 40
+    answer = ask(refusal)
+    assert (answer.status_code, answer.headers["retry-after"]) == (429, "40")
 
 
 def test_an_invalid_quantity_is_named_with_value_bound_and_what_to_do(ask):
