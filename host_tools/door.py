@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -76,6 +77,8 @@ def solve_ramp(
 
     if not presses:
         raise InvalidQuantity("presses", "none", "at least one", "give the loads")
+    _require_rising(presses)
+    require("within_s", within_s, Bound(0.0, 1e6, "s", low_included=False), "allow some time")
     aim = TOLERANCE if tolerance is None else tolerance
     takes_best = best or tolerance is None
     allowed = require("tolerance", aim, Bound(0.0, 1.0, "", low_included=False), "give a ratio, 0.01 for 1 %")
@@ -83,6 +86,14 @@ def solve_ramp(
     if tolerance is None and not best and climbed.missed:
         warnings.warn(climbed.missed, stacklevel=3)
     return held(climbed, best=takes_best).solutions
+
+
+def _require_rising(presses: Sequence[Press]) -> None:
+    """Raise `InvalidQuantity` unless all are by indentation or all by force, each more than the one before."""
+    loads = [press.indentation_mm if presses[0].force_n is None else press.force_n for press in presses]
+    known = [load for load in loads if load is not None]
+    if len(known) < len(loads) or any(after <= before for before, after in pairwise(known)):
+        raise InvalidQuantity("presses", loads, "all by indentation or all by force, rising", "give them in that order")
 
 
 def sweep(

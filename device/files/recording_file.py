@@ -82,8 +82,8 @@ def write_recording(
 ) -> None:
     """Write a recording to a new file, PATH.zip, or by any other name to a new folder.
 
-    When this returns it is on the disk; after an `OSError` nothing is left. `encode` may know PNGs that were made
-    before; `picture` is the PNG that `read_picture` returns, none when it is empty.
+    When this returns it is on the disk; after an `OSError` or Ctrl-C nothing is left. `encode` may know PNGs that were
+    made before; `picture` is the PNG that `read_picture` returns, none when it is empty.
     """
     temporary = path.with_name(path.name + ".tmp")
     remove_recording(temporary)
@@ -93,7 +93,7 @@ def write_recording(
         if path.is_file():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
         temporary.rename(path)
-    except OSError:
+    except (OSError, KeyboardInterrupt):
         remove_recording(temporary)
         raise
     sync_directory(path.parent)
@@ -135,9 +135,9 @@ def _write_zip(temporary: Path, name: str, files: Files, opened: FileOpener) -> 
             archive.writestr(info, content)
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path | str) -> Recording:
     """Read a folder or .zip; raise `InvalidQuantity` naming what is wrong."""
-    with _files(path) as read:
+    with _files(Path(path)) as read:
         try:
             record = json.loads(read("recording.json"))
         except (*UNREADABLE, ValueError) as error:

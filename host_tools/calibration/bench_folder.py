@@ -19,7 +19,7 @@ import numpy as np
 
 from device.files.recording_file import require_room_for
 from device.files.toml_record import InvalidRecord
-from device.measurement.quantities import InvalidQuantity
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.recording.led_sides import LedRatio
 from device.measurement.recording.recording import CameraSettings, RecordedCell, Recording
 from device.measurement.recording.tactile_image import Counts, Frame, Role
@@ -31,6 +31,8 @@ LEDS = ("led_x", "led_y", "led_minus_x", "led_minus_y")
 OPTIONAL = ("ramp", *LEDS)
 ROLES = get_args(Role)
 ACTION = "correct the table"
+FORCES_N = Bound(-0.1, 5.0, "N")
+"""An untouched face's force may drift below nothing; what lies beyond is no hand's, and most likely of another unit."""
 
 TableLine = Mapping[str, str]
 
@@ -72,7 +74,7 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         except InvalidQuantity as error:
             found = f"{table.name}, line {number}: {error.quantity}"
             problems.append(InvalidQuantity(found, error.value, error.bound, error.action))
-    problems += [] if problems else _missing_roles(frames)
+    problems += [] if problems else [*_missing_roles(frames), *_in_two_roles(rows, table)]
     if problems:
         raise InvalidRecord(problems)
     ordered = sorted(_at_the_top(frames, probe.camera.bits), key=lambda frame: frame.t_s)
@@ -85,6 +87,15 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         frames=tuple(ordered),
         cell=RecordedCell(probe.cell.counts_per_n),
     )
+
+
+def _in_two_roles(rows: Sequence[TableLine], table: Path) -> Iterator[InvalidQuantity]:
+    """Yield each file that is said to show two things."""
+    known: dict[str, str] = {}
+    for number, row in enumerate(rows, start=2):
+        name, role = row["file"].strip(), row["role"].strip()
+        if (before := known.setdefault(name, role)) != role:
+            yield InvalidQuantity(f"{table.name}, line {number}: role of {name}", role, f"{before} as before", ACTION)
 
 
 def _camera(press: PressOnBench, probe: Probe, bits: Literal[8, 16]) -> CameraSettings:
@@ -108,7 +119,7 @@ def _rows(table: Path) -> list[TableLine]:
             columns = [name.strip() for name in reader.fieldnames or ()]
             reader.fieldnames = columns
             rows: list[TableLine] = list(reader)
-    except (UnicodeDecodeError, csv.Error) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InvalidQuantity(str(table), error, "a table of comma separated values, UTF-8", ACTION) from error
     if problems := list(_of_columns(columns, table)):
         raise InvalidRecord(problems)
@@ -148,7 +159,9 @@ def _frame(row: TableLine, folder: Path, probe: Probe) -> Frame:
     counts = _counts(row["file"].strip(), folder, probe)
     dark: LedRatio = (0.0, 0.0, 0.0, 0.0)
     lit = dark if role == "dark" and LEDS[0] not in row else leds
-    return Frame(counts, cast(Role, role), _number(row, "t_s"), _number(row, "force_n"), lit, int(ramp))
+    force_n = _number(row, "force_n")
+    require("force_n", force_n, FORCES_N, "give the force of the press in newtons")
+    return Frame(counts, cast(Role, role), _number(row, "t_s"), force_n, lit, int(ramp))
 
 
 def _number(row: TableLine, name: str) -> float:

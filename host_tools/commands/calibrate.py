@@ -155,7 +155,7 @@ def commission(
     design: Annotated[Path, typer.Option(help="Bundle of modes standard and precise of the design.")] = STANDARD,
     table: Annotated[Path, typer.Option(help="Folder of the design's tables and derivatives.")] = SIMULATED_PROBE,
     valid_days: Annotated[float, typer.Option(help="Days until the probe is to be commissioned again.")] = 365.0,
-    seed: Annotated[int, typer.Option(help="Seed of the presses that limits and the card are made of.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the presses that limits and the card are made of.")] = 1,
     operator: Annotated[str, typer.Option(help="Who commissions.")] = "",
     quick: Annotated[bool, typer.Option(help="Train mode quick of the probe, too: four of the eight minutes.")] = True,
     quick_design: Annotated[Path, typer.Option(help="Bundle of mode quick of the design.")] = QUICK,

@@ -49,7 +49,7 @@ def evaluate(
         int | None,
         typer.Option(help="Random presses; 100, 160 without noise, 200 beside the posterior, 160 scans by default."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of scenes, camera and hand.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of scenes, camera and hand.")] = 1000,
     noise_free: Annotated[
         bool, typer.Option("--noise-free", help="Instead: ramps without noise, tissue and skin told.")
     ] = False,
@@ -72,6 +72,8 @@ def evaluate(
     asked = mode_named(mode) if mode else None
     if scenes is not None:
         require("scenes", scenes, Bound(1, 1_000_000, "presses"), "score at least one")
+    if recordings and scenes is not None:
+        raise InvalidQuantity("scenes", scenes, "left out with recordings", "score one or the other")
     with workers(scheduler):
         if named := [
             name for name, is_asked in zip(REFERENCES, (noise_free, posterior, scan), strict=True) if is_asked

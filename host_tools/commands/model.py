@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -85,8 +85,10 @@ def table(
 
 def phantom(
     out: Annotated[Path, typer.Option(help="Folder of the recordings.")],
-    which: Annotated[str, typer.Option("--set", help="calibration, breast-imager or random.")] = "calibration",
-    scenes: Annotated[int, typer.Option(help="How many random phantoms.")] = 20,
+    which: Annotated[
+        str | None, typer.Option("--set", help="calibration, breast-imager or random; calibration unless told.")
+    ] = None,
+    scenes: Annotated[int | None, typer.Option(help="With --set random: how many phantoms; 20.")] = None,
     scenario: Annotated[Path | None, typer.Option(help="Scenario file: what the probe is made of.")] = None,
     force_n: Annotated[list[float] | None, typer.Option(help="Force of the press; repeat for a ramp.")] = None,
     ramp: Annotated[
@@ -95,7 +97,7 @@ def phantom(
     offset_mm: Annotated[float, typer.Option(help="How far beside the lesion's middle it is pressed.")] = 0.0,
     model: Annotated[Path, typer.Option(help="Bundle whose phantom scenes to record.")] = MODELS / "paper",
     table: Annotated[Path, typer.Option(help="Folder of the probe's tables.")] = SIMULATED_PROBE,
-    seed: Annotated[int, typer.Option(help="Seed of scenes, camera, force and hand.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of scenes, camera, force and hand.")] = 100,
     probe: ProbeOption = None,
     phantoms: Annotated[
         Path | None, typer.Option(help="File of the phantoms to record instead of a set, phantoms.toml.")
@@ -134,10 +136,16 @@ def phantom(
     protocol = protocol_of("standard", offset_mm, 0.0) if ramp else held
     tables, made_by = ProbeTables.load(table), probe_with_tables(probe, table)
     stated_by = probe_of(camera_of) if camera_of else None
+    _require_one_source({"--grid": grid is not None, "--phantoms": phantoms is not None, "--set": which is not None})
+    if scenes is not None and which != "random":
+        raise InvalidQuantity("scenes", scenes, "left out but with --set random", "say --set random, or leave it out")
     if grid is not None:
+        if ramp or force_n or offset_mm:
+            bound = "given without --ramp, --force-n and --offset-mm"
+            raise InvalidQuantity("grid", grid, bound, "leave these out: a grid is taken as it is")
         _record_grid(out, grid, pitch_mm, play_mm, made_of, tables, seed, made_by)
         return
-    chosen = list(_phantom_set(which, model, scenes, seed, phantoms))
+    chosen = list(_phantom_set(which or "calibration", model, 20 if scenes is None else scenes, seed, phantoms))
     in_tissues = [one.in_its_tissue(made_of) for one in chosen]
     _require_room([out / one.name for one in chosen])
     for i, (one, scene) in enumerate(zip(chosen, in_tissues, strict=True)):
@@ -216,6 +224,13 @@ def _require_room(recordings: list[Path]) -> None:
             raise InvalidQuantity("out", path.parent, "a folder", "name another one with --out")
         if path.exists():
             raise InvalidQuantity("recording", path, "a new folder", "name another one with --out, or delete it first")
+
+
+def _require_one_source(is_given: Mapping[str, bool]) -> None:
+    """Refuse more than one word for what is pressed."""
+    named = [word for word, given in is_given.items() if given]
+    if len(named) > 1:
+        raise InvalidQuantity("phantoms", " and ".join(named), "one of them", "say once what is pressed")
 
 
 def _told(inclusion: Inclusion | None) -> str:

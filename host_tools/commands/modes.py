@@ -23,7 +23,9 @@ def modes(
     only: Annotated[
         list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it. The page keeps the others.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of dial, posterior, ranks, scan, missed, noise-free and tissue.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of dial, posterior, ranks, scan, missed, noise-free and tissue.")
+    ] = 1,
     scheduler: Scheduler = None,
 ) -> None:
     """Measure error, time, coverage and refusals of the modes against bounds; some hours on two cores.

@@ -20,7 +20,7 @@ optics = typer.Typer(no_args_is_help=True, help="The light in the block: its tab
 def build(
     out: Annotated[Path | None, typer.Option(help="Folder of the table; models/simulated_probe unless given.")] = None,
     rays: Annotated[int, typer.Option(help="Rays for the light of one LED; minutes for the default.")] = 100_000_000,
-    seed: Annotated[int, typer.Option(help="Seed of the rays; the same seed gives the same table.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the rays; the same seed gives the same table.")] = 1,
     probe: ProbeOption = None,
 ) -> None:
     """Trace the light of the block and write the table that the virtual probe's images come from."""

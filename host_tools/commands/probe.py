@@ -94,6 +94,10 @@ def _consequences(found: Probe) -> Iterator[tuple[str, float, str]]:
     yield "force_of_one_count", 1 / found.cell.counts_per_n, "N"
 
 
+WRITTEN = b"# Probe "
+"""How a scene of a probe begins: such a file may be written anew."""
+
+
 @probe.command(epilog="Example: host_tools probe scene probe.toml --out scene.toml, then make run SCENE=scene.toml")
 def scene(
     file: ProbeFile,
@@ -116,6 +120,10 @@ def scene(
     found = _read(read_probe, file, False)
     of_probe = as_scene_table(scene_of_probe(found, simulated_probe(), number))
     which = "as stated" if number is None else f"number {number} within its tolerances"
+    if out.exists() and not out.read_bytes().startswith(WRITTEN):
+        raise InvalidQuantity(
+            "out", out, "a new file, or a scene of a probe", "give another name: this one would be lost"
+        )
     write_durably(out, (f"# Probe {found.serial}, {which}.\n" + tomli_w.dumps(of_probe)).encode())
     note.print(f"{out} written: make run SCENE={out} runs probe {found.serial}, {which}.", soft_wrap=True)
 
@@ -231,7 +239,7 @@ def camera_trial(
     worlds: Annotated[list[Path], typer.Argument(help="Scenario files of simulated probes.")],
     grids: Annotated[int, typer.Option(help="Recordings of the grid on each.")] = 4,
     play_mm: PlayMm = 0.02,
-    seed: Annotated[int, typer.Option(help="Seed of caps, camera and press.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of caps, camera and press.")] = 1,
 ) -> None:
     """Print how far a grid target's camera is from the true one of each world, and what that makes of a press.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.output import Scheduler, note, progress, ratio_of
 from host_tools.commands.probe import ProbeOption
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from host_tools.data.plan import SweepPlan
 
 SweepStrain = Literal["small", "finite", "auto"]
+INTERRUPTED = 130
+"""Exit code of what Ctrl-C has ended."""
 
 
 def sweep(
@@ -33,8 +36,9 @@ def sweep(
         str | None, typer.Option(help="Every scene climbs until it states no more, such as 1%, or has failed.")
     ] = None,
     within_s: Annotated[
-        float, typer.Option(help="With --tolerance: time of a scene to find a level that holds it, wall clock.")
-    ] = 120.0,
+        float | None,
+        typer.Option(help="With --tolerance: time of a scene to find a level that holds it, wall clock; 120 s."),
+    ] = None,
     probe: ProbeOption = None,
     scheduler: Scheduler = None,
 ) -> None:
@@ -46,12 +50,15 @@ def sweep(
     """
     from host_tools.data.plan import DEFAULT_FORCES_N, SweepPlan, asked_strain
     from host_tools.data.sweep import sweep as run_sweep
+    from host_tools.door import WITHIN_S
     from host_tools.scenes.probe_file import probe_of
 
     forces_n = tuple(force_n) if force_n else DEFAULT_FORCES_N
     allowed = None if tolerance is None else ratio_of(tolerance)
     measure = asked_strain(strain, allowed)
-    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed, within_s)
+    if within_s is not None and allowed is None:
+        raise InvalidQuantity("within_s", within_s, "left out without --tolerance", "give both, or none")
+    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed, within_s or WITHIN_S)
     failed = 0
     with progress("scenes") as bar:
         task = bar.add_task("", total=scenes)
@@ -65,7 +72,7 @@ def sweep(
             run_sweep(plan, out, jobs=jobs, scheduler=scheduler, on_row=on_row, replace=force)
         except KeyboardInterrupt:
             note.print(f"Interrupted. Solved scenes are kept in {out}.partial: run the same command to go on.")
-            raise typer.Exit(1) from None
+            raise typer.Exit(INTERRUPTED) from None
     note.print(f"{out}: {scenes} scenes, {failed} of those solved now failed.")
     if measure == "small":
         note.print(_departure(plan), soft_wrap=True)

@@ -56,7 +56,7 @@ def train(
     wide: Annotated[
         Path | None, typer.Option(help="Of standard: folder of the table around the ranges; made unless given.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of weights, splits, presses and noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of weights, splits, presses and noise.")] = 1,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Of standard: few presses, to try the chain; the model is a poor one.")
     ] = False,

@@ -23,7 +23,7 @@ from host_tools.workers import workers
 def worlds(
     out: Annotated[Path, typer.Option(help="Folder of the scenario files.")],
     count: Annotated[int, typer.Option(help="How many, up to 99.")] = 20,
-    seed: Annotated[int, typer.Option(help="Seed of all tolerances.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all tolerances.")] = 1,
 ) -> None:
     """Write scenes of probes of random tolerances, all of it at once: layers, camera, contact law, LEDs, load cell, and
     what differs between the lesion's press and the reference's.
@@ -55,7 +55,7 @@ def robustness(
     only: Annotated[
         list[str] | None, typer.Option(help="Chapter to measure, all by default; repeat it. The page keeps the others.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of probes, presses and phantoms.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of probes, presses and phantoms.")] = 1,
     scheduler: Scheduler = None,
 ) -> None:
     """Measure how presses of probes that somebody built are answered, before and after commissioning: of random

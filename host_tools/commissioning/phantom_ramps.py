@@ -67,6 +67,7 @@ def phantom_ramps(
     problems = [
         *chain.from_iterable(_of_probe(one, name, probe) for one, name in zip(recordings, names, strict=True) if probe),
         *_of_several_spans(recordings),
+        *_given_twice(recordings, names),
         *(_of_phantoms(recordings, names, phantoms, unread) if phantoms else ()),
     ]
     ramps: list[PhantomRamp] = []
@@ -123,6 +124,15 @@ def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[Invalid
         bound = f"within {SIGMAS * tolerance:.3g} of the file's {span:g}"
         action = f"{OTHER_PROBE}, or correct the file"
         yield InvalidQuantity(f"counts_per_n of {name}", recording.cell.counts_per_n, bound, action)
+
+
+def _given_twice(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[InvalidQuantity]:
+    """Yield each recording that is there again: it would count as evidence of its own."""
+    ids = [one.id for one in recordings]
+    for place, name in enumerate(names):
+        if (before := ids.index(ids[place])) < place:
+            again = f"that of {names[before]} again"
+            yield InvalidQuantity(f"recording of {name}", again, "another recording", "give each once")
 
 
 def _of_several_spans(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:

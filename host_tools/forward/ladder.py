@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, isfinite
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
+from device.measurement.quantities import Bound, InvalidQuantity, require
 from host_tools.forward.accuracy import Level
 from host_tools.forward.error_estimates.foretold_error import foretold_error
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE, numbers
@@ -55,6 +56,8 @@ LIGHT_RATIO = 0.01
 """Share of a press at which small strain foretells: its relative errors are of any press, and none folds at this."""
 MESH_SHARE = 0.25
 """Where small strain departs by more than was asked for, a mesh that errs by so much of that adds little to it."""
+SIZES_MM = Bound(0.05, 100.0, "mm")
+"""Of smaller inclusions nothing shows, and meshes as fine as they are take minutes."""
 SMALL_IS_ENOUGH = "ask for small strain (--strain small), which then states its own errors alone"
 TAKE_THE_BEST = "take the best as it is (--best)"
 
@@ -161,6 +164,11 @@ def climb(
 
 def _plan(scene: Scene, tolerance: float, asked: AskedStrain) -> tuple[ModelPlan, float]:
     """Return the plan, its strain measure chosen by the tolerance unless told, and what that choice costs."""
+    if asked not in get_args(AskedStrain):
+        one_of = ", ".join(get_args(AskedStrain))
+        raise InvalidQuantity("strain", repr(asked), f"one of {one_of}", "choose one of them")
+    if scene.inclusion and scene.has_inclusion:
+        require("size_mm", scene.inclusion.size_mm, SIZES_MM, "leave so small an inclusion out: --size-mm 0")
     if asked != "auto":
         plan = model_plan(scene, strain=asked)
         if asked == "finite":

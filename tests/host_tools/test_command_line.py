@@ -67,6 +67,11 @@ def test_a_long_exposure_saturates_the_frame(tmp_path):
         (["phantom", "--offset-mm", "500", "--out", "p"], "offset_mm is 500.0, but must be at least -40"),
         (["calibrate", "missing", "--force-n", "nan", "--out", "c.json"], "force_n is nan, but must be above 0"),
         (["evaluate", "--scenes", "0"], "scenes is 0, but must be at least 1"),
+        (["evaluate", "missing", "--scenes", "5"], "scenes is 5, but must be left out with recordings"),
+        (["sweep", "--within-s", "3", "--out", "s.nc"], "within_s is 3.0, but must be left out without --tolerance"),
+        (["phantom", "--scenes", "3", "--out", "p"], "scenes is 3, but must be left out but with --set random"),
+        (["phantom", "--grid", "1", "--set", "random", "--out", "p"], "phantoms is --grid and --set"),
+        (["phantom", "--grid", "1", "--ramp", "--out", "p"], "a grid is taken as it is"),
     ],
 )
 def test_what_cannot_be_done_is_one_sentence_and_exit_code_1(arguments, words, tmp_path):
@@ -93,8 +98,11 @@ def test_help_loads_nothing_that_computes():
     assert done.stdout.splitlines()[-1] == "loaded:"
 
 
-def test_a_wrong_option_is_a_usage_error():
-    assert run_toolkit("simulate", "--size-cm", "1").returncode == 2
+@pytest.mark.parametrize(
+    "arguments", [["simulate", "--size-cm", "1"], ["phantom", "--set", "random", "--seed", "-1", "--out", "p"]]
+)
+def test_a_wrong_option_is_a_usage_error(arguments, tmp_path):
+    assert run_toolkit(*arguments, cwd=tmp_path).returncode == 2
 
 
 @pytest.mark.parametrize("verb", ["simulate", "sweep", "train", "evaluate", "calibrate", "phantom", "table"])

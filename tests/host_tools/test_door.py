@@ -68,6 +68,37 @@ def test_a_tolerance_is_a_ratio():
         tsis.solve(SCENE, tolerance=2)
 
 
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({"strain": "Finite"}, "strain is 'Finite', but must be one of small, finite, auto"),
+        ({"within_s": -1.0}, "within_s is -1.0"),
+        ({"within_s": float("nan")}, "within_s is nan"),
+    ],
+)
+def test_what_is_asked_of_a_solution_is_checked_before_anything_is_solved(asked, told):
+    with pytest.raises(tsis.InvalidQuantity, match=told):
+        tsis.solve(SCENE, **asked)
+
+
+def test_so_small_an_inclusion_is_refused_that_its_mesh_would_take_minutes():
+    with pytest.raises(tsis.InvalidQuantity, match="size_mm is 1e-06, but must be at least 0.05"):
+        tsis.solve(tsis.Scene(tsis.Inclusion(1e-6, 6.0, 80.0)))
+
+
+@pytest.mark.parametrize(
+    "presses",
+    [
+        [tsis.Press(indentation_mm=0.1), tsis.Press(force_n=0.5)],
+        [tsis.Press(force_n=0.5), tsis.Press(indentation_mm=0.1)],
+        [tsis.Press(indentation_mm=1.0), tsis.Press(indentation_mm=0.5)],
+    ],
+)
+def test_presses_of_a_ramp_are_of_one_kind_and_rise(presses):
+    with pytest.raises(tsis.InvalidQuantity, match="all by indentation or all by force, rising"):
+        tsis.solve_ramp(SCENE, presses)
+
+
 def test_a_tighter_tolerance_takes_a_finer_model_and_says_so():
     rough, tight = (tsis.solve(SCENE, tolerance=t, strain="small") for t in (0.1, 0.001))
     assert "10 %" in rough.plan.reasons["level"]

@@ -75,6 +75,8 @@ def test_everything_that_is_wrong_is_named_at_once_by_its_line(recorded, tmp_pat
         7: ("f1.png,press,0.5,0,2,1,1,1", "led_ratio is 2.0"),
         8: ("f1.png,press,0.5", "too many or too few"),
         9: ("f1.png,press,0;5,0,1,1,1,1", "'0;5'"),
+        10: ("f1.png,press,104,0,1,1,1,1", "force_n is 104.0, but must be at least -0.1 and at most 5 N"),
+        11: ("f1.png,reference,-0.5,0,1,1,1,1", "force_n is -0.5"),
     }
     for place, (line, _) in wrong.items():
         lines[place] = line
@@ -110,6 +112,20 @@ def test_missing_roles_and_a_time_without_a_zone_are_refused(recorded, tmp_path)
     assert "reference frames is 0" in str(refused.value)
     with pytest.raises(InvalidQuantity, match="started_at"):
         replace(PRESS, started_at="2026-11-02T09:30:00")
+
+
+def test_a_file_that_is_to_show_two_things_is_refused(recorded, tmp_path):
+    table = written(tmp_path / "bench", recorded)
+    dark = next(number for number, frame in enumerate(recorded.frames) if frame.role == "dark")
+    last = len(recorded.frames) - 1
+    table.write_text(table.read_text("utf-8-sig").replace(f"f{last}.png", f"f{dark}.png"))
+    with pytest.raises(InvalidQuantity, match=f"role of f{dark}.png is press, but must be dark as before"):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+
+
+def test_a_table_that_is_not_there_is_told_in_a_sentence(tmp_path):
+    with pytest.raises(InvalidQuantity, match="No such file.*a table of comma separated values"):
+        bench_recording(tmp_path, tmp_path / "none.csv", PRESS, simulated_probe())
 
 
 def test_more_frames_than_memory_holds_are_refused_before_any_is_read(tmp_path):

@@ -99,7 +99,8 @@ def changed(recording, **changes):
             lambda all_of: [*all_of[:5], changed(all_of[5], phantom_serial="PH-4")],
             "phantom_serial is PH-4 and none, but must be the same in all recordings",
         ),
-        (lambda all_of: [all_of[0]] * 6, "all equal"),
+        (lambda all_of: [changed(all_of[0], id=f"{number}") for number in range(6)], "all equal"),
+        (lambda all_of: [*all_of[:3], *all_of[:3]], "given 2 times, but must be given once"),
     ],
 )
 def test_recordings_that_are_no_calibration_are_refused(recordings, bundle, table, spoil, words):

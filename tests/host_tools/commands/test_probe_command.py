@@ -156,3 +156,13 @@ def test_a_probes_file_becomes_a_scene_that_the_simulator_reads(tmp_path):
     told = run_toolkit("probe", "scene", tmp_path / "own.toml", "--out", out)
     assert (told.returncode, read_scenario(out)) == (1, drawn)
     assert "radius_mm is 10.5, but must be 11.0, as the simulator's tables have it" in told.stderr
+
+
+def test_a_scene_is_never_written_over_what_is_none(tmp_path):
+    own = tmp_path / "probe.toml"
+    own.write_text(OWN.read_text())
+    refused = run_toolkit("probe", "scene", own, "--out", own)
+    assert (refused.returncode, "must be a new file, or a scene of a probe" in refused.stderr) == (1, True)
+    assert own.read_text() == OWN.read_text()
+    for _ in range(2):
+        assert run_toolkit("probe", "scene", own, "--out", tmp_path / "scene.toml").returncode == 0
