@@ -1,7 +1,7 @@
 """Trained networks to ONNX: an ensemble to size, depth, modulus and their spread; the range classifier to log odds.
 
 The ensemble answers in mm, mm and kPa; its spread stays in coordinates, -1 to 1 over the trained range, in which the
-belts of a card are. The classifier has one output for each mode (`range.onnx` of a bundle, docs/contracts.md).
+belts of a card are. The classifier has one output, for presses of any mode (`range.onnx`, docs/contracts.md).
 Operators: the ONNX standard, opset 17.
 """
 

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from device.config import Config
@@ -40,9 +39,10 @@ from device.measurement.mode import Mode
 from device.measurement.paper_mode.features import FeatureSettings, extract_features
 from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid
 from device.measurement.recording.camera_geometry import CameraGeometry
+from device.measurement.recording.frame_light import binned
 from device.measurement.recording.led_sides import SIDES, LedRatio
 from device.measurement.recording.pixel_scale import PixelScale
-from device.measurement.recording.reference_light import Image, reference_light
+from device.measurement.recording.reference_light import reference_light
 from device.measurement.recording.tactile_image import Frame, Role, TactileImage, saturated_ratio
 
 UNLOADED_FRAMES = 4
@@ -364,15 +364,15 @@ def inclusion_spot_mm(
     """
     scale = geometry.scale
     factor = _factor(scale.mm_per_px_x), _factor(scale.mm_per_px_y)
-    base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
-    lit = [_binned(frame, factor) - base for frame in reference]
+    base = np.asarray(np.mean([binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
+    lit = [binned(frame, factor) - base for frame in reference]
     light = reference_light([frame.force_n for frame in reference], lit, FLOOR_COUNTS)
     hardest_n = max(frame.force_n for frame in press)
     hard = [frame for frame in press if frame.force_n >= HARD_RATIO * hardest_n]
-    seen = [contrast_and_valid(_binned(frame, factor) - base, light, frame.force_n) for frame in hard]
+    seen = [contrast_and_valid(binned(frame, factor) - base, light, frame.force_n) for frame in hard]
     contrast = np.asarray(np.mean([contrast for contrast, _ in seen], axis=0), dtype=np.float32)
-    binned = PixelScale(scale.mm_per_px_x * factor[0], scale.mm_per_px_y * factor[1])
-    image = TactileImage(contrast, np.all([valid for _, valid in seen], axis=0), binned, hardest_n)
+    of_blocks = PixelScale(scale.mm_per_px_x * factor[0], scale.mm_per_px_y * factor[1])
+    image = TactileImage(contrast, np.all([valid for _, valid in seen], axis=0), of_blocks, hardest_n)
     features = extract_features(image, FeatureSettings())
     if features.centroid_intensity < SPOT_CONTRAST:
         return None
@@ -382,11 +382,3 @@ def inclusion_spot_mm(
 
 def _factor(mm_per_px: float) -> int:
     return max(round(BINNED_MM / mm_per_px), 1)
-
-
-def _binned(frame: Frame, factor: tuple[int, int]) -> Image:
-    """Return means over blocks of pixels; the rows and columns left over are dropped evenly."""
-    (height, width), (x, y) = frame.counts.shape, factor
-    top, left = height % y // 2, width % x // 2
-    counts = frame.counts[top : top + height // y * y, left : left + width // x * x].astype(np.float32)
-    return np.asarray(cv2.resize(counts, (width // x, height // y), interpolation=cv2.INTER_AREA), dtype=np.float32)

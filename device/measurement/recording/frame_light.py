@@ -61,7 +61,7 @@ class FrameLight:
 
     def _light(self, frame: Frame) -> Image:
         ratio = np.float32(self.per_count / brightness_of(frame.led_ratio, self.first or frame.led_ratio))
-        image = (_binned(frame, self.factor) - self.dark) * ratio
+        image = (binned(frame, self.factor) - self.dark) * ratio
         return self.on_face(image) if self.on_face else image
 
 
@@ -72,7 +72,7 @@ def frame_light(recording: Recording, frames: Sequence[Frame]) -> FrameLight:
         raise InvalidQuantity("dark frames", 0, "at least one", "record dark frames before the press")
     camera = recording.camera
     factor, scale = _binning(camera.scale), binned_scale(camera.scale)
-    base = np.asarray(np.mean([_binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
+    base = np.asarray(np.mean([binned(frame, factor) for frame in dark], axis=0), dtype=np.float32)
     per_count = 1 if camera.bits == 8 else 1 / 256
     first = next((frame.led_ratio for frame in frames), None)
     return FrameLight(base, factor, per_count, first, face_map(camera.geometry, base.shape, scale), scale)
@@ -103,7 +103,7 @@ def binned_scale(scale: PixelScale) -> PixelScale:
     return PixelScale(x * scale.mm_per_px_x, y * scale.mm_per_px_y)
 
 
-def _binned(frame: Frame, factor: tuple[int, int]) -> Image:
+def binned(frame: Frame, factor: tuple[int, int]) -> Image:
     """Return the frame's means over blocks of pixels; the rows and columns left over are dropped evenly."""
     (height, width), (x, y) = frame.counts.shape, factor
     top, left = height % y // 2, width % x // 2
