@@ -37,6 +37,8 @@ class BodyRule:
     local_only: bool = False
 
 
+ENDLESS = ("/api/v1/events", "/api/v1/live.mjpeg")
+"""Answers that go on: of these HEAD is refused."""
 JSON_BODY = BodyRule()
 BODY_RULES: Mapping[str, BodyRule] = {
     "/api/v1/updates": BodyRule("application/octet-stream", 300_000_000, streamed=True, local_only=True),

@@ -86,7 +86,7 @@ def verified(folder: Path, head: str | None = None) -> AuditHead:
     try:
         with closing(sqlite3.connect(f"{database.resolve().as_uri()}?mode=ro", uri=True, timeout=BUSY_S)) as db:
             found = verify_chain(db)
-            if head:
+            if head is not None:
                 require_head(db, head)
     except sqlite3.Error as error:
         remedy = "Name the data folder by the setting `data`; an older release's is chained by the next start."

@@ -161,6 +161,9 @@ def _table_at(kind: Any, path: Iterable[str | int]) -> Any:
 def _described(kind: Any, path: Sequence[str | int]) -> str | None:
     """Return in words what text must be like whose pattern is one of a key's annotations."""
     *above, key = [step for step in path if isinstance(step, str)]
-    annotation = get_type_hints(_table_at(kind, above), include_extras=True)[key]
+    try:
+        annotation = get_type_hints(_table_at(kind, above), include_extras=True)[key]
+    except (KeyError, RuntimeError, StopIteration):  # the path leaves the records
+        return None
     found = (part.description for part in annotation_parts(annotation) if isinstance(part, FieldInfo))
     return next((words for words in found if words), None)

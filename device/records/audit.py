@@ -44,8 +44,9 @@ CREATE TRIGGER IF NOT EXISTS audit_is_never_deleted BEFORE DELETE ON audit
   BEGIN SELECT RAISE(ABORT, 'an entry of the audit is never deleted'); END;
 """
 FIRST = "0" * 64
-HEAD = re.compile(r"\d{1,18}:[0-9a-f]{64}")
 """What stands before the first entry."""
+HEAD = re.compile(r"\d{1,18}:[0-9a-f]{64}")
+"""A head as it is printed, `SEQ:HASH`."""
 PROBE = "probe"
 CLIENT: ContextVar[str] = ContextVar("client", default=PROBE)
 """Who asks for what is being done: the own screen, a token's name, or the probe by itself."""

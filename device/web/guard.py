@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import logging
+from collections import Counter
 from collections.abc import Callable, Coroutine
 from typing import Any
 from urllib.parse import parse_qsl
@@ -19,7 +20,7 @@ from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from device.access.known_hosts import KnownHosts, split_authority
-from device.access.request_rules import AskedRequest, BodyRule, joined, require_allowed, too_large
+from device.access.request_rules import ENDLESS, AskedRequest, BodyRule, joined, require_allowed, too_large
 from device.access.safe_headers import SAFE_HEADERS
 from device.access.scopes import OPEN_FOLDER, PAIRING_PAGE
 from device.errors import DeviceError, InvalidRequest, TokenNeeded, UnencryptedRequest
@@ -32,8 +33,6 @@ from device.web.problems import problem
 
 log = logging.getLogger(__name__)
 NO_STORE = (b"cache-control", b"no-store")
-ENDLESS = ("/api/v1/events", "/api/v1/live.mjpeg")
-"""Answers that go on: of these HEAD is refused."""
 HEADERS = [(name.encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
 
 
@@ -63,12 +62,12 @@ class RequestGuard:
             scope, noting = {**scope, "method": "GET"}, _without_body(noting)
         try:
             require_allowed(request, self._hosts)
-            _require_each_once(scope)
             client = self._door.require(request)
             line.client = client.name
+            _require_each_once(scope)
             bounded = await _bounded(request, receive)
         except DeviceError as error:
-            log.warning("%s %s", error.code, error)
+            log.warning("%s %s", error.code, ascii(str(error))[1:-1])  # what a stranger sent begins no line of its own
             await self._refusal(request, error)(scope, receive, noting)
         else:
             with done_for(client.name):
@@ -178,8 +177,9 @@ def _replayed(message: Message, receive: Receive) -> Receive:
 def _require_each_once(scope: Scope) -> None:
     """Raise `InvalidRequest` for a parameter that is there twice: routes take the last of them without a word."""
     names = [name for name, _ in parse_qsl(scope.get("query_string", b"").decode("latin-1"), keep_blank_values=True)]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise InvalidRequest(f"query.{twice} is there {names.count(twice)} times.", "Give it once.")
+    if len(set(names)) < len(names):
+        name, count = Counter(names).most_common(1)[0]
+        raise InvalidRequest(f"query.{name[:80]} is there {count} times.", "Give it once.")
 
 
 def _without_body(send: Send) -> Send:

@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match, Route
 
+from device.access.request_rules import ENDLESS
 from device.errors import BusyError, DeviceError, InvalidRequest, TooManyTries, UnknownPath
 from device.measurement.quantities import InvalidQuantity
 
@@ -71,10 +72,12 @@ def _told(wrong: Mapping[str, Any]) -> str:
         return f"{where}: {wrong['msg']} ({wrong['ctx']['error']})"
     if kind == "missing":
         return f"{where} is missing"
-    said = wrong["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    if isinstance(value, str | int | float) and len(repr(value)) <= LONGEST_ECHO:
-        where = f"{where} is {value!r}"
-    return f"{where}: {said}" if said[:1].isupper() or said.startswith("must") else f"{where}, but must be {said}"
+    said = wrong["msg"].removeprefix("Value error, ")
+    bound = said.removeprefix("Input should be ")
+    is_told = isinstance(value, str | int | float) and len(repr(value)) <= LONGEST_ECHO
+    if bound != said:
+        return f"{where} is {value!r}, but must be {bound}" if is_told else f"{where} must be {bound}"
+    return f"{where} is {value!r}: {said}" if is_told else f"{where}: {said}"
 
 
 def _http_error(request: Request, error: HTTPException) -> JSONResponse:
@@ -82,7 +85,8 @@ def _http_error(request: Request, error: HTTPException) -> JSONResponse:
     answer = problem(unknown, error.status_code)
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
         methods = _methods(request)
-        answer.headers["Allow"] = ", ".join(sorted(methods | ({"HEAD"} if "GET" in methods else set())))
+        has_head = "GET" in methods and request.url.path not in ENDLESS
+        answer.headers["Allow"] = ", ".join(sorted(methods | ({"HEAD"} if has_head else set())))
     return answer
 
 

@@ -117,9 +117,10 @@ def _unusable(recording: Recording, force_n: float) -> list[InvalidQuantity]:
 
 def disagreements(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:
     """Yield what recordings of one probe's calibration must have in common, and do not; and what is there twice."""
-    ids = [one.id for one in recordings]
-    for twice in sorted({one for one in ids if ids.count(one) > 1}):
-        yield InvalidQuantity(f"recording {twice}", f"given {ids.count(twice)} times", "given once", "leave it out")
+    taken = [(one.id, one.started_at) for one in recordings]
+    for twice in sorted({one for one in taken if taken.count(one) > 1}):
+        found = f"recording {twice[0]} of {twice[1]}"
+        yield InvalidQuantity(found, f"given {taken.count(twice)} times", "given once", "leave the others out")
     for quantity, values, action in _must_agree(recordings):
         if len(set(values)) > 1:
             found = " and ".join(sorted({str(value) for value in values}))

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -94,7 +95,7 @@ def _consequences(found: Probe) -> Iterator[tuple[str, float, str]]:
     yield "force_of_one_count", 1 / found.cell.counts_per_n, "N"
 
 
-WRITTEN = b"# Probe "
+WRITTEN = re.compile(rb"# Probe .+, (as stated|number \d+ within its tolerances)\.\n")
 """How a scene of a probe begins: such a file may be written anew."""
 
 
@@ -120,7 +121,7 @@ def scene(
     found = _read(read_probe, file, False)
     of_probe = as_scene_table(scene_of_probe(found, simulated_probe(), number))
     which = "as stated" if number is None else f"number {number} within its tolerances"
-    if out.exists() and not out.read_bytes().startswith(WRITTEN):
+    if out.exists() and not WRITTEN.match(out.read_bytes()):
         raise InvalidQuantity(
             "out", out, "a new file, or a scene of a probe", "give another name: this one would be lost"
         )

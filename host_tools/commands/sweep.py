@@ -58,7 +58,8 @@ def sweep(
     measure = asked_strain(strain, allowed)
     if within_s is not None and allowed is None:
         raise InvalidQuantity("within_s", within_s, "left out without --tolerance", "give both, or none")
-    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed, within_s or WITHIN_S)
+    limit_s = WITHIN_S if within_s is None else within_s
+    plan = SweepPlan(scenes, seed, forces_n, measure, probe_of(probe).waveguide, allowed, limit_s)
     failed = 0
     with progress("scenes") as bar:
         task = bar.add_task("", total=scenes)

@@ -128,9 +128,9 @@ def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[Invalid
 
 def _given_twice(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[InvalidQuantity]:
     """Yield each recording that is there again: it would count as evidence of its own."""
-    ids = [one.id for one in recordings]
+    taken = [(one.id, one.started_at) for one in recordings]  # an imported one has its phantom's name as its id
     for place, name in enumerate(names):
-        if (before := ids.index(ids[place])) < place:
+        if (before := taken.index(taken[place])) < place:
             again = f"that of {names[before]} again"
             yield InvalidQuantity(f"recording of {name}", again, "another recording", "give each once")
 

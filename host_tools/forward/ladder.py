@@ -56,8 +56,8 @@ LIGHT_RATIO = 0.01
 """Share of a press at which small strain foretells: its relative errors are of any press, and none folds at this."""
 MESH_SHARE = 0.25
 """Where small strain departs by more than was asked for, a mesh that errs by so much of that adds little to it."""
-SIZES_MM = Bound(0.05, 100.0, "mm")
-"""Of smaller inclusions nothing shows, and meshes as fine as they are take minutes."""
+SIZES_MM = Bound(0.001, 100.0, "mm")
+"""Of smaller inclusions nothing shows, and meshing around them does not come to an end."""
 SMALL_IS_ENOUGH = "ask for small strain (--strain small), which then states its own errors alone"
 TAKE_THE_BEST = "take the best as it is (--best)"
 

@@ -82,7 +82,7 @@ def test_what_is_asked_of_a_solution_is_checked_before_anything_is_solved(asked,
 
 
 def test_so_small_an_inclusion_is_refused_that_its_mesh_would_take_minutes():
-    with pytest.raises(tsis.InvalidQuantity, match="size_mm is 1e-06, but must be at least 0.05"):
+    with pytest.raises(tsis.InvalidQuantity, match="size_mm is 1e-06, but must be at least 0.001"):
         tsis.solve(tsis.Scene(tsis.Inclusion(1e-6, 6.0, 80.0)))
 
 

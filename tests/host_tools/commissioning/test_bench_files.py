@@ -39,9 +39,9 @@ def taken(tables):
     protocol = PhantomProtocol(RAMP_N, frames=1)
     return {
         one.name: replace(
-            phantom_recording(one.inclusion, tables, seed=4, protocol=protocol, probe=made_by), truth=one.truth
+            phantom_recording(one.inclusion, tables, seed=seed, protocol=protocol, probe=made_by), truth=one.truth
         )
-        for one in of_file(read_phantoms(PHANTOMS))
+        for seed, one in enumerate(of_file(read_phantoms(PHANTOMS)), start=4)
     }
 
 
