@@ -31,14 +31,19 @@ class OpenedParts:
         self.opened = ExitStack()
         self._is_complete = True
 
-    def open(self, opener: Callable[[], OpenedPart]) -> OpenedPart | None:
-        """Return the part that an opener returns, or None and remember the fault when it raises one."""
+    def open(
+        self, opener: Callable[[], OpenedPart], *, refused_as: type[DeviceError] = ModelError
+    ) -> OpenedPart | None:
+        """Return the part that an opener returns, or None and remember the fault when it raises one.
+
+        What it refuses is a fault of a model unless told otherwise.
+        """
         try:
             part = opener()
         except DeviceError as error:
             self._fail(error)
         except (InvalidQuantity, BundleRefused) as error:
-            self._fail(ModelError(str(error), "Then start the daemon again."))
+            self._fail(refused_as(str(error), "Then start again."))
         else:
             if hasattr(part, "close"):
                 self.opened.callback(part.close)

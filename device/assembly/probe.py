@@ -218,7 +218,9 @@ def open_simulated(config: Config, scenario: Scenario, on_top: Callable[[OpenedP
     server = CameraServer(open_picam2)
     parts.opened.callback(server.close)
     camera = parts.open(lambda: emulated_camera(config.camera, server.address))
-    probe = parts.open(lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale))
+    probe = parts.open(
+        lambda: VirtualProbe(scenario, ProbeTables.load(SIMULATED_PROBE), shape, scale), refused_as=ConfigError
+    )
     parts.require_all()
     assert probe is not None  # require_all has raised otherwise
     line = emulated_amplifier(config, probe, faults)

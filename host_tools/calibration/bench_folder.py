@@ -74,7 +74,9 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         except InvalidQuantity as error:
             found = f"{table.name}, line {number}: {error.quantity}"
             problems.append(InvalidQuantity(found, error.value, error.bound, error.action))
-    problems += [] if problems else [*_missing_roles(frames), *_in_two_roles(rows, table)]
+    problems += (
+        [] if problems else [*_missing_roles(frames), *_in_two_roles(rows, table), *_of_two_depths(frames, rows)]
+    )
     if problems:
         raise InvalidRecord(problems)
     ordered = sorted(_at_the_top(frames, probe.camera.bits), key=lambda frame: frame.t_s)
@@ -96,6 +98,15 @@ def _in_two_roles(rows: Sequence[TableLine], table: Path) -> Iterator[InvalidQua
         name, role = row["file"].strip(), row["role"].strip()
         if (before := known.setdefault(name, role)) != role:
             yield InvalidQuantity(f"{table.name}, line {number}: role of {name}", role, f"{before} as before", ACTION)
+
+
+def _of_two_depths(frames: Sequence[Frame], rows: Sequence[TableLine]) -> Iterator[InvalidQuantity]:
+    """Yield that images are of 8 and of 16 bit, with those of the rarer depth."""
+    of_8 = [row["file"].strip() for frame, row in zip(frames, rows, strict=True) if frame.counts.dtype == np.uint8]
+    others = [row["file"].strip() for row in rows if row["file"].strip() not in of_8]
+    if of_8 and others:
+        rarer = ", ".join(sorted(set(of_8 if len(of_8) < len(others) else others))[:5])
+        yield InvalidQuantity("images", "of 8 and of 16 bit", "of one depth", f"save all alike; the rarer are {rarer}")
 
 
 def _camera(press: PressOnBench, probe: Probe, bits: Literal[8, 16]) -> CameraSettings:

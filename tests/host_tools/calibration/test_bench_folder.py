@@ -123,6 +123,14 @@ def test_a_file_that_is_to_show_two_things_is_refused(recorded, tmp_path):
         bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
 
 
+def test_images_of_two_depths_are_refused_with_those_that_differ(recorded, tmp_path):
+    table = written(tmp_path / "bench", recorded)
+    last = tmp_path / "bench" / f"f{len(recorded.frames) - 1}.png"
+    cv2.imwrite(str(last), cv2.imread(str(last), cv2.IMREAD_UNCHANGED).astype(np.uint16) << 8)
+    with pytest.raises(InvalidQuantity, match=f"images is of 8 and of 16 bit, .* the rarer are {last.name}"):
+        bench_recording(tmp_path / "bench", table, PRESS, simulated_probe())
+
+
 def test_a_table_that_is_not_there_is_told_in_a_sentence(tmp_path):
     with pytest.raises(InvalidQuantity, match="No such file.*a table of comma separated values"):
         bench_recording(tmp_path, tmp_path / "none.csv", PRESS, simulated_probe())
