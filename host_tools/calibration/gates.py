@@ -115,9 +115,17 @@ def _unusable(recording: Recording, force_n: float) -> list[InvalidQuantity]:
     return problems
 
 
+def identity_of(recording: Recording) -> tuple[str, str, int]:
+    """Return what tells a recording from others: its id, when it began, and its last frame.
+
+    An imported one has its phantom's name as its id, a simulated one that of its seed.
+    """
+    return recording.id, recording.started_at, hash(recording.frames[-1].counts.tobytes())
+
+
 def disagreements(recordings: Sequence[Recording]) -> Iterator[InvalidQuantity]:
     """Yield what recordings of one probe's calibration must have in common, and do not; and what is there twice."""
-    taken = [(one.id, one.started_at) for one in recordings]
+    taken = [identity_of(one) for one in recordings]
     for twice in sorted({one for one in taken if taken.count(one) > 1}):
         found = f"recording {twice[0]} of {twice[1]}"
         yield InvalidQuantity(found, f"given {taken.count(twice)} times", "given once", "leave the others out")

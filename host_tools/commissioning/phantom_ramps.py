@@ -18,7 +18,7 @@ from device.measurement.parameters import EVEN_STD, NOMINAL, PARAMETERS, RANGES,
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.ramp_modes.radial_profile import SeenPresses, press_profiles, seen_presses
 from device.measurement.recording.recording import Recording
-from host_tools.calibration.gates import CalibrationRejected
+from host_tools.calibration.gates import CalibrationRejected, identity_of
 from host_tools.calibration.known_bench import another_set, truth_contradiction
 from host_tools.scenes.phantom_set import (
     BLOCKS_NEEDED,
@@ -128,7 +128,7 @@ def _of_probe(recording: Recording, name: str, probe: Probe) -> Iterator[Invalid
 
 def _given_twice(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[InvalidQuantity]:
     """Yield each recording that is there again: it would count as evidence of its own."""
-    taken = [(one.id, one.started_at) for one in recordings]  # an imported one has its phantom's name as its id
+    taken = [identity_of(one) for one in recordings]
     for place, name in enumerate(names):
         if (before := taken.index(taken[place])) < place:
             again = f"that of {names[before]} again"

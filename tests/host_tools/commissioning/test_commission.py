@@ -273,16 +273,19 @@ def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives,
         read_ramp_model(out)
 
 
-def recorded(tables, one, world=FOREIGN, forces_n=RAMP_N):
+def recorded(tables, one, world=FOREIGN, forces_n=RAMP_N, seed=4):
     scenario = one.in_its_tissue(Scenario(world=world))
     protocol = PhantomProtocol(forces_n, frames=1)
-    return phantom_recording(one.inclusion, tables, seed=4, protocol=protocol, scenario=scenario)
+    return phantom_recording(one.inclusion, tables, seed=seed, protocol=protocol, scenario=scenario)
 
 
 def test_a_recording_is_of_the_phantom_whose_name_its_file_has(tables, phantoms):
     known = list(of_file(phantoms))
-    recordings = [recorded(tables, one) for one in known]
-    ramps = phantom_ramps(recordings, [one.name for one in known], phantoms, simulated_probe())
+    recordings = [recorded(tables, one, seed=seed) for seed, one in enumerate(known)]
+    names = [one.name for one in known]
+    ramps = phantom_ramps(recordings, names, phantoms, simulated_probe())
+    with pytest.raises(CalibrationRejected, match=f"recording of {names[1]} is that of {names[0]} again"):
+        phantom_ramps([recordings[0], *recordings[:-1]], names, phantoms, simulated_probe())
     assert [ramp.name for ramp in ramps] == [one.name for one in known]
     assert [ramp.has_inclusion for ramp in ramps] == [one.truth is not None for one in known]
     assert ramps[0].seen.across is not None

@@ -126,7 +126,7 @@ def test_the_command_tells_what_a_certificate_lacks_before_it_computes(recording
     touched = (frame for frame in recordings[0].frames if frame.role != "reference" or frame.force_n > 0.01)
     made = replace(recordings[0], frames=tuple(touched))
     for one in read_phantoms(file).phantoms:
-        write_recording(replace(made, truth=one.inclusion), tmp_path / "ramps" / one.name)
+        write_recording(replace(made, id=one.name, truth=one.inclusion), tmp_path / "ramps" / one.name)
     ramps, files = sorted((tmp_path / "ramps").iterdir()), ("--probe", SIMULATED_PROBE / NAME, "--phantoms", file)
     told = run_toolkit("commission", *ramps, *files, "--out", tmp_path / "own")
     assert told.returncode == 1

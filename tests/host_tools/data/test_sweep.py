@@ -57,7 +57,7 @@ def test_an_interrupted_sweep_goes_on_and_gives_the_same_data(tmp_path, uninterr
     _wait_for_rows(journal, 3)
     os.killpg(running.pid, stop)
     _, told = running.communicate(timeout=WAIT_S)
-    assert running.returncode == (1 if stop == signal.SIGINT else -signal.SIGKILL)
+    assert running.returncode == (130 if stop == signal.SIGINT else -signal.SIGKILL)
     assert not out.exists()
     if stop == signal.SIGINT:
         assert b"run the same command to go on" in b" ".join(told.split())
