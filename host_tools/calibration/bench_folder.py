@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path, PurePosixPath
-from typing import Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import cv2
 import numpy as np
@@ -74,9 +74,8 @@ def bench_recording(folder: Path, table: Path, press: PressOnBench, probe: Probe
         except InvalidQuantity as error:
             found = f"{table.name}, line {number}: {error.quantity}"
             problems.append(InvalidQuantity(found, error.value, error.bound, error.action))
-    problems += (
-        [] if problems else [*_missing_roles(frames), *_in_two_roles(rows, table), *_of_two_depths(frames, rows)]
-    )
+    if not problems:
+        problems = [*_missing_roles(frames), *_in_two_roles(rows, table), *_of_two_depths(frames, rows)]
     if problems:
         raise InvalidRecord(problems)
     ordered = sorted(_at_the_top(frames, probe.camera.bits), key=lambda frame: frame.t_s)
@@ -102,11 +101,13 @@ def _in_two_roles(rows: Sequence[TableLine], table: Path) -> Iterator[InvalidQua
 
 def _of_two_depths(frames: Sequence[Frame], rows: Sequence[TableLine]) -> Iterator[InvalidQuantity]:
     """Yield that images are of 8 and of 16 bit, with those of the rarer depth."""
-    of_8 = [row["file"].strip() for frame, row in zip(frames, rows, strict=True) if frame.counts.dtype == np.uint8]
-    others = [row["file"].strip() for row in rows if row["file"].strip() not in of_8]
-    if of_8 and others:
-        rarer = ", ".join(sorted(set(of_8 if len(of_8) < len(others) else others))[:5])
-        yield InvalidQuantity("images", "of 8 and of 16 bit", "of one depth", f"save all alike; the rarer are {rarer}")
+    by_depth: dict[Any, list[str]] = {}
+    for frame, row in zip(frames, rows, strict=True):
+        by_depth.setdefault(frame.counts.dtype, []).append(row["file"].strip())
+    if len(by_depth) > 1:
+        rarer: list[str] = min(by_depth.values(), key=len)
+        action = f"save all alike; the rarer are {', '.join(sorted(set(rarer))[:5])}"
+        yield InvalidQuantity("images", "of 8 and of 16 bit", "of one depth", action)
 
 
 def _camera(press: PressOnBench, probe: Probe, bits: Literal[8, 16]) -> CameraSettings:

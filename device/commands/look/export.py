@@ -10,7 +10,6 @@ import sys
 from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
-from typing import get_args
 
 from device.config import Config
 from device.errors import StorageError
@@ -20,7 +19,7 @@ from device.exports.lesions import lesion_table
 from device.exports.selection import Selection
 from device.exports.table import long_table, wide_table
 from device.files.durable import synced_file
-from device.measurement.mode import Mode
+from device.measurement.mode import MODES
 from device.measurement.quantities import InvalidQuantity
 from device.records.listing import Wanted
 from device.records.store import Store
@@ -43,7 +42,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     kinds = ", ".join(KINDS)
     parser.add_argument("--out", type=Path, default=SCREEN, metavar="FILE", help=f"a new file: {kinds}; else a table")
     parser.add_argument("--exam", metavar="ID", help="measurements of one exam")
-    parser.add_argument("--mode", choices=get_args(Mode), help="measurements of one mode")
+    parser.add_argument("--mode", choices=MODES, help="measurements of one mode")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--long", action="store_true", help="a table with a row for each quantity")
     form.add_argument(
