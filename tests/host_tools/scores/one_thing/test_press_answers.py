@@ -87,10 +87,11 @@ def test_skin_twice_as_stiff_is_covered_by_who_knows_of_skins(tables, quick):
 def test_presses_on_coarser_skin_than_is_believed_are_refused_or_covered(tables, quick):
     """Of 1 % over 2 mm, where 0.3 % are believed; by these alone four fifths and three quarters were covered.
 
-    Unknowns that are not determined, whose interval is the whole range, do not count.
+    Unknowns that are not determined, whose interval is the whole range, do not count. Of 36 presses some 13 counted,
+    and one of them was seven in a hundred.
     """
     for found in with_tolerances_on(
-        lambda rng: World(texture=SkinTexture(1.0, 2.0, int(rng.integers(2**31)))), tables, quick, 36
+        lambda rng: World(texture=SkinTexture(1.0, 2.0, int(rng.integers(2**31)))), tables, quick, 96
     ):
         assert found.share_answered() > 0.3
         everything = replace(found, is_answered=np.ones_like(found.is_answered))
