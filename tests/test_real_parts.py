@@ -137,9 +137,12 @@ def test_the_parts_are_told_at_once_also_while_a_press_is_under_way(rig: Rig):
 @pytest.mark.parametrize("rig", [{"is_wired": True}], indirect=True, ids=str)
 @pytest.mark.parametrize("how", ["frozen", "killed", "bus hangs"])
 def test_with_the_enable_line_wired_it_is_dark_soon_whatever_becomes_of_daemon_and_bus(rig: Rig, how: str):
-    """Nobody is there to darken it: no systemd, no command after the end."""
+    """Nobody is there to darken it: no systemd, no command after the end.
+
+    On a machine so busy that the daemon has no processor for 0.75 s the line does what it is there for: pressed again.
+    """
     daemon = rig.start()
-    job = daemon.press("quick")
+    job = wait_for(lambda: daemon.press("quick"), lambda job: job["code"] != "E212")
     assert job["state"] == "done", f"{job}"  # whole, or pytest shortens it
     rig.press_until_lit()
     since_s = time.monotonic()

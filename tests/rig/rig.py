@@ -152,10 +152,18 @@ class Rig:
         return daemon
 
     def press_until_lit(self) -> str:
-        """Ask for a press and wait for its light; return where its job is."""
-        assert self.daemon
-        location = self.daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
-        wait_for(self.world.is_lit, bool)
+        """Ask for a press and wait for its light, for another one where that was cut; return where its job is."""
+        daemon = self.daemon
+        assert daemon
+        location = daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
+
+        def is_lit() -> bool:
+            nonlocal location
+            if daemon.ask(location).json["code"] == "E212":
+                location = daemon.ask("/api/v1/presses", "POST", {}).headers["location"]
+            return self.world.is_lit()
+
+        wait_for(is_lit, bool)
         return location
 
     def is_fed_until(self, condition: Callable[[], bool]) -> bool:
