@@ -15,7 +15,7 @@ import typer
 from device.files.durable import write_once
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.commands.output import Scheduler, note, problem_record
+from host_tools.commands.output import Scheduler, note, problem_record, require_writable_folder
 from host_tools.commands.probe import ProbeOption, probe_with_tables
 from host_tools.workers import workers
 
@@ -65,6 +65,7 @@ def calibrate(
     from host_tools.calibration.gates import CalibrationRejected
 
     _require_new(out)
+    require_writable_folder(out.parent if out.suffix == ".json" else out)
     require("force_n", force_n, Bound(0.0, 5.0, "N", low_included=False), "give the force of the recordings' presses")
     surface = load_surface_table(table)
     made, bench = _on_bench(recordings, probe, phantoms, table)
@@ -186,6 +187,7 @@ def commission(
     quick_out = quick_folder(out) if quick else None
     for folder in (out, quick_out) if quick_out else (out,):
         require_new(folder)
+        require_writable_folder(folder)
     require("valid_days", valid_days, Bound(1.0, 730.0, "days"), "commission again before that")
     probe_with_tables(None, table)
     model, derivatives = read_ramp_model(design), load_derivatives(table)

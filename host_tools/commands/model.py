@@ -11,7 +11,7 @@ import typer
 
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
-from host_tools.commands.output import Scheduler, note, progress
+from host_tools.commands.output import Scheduler, note, progress, require_writable_folder
 from host_tools.commands.probe import ProbeOption, own_folder, probe_with_tables
 from host_tools.workers import workers
 
@@ -220,8 +220,7 @@ def _record_grid(
 def _require_room(recordings: list[Path]) -> None:
     """Refuse to record where a recording is, before any is made."""
     for path in recordings:
-        if path.parent.exists() and not path.parent.is_dir():
-            raise InvalidQuantity("out", path.parent, "a folder", "name another one with --out")
+        require_writable_folder(path.parent)
         if path.exists():
             raise InvalidQuantity("recording", path, "a new folder", "name another one with --out, or delete it first")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -52,6 +53,21 @@ def require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:
         raise InvalidQuantity("file", path, f"of type {', '.join(suffixes)}", "give it another name")
     if path and not path.parent.is_dir():
         raise InvalidQuantity("folder", path.parent, "a folder that exists", "make it first")
+    if path:
+        _require_ours(path if path.exists() else path.parent)
+
+
+def require_writable_folder(path: Path) -> None:
+    """Refuse a folder, there already or to be made, that could not be written to, as `require_writable` does a file."""
+    there = next(one for one in (path, *path.absolute().parents) if one.exists())
+    if not there.is_dir():
+        raise InvalidQuantity("folder", there, "a folder, not a file", "name another one with --out")
+    _require_ours(there)
+
+
+def _require_ours(path: Path) -> None:
+    if not os.access(path, os.W_OK):
+        raise InvalidQuantity("out", path, "writable by who runs this", "name another one, or change its rights")
 
 
 def ratio_of(text: str) -> float:

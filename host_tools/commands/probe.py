@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.commands.output import note, own_models, print_rows, problem_record
+from host_tools.commands.output import note, own_models, print_rows, problem_record, require_writable_folder
 
 if TYPE_CHECKING:
     from device.files.toml_record import Record
@@ -291,8 +291,13 @@ def probe_with_tables(probe: Path | None, table: Path) -> Probe | None:
 
 
 def own_folder(probe: Path | None, out: Path | None) -> Path:
-    """Return the folder of a probe's tables; another probe's never stand in the simulated one's by default."""
+    """Return the folder of a probe's tables; another probe's never stand in the simulated one's by default.
+
+    Refuse one that cannot be written.
+    """
     if probe and out is None:
         bound = "given with --probe"
         raise InvalidQuantity("out", "not given", bound, "name a folder: models/simulated_probe is another probe's")
-    return out or own_models("simulated_probe")
+    folder = out or own_models("simulated_probe")
+    require_writable_folder(folder)
+    return folder

@@ -20,7 +20,15 @@ import typer
 from device import __version__
 from device.files.shipped import MODELS, SIMULATED_PROBE
 from device.measurement.quantities import UNKNOWNS, InvalidQuantity
-from host_tools.commands.output import Scheduler, note, note_left_out, own_models, progress, source_tree
+from host_tools.commands.output import (
+    Scheduler,
+    note,
+    note_left_out,
+    own_models,
+    progress,
+    require_writable_folder,
+    source_tree,
+)
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
@@ -89,6 +97,7 @@ def train(
         return run_chain(chained_commands(seed, scheduler), source_tree("make everything in models/"))
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
     folder = out or own_models(mode)
+    require_writable_folder(folder)
     if mode == "paper" and data is None:
         data = _swept(scheduler)
     with workers(scheduler):

@@ -1,6 +1,7 @@
 """The toolkit's commands as a researcher types them: output, exit codes, and one sentence for what cannot be done."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -13,9 +14,10 @@ from toolkit_process import run_toolkit
 
 from device.files.certificate_file import read_calibration
 from device.files.recording_file import write_recording
-from device.measurement.quantities import Inclusion
+from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.simulation.scenario import Scenario
 from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
+from host_tools.commands.output import require_writable, require_writable_folder
 
 SCENE = ["--size-mm", "10", "--depth-mm", "6", "--modulus-kpa", "80"]
 PRESS = [*SCENE, "--force-n", "0.5", "--strain", "small"]
@@ -171,8 +173,29 @@ def test_phantom_records_over_nothing(tmp_path):
     assert "phantom3, but must be a new folder" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["phantom3"]
     (tmp_path / "a file").touch()
-    done = run_toolkit("phantom", "--out", tmp_path / "a file")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("phantom",), ("train", "--mode", "quick"), ("table",), ("optics", "build"), ("calibrate", "x"),
+     ("commission", "x", "--probe", "p.toml", "--phantoms", "q.toml")],
+    ids=lambda words: words[0],
+)  # fmt: skip
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, words):
+    (tmp_path / "a file").touch()
+    done = run_toolkit(*words, "--out", tmp_path / "a file" / "within")
+    assert (done.returncode, done.stdout) == (1, "")
     assert "a file, but must be a folder" in done.stderr
+
+
+def test_a_page_that_may_not_be_written_is_refused_before_the_work(tmp_path, monkeypatch):
+    """Whoever is root may write everywhere: the system's word is put in."""
+    (tmp_path / "known.md").touch()
+    monkeypatch.setattr(os, "access", lambda path, mode: path.name != "known.md")
+    require_writable(tmp_path / "new.md", (".md",))
+    require_writable_folder(tmp_path / "folder" / "within")
+    with pytest.raises(InvalidQuantity, match="known.md, but must be writable"):
+        require_writable(tmp_path / "known.md", (".md",))
 
 
 def test_the_first_solve_waits_for_nothing_that_it_does_not_need():
