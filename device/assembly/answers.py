@@ -7,20 +7,17 @@ The certificate is the active one, once it is for this probe, its model and its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from types import MappingProxyType
-from typing import NamedTuple
+from collections.abc import Iterator
 
 from device.config import Config
-from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
+from device.errors import ForeignCalibration, MissingCalibration, ModelError
 from device.files.bundle_file import read_models
-from device.instrument.press.record import Adviser, Estimator, LookAhead, look_at_nothing
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.remembered_ramps import RememberedRamps
-from device.instrument.watch.progress import ProgressBoard
 from device.measurement.bundle import BundleRefused, ModelBundle
 from device.measurement.calibration import Calibration
 from device.measurement.estimate import Estimate
-from device.measurement.mode import Mode, ModeWorth
+from device.measurement.mode import Mode
 from device.measurement.mode_models import ModeModels
 from device.measurement.quantities import InvalidQuantity
 from device.measurement.recording.camera_geometry import CameraGeometry
@@ -64,52 +61,7 @@ def _foreign(calibration: Calibration, config: Config, bundle: ModelBundle) -> I
     )
 
 
-def _nothing_to_prove() -> None:
-    """Stand for models without golden vectors."""
-
-
-class Answers(NamedTuple):
-    """The modes in which this probe has a model, what answers in them, what advises on a scan, what proves that both
-    still do, what each mode's answers are worth by its model card, what reads a reference press before them, until when
-    a commissioned model holds, and which level of the flat field the models of ramps believe in."""
-
-    modes: tuple[Mode, ...]
-    estimator: Estimator
-    adviser: Adviser
-    prove: Callable[[], None] = _nothing_to_prove
-    worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({})
-    look_ahead: LookAhead = look_at_nothing
-    expires_at: str | None = None
-    flat_field_ratio: float | None = None
-
-    def require(self, mode: Mode) -> None:
-        """Raise `ConfigError` when the settings ask for a mode that is not among them."""
-        if mode not in self.modes:
-            cause = f"press.mode is {mode}, but this probe has models for {', '.join(self.modes)} only."
-            raise ConfigError(cause, "Set press.mode to one of those, or install the model.")
-
-    def watched(self, progress: ProgressBoard, begin: Callable[[], None]) -> Answers:
-        """Return the same, each run of it noted as progress of the inference; `begin` is called before each."""
-
-        def estimator(recording: Recording, mode: Mode) -> Estimate:
-            with progress.inside("inference"):
-                begin()
-                return self.estimator(recording, mode)
-
-        def adviser(recording: Recording) -> ScanAdvice:
-            with progress.inside("inference"):
-                begin()
-                return self.adviser(recording)
-
-        def prove() -> None:
-            with progress.inside("inference"):
-                begin()
-                self.prove()
-
-        return self._replace(estimator=estimator, adviser=adviser, prove=prove)
-
-
-def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
     """Return what a probe can answer; without a calibration its estimator raises `MissingCalibration`.
 
     Mode paper is none of its modes where the certificate has no lines.
@@ -133,7 +85,7 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
     has_lines = calibration is None or calibration.lines is not None
     modes = tuple(mode for mode in models.modes if has_lines or mode != "paper")
     worth = {mode: models.worth(mode) for mode in modes}
-    return Answers(
+    return ProbeAnswers(
         modes,
         estimate,
         advise,

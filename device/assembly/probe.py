@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
-from device.assembly.answers import Answers, active_calibration, answers_for
+from device.assembly.answers import active_calibration, answers_for
 from device.assembly.camera import emulated_camera, real_camera, require_open
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.light import emulated_line
@@ -32,6 +32,7 @@ from device.instrument.acquisition.force_recorder import ForceRecorder
 from device.instrument.acquisition.frame_check import FramePace
 from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press.phantom_press import PhantomPress
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.states import Guidance, before_contact
 from device.instrument.procedure import Procedure
 from device.instrument.status import StatusBoard
@@ -311,12 +312,8 @@ def _procedure(probe: OpenedProbe) -> Procedure:
     return Procedure(
         config,
         bench,
-        answers.estimator,
+        answers,
         store,
-        adviser=answers.adviser,
-        modes=answers.modes,
-        worth=answers.worth,
-        look_ahead=answers.look_ahead,
         calibration=watch,
         opened=parts.opened,
         clock=probe.clock,
@@ -324,11 +321,10 @@ def _procedure(probe: OpenedProbe) -> Procedure:
         progress=progress,
         simulated_truth=probe.simulated_truth,
         folder_of=probe.folder_of,
-        flat_field_ratio=answers.flat_field_ratio,
     )
 
 
-def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> Answers:
+def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
     answers = answers_for(config, bundle, calibration)
     answers.require(config.press.mode)
     return answers

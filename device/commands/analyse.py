@@ -6,10 +6,11 @@ import argparse
 import json
 from pathlib import Path
 
-from device.assembly.answers import Answers, answers_for
+from device.assembly.answers import answers_for
 from device.config import Config, simulated_config
 from device.files.bundle_file import read_paper_model
 from device.files.recording_file import read_recording
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.watch.calibration_watch import CalibrationWatch
 from device.measurement.mode import mode_named
 from device.measurement.mode_models import mode_of_recording
@@ -29,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     The certificate has to have held when they were recorded.
     """
     stated = read_config(options.config) if options.config else None
-    of_probe: dict[str, tuple[CalibrationWatch, Answers]] = {}
+    of_probe: dict[str, tuple[CalibrationWatch, ProbeAnswers]] = {}
     for path in options.recordings:
         recording = read_recording(path)
         if recording.serial not in of_probe:
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, Answers]:
+def _answers_of(serial: str, stated: Config | None) -> tuple[CalibrationWatch, ProbeAnswers]:
     """Return certificate and answers of the probe with a serial number, refusing those of another probe or model."""
     config = stated or simulated_config(serial)
     bundle = read_paper_model(config.paper_model)

@@ -11,10 +11,9 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from types import MappingProxyType
 
 from device.config import Config
 from device.errors import DeviceError, InterruptedPress, LightError, LightRestError, NoContrastError
@@ -25,15 +24,8 @@ from device.instrument.acquisition.light_check import DimmingWatch
 from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.encoded_frames import EncodedFrames
-from device.instrument.press.record import (
-    SAVE_LIGHT_EVERY_S,
-    Adviser,
-    Estimator,
-    LookAhead,
-    PressAnswers,
-    PressBook,
-    look_at_nothing,
-)
+from device.instrument.press.probe_answers import ProbeAnswers
+from device.instrument.press.record import SAVE_LIGHT_EVERY_S, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.scan import Scan, ScanTaken
 from device.instrument.press.states import Guidance, PressState, before_contact
@@ -48,7 +40,7 @@ from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
 from device.instrument.watch.recordings_watch import RecordingsWatch, retention_rule
 from device.instrument.watch.space_watch import SpaceWatch
-from device.measurement.mode import FRAMES, Mode, ModeWorth
+from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
 from device.measurement.wanted_accuracy import WantedAccuracy
@@ -76,13 +68,9 @@ class Procedure:
         self,
         config: Config,
         bench: Bench,
-        estimator: Estimator,
+        answers: ProbeAnswers,
         store: Store,
         *,
-        adviser: Adviser,
-        modes: tuple[Mode, ...],
-        worth: Mapping[Mode, ModeWorth | None] = MappingProxyType({}),
-        look_ahead: LookAhead = look_at_nothing,
         calibration: CalibrationWatch,
         opened: ExitStack,
         clock: ClockWatch | None = None,
@@ -90,29 +78,16 @@ class Procedure:
         progress: ProgressBoard | None = None,
         simulated_truth: Inclusion | None = None,
         folder_of: Callable[[Path], Path] = Path,
-        flat_field_ratio: float | None = None,
     ) -> None:
-        """Take `modes`, those in which the estimator answers; the settings' own mode is one of them.
-
-        `adviser` says what a scan tells so far, `worth` what their answers are worth by the model cards, `look_ahead`
-        reads the press beside the lesion before that on it, `folder_of` says where an installed model lies,
-        `flat_field_ratio` which level of the flat field the models of ramps believe in.
-        """
+        """Take what this probe can answer: the settings' own mode is among it. `folder_of` says where an installed
+        model lies."""
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
-        self.modes, self.calibration = modes, calibration
+        self.modes, self._worth, self.calibration = answers.modes, answers.worth, calibration
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
         self._show_what_was_kept()
         self._encoded = EncodedFrames()
         self._answers = PressAnswers(
-            config,
-            calibration,
-            estimator,
-            adviser,
-            store,
-            self.progress,
-            simulated_truth,
-            self._encoded.png_of,
-            look_ahead,
+            config, calibration, answers, store, self.progress, simulated_truth, self._encoded.png_of
         )
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
@@ -123,7 +98,7 @@ class Procedure:
         self._requests = PressRequests(
             self.board,
             store,
-            modes=modes,
+            modes=answers.modes,
             mode=config.press.mode,
             cancelled=self._capture.cancelled,
             finished=self._capture.finished,
@@ -132,11 +107,12 @@ class Procedure:
         )
         self._obeying_once = threading.Lock()
         self._book = PressBook(self.board, store, bench.budget)
-        self._worth, self._answer_times = worth, AnswerTimes(config.data / "answer_times.json")
+        self._answer_times = AnswerTimes(config.data / "answer_times.json")
         self._written_s, self._used_s = -math.inf, time.monotonic()
         self.progress.exercise("storage", self._prove_store)
         stopping = self._capture.stopping
-        test = SelfTestRun(config, bench, store, self._clock, self.board, stopping, folder_of, flat_field_ratio)
+        believed = answers.flat_field_ratio
+        test = SelfTestRun(config, bench, store, self._clock, self.board, stopping, folder_of, believed)
         self._self_tests = SelfTestRequests(self.board, test, self._clock.now, self._capture.called_away)
         self._thread = threading.Thread(target=self._run, name="procedure", daemon=True)
         self._darkening = threading.Thread(target=self._darken_at_stop, name="darkening", daemon=True)

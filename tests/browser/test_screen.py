@@ -23,10 +23,10 @@ from small_release import tar
 from stand_in_adviser import no_advice
 
 from device.assembly import probe as assembly
-from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
 from device.config import CameraSection, simulated_config
 from device.errors import StorageError
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import NO_NUMBERS, Estimate, Origin, Quantity, without_numbers
 from device.measurement.mode import MODES, Mode, ModeWorth
@@ -146,7 +146,7 @@ def same_answer_in_every_mode(monkeypatch: pytest.MonkeyPatch) -> None:
             ("precise", 0.9, 3.1, 2.4),
         )
     }
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, no_advice, worth=worth))
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, no_advice, worth=worth))
 
 
 @pytest.fixture
@@ -174,7 +174,7 @@ def narrowing_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     def estimate(recording: Recording, mode: Mode) -> Estimate:
         return advise(recording).estimate
 
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, advise, worth=worth))
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, advise, worth=worth))
 
 
 @pytest.fixture
@@ -186,7 +186,7 @@ def no_numbers_in_any_mode(request: pytest.FixtureRequest, monkeypatch: pytest.M
         reason = " ".join([*(REASONS | {"misfit_ratio": of_misfit}).values(), action])
         return without_numbers("outside_range", reason, Origin(mode, "stand-in", "00", "c", True))
 
-    monkeypatch.setattr(assembly, "answers_for", lambda *parts: Answers(MODES, estimate, no_advice))
+    monkeypatch.setattr(assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, estimate, no_advice))
 
 
 def _require_fits(page: Page) -> None:

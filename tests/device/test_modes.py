@@ -22,13 +22,13 @@ from simulated_time_probe import simulate_time
 from stand_in_adviser import narrowing
 
 from device.assembly import probe as assembly
-from device.assembly.answers import Answers
 from device.assembly.probe import open_simulated_probe
 from device.config import CameraSection, PressSection, simulated_config
 from device.errors import CameraError
 from device.files.recording_file import read_recording
 from device.instrument.press.cost import ModeOffer
 from device.instrument.press.frame_choice import ramp_targets_n
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.procedure import Procedure
 from device.measurement.estimate import UNKNOWN_QUANTITY, Estimate
@@ -119,7 +119,7 @@ class Device:
 def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     witness, clock = Witness(), simulate_time(monkeypatch)
     monkeypatch.setattr(
-        assembly, "answers_for", lambda *parts: Answers(MODES, witness.estimate, witness.advise, worth=WORTH)
+        assembly, "answers_for", lambda *parts: ProbeAnswers(MODES, witness.estimate, witness.advise, worth=WORTH)
     )
     config = replace(simulated_config(), data=tmp_path, camera=CameraSection(frame_rate_hz=60.0), press=PRESS)
 

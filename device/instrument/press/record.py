@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from device.errors import DeviceError
 from device.files.recording_file import FrameEncoder, png_of
 from device.instrument.acquisition.light_budget import LightBudget
 from device.instrument.press.picture import tactile_png
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.scan import ScanTaken
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.calibration_watch import CalibrationWatch
@@ -32,16 +33,8 @@ from device.measurement.scan_advice import ScanAdvice
 from device.records.store import ENDED, Store
 
 log = logging.getLogger(__name__)
-Estimator = Callable[[Recording, Mode], Estimate]
-Adviser = Callable[[Recording], ScanAdvice]
-LookAhead = Callable[[Recording], None]
-"""What reads dark and reference frames of a ramp before there is one on the lesion, so that its answer comes sooner."""
 SAVE_LIGHT_EVERY_S = 10.0
 """So much light may be missing from the hours counter after a power cut, and that of the press under way."""
-
-
-def look_at_nothing(recording: Recording) -> None:
-    """Stand for models that have nothing to look at before the press on the lesion."""
 
 
 class PressBook:
@@ -106,18 +99,15 @@ class PressAnswers:
         self,
         config: Config,
         calibration: CalibrationWatch,
-        estimator: Estimator,
-        adviser: Adviser,
+        answers: ProbeAnswers,
         store: Store,
         progress: ProgressBoard,
         truth: Inclusion | None,
         encode: FrameEncoder = png_of,
-        look_ahead: LookAhead = look_at_nothing,
     ) -> None:
         """Take the inclusion that a simulated probe presses on as `truth`; `encode` may know PNGs of the frames."""
-        self._look_ahead = look_ahead
         self._config, self._calibration, self._truth = config, calibration, truth
-        self._estimator, self._adviser = estimator, adviser
+        self._answers = answers
         self._store, self._progress, self._encode = store, progress, encode
 
     @property
@@ -128,11 +118,11 @@ class PressAnswers:
     def look_ahead(self, beside: Sequence[Frame], mode: Mode, started_at: str) -> None:
         """Read the frames of the press beside the lesion, while the hand goes on to it."""
         if FRAMES[mode].is_ramp:
-            self._look_ahead(self._recording(beside, started_at))
+            self._answers.look_ahead(self._recording(beside, started_at))
 
     def advise(self, frames: Sequence[Frame], started_at: str) -> ScanAdvice:
         """Return what the frames of a scan tell so far; raises as `answer` does."""
-        return self._adviser(self._recording(frames, started_at))
+        return self._answers.adviser(self._recording(frames, started_at))
 
     def answer(
         self,
@@ -147,7 +137,7 @@ class PressAnswers:
         Raises `InvalidQuantity` when an estimate cannot be made of them.
         """
         recording = self._recording(frames, started_at)
-        estimate = scan.advice.estimate if scan else self._estimator(recording, job.mode)
+        estimate = scan.advice.estimate if scan else self._answers.estimator(recording, job.mode)
         record = measurement_record(recording, estimate, job.mode, warnings)
         asked = {"until": job.until, "within_s": job.within_s, "reached": scan.reached if scan else None}
         return PressAnswer(recording, record | asked, job.exam_id)

@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stand_in_adviser import no_advice
 
-from device.assembly.answers import Answers, answers_for
+from device.assembly.answers import answers_for
 from device.assembly.opened_parts import StartFailed
 from device.assembly.probe import open_simulated_probe
 from device.config import PressSection, simulated_config
-from device.errors import ConfigError, ModelError
+from device.errors import ModelError
 from device.files.bundle_file import read_models
-from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import MODES
 from device.measurement.paper_mode.estimate import estimate_paper
 from device.measurement.parameters import NOMINAL
@@ -48,14 +46,6 @@ def test_a_certificate_without_lines_answers_in_every_mode_but_the_papers(bundle
         answers.estimator(recording, "paper")
 
 
-def test_a_mode_without_a_model_is_no_default():
-    answers = Answers(("quick", "paper"), lambda recording, mode: None, no_advice)
-    answers.require("quick")
-    with pytest.raises(ConfigError, match=r"press\.mode is precise, but .* models for quick, paper only") as refusal:
-        answers.require("precise")
-    assert refusal.value.code == "E001"
-
-
 def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tmp_path):
     config = replace(simulated_config(), data=tmp_path, standard_model=tmp_path / "none")
     with pytest.raises(StartFailed, match=r"press\.mode is standard, but this probe has models for quick, paper only"):
@@ -70,23 +60,6 @@ def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle
     with pytest.raises(ModelError, match=r"golden\.estimate") as refusal:
         answers.prove()
     assert refusal.value.code == "E401"
-
-
-def test_every_run_of_a_watched_answer_is_progress_of_the_inference():
-    now_s, begun = [0.0], []
-    progress = ProgressBoard(lambda: now_s[0])
-    unwatched = Answers(("paper",), lambda recording, mode: mode, lambda recording: "advice")
-    answers = unwatched.watched(progress, lambda: begun.append(now_s[0]))
-    now_s[0] = 20.0
-    assert answers.adviser(None) == "advice"
-    assert "inference" not in progress.stall(15.0).parts
-    now_s[0] = 40.0
-    assert answers.estimator(None, "paper") == "paper"
-    assert "inference" not in progress.stall(15.0).parts
-    now_s[0] = 80.0
-    answers.prove()
-    assert "inference" not in progress.stall(15.0).parts
-    assert begun == [20.0, 40.0, 80.0]
 
 
 def test_a_scans_answer_is_that_of_its_recording_whatever_was_read_of_it_before(tables, bundle, calibration):

@@ -28,6 +28,7 @@ from device.errors import (
 from device.files.recording_file import read_recording
 from device.instrument import procedure as procedure_module
 from device.instrument.acquisition.light_budget import LightBudget
+from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.states import Guidance, PressState
 from device.instrument.procedure import Procedure
 from device.instrument.self_test.report import CheckResult
@@ -116,10 +117,8 @@ class Rig:
         self.procedure = Procedure(
             CONFIG,
             self.bench,
-            self.estimate,
+            ProbeAnswers(("paper", "quick", "standard"), self.estimate, no_advice),
             self.store,
-            adviser=no_advice,
-            modes=("paper", "quick", "standard"),
             calibration=CalibrationWatch(small_certificate(validity=AGELESS, untouched=DARK_FACE)),
             opened=opened,
             simulated_truth=Inclusion(10.0, 5.0, 80.0),

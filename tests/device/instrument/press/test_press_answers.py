@@ -14,7 +14,8 @@ from stand_in_adviser import advice, no_advice
 from device.config import CameraSection, Config
 from device.errors import DeviceError, DimLightError
 from device.files.recording_file import read_picture, read_recording
-from device.instrument.press.record import Adviser, Estimator, PressAnswers
+from device.instrument.press.probe_answers import Adviser, Estimator, ProbeAnswers
+from device.instrument.press.record import PressAnswers
 from device.instrument.press.scan import ScanTaken
 from device.instrument.status import PressJob
 from device.instrument.watch.calibration_watch import CalibrationWatch
@@ -37,7 +38,8 @@ def answers(
     store: Store, estimator: Estimator, truth: Inclusion | None = None, adviser: Adviser = no_advice
 ) -> PressAnswers:
     watch = CalibrationWatch(small_certificate())
-    return PressAnswers(CONFIG, watch, estimator, adviser, store, ProgressBoard(), truth)
+    answers = ProbeAnswers(("quick",), estimator, adviser)
+    return PressAnswers(CONFIG, watch, answers, store, ProgressBoard(), truth)
 
 
 def kept_by(probe: PressAnswers, *warnings: DeviceError) -> dict[str, Any]:
