@@ -68,7 +68,7 @@ def _wide_table() -> Iterator[Figure]:
 
 def _ramp() -> None:
     presses = [Press(force_n=force) for force in FORCES_N]
-    solve_ramp(SCENE, presses, model_plan(SCENE.with_press(presses[-1]), tolerance=0.01, strain="finite"))
+    solve_ramp(SCENE, presses, model_plan(SCENE.with_press(presses[-1]), strain="finite"))
 
 
 def _started_s(*words: str) -> float:

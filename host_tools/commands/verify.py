@@ -11,7 +11,7 @@ import typer
 
 from device.measurement.quantities import InvalidQuantity
 from host_tools.commands.measured_chapters import measure_chapters, print_chapter, shown
-from host_tools.commands.output import Scheduler, note, require_writable, source_tree
+from host_tools.commands.output import Scheduler, note, require_writable
 from host_tools.workers import workers
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ def verify(
             "Empty it when what solves a scene changes; what states errors may."
         ),
     ] = None,
-    tables: Annotated[bool, typer.Option(help="First measure the tables that plans choose levels by anew.")] = False,
     scheduler: Scheduler = None,
 ) -> None:
     """Check the forward model against answers known on paper; exit code 1 when one misses its bound.
@@ -49,8 +48,6 @@ def verify(
         raise InvalidQuantity(f"--{next(iter(drawn))}", drawn, "given with --tolerances", "ask for that chapter")
     chapters = _chapters(only or [], extra, short=short, drawn=drawn)
     with workers(scheduler):
-        if tables:
-            _measure_tables()
         measured = measure_chapters(chapters)
     failed = sum(print_chapter(timed) for timed in measured.values())
     if out:
@@ -89,11 +86,3 @@ def _order() -> list[str]:
     from host_tools.verification.chapters import CHAPTERS, EXTRA_CHAPTERS
 
     return [*CHAPTERS, *EXTRA_CHAPTERS]
-
-
-def _measure_tables() -> None:
-    from host_tools.verification.level_tables import measure_tables
-
-    tables = source_tree("measure the tables of plans") / "host_tools" / "forward" / "accuracy_table.json"
-    measure_tables(tables, on_step=lambda what: note.print(f"measuring {what}"))
-    note.print(f"{tables} written.")

@@ -1,6 +1,6 @@
 """The forward model: a scene in, the deformed sensing surface, contact pressure and force out.
 
-Modules in reading order: `ladder`, `model_departures`, `solve`, `plan`, `accuracy`, `tiers`, `press_model`,
+Modules in reading order: `ladder`, `model_departures`, `solve`, `plan`, `tiers`, `press_model`,
 `materials`, `symmetry`, `sampling`, `face_state`, `deformation`, `solution`, `soundness`, `solution_dataset`,
 `solution_html`, `face_points`, `plots`.
 

@@ -17,11 +17,18 @@ from math import inf, isfinite
 from typing import Any, Literal, get_args
 
 from device.measurement.quantities import Bound, InvalidQuantity, require
-from host_tools.forward.accuracy import Level
 from host_tools.forward.error_estimates.foretold_error import foretold_error
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE, numbers
 from host_tools.forward.model_departures import largest_departure, small_strain_press, strain_departure
-from host_tools.forward.plan import FINITE_IS_LIMITED, GRADED, ModelPlan, StrainModel, has_finite_strain, model_plan
+from host_tools.forward.plan import (
+    FINITE_IS_LIMITED,
+    GRADED,
+    Level,
+    ModelPlan,
+    StrainModel,
+    has_finite_strain,
+    model_plan,
+)
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramp
@@ -289,8 +296,6 @@ class _Rung:
             order=level.order,
             mesh="remeshed",
             reasons=reasons,
-            predicted_error={},
-            predicted_seconds=None,
         )
 
     def _foretold(self, plan: ModelPlan) -> tuple[Solution, ...]:

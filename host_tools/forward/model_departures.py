@@ -15,11 +15,10 @@ from dataclasses import fields, replace
 from functools import lru_cache
 from math import inf, pi, sqrt
 
-from host_tools.forward.accuracy import Level
 from host_tools.forward.deformation import Deformation
 from host_tools.forward.error_estimates.stated_error import CANCELLING_UNDER_FORCE, numbers
 from host_tools.forward.materials import LOCKING_POISSON_RATIO
-from host_tools.forward.plan import GRADED, ModelPlan, StrainModel, model_plan
+from host_tools.forward.plan import GRADED, Level, ModelPlan, StrainModel, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve

@@ -1,17 +1,16 @@
-"""A scene and a tolerance to the cheapest model that holds it, each choice with its reason.
+"""A scene to the model that it requires, each choice with its reason.
 
 Symmetry, contact and formulation follow from the scene alone. Strain is told, or chosen by what small strain departs by
-(`ladder.py`). Order and grading follow from measured tables (`accuracy.py`), not from taste.
+(`ladder.py`, where a tolerance takes the level, too). Data sets stay at the level that stands here.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
 from math import atan2
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from device.measurement.quantities import InvalidQuantity
-from host_tools.forward.accuracy import Level, cheapest_level
 from host_tools.forward.materials import LOCKING_POISSON_RATIO, baseline, with_inclusion
 from host_tools.forward.meshes.mesh import PER_CONTACT, Resolution, touching_radius_mm
 from host_tools.forward.meshes.morph import reaches
@@ -21,6 +20,14 @@ from host_tools.scenes.scene import Scene
 
 StrainModel = Literal["small", "finite"]
 Contact = Literal["closed_sliding", "unilateral", "true_sliding"]
+
+
+class Level(NamedTuple):
+    """Element order and the name of the element sizes it goes with."""
+
+    grading: str
+    order: int
+
 
 DEFAULT_TOLERANCE = 0.005
 STANDARD = Level("standard", 3)
@@ -48,8 +55,6 @@ class ModelPlan:
     grading: str
     order: int
     reasons: dict[str, str] = field(default_factory=dict)
-    predicted_error: dict[str, float] = field(default_factory=dict)
-    predicted_seconds: float | None = None
 
     @property
     def level(self) -> str:
@@ -61,16 +66,8 @@ class ModelPlan:
         return asdict(self)
 
 
-def model_plan(
-    scene: Scene,
-    *,
-    tolerance: float | None = None,
-    strain: StrainModel = "small",
-    because: str = "asked for",
-) -> ModelPlan:
-    """Return the plan for a relative tolerance on O1-O3; without one, at the level that all data sets share.
-
-    `because` is why the strain measure was chosen (`ladder.py`).
+def model_plan(scene: Scene, *, strain: StrainModel = "small", because: str = "asked for") -> ModelPlan:
+    """Return the plan at the level that all data sets share; `because` is why the strain measure was chosen.
 
     Raise `InvalidQuantity` when no model of ours serves the scene (finite strain off the axis or under a dome).
     """
@@ -81,8 +78,9 @@ def model_plan(
     contact = _contact(scene, strain, reasons)
     formulation = _formulation(scene, strain, reasons)
     mesh = _mesh(scene, symmetry, reasons)
-    level, error, seconds = _level(scene, symmetry, strain, tolerance, reasons)
-    return ModelPlan(symmetry, strain, contact, formulation, mesh, level.grading, level.order, reasons, error, seconds)
+    level = BLUNT if strain == "finite" else STANDARD
+    reasons["level"] = "the level that all data sets share, so that features are smooth"
+    return ModelPlan(symmetry, strain, contact, formulation, mesh, level.grading, level.order, reasons)
 
 
 def _symmetry(scene: Scene, reasons: dict[str, str]) -> FaceSector:
@@ -176,12 +174,3 @@ def _mesh(scene: Scene, symmetry: FaceSector, reasons: dict[str, str]) -> Litera
         return "morphed"
     reasons["mesh"] = "outside what the fixed topology reaches: meshed anew (features jump by up to 1e-3)"
     return "remeshed"
-
-
-def _level(
-    scene: Scene, symmetry: FaceSector, strain: StrainModel, tolerance: float | None, reasons: dict[str, str]
-) -> tuple[Level, dict[str, float], float | None]:
-    pinned = BLUNT if strain == "finite" else STANDARD
-    found = cheapest_level(scene, symmetry, strain, tolerance, pinned)
-    reasons["level"] = found.reason
-    return found.level, found.predicted_error, found.seconds

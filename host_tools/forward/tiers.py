@@ -11,7 +11,7 @@ from host_tools.forward.face_state import Rays
 from host_tools.forward.materials import baseline
 from host_tools.forward.meshes.mesh import Resolution, axisymmetric_mesh
 from host_tools.forward.meshes.morph import morphed_mesh
-from host_tools.forward.meshes.solid_mesh import COARSE, FINE, LAYERED, SolidResolution, solid_mesh
+from host_tools.forward.meshes.solid_mesh import COARSE, LAYERED, SolidResolution, solid_mesh
 from host_tools.forward.plan import GRADED, ModelPlan
 from host_tools.forward.press_model import PressFailed, PressModel
 from host_tools.forward.sampling import FaceSampler
@@ -28,7 +28,6 @@ from host_tools.scenes.scene import Placement, Scene
 AXISYMMETRIC_SIZES = {
     "coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=10.0),
     "standard": Resolution(),
-    "fine": Resolution(bulk_mm=2.0),
     GRADED: Resolution(bulk_mm=4.0, contact_rim_mm=0.1, back_rim_mm=0.1, per_inclusion=8.0, grading=0.5, rim_layers=5),
     "sliding_coarse": Resolution(bulk_mm=4.0, contact_rim_mm=0.5, back_rim_mm=0.02, per_inclusion=10.0, grading=0.5),
     "sliding": Resolution(bulk_mm=4.0, contact_rim_mm=0.2, back_rim_mm=0.02, per_inclusion=10.0, grading=0.5),
@@ -40,9 +39,9 @@ AXISYMMETRIC_SIZES = {
     "blunt_fine": Resolution(bulk_mm=2.0, face_mm=0.5, contact_rim_mm=0.3, back_rim_mm=0.3, grading=0.4),
 }
 """Element sizes by the name of the level. Those of finite strain keep the contact's rim coarser than its slip: "blunt"
-ones, of data sets and tables, both rims, "sliding" ones of a climb only that, since the bonded rim does not slip."""
+ones, of data sets, both rims, "sliding" ones of a climb only that, since the bonded rim does not slip."""
 
-SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), "fine": FINE, GRADED: LAYERED}
+SOLID_SIZES = {"coarse": COARSE, "standard": SolidResolution(), GRADED: LAYERED}
 SOLID_ANGLES = 48
 """Rays over the face of a 3-D scene: 7.5 degrees apart, a multiple of eight to meet a square's corners."""
 

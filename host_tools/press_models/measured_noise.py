@@ -24,7 +24,7 @@ from device.measurement.ramp_modes.surrogate import OFFSET, PressRows
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.forward.accuracy import Level
+from host_tools.forward.plan import Level
 from host_tools.forward.press_model import PressFailed
 from host_tools.press_models.fit_surrogate import missed_rows
 from host_tools.press_models.press_samples import PressSamples, draw_beside, draw_parameters, profile_rows

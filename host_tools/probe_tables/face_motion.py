@@ -16,8 +16,8 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.face_motion import FaceMotion
 from device.simulation.physics.inclusion_axes import InclusionAxes
 from device.simulation.physics.slab import NOMINAL, Slab
-from host_tools.forward.accuracy import Level
 from host_tools.forward.face_state import FaceState
+from host_tools.forward.plan import Level
 from host_tools.forward.solution import Solution
 from host_tools.probe_tables.changes_in_slabs import PLACES, SLABS_SOLVED, build_changes_in_slabs
 from host_tools.probe_tables.force_ramps import BASELINE, CHANGES, EVERY, FORCES_N, ramp, ramps_of, scene_in

@@ -18,8 +18,7 @@ from device.measurement.quantities import Inclusion
 from device.simulation.physics.chebyshev import points_inside
 from device.simulation.physics.slab import Slab
 from device.simulation.physics.surface_table import PressRamps, Ramp
-from host_tools.forward.accuracy import Level
-from host_tools.forward.plan import model_plan
+from host_tools.forward.plan import Level, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve_ramps

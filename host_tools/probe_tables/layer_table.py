@@ -32,7 +32,7 @@ from device.simulation.physics.layer_table import (
 )
 from device.simulation.physics.slab import NOMINAL, Slab
 from device.simulation.physics.slab_changes import SlabChanges
-from host_tools.forward.accuracy import Level
+from host_tools.forward.plan import Level
 from host_tools.probe_tables.changes_in_slabs import PLACES, SLABS_SOLVED, build_changes_in_slabs
 from host_tools.probe_tables.force_ramps import CHANGES, FORCES_N, bare_per_n, first_that_can, inclusions_per_n_mm3
 from host_tools.probe_tables.slab_changes import (

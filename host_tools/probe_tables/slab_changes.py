@@ -36,7 +36,7 @@ from device.simulation.physics.slab_changes import (
     field_shapes,
     resampling,
 )
-from host_tools.forward.accuracy import Level
+from host_tools.forward.plan import Level
 from host_tools.probe_tables.force_ramps import (
     CHANGES,
     SceneOf,

@@ -16,11 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from device.measurement.quantities import Inclusion
-from host_tools.forward.accuracy import Level
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.face_state import FaceState, Rays
 from host_tools.forward.ladder import FINITE_RUNGS, climb, solved_at
-from host_tools.forward.plan import BLUNT, DEFAULT_TOLERANCE, GRADED, STANDARD, StrainModel, model_plan
+from host_tools.forward.plan import BLUNT, DEFAULT_TOLERANCE, GRADED, STANDARD, Level, StrainModel, model_plan
 from host_tools.forward.solution import Solution
 from host_tools.forward.solve import solve
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
@@ -36,7 +35,7 @@ from host_tools.verification.cross_check.calculix import (
 )
 from host_tools.verification.cross_check.calculix_deck import Process
 from host_tools.verification.cross_check.section import Sizes
-from host_tools.verification.level_tables import FEATURES
+from host_tools.verification.effectivity import FEATURES
 from host_tools.verification.truths import true_numbers
 
 MODULUS_KPA = 80.0

@@ -2,7 +2,7 @@
 
 Modules in reading order: `elastic`, `patch`, `rates`, `hertz`, `hayes`, `eshelby`, `incompressible`, `balance`,
 `symmetries`, `smoothness`, `scene_rates`, `mechanics`, `extremes`, `truths`, `tolerances`, `effectivity`,
-`level_tables`, `chapters`.
+`chapters`.
 
 Rooms: `light` (the same for the optics), `cross_check` (other programs solve the same).
 Measured here, bounded in tests/physics.

@@ -16,10 +16,9 @@ import numpy as np
 from joblib import Memory, Parallel, delayed
 
 from device.measurement.quantities import Inclusion
-from host_tools.forward.accuracy import Level
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.ladder import FINITE_RUNGS, climb, held
-from host_tools.forward.plan import GRADED
+from host_tools.forward.plan import GRADED, Level
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solution import Solution
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least

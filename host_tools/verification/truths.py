@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from host_tools.forward.accuracy import Level
 from host_tools.forward.error_estimates.stated_error import numbers
 from host_tools.forward.ladder import lightened
-from host_tools.forward.plan import GRADED, StrainModel, model_plan
+from host_tools.forward.plan import GRADED, Level, StrainModel, model_plan
 from host_tools.forward.press_model import PressFailed
 from host_tools.forward.solve import solve
 from host_tools.scenes.scene import Scene

@@ -62,18 +62,6 @@ class SolidResolution:
 
 
 COARSE = SolidResolution(bulk_mm=15.0, face_mm=3.0, contact_rim_mm=2.0, back_rim_mm=3.0, per_inclusion=6.0, grading=0.6)
-FINE = SolidResolution(
-    bulk_mm=8.0,
-    face_mm=1.5,
-    contact_rim_mm=1.0,
-    back_rim_mm=1.5,
-    per_inclusion=10.0,
-    grading=0.4,
-    rim_layers=2,
-    rim_ratio=0.15,
-)
-
-
 LAYERED = SolidResolution(
     bulk_mm=20.0,
     face_mm=4.0,

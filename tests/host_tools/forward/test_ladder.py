@@ -7,9 +7,9 @@ import pytest
 
 from device.measurement.quantities import Inclusion
 from host_tools.forward import ladder as module
-from host_tools.forward.accuracy import Level
 from host_tools.forward.finite_strain.equilibrium_path import ErrorUnknown, PathEnded
 from host_tools.forward.ladder import ToleranceMissed, climb, held
+from host_tools.forward.plan import Level
 from host_tools.forward.press_model import PressFailed
 from host_tools.scenes.scene import Placement, Press, Scene, Tissue
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from host_tools.forward.accuracy import Level
 from host_tools.forward.ladder import DOMED_ORDERS, FINITE_RUNGS, FLAT_ORDERS, SOLID_ORDERS, WIDEST_RIM
+from host_tools.forward.plan import Level
 from host_tools.verification.effectivity import (
     KINDS,
     ErrorStatement,
