@@ -611,6 +611,14 @@ class StaleVersion(DeviceError):  # noqa: N818 - the name is what the caller rea
     status = 412
 
 
+class NotSetUp(DeviceError):  # noqa: N818 - the name is what the caller reads
+    """The request is right, but this probe is not set up for it: no archive, no worklist, no release to go back to."""
+
+    code = "E812"
+    title = "Not set up"
+    status = 409
+
+
 class TokenNeeded(DeviceError):  # noqa: N818 - the name is what the caller reads
     """Whoever asks from another machine needs a token, and sent none that holds."""
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from device.config import DicomSection
 from device.dicom.sender import Sender
 from device.dicom.subject import OrderedStudy, require_writable
-from device.errors import DeviceError, InvalidRequest, UnknownResource
+from device.errors import DeviceError, NotSetUp, UnknownResource
 from device.records.asked_once import AskedOnce
 from device.records.exams import exam_content
 from device.records.store import Store, StoredRecord
@@ -68,10 +68,10 @@ class Hospital:
     def send(self, exam_id: str, *, version: int, by: str) -> list[StoredRecord]:
         """Queue an exam as it was seen in a version; return its objects. Raises as `Outgoing.queue`.
 
-        Raises `InvalidRequest` when no archive is set.
+        Raises `NotSetUp` when no archive is set.
         """
         if not self._sender:
-            raise InvalidRequest("No archive is set.", "Set dicom.archive_host, its port and its title.")
+            raise NotSetUp("No archive is set.", "Set dicom.archive_host, its port and its title.")
         self._outgoing.queue(exam_id, version=version, by=by)
         self._sender.wake()
         return self.objects_of(exam_id)
@@ -84,10 +84,10 @@ class Hospital:
     def scheduled(self, day: date | None, patient_ref: str | None, order_number: str | None) -> list[dict[str, Any]]:
         """Return what the worklist has, of a day, a patient or an order; raises as `scheduled_steps`.
 
-        Raises `InvalidRequest` when no worklist is set.
+        Raises `NotSetUp` when no worklist is set.
         """
         if self._settings.worklist_host is None:
-            raise InvalidRequest("No worklist is set.", "Set dicom.worklist_host, its port and its title.")
+            raise NotSetUp("No worklist is set.", "Set dicom.worklist_host, its port and its title.")
         from device.dicom.association import worklist_of
         from device.dicom.worklist import WorklistQuery, scheduled_steps
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from device import __version__
-from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
+from device.errors import BodyTooLarge, BusyError, DiskFullError, NotSetUp, RolledBack, StorageError
 from device.files.handed_over import PART, HandedOverFile, is_held
 
 log = logging.getLogger(__name__)
@@ -135,10 +135,10 @@ class Updates:
         return RolledBack(_failure(last), f"{_way_back(record)} Measure as before.")
 
     def require_free(self) -> None:
-        """Raise `BusyError` while an update is under way, `InvalidRequest` where there is no updater."""
+        """Raise `BusyError` while an update is under way, `NotSetUp` where there is no updater."""
         record = self.now()
         if not self._incoming.is_dir():
-            raise _refused("This software is not installed as a release.", "Update it as it was installed.", 409)
+            raise NotSetUp("This software is not installed as a release.", "Update it as it was installed.")
         if record.is_under_way:
             raise BusyError(f"An update is under way: {record.step or record.state}.", "Wait until it has ended.")
 
@@ -150,7 +150,7 @@ class Updates:
     def receive(self, announced_bytes: int | None) -> IncomingRelease:
         """Begin to take a release file of so many bytes, if that is known.
 
-        Raises `InvalidRequest` for one that is too large, `DiskFullError` when there is no space for it,
+        Raises `BodyTooLarge` for one that is too large, `DiskFullError` when there is no space for it,
         `StorageError` when the folder cannot be written, and as `require_free`.
         """
         self.require_free()
@@ -168,10 +168,10 @@ class Updates:
         return self._taking
 
     def ask_to_roll_back(self) -> None:
-        """Ask the updater for the release before; raise as `require_free`, `InvalidRequest` when there is none."""
+        """Ask the updater for the release before; raise as `require_free`, `NotSetUp` when there is none."""
         self.require_free()
         if not self.now().can_roll_back:
-            raise _refused("There is no release before this one on the probe.", "Install another one.", 409)
+            raise NotSetUp("There is no release before this one on the probe.", "Install another one.")
         _on_disk(lambda: IncomingRelease(self._incoming).hand_over(WAY_BACK))
 
 
@@ -193,7 +193,7 @@ class IncomingRelease:
         return self._file.is_open
 
     def write(self, part: bytes) -> None:
-        """Append; raise `InvalidRequest` when it grows too large, `StorageError` when the disk refuses it.
+        """Append; raise `BodyTooLarge` when it grows too large, `StorageError` when the disk refuses it.
 
         Synchronised every few megabytes: what is written at the end of a press must not wait behind all of it.
         """
@@ -221,16 +221,10 @@ class IncomingRelease:
 
 
 def require_size(size_bytes: int) -> None:
-    """Raise `InvalidRequest` for a release file that is larger than any can be."""
+    """Raise `BodyTooLarge` for a release file that is larger than any can be."""
     if size_bytes > LARGEST_BYTES:
         cause = f"The file has {size_bytes} bytes, but a release file has at most {LARGEST_BYTES}."
-        raise _refused(cause, "Send the file that `make bundle` built.", 413)
-
-
-def _refused(cause: str, remedy: str, status: int) -> InvalidRequest:
-    refusal = InvalidRequest(cause, remedy)
-    refusal.status = status
-    return refusal
+        raise BodyTooLarge(cause, "Send the file that `make bundle` built.")
 
 
 def _on_disk(action: Callable[[], Result]) -> Result:

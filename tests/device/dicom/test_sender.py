@@ -15,7 +15,7 @@ from orthanc import OWN_TITLE, TITLE, Orthanc, needs_orthanc
 from written_exam import begin, measure
 
 from device.dicom.hospital import Hospital
-from device.errors import InvalidRequest
+from device.errors import NotSetUp
 from device.files.recording_file import read_picture
 from device.records.store import Store
 from device.sending import persistent_sender
@@ -170,7 +170,7 @@ def test_nothing_is_sent_where_no_archive_is_set(store, archive):
     exam = begin(store)
     measure(store, exam)
     hospital = Hospital(archive.settings(archive_host=None), store, read_picture)
-    with pytest.raises(InvalidRequest, match="No archive is set"):
+    with pytest.raises(NotSetUp, match="No archive is set"):
         hospital.send(exam["id"], version=1, by="Ada")
     assert store.outbox.counts() == {}
 

@@ -14,7 +14,7 @@ from written_exam import measure, needs_dciodvfy, verdict
 from device.dicom.hospital import Hospital
 from device.dicom.subject import require_writable
 from device.dicom.worklist import _step
-from device.errors import ArchiveUnreachable, InvalidRequest, ReusedKey, UnknownResource
+from device.errors import ArchiveUnreachable, InvalidRequest, NotSetUp, ReusedKey, UnknownResource
 from device.files.recording_file import read_picture
 from device.records.asked_once import AskedOnce
 from device.records.store import Store
@@ -181,7 +181,7 @@ def test_a_worklist_that_is_not_there_or_refuses_is_told_as_such(archive, store)
         asked(worklist_port=free_port())
     with pytest.raises(ArchiveUnreachable, match="rejects STRANGER"):
         asked(own_title="STRANGER")
-    with pytest.raises(InvalidRequest, match="No worklist is set"):
+    with pytest.raises(NotSetUp, match="No worklist is set"):
         asked(worklist_host=None)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from device.errors import BusyError, DiskFullError, InvalidRequest, RolledBack, StorageError
+from device.errors import BodyTooLarge, BusyError, DiskFullError, NotSetUp, RolledBack, StorageError
 from device.records import updates as module
 from device.records.updates import RELEASES, IncomingRelease, Updates, release_of
 from device.update.incoming import clear_incoming, take_uploaded
@@ -170,9 +170,9 @@ def test_nothing_is_taken_while_an_update_is_under_way(folder, state):
 
 def test_a_file_that_cannot_be_one_is_refused_before_anything_is_written(folder, monkeypatch):
     updates = told(folder)
-    with pytest.raises(InvalidRequest, match="at most") as refused:
+    with pytest.raises(BodyTooLarge, match="at most") as refused:
         updates.receive(module.LARGEST_BYTES + 1)
-    assert refused.value.status == 413
+    assert (refused.value.code, refused.value.status) == ("E809", 413)
     monkeypatch.setattr(module, "SPARE_BYTES", 10**18)
     with pytest.raises(DiskFullError, match="does not fit"):
         updates.receive(10)
@@ -183,7 +183,7 @@ def test_one_that_grows_too_large_is_refused(folder, monkeypatch):
     monkeypatch.setattr(module, "LARGEST_BYTES", 5)
     incoming = told(folder).receive(None)
     incoming.write(b"12345")
-    with pytest.raises(InvalidRequest, match="at most 5"):
+    with pytest.raises(BodyTooLarge, match="at most 5"):
         incoming.write(b"6")
     incoming.discard()
 
@@ -208,15 +208,15 @@ def test_the_way_back_is_a_file_too_and_only_where_there_is_one(folder):
     with pytest.raises(BusyError):
         told(folder).ask_to_roll_back()
     (folder / "incoming" / "roll_back").unlink()
-    with pytest.raises(InvalidRequest, match="no release before"):
+    with pytest.raises(NotSetUp, match="no release before"):
         told(folder, STATE | {"previous": None}).ask_to_roll_back()
     assert list((folder / "incoming").iterdir()) == []
 
 
 def test_without_an_updater_nothing_is_taken(tmp_path):
-    with pytest.raises(InvalidRequest, match="not installed as a release") as refused:
+    with pytest.raises(NotSetUp, match="not installed as a release") as refused:
         Updates(tmp_path / "none").receive(10)
-    assert refused.value.status == 409
+    assert (refused.value.code, refused.value.status) == ("E812", 409)
 
 
 def test_what_the_updater_writes_is_what_is_read(tmp_path):

@@ -65,7 +65,8 @@ def test_what_was_not_seen_or_not_said_is_refused_and_nothing_queued(ask, store,
 @pytest.mark.parametrize("ask", [None], indirect=True)
 def test_without_an_archive_an_exam_can_be_fetched_but_not_sent(ask, exam):
     answer = ask("POST", f"exams/{exam['id']}/dicom", {"by": "Ada"}, **{"if-match": '"1"'})
-    assert (answer.status_code, answer.json()["detail"]) == (422, "No archive is set.")
+    refusal = answer.json()
+    assert (answer.status_code, refusal["code"], refusal["detail"]) == (409, "E812", "No archive is set.")
     files = ask("GET", f"exams/{exam['id']}/dicom.zip")
     assert (files.headers["content-type"], files.content[:2]) == ("application/zip", b"PK")
 

@@ -184,4 +184,4 @@ def test_the_release_before_is_asked_for(ask, probe):
 def test_on_a_workstation_nothing_is_taken(ask, probe):
     probe.incoming.rmdir()
     answer = ask("POST", "/api/v1/updates", content=release(10), headers=OCTETS)
-    assert (answer.status_code, answer.json()["code"]) == (409, "E803")
+    assert (answer.status_code, answer.json()["code"]) == (409, "E812")
