@@ -16,7 +16,6 @@ from device.errors import DeviceError, NotSetUp, UnknownResource
 from device.records.asked_once import AskedOnce
 from device.records.exams import exam_content
 from device.records.store import Store, StoredRecord
-from device.sending.persistent_sender import SenderState
 
 if TYPE_CHECKING:
     from device.dicom.delivery import Delivery
@@ -43,21 +42,17 @@ class Hospital:
         Nothing is sent before `start`, nor while the probe is busy with a press.
         """
         self._settings, self._store, self._picture_of = settings, store, picture_of
-        self._sender: Sender | None = None
         self._shown: dict[str, OrderedStudy] = {}
-        if settings.archive_host is not None:
-            days = settings.demographics_days
-            self._sender = Sender(store.outbox, self._delivery, keep_patients_days=days, tell=tell, is_busy=is_busy)
+        days, deliver = settings.demographics_days, self._delivery if settings.archive_host is not None else None
+        self._sender = Sender(store.outbox, deliver, keep_patients_days=days, tell=tell, is_busy=is_busy)
 
     def start(self) -> None:
-        """Begin to send what waits, if there is an archive."""
-        if self._sender:
-            self._sender.start()
+        """Begin to send what waits, if there is an archive, and to erase names in any case."""
+        self._sender.start()
 
     def close(self) -> None:
         """End sending; what waits is sent after the next start."""
-        if self._sender:
-            self._sender.close()
+        self._sender.close()
 
     def files_of(self, exam_id: str) -> bytes:
         """Return an exam as DICOM files in one .zip; raises as `exam_zip`."""
@@ -70,7 +65,7 @@ class Hospital:
 
         Raises `NotSetUp` when no archive is set.
         """
-        if not self._sender:
+        if self._settings.archive_host is None:
             raise NotSetUp("No archive is set.", "Set dicom.archive_host, its port and its title.")
         self._outgoing.queue(exam_id, version=version, by=by)
         self._sender.wake()
@@ -120,7 +115,7 @@ class Hospital:
     def as_record(self) -> dict[str, Any]:
         """Return where archive and worklist are, how many objects are in which state, and what is wrong."""
         said, counts = self._settings, self._store.outbox.counts()
-        state = self._sender.state if self._sender else SenderState()
+        state = self._sender.state
         return {
             "own_title": said.own_title,
             "archive": _place(said.archive_host, said.archive_port, said.archive_title),

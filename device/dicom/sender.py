@@ -1,4 +1,4 @@
-"""The thread that brings the outbox to the archive, and erases who patients are when the archive has them."""
+"""The thread that brings the outbox to the archive, if there is one, and erases who patients are in time."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class Sender(PersistentSender):
     def __init__(
         self,
         outbox: Outbox,
-        deliver: Callable[[], Delivery],
+        deliver: Callable[[], Delivery] | None,
         *,
         keep_patients_days: int,
         tell: Callable[[DeviceError | None], None],
         is_busy: Callable[[], bool],
     ) -> None:
-        """Take the outbox, what makes the delivery when it is first needed, and whom to tell of a fault.
+        """Take the outbox, what makes the delivery when it is first needed, None without an archive, and whom to tell.
 
         While the probe `is_busy` nothing is sent: a press has it to itself.
         """
@@ -43,7 +43,11 @@ class Sender(PersistentSender):
 
     def _delivered(self) -> tuple[bool, DeviceError | None]:
         """Send and ask; only when there is anything to are DICOM's libraries loaded."""
-        self._outbox.erase_patients(sent_before=_ago(self._keep_patients), made_before=_ago(NEVER_SENT))
+        self._outbox.erase_patients(
+            sent_before=_ago(self._keep_patients), made_before=_ago(NEVER_SENT), has_archive=self._deliver is not None
+        )
+        if self._deliver is None:
+            return False, None
         is_left = False
         if not self._outbox.is_idle():
             self._delivery = self._delivery or self._deliver()

@@ -165,20 +165,21 @@ class Outbox:
             row = db.execute("SELECT record, patient FROM ordered_study WHERE exam_id = ?", (exam_id,)).fetchone()
         return (json.loads(row[0]), json.loads(row[1] or "{}")) if row else None
 
-    def erase_patients(self, *, sent_before: str, made_before: str) -> int:
+    def erase_patients(self, *, sent_before: str, made_before: str, has_archive: bool = True) -> int:
         """Erase who patients are, from the file as well; return of how many exams. Times are RFC 3339 UTC.
 
         Erased are those whose exam the archive has had since before the first time, or that was made before the other
-        one, unless any of it waits to be sent.
+        one, unless any of it waits to be sent: where there is no archive nothing does.
         """
         query = """
             SELECT exam_id FROM ordered_study WHERE patient IS NOT NULL
-            AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent'))
+            AND NOT (:waits AND exam_id IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent')))
             AND (exam_id IN (SELECT id FROM exam WHERE json_extract(record, '$.made_at') < :made)
               OR exam_id IN (SELECT exam_id FROM outbox WHERE state = 'confirmed')
               AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE json_extract(record, '$.confirmed_at') >= :sent))"""
         with self._transaction() as db:
-            erased = db.execute(query, {"made": made_before, "sent": sent_before}).fetchall()
+            of_query = {"made": made_before, "sent": sent_before, "waits": has_archive}
+            erased = db.execute(query, of_query).fetchall()
             for (exam_id,) in erased:
                 db.execute("UPDATE ordered_study SET patient = NULL WHERE exam_id = ?", (exam_id,))
                 append(db, "patient_erased", exam_id, reason=NOT_NEEDED, after={"patient": None})
