@@ -205,7 +205,7 @@ def _started(options: argparse.Namespace) -> Config:
 
 def _serve(options: argparse.Namespace) -> int:
     from device.commands.serve import refusal_noted, serve
-    from device.fallback.start_note import clear_note
+    from device.files.start_note import clear_note
 
     with refusal_noted(options.root):
         scenario = _scenario(options)

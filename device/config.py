@@ -321,7 +321,13 @@ class CellSection(Section):
 class PressSection(Section):
     """The press: mode unless asked otherwise, target force and its band, what is contact, steady, and too much."""
 
-    mode: Annotated[Mode, Doc("How a press is measured unless it is asked for in another mode.")] = "standard"
+    mode: Annotated[
+        Mode | None,
+        Doc(
+            "How a press is measured unless it is asked for in another mode; unless given standard, or on a probe "
+            "without a model of that quick or paper."
+        ),
+    ] = None
     target_n: Annotated[float, Bound(0.1, 20.0, "N"), Doc("Force of a hold.")] = 0.5
     band_ratio: Annotated[
         float, Bound(0.005, 0.2, ""), Doc("Frames of a hold are taken this near to the target, as a part of it.")
@@ -630,18 +636,14 @@ class Config(Section):
 RENAMED = {"model": "paper_model", "profile_model": "standard_model"}
 """Settings of earlier versions and what each is called now: a file that still has one is refused with the new name."""
 
-SIMULATED: dict[str, tuple[str, Mode]] = {
-    "SIM-0001": ("calibration.json", "standard"),
-    "SIM-LINEAR": ("calibration_linear.json", "paper"),
-}
-"""Certificate and mode of each simulated probe."""
+SIMULATED = {"SIM-0001": "calibration.json", "SIM-LINEAR": "calibration_linear.json"}
+"""Certificate of each simulated probe."""
 
 
 def simulated_config(serial: str = "SIM-0001") -> Config:
-    """Return the settings of a simulated probe: its certificate, mode and data folder. Each kind of light has a serial.
+    """Return the settings of a simulated probe: its certificate and data folder. Each kind of light has a serial.
 
     Only the paper's regressions can be had for the paper's light.
     """
-    certificate, mode = SIMULATED.get(serial, SIMULATED["SIM-0001"])
-    calibration = SIMULATED_PROBE / certificate
-    return Config(serial=serial, calibration=calibration, data=Path("var"), press=PressSection(mode=mode))
+    calibration = SIMULATED_PROBE / SIMULATED.get(serial, SIMULATED["SIM-0001"])
+    return Config(serial=serial, calibration=calibration, data=Path("var"))

@@ -2,7 +2,8 @@
 
 It answers as the release under `opt/tsis/current` tells it to (`tsis_fake.json`): `{"mute": true}` never answers,
 `{"dies_after": 2}` ends after so many answers, `{"falls_back_after": 2}` gives way to the page that stands in for it,
-`{"faults": {"camera": "E101"}}` is not ready, `{"says": "..."}` is of another release.
+`{"lacks": ["E101"]}` does not start and notes these codes, `{"faults": {"camera": "E101"}}` is not ready,
+`{"says": "..."}` is of another release.
 """
 
 import json
@@ -41,12 +42,22 @@ class Answers(BaseHTTPRequestHandler):
         pass
 
 
+def keep_note(name, codes):
+    said = {"title": "", "severity": "fault", "cause": "It is not there.", "remedy": "Plug it in."}
+    record = {"schema": "tsis.start/1", "pid": 1, "release": name, "faults": [{"code": code, **said} for code in codes]}
+    (ROOT / "run/tsis").mkdir(parents=True, exist_ok=True)
+    (ROOT / "run/tsis/start.json").write_text(json.dumps(record))
+
+
 def daemon():
     current = ROOT / "opt/tsis/current"
     name = Path(os.readlink(current)).name
     behaviour = json.loads(next(current.glob("lib/python3*/site-packages/tsis_fake.json")).read_text())
     if behaviour.get("mute"):
         time.sleep(600)
+    if codes := behaviour.get("lacks"):
+        keep_note(name, codes)
+        os._exit(1)
     faults = behaviour.get("faults", {})
     parts = {
         part: {"ready": part not in faults, "code": faults.get(part)}

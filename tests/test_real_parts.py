@@ -76,6 +76,19 @@ def test_a_real_probe_starts_measures_and_stops_dark(rig: Rig):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("rig", [{"is_new": True}], indirect=True, ids=[""])
+def test_a_new_one_starts_in_the_only_mode_that_it_has_and_asks_for_its_certificate(rig: Rig):
+    """As `make provision` leaves it: nobody has said in which mode it presses, and its trial finds every part ready."""
+    daemon = rig.start()
+    device = daemon.ask("/api/v1/device").json
+    assert (device["serial"], device["default_mode"]) == ("TSIS-0007", "paper")
+    wait_for(lambda: parts(rig), lambda told: all(part["ready"] for part in told.values()))
+    wait_for(lambda: codes(rig), lambda told: "E402" in told)
+    refusal = daemon.ask("/api/v1/presses", "POST", {})
+    assert (refusal.status, refusal.json["code"]) == (503, "E402")
+
+
+@pytest.mark.long
 def test_one_that_is_killed_while_lit_is_darkened_by_the_command_after_it_and_starts_again(rig: Rig):
     daemon = rig.start()
     rig.press_until_lit()

@@ -17,7 +17,7 @@ import pytest
 from daemon_process import ROOT
 
 from device.fallback.server import GIVEN_UP_S
-from device.fallback.start_note import NOTE
+from device.files.start_note import NOTE
 from device.instrument.watch.watchdog import WITHOUT_SYSTEMD_S
 from device.settings.catalogue import SETTINGS
 

@@ -326,5 +326,5 @@ def _procedure(probe: OpenedProbe) -> Procedure:
 
 def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
     answers = answers_for(config, bundle, calibration)
-    answers.require(config.press.mode)
+    answers.mode_unless_asked(config.press.mode)
     return answers

@@ -24,7 +24,7 @@ from device.access.known_hosts import ANYWHERE
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError, StorageError
 from device.fallback.handover import ask_for_port, is_fallback
-from device.fallback.start_note import write_note
+from device.files.start_note import write_note
 from device.instrument.watch.restart_note import RestartNote
 from device.measurement.quantities import InvalidQuantity
 from device.records.updates import Updates
@@ -177,7 +177,7 @@ def refusal_noted(root: Path) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        write_note(root, faults_of(error))
+        write_note(root, [fault.as_record() for fault in faults_of(error)])
         raise
 
 

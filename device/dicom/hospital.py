@@ -42,9 +42,8 @@ class Hospital:
         Nothing is sent before `start`, nor while the probe is busy with a press.
         """
         self._settings, self._store, self._picture_of = settings, store, picture_of
+        self._tell, self._is_busy = tell, is_busy
         self._shown: dict[str, OrderedStudy] = {}
-        days, deliver = settings.demographics_days, self._delivery if settings.archive_host is not None else None
-        self._sender = Sender(store.outbox, deliver, keep_patients_days=days, tell=tell, is_busy=is_busy)
 
     def start(self) -> None:
         """Begin to send what waits, if there is an archive, and to erase names in any case."""
@@ -124,6 +123,14 @@ class Hospital:
             "fault": state.fault.as_record() if state.fault else None,
             "next_try_at": state.next_try_at,
         }
+
+    @cached_property
+    def _sender(self) -> Sender:
+        days, deliver = (
+            self._settings.demographics_days,
+            self._delivery if self._settings.archive_host is not None else None,
+        )
+        return Sender(self._store.outbox, deliver, keep_patients_days=days, tell=self._tell, is_busy=self._is_busy)
 
     @cached_property
     def _writer(self) -> DicomWriter:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from device.errors import DeviceError
-from device.fallback.start_note import StartNote, linked_release, read_note
+from device.files.start_note import StartNote, linked_release, read_note
 
 UNIT = "tsis.service"
 NOTES = "var/lib/tsis-update"

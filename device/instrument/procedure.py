@@ -83,6 +83,7 @@ class Procedure:
         model lies."""
         self.config, self.bench, self.store, self._opened = config, bench, store, opened
         self.modes, self._worth, self.calibration = answers.modes, answers.worth, calibration
+        self.mode = answers.mode_unless_asked(config.press.mode)
         self.board, self.progress = StatusBoard(), progress or ProgressBoard()
         self._show_what_was_kept()
         self._encoded = EncodedFrames()
@@ -99,7 +100,7 @@ class Procedure:
             self.board,
             store,
             modes=answers.modes,
-            mode=config.press.mode,
+            mode=self.mode,
             cancelled=self._capture.cancelled,
             finished=self._capture.finished,
             called_away=self._capture.called_away,
@@ -181,7 +182,7 @@ class Procedure:
 
         Raises `InvalidQuantity` for a wanted accuracy that the mode has not to offer.
         """
-        mode = mode or self.config.press.mode
+        mode = mode or self.mode
         if wanted:
             wanted.require_for(mode, self._worth.get(mode), press_cost(mode, self.config).seconds)
         return self._requests.ask(mode, wanted, once=once, exam=exam)
@@ -289,7 +290,7 @@ class Procedure:
             return  # it may have too few frames to judge
         self._require_no_drift(unloaded)
         if self.board.now.step in ("starting", "fault"):
-            guidance = before_contact("reference", self.config.press.mode)
+            guidance = before_contact("reference", self.mode)
             self.board.update(step="ready", state=PressState.IDLE, guidance=guidance, fault=None)
         if job := self._next_job(until_s=time.monotonic() + UNLOADED_VALID_S):
             self._measure(job, unloaded)

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from device.files.start_note import read_note
 from device.provisioning.identity import is_calibrated
 from device.provisioning.installation import FirstReleaseItem
 from device.provisioning.item import ProvisioningItem
@@ -59,6 +60,9 @@ def apply(items: Sequence[ProvisioningItem], target: TargetMachine, is_stand_in:
             print("reboot     I2C and camera are there from the next boot on: reboot, then run this again")
             return REBOOT
         wants_reboot |= put_right(item, target) and item.wants_reboot
+    note = read_note(target.root)
+    for fault in note.faults if note else ():
+        print(f"next       its daemon does not start yet: {fault['code']} {fault['cause']} {fault['remedy']}")
     if not is_calibrated(target):
         print("next       this probe has no certificate: its screen says E402 until it is calibrated")
     return 0

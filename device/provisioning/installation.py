@@ -99,6 +99,10 @@ class FirstReleaseItem:
             raise ProvisioningFailed(f"The release was not installed (exit code {ended.returncode}).", "See above.")
 
 
+def _going(unit: str) -> tuple[str, ...]:
+    return ("active", "activating") if unit == GOING[0] else ("active",)
+
+
 @dataclass(frozen=True)
 class GoingItem:
     """The daemon, the updater's path and the page for when the daemon is gone, going."""
@@ -107,10 +111,10 @@ class GoingItem:
     wants_reboot: bool = False
 
     def differs(self, target: TargetMachine) -> str:
-        """Return which of them does not."""
+        """Return which of them does not; a daemon that lacks a part is started again and again."""
         states = target.asked("systemctl", "is-active", *GOING).split()
         pairs = zip(GOING, [*states, *["unknown"] * len(GOING)], strict=False)
-        return told([f"{unit} is {state}" for unit, state in pairs if state != "active"])
+        return told([f"{unit} is {state}" for unit, state in pairs if state not in _going(unit)])
 
     def apply(self, target: TargetMachine) -> None:
         """Start them, and the screen."""

@@ -65,7 +65,8 @@ class PersistentSender(ABC):
         """End after what is being sent; a receiver that hangs is not waited for."""
         self._stopping.set()
         self.wake()
-        self._thread.join(timeout=STOP_S)
+        if self._thread.is_alive():
+            self._thread.join(timeout=STOP_S)
 
     def _is_to_pause(self) -> bool:
         return self._stopping.is_set() or self._is_busy()

@@ -1,7 +1,8 @@
 """Whether a release is healthy: its daemon is asked for every part, until all are ready three times in a row.
 
 A fault that was there before the switch is not the new release's. The models' answers and the store depend on no
-cable, and have to be ready always.
+cable, and have to be ready always. A first release has nothing before it: where its daemon does not start for what it
+says is its machine's, as a part that is not wired yet, no other release would, and without it nobody could look why.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from device.access.known_hosts import asked_at
 from device.files.plain_settings import DaemonAddress
+from device.files.start_note import read_note
 
 Answer = TypeVar("Answer")
 
@@ -26,6 +29,8 @@ UNDER_WAY = ("waiting", "capturing", "computing", "running")
 LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
 ALWAYS = ("answers", "store")
+OF_THE_MACHINE = ("E001", "E1", "E2", "E3")
+"""How codes of settings, camera, light and load cell begin."""
 LOOPBACK_ADDRESS = "127.0.0.1"
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
@@ -130,27 +135,42 @@ def wait_until_healthy(
     baseline: Baseline | None,
     patience: Patience,
     told: Callable[[float], None],
-) -> None:
-    """Return when the release was healthy at every one of some looks in a row.
+    *,
+    excuse: Callable[[], str] = str,
+) -> str:
+    """Return when the release was healthy at every one of some looks in a row: what `excuse` said at the last, or "".
 
-    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone. `told` hears, from 0 to 1,
-    how much of the time is over.
+    `excuse` says in words why a daemon that does not start is not to be blamed, and "" when it is. Raises `NotHealthy`
+    when time is up, or at once when a daemon that was healthy is gone. `told` hears, from 0 to 1, how much of the time
+    is over.
     """
-    began, healthy, reason = time.monotonic(), 0, ""
+    began, healthy, reason, words = time.monotonic(), 0, "", ""
     while healthy < patience.looks:
         spent = time.monotonic() - began
         told(min(1.0, spent / patience.within_s))
         try:
             _require_healthy(ask_parts(address), release, baseline)
-            healthy += 1
+            healthy, words = healthy + 1, ""
         except NotHealthy as error:
-            if healthy and isinstance(error, DaemonGone):
+            words = excuse() if isinstance(error, DaemonGone) else ""
+            if healthy and not words and isinstance(error, DaemonGone):
                 raise NotHealthy(f"It was ready, and then {error}.") from None  # though systemd starts it again
-            healthy, reason = 0, str(error)
+            healthy, reason = healthy + 1 if words else 0, str(error)
         if healthy < patience.looks:
             if spent > patience.within_s:
                 raise NotHealthy(f"After {patience.within_s:g} s {reason or 'it was not ready often enough'}.")
             time.sleep(patience.every_s)
+    return words
+
+
+def what_the_machine_lacks(root: Path, release: str) -> str:
+    """Return why a release's daemon does not start, by its own note, if all of that is its machine's; "" otherwise."""
+    note = read_note(root)
+    if note is None or note.release != release or not all(
+        fault["code"].startswith(OF_THE_MACHINE) for fault in note.faults
+    ):  # fmt: skip
+        return ""
+    return " ".join(f"{fault['code']} {fault['cause']}" for fault in note.faults)
 
 
 def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | None) -> None:

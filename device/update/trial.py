@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 from device.errors import RolledBack, UpdateFailed
 from device.files.durable import sync_directory, write_durably
 from device.files.plain_settings import daemon_address
-from device.update.gate import NotHealthy, Patience, wait_for_press, wait_until_healthy
+from device.files.start_note import clear_note
+from device.update.gate import NotHealthy, Patience, wait_for_press, wait_until_healthy, what_the_machine_lacks
 from device.update.layout import UpdateLayout, make_link, point
 from device.update.manifest import read_installed
 from device.update.progress import ENDED, ProgressReport, read_progress
@@ -66,16 +67,18 @@ def carry_through(updater: Updater) -> None:
         leave(updater, GONE, is_bad=False)
     try:
         _switch(updater, pending.release)
-        _watch(updater, pending)
-        commit(updater)
+        commit(updater, lacking=_watch(updater, pending))
     except NotHealthy as reason:
         leave(updater, str(reason), is_bad=True)
     except (OSError, UpdateFailed) as error:
         leave(updater, f"A step failed: {error}", is_bad=False)
 
 
-def commit(updater: Updater) -> None:
-    """Make the release on trial the one that comes back from now on. Raises `OSError`; then it is still on trial."""
+def commit(updater: Updater, *, lacking: str = "") -> None:
+    """Make the release on trial the one that comes back from now on; `lacking` is why its daemon does not start yet.
+
+    Raises `OSError`; then it is still on trial.
+    """
     state = read_state(updater.layout)
     pending = state.pending
     if not pending:
@@ -84,7 +87,7 @@ def commit(updater: Updater) -> None:
     committed = replace(
         state, committed=pending.release, previous=state.committed, pending=None, floor=floor, is_finishing=True,
         bad={release: reason for release, reason in state.bad.items() if counter_of(release) > floor},
-    ).noted(pending.release, "committed", "asked for by the operator" if pending.is_roll_back else "")  # fmt: skip
+    ).noted(pending.release, "committed", "asked for by the operator" if pending.is_roll_back else lacking)  # fmt: skip
     try:
         write_state(updater.layout, committed)
     except OSError:
@@ -195,16 +198,21 @@ def _switch(updater: Updater, release: str) -> None:
         stop_daemon()
         report.tell("switching", 0.62, "link")
         point(layout.current, layout.release(release))
+    clear_note(layout.root)  # of a start before this one
     report.tell("switching", 0.64, "start")
     reload_units()
     start_daemon()
 
 
-def _watch(updater: Updater, pending: PendingRelease) -> None:
+def _watch(updater: Updater, pending: PendingRelease) -> str:
+    """Return when the release is healthy, or is the first one and says why it does not start: that, in words."""
+    layout = updater.layout
+    is_first = read_state(layout).committed is None
     updater.report.tell("checking", 0.65, "health")
-    wait_until_healthy(
-        daemon_address(updater.layout.root), pending.release, pending.baseline, updater.patience,
+    return wait_until_healthy(
+        daemon_address(layout.root), pending.release, pending.baseline, updater.patience,
         lambda part: updater.report.tell("checking", 0.65 + 0.3 * part, "health"),
+        excuse=lambda: what_the_machine_lacks(layout.root, pending.release) if is_first else "",
     )  # fmt: skip
 
 

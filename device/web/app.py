@@ -141,7 +141,7 @@ def _add_state(app: FastAPI, procedure: Procedure, store: Store, network: Served
             "software": __version__,
             "simulated": procedure.is_simulated,
             "light_on_s": round(store.light_on_s, 1),
-            "default_mode": config.press.mode,
+            "default_mode": procedure.mode,
             "modes": [_offered(offer, config.press) for offer in procedure.offers()],
             "network": network and network.as_record(),
         }

@@ -45,7 +45,7 @@ def snapshot(procedure: Procedure) -> dict[str, Any]:
     is_touched = force_n is not None and force_n >= press.contact_n
     status = _since_asked(procedure.board.now, is_touched=is_touched)
     job = status.press if status.press and status.press.state not in ENDED else None
-    mode = job.mode if job else press.mode
+    mode = job.mode if job else procedure.mode
     ramp_n = _ramp_n(mode, status) if FRAMES[mode].is_ramp else None
     faults: list[DeviceError] = [fault for fault in (status.fault, status.stall) if fault]
     step, guidance = ("fault", Guidance.FAULT) if status.stall else (status.step, status.guidance)

@@ -149,6 +149,7 @@ def provision(
     ssh: Ssh = "",
     signers: Signers = SIGNERS,
     time_zone: Annotated[str, typer.Option(help="As Europe/Berlin; as it is unless given.")] = "",
+    camera_overlay: Annotated[str, typer.Option(help="The sensor's, as imx296; ov9281 unless given.")] = "",
     check: Annotated[
         bool, typer.Option("--check", help="Only tell what differs, exit code 1 when something does.")
     ] = False,
@@ -161,6 +162,7 @@ def provision(
     options = [*(["--check"] if check else []), *(["--stand-in"] if stand_in else [])]
     options += [f"--serial={serial}"] if serial else []
     options += [f"--time-zone={time_zone}"] if time_zone else []
+    options += [f"--camera-overlay={camera_overlay}"] if camera_overlay else []
     order = ProvisioningOrder(file, signers, deploy_key, tuple(options))
     try:
         code = provision_machine(order, RemoteMachine(host, user, ssh), _tell)

@@ -93,11 +93,7 @@ def test_the_simulated_probe_has_its_own_serial_certificate_and_data_folder():
     assert simulated.calibration.is_file()
     assert simulated.data != real.data
     assert simulated.camera == real.camera
-    assert simulated.press == replace(real.press, mode="standard")
-
-
-def test_in_the_papers_light_only_its_own_mode_can_be_had():
-    assert simulated_config("SIM-LINEAR").press.mode == "paper"
+    assert simulated.press == real.press
 
 
 def test_only_this_machine_is_served_unless_told_otherwise():

@@ -130,9 +130,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ob
         faults = tuple(
             replace(fault, from_s=ratio * fault.from_s, until_s=ratio * fault.until_s) for fault in scenario.faults
         )
-        of_light = simulated_config(scenario.serial)
-        own = {"serial": scenario.serial, "calibration": of_light.calibration}
-        own["press"] = replace(QUICK_PRESS, mode=of_light.press.mode)
+        own = {"serial": scenario.serial, "calibration": simulated_config(scenario.serial).calibration}
         hand = replace(QUICK_HAND, tremor_n=scenario.hand.tremor_n, held_n=scenario.hand.held_n)
         quick = replace(scenario, hand=hand, faults=faults)
         opened = open_simulated_probe(overridden(replace(config, **(own | settings)), scenario.settings), quick)

@@ -25,9 +25,11 @@ from daemon_process import ROOT, Daemon, wait_for
 from device.config import MODELS
 
 HERE = Path(__file__).parent
-SETTINGS = f"""
-serial = "SIM-0001"
-calibration = "{MODELS / "simulated_probe" / "calibration.json"}"
+NEW, COMMISSIONED = (
+    'serial = "TSIS-0007"\ncalibration = "calibrations"\n',
+    f'serial = "SIM-0001"\ncalibration = "{MODELS / "simulated_probe" / "calibration.json"}"\n',
+)
+SETTINGS = """
 data = "var"
 [camera]
 late_frames = 100.0
@@ -120,13 +122,23 @@ class Rig:
     """A world and, when it is started, the daemon in it."""
 
     def __init__(
-        self, folder: Path, shim: Path, scene: str = "", *, watchdog_s: float | None = None, is_wired: bool = False
+        self,
+        folder: Path,
+        shim: Path,
+        scene: str = "",
+        *,
+        watchdog_s: float | None = None,
+        is_wired: bool = False,
+        is_new: bool = False,
     ) -> None:
-        """Take whether the chip's RESET is wired to a line of the board, as docs/build.md has it."""
-        self._folder, self._watchdog_s = folder, watchdog_s
+        """Take whether the chip's RESET is wired to a line of the board, as docs/build.md has it, and whether the probe
+        is as provisioning leaves it: with a serial number, and neither certificate nor model of its own."""
+        self._folder, self._watchdog_s, self._is_new = folder, watchdog_s, is_new
         self.world = WorldProcess(folder / "world", scene)
         self.world.wish(wired=is_wired)
-        settings = SETTINGS + f'device = "{folder / "world" / "force"}"\n' + (WIRED if is_wired else "")
+        (folder / "calibrations").mkdir()
+        settings = (NEW if is_new else COMMISSIONED) + SETTINGS + f'device = "{folder / "world" / "force"}"\n'
+        settings += WIRED if is_wired else ""
         (folder / "config.toml").write_text(settings)
         self.environment = {
             "LD_PRELOAD": str(shim),
@@ -141,14 +153,15 @@ class Rig:
         self.daemon: Daemon | None = None
 
     def start(self) -> Daemon:
-        """Start the daemon as its unit does; return it when it can be pressed and the hand reads its screen."""
+        """Start the daemon as its unit does; return it when its parts are ready and the hand reads its screen."""
         since_s = time.monotonic()
         self.daemon = daemon = Daemon(
             self._folder, arguments=("--config", "config.toml", "--port", "0"), environment=self.environment
         )
         assert self._systemd.is_told("READY=1", since_s, START_S)
         self.world.wish(url=daemon.url)
-        wait_for(lambda: daemon.ask("/api/v1/health/ready").status, lambda status: status == 200)
+        if not self._is_new:  # it takes no press
+            wait_for(lambda: daemon.ask("/api/v1/health/ready").status, lambda status: status == 200)
         return daemon
 
     def press_until_lit(self) -> str:

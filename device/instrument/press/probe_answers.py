@@ -16,6 +16,8 @@ from device.measurement.mode import Mode, ModeWorth
 from device.measurement.recording.recording import Recording
 from device.measurement.scan_advice import ScanAdvice
 
+PREFERRED: tuple[Mode, ...] = ("standard", "quick", "paper")
+"""What a press is taken in that nobody asks another mode for; a scan is always asked for."""
 Estimator = Callable[[Recording, Mode], Estimate]
 Adviser = Callable[[Recording], ScanAdvice]
 LookAhead = Callable[[Recording], None]
@@ -44,11 +46,21 @@ class ProbeAnswers(NamedTuple):
     expires_at: str | None = None
     flat_field_ratio: float | None = None
 
-    def require(self, mode: Mode) -> None:
-        """Raise `ConfigError` when the settings ask for a mode that is not among them."""
-        if mode not in self.modes:
-            cause = f"press.mode is {mode}, but this probe has models for {', '.join(self.modes)} only."
+    def mode_unless_asked(self, stated: Mode | None) -> Mode:
+        """Return the mode of a press that is asked for without one: that of the settings, or the best there is.
+
+        Raises `ConfigError` when the settings state one that is not among them, or there is none at all.
+        """
+        if stated is None:
+            offered = [mode for mode in PREFERRED if mode in self.modes]
+            if not offered:
+                cause = "No model is for this probe."
+                raise ConfigError(cause, "Install one for its serial number, or calibrate it for mode paper.")
+            return offered[0]
+        if stated not in self.modes:
+            cause = f"press.mode is {stated}, but this probe has models for {', '.join(self.modes)} only."
             raise ConfigError(cause, "Set press.mode to one of those, or install the model.")
+        return stated
 
     def watched(self, progress: ProgressBoard, begin: Callable[[], None]) -> ProbeAnswers:
         """Return the same, each run of it noted as progress of the inference; `begin` is called before each."""

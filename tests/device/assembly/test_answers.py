@@ -47,7 +47,8 @@ def test_a_certificate_without_lines_answers_in_every_mode_but_the_papers(bundle
 
 
 def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tmp_path):
-    config = replace(simulated_config(), data=tmp_path, standard_model=tmp_path / "none")
+    press = PressSection(mode="standard")
+    config = replace(simulated_config(), data=tmp_path, standard_model=tmp_path / "none", press=press)
     with pytest.raises(StartFailed, match=r"press\.mode is standard, but this probe has models for quick, paper only"):
         open_simulated_probe(config, Scenario())
 

@@ -11,7 +11,7 @@ from device.assembly.opened_parts import StartFailed
 from device.commands.serve import SWITCH_S, DaemonPort, refusal_noted, serve
 from device.config import Config, ServerSection
 from device.errors import CameraError, ConfigError, LightError
-from device.fallback.start_note import NOTE, read_note
+from device.files.start_note import NOTE, read_note
 from device.measurement.bundle import BundleRefused
 from device.measurement.quantities import InvalidQuantity
 from device.settings.last_good import StartSettings

@@ -13,7 +13,7 @@ from device.config import Config, ServerSection
 from device.errors import ConfigError, DeviceError
 from device.fallback.address import own_addresses
 from device.fallback.handover import ask_for_port, is_fallback
-from device.fallback.start_note import write_note
+from device.files.start_note import write_note
 
 REFUSED = ConfigError("press.target_n is 99.", "Correct it.")
 ROLL_BACK = "/api/v1/updates/roll-back"
@@ -23,7 +23,7 @@ ROLL_BACK = "/api/v1/updates/roll-back"
 def fallback(tmp_path_factory):
     root = ProbeRoot(tmp_path_factory.mktemp("probe"))
     root.releases("0.2.0+9", committed="0.2.0+9", previous="0.1.0+3")
-    write_note(root.folder, [REFUSED])
+    write_note(root.folder, [REFUSED.as_record()])
     running = Fallback(root)
     yield running
     assert running.stop() == 0

@@ -6,7 +6,7 @@ import pytest
 
 from device.errors import ConfigError
 from device.fallback.situation import NOTES, read_situation
-from device.fallback.start_note import write_note
+from device.files.start_note import write_note
 
 REFUSED = ConfigError("press.target_n is 99.", "Correct it.")
 FAILED = {"LoadState": "loaded", "ActiveState": "activating", "Result": "exit-code", "ExecMainStatus": "1"}
@@ -33,7 +33,7 @@ class FakeProbe:
         self.command("systemctl", f"printf '{lines}'")
 
     def refused(self, pid):
-        write_note(self.folder, [REFUSED])
+        write_note(self.folder, [REFUSED.as_record()])
         path = self.folder / "run/tsis/start.json"
         path.write_text(json.dumps({**json.loads(path.read_text()), "pid": pid}))
 

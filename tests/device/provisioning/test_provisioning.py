@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
+from device.errors import CameraError
+from device.files.start_note import NOTE, write_note
 from device.files.toml_record import read_table
 from device.provisioning.__main__ import REBOOT, main
 from device.provisioning.installation import unit_links
@@ -100,6 +102,17 @@ def test_a_fresh_machine_becomes_a_probe_and_then_differs_in_nothing(probe, caps
     capsys.readouterr()
     assert probe.check("--serial", "TSIS-0007", "--time-zone", "Europe/Berlin") == 0
     assert capsys.readouterr().out == ""
+
+
+def test_a_probe_whose_parts_are_not_wired_yet_is_made_and_says_what_is_missing(probe, capsys):
+    (probe.root / NOTE).parent.mkdir(parents=True)
+    write_note(probe.root, [CameraError("No camera at index 0.", "Plug it in.").as_record()])
+    (probe.root / "active").write_text("activating\nactive\nactive\n")
+    capsys.readouterr()
+    assert probe.run("--time-zone", "Europe/Berlin") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-2] == "next       its daemon does not start yet: E101 No camera at index 0. Plug it in."
+    assert "E402" in lines[-1]
 
 
 def test_what_is_in_place_stays_as_it_is(probe, capsys):

@@ -13,6 +13,29 @@ def test_a_first_release_is_installed_committed_and_runs(probe):
     assert probe.progress.state == "committed"
 
 
+@pytest.mark.parametrize("codes", [["E101"], ["E001", "E201", "E301"]])
+def test_a_first_release_is_committed_on_a_machine_whose_parts_are_not_wired_yet(probe, codes):
+    """Nothing is there that it would be better to go back to, and its commands are what parts are looked for with."""
+    done = probe.run("install", probe.write("1.0", 10, {"lacks": codes}))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert probe.require_whole() == probe.state.committed == "1.0+10"
+    assert probe.state.history[-1].reason == " ".join(f"{code} It is not there." for code in codes)
+
+
+@pytest.mark.parametrize("codes", [["E401"], ["E101", "E000"]])
+def test_a_first_release_that_does_not_start_for_its_own_sake_leaves_nothing_behind(probe, codes):
+    done = probe.run(*IMPATIENT, "install", probe.write("1.0", 10, {"lacks": codes}))
+    assert done.returncode == 1
+    assert (probe.state.committed, probe.current, probe.releases()) == (None, None, [])
+
+
+def test_the_next_one_is_left_where_the_one_before_had_the_part(probe):
+    probe.install("1.0", 10)
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"lacks": ["E101"]}))
+    assert done.returncode == 1
+    assert probe.require_whole() == "1.0+10"
+
+
 def test_the_next_one_takes_its_place_and_the_one_before_the_last_goes(probe):
     for counter in (10, 11, 12):
         probe.install(f"1.{counter}", counter)

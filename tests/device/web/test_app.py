@@ -32,6 +32,7 @@ class Procedure:
 
     def __init__(self):
         self.config, self.modes, self.is_simulated, self.asked = Config(), ("paper", "standard"), True, []
+        self.mode = "standard"
         self.calibration = CalibrationWatch(None)
         self.bench = types.SimpleNamespace(force=types.SimpleNamespace(zero_shift_n=0.051))
         self.refusal, self.obeyed = None, {}

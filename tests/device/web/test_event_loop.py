@@ -25,7 +25,7 @@ class Witness:
 
     def __init__(self, folder):
         self.folder, self.threads = folder, {}
-        self.config, self.modes, self.is_simulated = Config(), ("paper",), True
+        self.config, self.modes, self.mode, self.is_simulated = Config(), ("paper",), "paper", True
         self.light_on_s, self.board = 0.0, StatusBoard()
         self.bench = types.SimpleNamespace(force=types.SimpleNamespace(latest_n=0.25))
 

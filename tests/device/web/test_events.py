@@ -44,7 +44,8 @@ def told():
     def tell(status, force):
         config = types.SimpleNamespace(serial="SIM-0001", press=PressSection())
         board, bench = types.SimpleNamespace(now=status), types.SimpleNamespace(force=force)
-        return snapshot(types.SimpleNamespace(config=config, board=board, bench=bench, is_simulated=True))
+        probe = types.SimpleNamespace(config=config, mode="standard", board=board, bench=bench, is_simulated=True)
+        return snapshot(probe)
 
     return tell
 
@@ -156,7 +157,7 @@ class Told:
 
     def __init__(self, monkeypatch):
         self.config = types.SimpleNamespace(serial="SIM-0001", press=PressSection())
-        self.board, self.is_simulated = StatusBoard(), True
+        self.board, self.mode, self.is_simulated = StatusBoard(), "standard", True
         self.bench = types.SimpleNamespace(force=types.SimpleNamespace(latest_n=0.25))
         self.now_s, self.built = 100.0, 0
         monkeypatch.setattr(events, "snapshot", self._snapshot)

@@ -1,4 +1,4 @@
-"""What a daemon that does not start leaves behind for the page that says so."""
+"""What a daemon that does not start leaves behind for those who say so."""
 
 import json
 import os
@@ -6,9 +6,10 @@ import os
 import pytest
 
 from device.errors import CameraError, ConfigError
-from device.fallback.start_note import NOTE, clear_note, read_note, write_note
+from device.files.start_note import NOTE, clear_note, read_note, write_note
 
-FAULTS = [ConfigError("a is 3.", "Correct it."), CameraError("No camera.", "Plug it in.")]
+REFUSED = ConfigError("a is 3.", "Correct it."), CameraError("No camera.", "Plug it in.")
+FAULTS = [fault.as_record() for fault in REFUSED]
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def test_every_fault_is_there_with_the_process_and_its_release(root):
     write_note(root, FAULTS)
     note = read_note(root)
     assert (note.pid, note.release) == (os.getpid(), "0.2.0+7")
-    assert note.faults == tuple(fault.as_record() for fault in FAULTS)
+    assert note.faults == tuple(FAULTS)
 
 
 def test_a_start_that_succeeds_leaves_none(root):
@@ -49,7 +50,7 @@ def test_where_there_is_no_folder_nothing_is_written(tmp_path):
         '{"schema": "tsis.start/2"}',
         json.dumps({"schema": "tsis.start/1", "pid": 1, "release": "", "faults": []}),
         json.dumps({"schema": "tsis.start/1", "pid": 1, "release": "", "faults": [{"code": "E001"}]}),
-        json.dumps({"schema": "tsis.start/1", "pid": "x", "release": "", "faults": [FAULTS[0].as_record()]}),
+        json.dumps({"schema": "tsis.start/1", "pid": "x", "release": "", "faults": [FAULTS[0]]}),
     ],
 )
 def test_a_note_that_cannot_be_read_is_none(root, text):

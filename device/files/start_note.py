@@ -1,5 +1,6 @@
-"""Why the daemon did not start, written by itself in memory (/run) and read by the fallback: schema `tsis.start/1`.
+"""Why the daemon did not start, written by itself in memory (/run): schema `tsis.start/1`.
 
+Read by the fallback, whose page says it, and by the installer of a first release. Standard library only.
 The folder is the unit's RuntimeDirectory; where it is missing, as on a laptop, nothing is written.
 """
 
@@ -7,13 +8,11 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from device.errors import DeviceError
 
 SCHEMA = "tsis.start/1"
 NOTE, RELEASE_LINK = "run/tsis/start.json", "opt/tsis/current"
@@ -29,14 +28,14 @@ class StartNote:
     faults: tuple[dict[str, str], ...]
 
 
-def write_note(root: Path, faults: Sequence[DeviceError]) -> None:
-    """Note why this process does not start; that it cannot be written changes nothing."""
+def write_note(root: Path, faults: Sequence[Mapping[str, str]]) -> None:
+    """Note why this process does not start, by records of faults; that it cannot be written changes nothing."""
     path = root / NOTE
     record = {
         "schema": SCHEMA,
         "pid": os.getpid(),
         "release": linked_release(root),
-        "faults": [fault.as_record() for fault in faults],
+        "faults": list(map(dict, faults)),
     }
     temporary = path.with_name(f"{path.name}.tmp")
     with suppress(OSError):
