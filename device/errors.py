@@ -157,7 +157,7 @@ class AuditChanged(DeviceError):  # noqa: N818 - the name is what the operator r
 
 
 class CertificateRefused(DeviceError):  # noqa: N818 - the name is what the operator reads
-    """The server's certificate cannot be read, made or used, so the probe does not serve the network."""
+    """The server's certificate cannot be read, made or used, so the probe does not start."""
 
     code = "E021"
     title = "Server certificate refused"
@@ -548,7 +548,7 @@ class InvalidRequest(DeviceError):  # noqa: N818 - the name is what the caller r
 
 
 class UnknownPath(DeviceError):  # noqa: N818 - the name is what the caller reads
-    """The API has no such path, or not with that method."""
+    """The API has no such path, or not with that method (405)."""
 
     code = "E804"
     title = "No such path"

@@ -234,5 +234,8 @@ def test_a_probe_that_serves_one_address_has_its_own_screen_at_loopback_all_the_
         assert probe.ask("GET", "/api/v1/status").status_code == 401
         health = ask_parts(DaemonAddress(probe.port, probe.address))  # as the updater asks
         assert health.release
+        command = ["-m", "device", "--simulate", "--config", "probe.toml", "--port", str(probe.port), "status"]
+        told = subprocess.run([sys.executable, *command], cwd=probe.folder, env=SHELL, capture_output=True, text=True)
+        assert told.stdout.startswith("simulated probe SIM-0001"), told.stderr
     finally:
         probe.daemon.stop()

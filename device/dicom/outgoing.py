@@ -23,7 +23,8 @@ from device.records.store import Store, StoredRecord
 
 WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
 """What is written of each measurement, in the order in which it is sent: a report refers to its image."""
-MOST_MEASUREMENTS = 200
+AT_ONCE = 200
+"""So many measurements are read of an exam at a time."""
 
 
 class Outgoing:
@@ -127,8 +128,10 @@ def ordered_study(store: Store, exam_id: str) -> OrderedStudy | None:
 
 def counting_measurements(store: Store, exam_id: str) -> list[dict[str, Any]]:
     """Return the measurements of an exam that are not void; raise `InvalidRequest` when there is none."""
-    found = store.measurements(before_seq=2**63 - 1, limit=MOST_MEASUREMENTS, exam_id=exam_id)
-    counting = [one for one in found if not one["voided"]]
+    counting, before_seq = list[dict[str, Any]](), 2**63 - 1
+    while found := store.measurements(before_seq=before_seq, limit=AT_ONCE, exam_id=exam_id):
+        counting += [one for one in found if not one["voided"]]
+        before_seq = found[-1]["seq"]
     if not counting:
         raise InvalidRequest(f"The exam {exam_id} has no measurement that counts.", "Measure first.")
     return counting

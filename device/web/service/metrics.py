@@ -52,8 +52,9 @@ class ProbeCollector(Collector):
         for name, health in procedure.parts().items():
             parts.add_metric([name], float(health.ready))
         yield parts
+        shown = (now.fault, now.stall, *now.warnings, now.archive, now.webhook)
         faults = GaugeMetricFamily("tsis_fault", "Faults and warnings that are shown.", labels=["code", "severity"])
-        for error in {one.code: one for one in (now.fault, now.stall, *now.warnings) if one}.values():
+        for error in {one.code: one for one in shown if one}.values():
             faults.add_metric([error.code, error.severity], 1.0)
         yield faults
         is_pressed = bool(now.press and now.press.state not in ENDED)

@@ -13,7 +13,7 @@ import pytest
 from written_exam import ESTIMATE, OF_A_PATIENT, begin, measure, needs_dciodvfy, quantity, verdict
 
 from device.config import DicomSection
-from device.dicom import codes
+from device.dicom import codes, outgoing
 from device.dicom.hospital import Hospital
 from device.dicom.subject import OrderedStudy, study_uid
 from device.errors import InvalidRequest, UnknownResource
@@ -187,6 +187,15 @@ def test_phantoms_and_simulated_presses_are_marked_as_no_patients(store, files_o
     assert simulated.QualityControlSubject == "YES"
     assert "simulated" in simulated.SeriesDescription
     assert any("Simulated press" in item.get("TextValue", "") for _, item in items(report))
+
+
+def test_an_exam_of_more_measurements_than_are_read_at_once_is_written_whole(store, hospital, monkeypatch):
+    monkeypatch.setattr(outgoing, "AT_ONCE", 2)
+    exam = begin(store)
+    kept = [measure(store, exam) for _ in range(5)]
+    store.exams.void(kept[2]["id"], version=1, by="Ada", reason="Slipped")
+    with zipfile.ZipFile(io.BytesIO(hospital.files_of(exam["id"]))) as archive:
+        assert len(archive.namelist()) == 8
 
 
 def test_what_is_void_is_not_written_and_an_exam_without_anything_is_refused(store, hospital):

@@ -8,7 +8,7 @@ import pytest
 from kept_measurements import keep
 from prometheus_client.parser import text_string_to_metric_families
 
-from device.errors import DimLightError, LightBusError, StorageError
+from device.errors import ArchiveUnreachable, DimLightError, LightBusError, StorageError
 from device.instrument.status import PressJob, StatusBoard
 from device.instrument.watch.readiness import PartHealth
 from device.records.exams import ExamContent
@@ -79,7 +79,9 @@ def test_faults_and_a_press_are_told_as_they_come(figures, probe):
     told = figures()
     assert (told[("tsis_fault", "E202", "fault")], told[("tsis_fault", "E206", "warning")]) == (1.0, 1.0)
     assert (told[("tsis_ready",)], told[("tsis_press_under_way",)]) == (0.0, 1.0)
-    probe.board.update(fault=None, warnings=())
+    probe.board.update(fault=None, warnings=(), archive=ArchiveUnreachable("Down.", "Look."))
+    assert [key for key in figures() if key[0] == "tsis_fault"] == [("tsis_fault", "E030", "warning")]
+    probe.board.update(archive=None)
     assert not [key for key in figures() if key[0] == "tsis_fault"]
 
 
