@@ -44,7 +44,12 @@ class Answers(BaseHTTPRequestHandler):
 
 def keep_note(name, codes):
     said = {"title": "", "severity": "fault", "cause": "It is not there.", "remedy": "Plug it in."}
-    record = {"schema": "tsis.start/1", "pid": 1, "release": name, "faults": [{"code": code, **said} for code in codes]}
+    record = {
+        "schema": "tsis.start/1",
+        "pid": os.getpid(),
+        "release": name,
+        "faults": [{"code": code, **said} for code in codes],
+    }
     (ROOT / "run/tsis").mkdir(parents=True, exist_ok=True)
     (ROOT / "run/tsis/start.json").write_text(json.dumps(record))
 

@@ -8,9 +8,10 @@ The certificate is the active one, once it is for this probe, its model and its 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from device.config import Config
-from device.errors import ForeignCalibration, MissingCalibration, ModelError
+from device.errors import ConfigError, ForeignCalibration, MissingCalibration, ModelError
 from device.files.bundle_file import read_models
 from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.remembered_ramps import RememberedRamps
@@ -95,6 +96,21 @@ def answers_for(config: Config, bundle: ModelBundle, calibration: Calibration | 
         models.expires_at,
         models.flat_field_ratio,
     )
+
+
+def require_named_models(config: Config, answers: ProbeAnswers) -> None:
+    """Raise `ConfigError` when the settings name a model that is not there, or not for this probe.
+
+    Those that every release brings are the simulated probe's: another probe has to do without, and does.
+    """
+    named: dict[str, tuple[Path, Path, Mode]] = {
+        "standard_model": (config.standard_model, Config.standard_model, "standard"),
+        "quick_model": (config.quick_model, Config.quick_model, "quick"),
+    }
+    for setting, (path, of_release, mode) in named.items():
+        if path != of_release and mode not in answers.modes:
+            cause = f"{setting} is {path}, which holds no model of mode {mode} for {config.serial}."
+            raise ConfigError(cause, "Correct the path, copy the bundle there, or take the setting out.")
 
 
 def _prove(models: ModeModels) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
-from device.assembly.answers import active_calibration, answers_for
+from device.assembly.answers import active_calibration, answers_for, require_named_models
 from device.assembly.camera import emulated_camera, real_camera, require_open
 from device.assembly.cell import commissioned, emulated_amplifier, open_cell, tared, tared_once_lifted
 from device.assembly.light import emulated_line
@@ -327,4 +327,5 @@ def _procedure(probe: OpenedProbe) -> Procedure:
 def _answers(config: Config, bundle: ModelBundle, calibration: Calibration | None) -> ProbeAnswers:
     answers = answers_for(config, bundle, calibration)
     answers.mode_unless_asked(config.press.mode)
+    require_named_models(config, answers)
     return answers

@@ -26,6 +26,7 @@ from device.errors import ConfigError, DeviceError, ModelError, StorageError
 from device.fallback.handover import ask_for_port, is_fallback
 from device.files.start_note import write_note
 from device.instrument.watch.restart_note import RestartNote
+from device.measurement.mode import Mode
 from device.measurement.quantities import InvalidQuantity
 from device.records.updates import Updates
 from device.settings.last_good import StartSettings
@@ -92,17 +93,21 @@ def serve(settings: StartSettings, opened: Callable[[], Procedure], ready: Calla
 def _note_in_use(procedure: Procedure) -> None:
     """Write down what the probe works by; a store that takes nothing is the procedure's to tell, and stops no start."""
     try:
-        procedure.store.audit.note_in_use(in_use(procedure.config, procedure.calibration.id))
+        procedure.store.audit.note_in_use(in_use(procedure.config, procedure.calibration.id, procedure.mode))
     except StorageError as error:
         log.error("%s %s", error.code, error)
 
 
-def in_use(config: Config, calibration_id: str) -> dict[str, Any]:
-    """Return what a probe works by, for its audit: software, certificate, and each setting by its full name."""
+def in_use(config: Config, calibration_id: str, mode: Mode) -> dict[str, Any]:
+    """Return what a probe works by, for its audit: software, certificate, and each setting by its full name.
+
+    `mode` is what `press.mode` comes to, also where it is not set.
+    """
     said: dict[str, Any] = {"software": __version__, "calibration_id": calibration_id}
     for name, value in asdict(config).items():
         for inner, one in value.items() if isinstance(value, dict) else [("", value)]:
             said[f"{name}.{inner}" if inner else name] = str(one) if isinstance(one, Path) else one
+    said["press.mode"] = mode
     present: dict[str, Any] = json.loads(json.dumps(said, default=str))  # as it comes back: a tuple is a list
     return present
 

@@ -11,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from device.errors import BusyError, DeviceError, UnknownResource
+from device.errors import BusyError, DeviceError, NotSetUp
 from device.fallback.situation import NOTES, Situation
 from device.files.handed_over import HandedOverFile
 
@@ -23,10 +23,10 @@ SUPPORT_S = 60.0
 def roll_back(root: Path, situation: Situation) -> None:
     """Ask the updater for the last good release.
 
-    Raises `UnknownResource` when there is none, `BusyError` when it was asked already, `DeviceError` when it cannot be.
+    Raises `NotSetUp` when there is none, `BusyError` when it was asked already, `DeviceError` when it cannot be.
     """
     if not situation.may_roll_back:
-        raise UnknownResource("There is no other release on this probe.", "Install one: `make deploy`, or a USB stick.")
+        raise NotSetUp("There is no other release on this probe.", "Install one: `make deploy`, or a USB stick.")
     path = root / ROLL_BACK
     try:
         HandedOverFile(path.parent).hand_over(path.name)

@@ -17,6 +17,8 @@ from typing import Any
 SCHEMA = "tsis.start/1"
 NOTE, RELEASE_LINK = "run/tsis/start.json", "opt/tsis/current"
 FIELDS = ("code", "title", "severity", "cause", "remedy")
+OF_THE_MACHINE = ("E001", "E1", "E2", "E3")
+"""How codes of settings, camera, light and load cell begin: what a release finds, and does not bring."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,19 @@ class StartNote:
     pid: int
     release: str
     faults: tuple[dict[str, str], ...]
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """The codes of its faults."""
+        return tuple(fault["code"] for fault in self.faults)
+
+    @property
+    def is_of_the_machine(self) -> bool:
+        """Whether all that is missing is the machine's: settings, or a part that is not there or not wired."""
+        return all(code.startswith(OF_THE_MACHINE) for code in self.codes)
+
+    def __str__(self) -> str:
+        return " ".join(f"{fault['code']} {fault['cause']}" for fault in self.faults)
 
 
 def write_note(root: Path, faults: Sequence[Mapping[str, str]]) -> None:

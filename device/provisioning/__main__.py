@@ -45,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def check(items: Sequence[ProvisioningItem], target: TargetMachine) -> int:
     """Print what differs, one line an item; return the exit code."""
     differences = [f"differs    {item.title}: {words}" for item in items if (words := item.differs(target))]
+    differences += [f"lacks      {line}" for line in _missing(target)]
     for line in differences:
         print(line)
     return DIFFERS if differences else 0
@@ -60,12 +61,17 @@ def apply(items: Sequence[ProvisioningItem], target: TargetMachine, is_stand_in:
             print("reboot     I2C and camera are there from the next boot on: reboot, then run this again")
             return REBOOT
         wants_reboot |= put_right(item, target) and item.wants_reboot
-    note = read_note(target.root)
-    for fault in note.faults if note else ():
-        print(f"next       its daemon does not start yet: {fault['code']} {fault['cause']} {fault['remedy']}")
+    for line in _missing(target):
+        print(f"next       its daemon does not start yet: {line}")
     if not is_calibrated(target):
         print("next       this probe has no certificate: its screen says E402 until it is calibrated")
     return 0
+
+
+def _missing(target: TargetMachine) -> list[str]:
+    """Return why the daemon does not start, by its own note, one line a fault."""
+    note = read_note(target.root)
+    return [f"{fault['code']} {fault['cause']} {fault['remedy']}" for fault in note.faults] if note else []
 
 
 def put_right(item: ProvisioningItem, target: TargetMachine) -> bool:
@@ -92,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--signers", type=Path, metavar="FILE", help="keys whose releases are taken (ALLOWED SIGNERS)")
     parser.add_argument("--deploy-key", type=Path, metavar="FILE", help="public key of who may send releases")
     parser.add_argument("--time-zone", default="", metavar="ZONE", help="as Europe/Berlin; as it is unless given")
-    parser.add_argument("--camera-overlay", default="ov9281", metavar="NAME", help="the sensor's (default: ov9281)")
+    parser.add_argument("--camera-overlay", default="", metavar="NAME", help="the sensor's (as it is, else ov9281)")
     parser.add_argument("--stand-in", action="store_true", help="a machine that is no Pi, for tests")
     parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="the machine's / (default: /)")
     return parser

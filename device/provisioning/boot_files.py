@@ -7,6 +7,7 @@ journal: a power cut while it is written may leave a card that does not boot. So
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -34,7 +35,8 @@ class BootSettingsItem:
     What detection finds is only Raspberry Pi's own cameras.
     """
 
-    camera_overlay: str = "ov9281"
+    camera_overlay: str = ""
+    """As it is unless named, and an OV9281's where none was."""
     title: str = "I2C and camera at boot"
     wants_reboot: bool = True
 
@@ -47,7 +49,9 @@ class BootSettingsItem:
         _rewrite(target, CONFIG, self._with_ours)
 
     def _with_ours(self, text: str) -> str:
-        camera = ["camera_auto_detect=0", f"dtoverlay={self.camera_overlay}"]
+        found = re.search(rf"{BEGIN}\n.*?^dtoverlay=(\S+)$.*?{END}", text, re.MULTILINE | re.DOTALL)
+        overlay = self.camera_overlay or (found[1] if found else "ov9281")
+        camera = ["camera_auto_detect=0", f"dtoverlay={overlay}"]
         # Else the kernel leaves the LEDs' enable line as it was when the process that held it was killed.
         lines = ["[all]", "dtparam=i2c_arm=on", "dtparam=strict_gpiod", *camera]
         before, begin, rest = text.partition(f"{BEGIN}\n")

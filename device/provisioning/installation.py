@@ -11,6 +11,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
+from device.files.start_note import read_note
 from device.provisioning.item import LinkItem, TextItem, told
 from device.provisioning.target import ProvisioningFailed, TargetMachine, systemd_files
 
@@ -22,7 +23,10 @@ AT_BOOT = "WantedBy=multi-user.target"
 FOLDERS_OF = {".sysusers.conf": "/etc/sysusers.d/", ".tmpfiles.conf": "/etc/tmpfiles.d/"}
 """Where files go that are no units, by how their names end."""
 RULES = "/etc/udev/rules.d/60-"
-GOING = ("tsis.service", "tsis-update.path", "tsis-fallback.service")
+DAEMON = "tsis.service"
+GOING = (DAEMON, "tsis-update.path", "tsis-fallback.service")
+STARTED_AGAIN = ("activating", "deactivating")
+"""What systemd calls a daemon that has failed and is started again, and darkens the LEDs before that."""
 RELOAD = ("systemctl", "daemon-reload")
 SUBSYSTEMS = ("tty", "i2c-dev", "gpio", "video4linux")
 UDEV = (
@@ -99,10 +103,6 @@ class FirstReleaseItem:
             raise ProvisioningFailed(f"The release was not installed (exit code {ended.returncode}).", "See above.")
 
 
-def _going(unit: str) -> tuple[str, ...]:
-    return ("active", "activating") if unit == GOING[0] else ("active",)
-
-
 @dataclass(frozen=True)
 class GoingItem:
     """The daemon, the updater's path and the page for when the daemon is gone, going."""
@@ -111,13 +111,18 @@ class GoingItem:
     wants_reboot: bool = False
 
     def differs(self, target: TargetMachine) -> str:
-        """Return which of them does not; a daemon that lacks a part is started again and again."""
+        """Return which of them does not; a daemon that says that a part is missing is started again and again."""
         states = target.asked("systemctl", "is-active", *GOING).split()
+        note = read_note(target.root)
+        waits = [DAEMON] if note and note.is_of_the_machine else []
         pairs = zip(GOING, [*states, *["unknown"] * len(GOING)], strict=False)
-        return told([f"{unit} is {state}" for unit, state in pairs if state not in _going(unit)])
+        return told([
+            f"{unit} is {state}" for unit, state in pairs
+            if state != "active" and not (unit in waits and state in STARTED_AGAIN)
+        ])  # fmt: skip
 
     def apply(self, target: TargetMachine) -> None:
-        """Start them, and the screen."""
-        target.run_each(
-            (RELOAD, ("systemctl", "start", *GOING), ("systemctl", "start", "--no-block", "tsis-kiosk.service"))
-        )
+        """Start them, and the screen; a daemon that does not start says why, and is judged by that."""
+        target.run_each((RELOAD, ("systemctl", "start", *GOING[1:])))
+        target.asked("systemctl", "start", DAEMON)
+        target.run("systemctl", "start", "--no-block", "tsis-kiosk.service")

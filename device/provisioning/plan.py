@@ -32,7 +32,7 @@ class ProvisioningWishes:
     signers: str = ""
     deploy_key: str = ""
     time_zone: str = ""
-    camera_overlay: str = "ov9281"
+    camera_overlay: str = ""
     is_stand_in: bool = False
 
 

@@ -3,6 +3,7 @@
 A fault that was there before the switch is not the new release's. The models' answers and the store depend on no
 cable, and have to be ready always. A first release has nothing before it: where its daemon does not start for what it
 says is its machine's, as a part that is not wired yet, no other release would, and without it nobody could look why.
+A later one that does not start for the same is no worse.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import Any, TypeVar
 
 from device.access.known_hosts import asked_at
 from device.files.plain_settings import DaemonAddress
-from device.files.start_note import read_note
+from device.files.start_note import StartNote, read_note
 
 Answer = TypeVar("Answer")
 
@@ -29,8 +30,6 @@ UNDER_WAY = ("waiting", "capturing", "computing", "running")
 LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
 ALWAYS = ("answers", "store")
-OF_THE_MACHINE = ("E001", "E1", "E2", "E3")
-"""How codes of settings, camera, light and load cell begin."""
 LOOPBACK_ADDRESS = "127.0.0.1"
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
@@ -135,42 +134,63 @@ def wait_until_healthy(
     baseline: Baseline | None,
     patience: Patience,
     told: Callable[[float], None],
-    *,
-    excuse: Callable[[], str] = str,
+    excused: ExcusedStarts | None = None,
 ) -> str:
-    """Return when the release was healthy at every one of some looks in a row: what `excuse` said at the last, or "".
+    """Return when the release was healthy at every one of some looks in a row, or its starts are excused: that, or "".
 
-    `excuse` says in words why a daemon that does not start is not to be blamed, and "" when it is. Raises `NotHealthy`
-    when time is up, or at once when a daemon that was healthy is gone. `told` hears, from 0 to 1, how much of the time
-    is over.
+    Raises `NotHealthy` when time is up, or at once when a daemon that was healthy is gone. `told` hears, from 0 to 1,
+    how much of the time is over.
     """
-    began, healthy, reason, words = time.monotonic(), 0, "", ""
+    began, healthy, reason = time.monotonic(), 0, ""
     while healthy < patience.looks:
         spent = time.monotonic() - began
         told(min(1.0, spent / patience.within_s))
         try:
             _require_healthy(ask_parts(address), release, baseline)
-            healthy, words = healthy + 1, ""
+            healthy += 1
         except NotHealthy as error:
-            words = excuse() if isinstance(error, DaemonGone) else ""
-            if healthy and not words and isinstance(error, DaemonGone):
+            if healthy and isinstance(error, DaemonGone):
                 raise NotHealthy(f"It was ready, and then {error}.") from None  # though systemd starts it again
-            healthy, reason = healthy + 1 if words else 0, str(error)
+            healthy, reason = 0, str(error)
+            is_gone, is_last = isinstance(error, DaemonGone), spent > patience.within_s
+            if excused and is_gone and (words := excused.words(is_last=is_last)):
+                return words
         if healthy < patience.looks:
             if spent > patience.within_s:
                 raise NotHealthy(f"After {patience.within_s:g} s {reason or 'it was not ready often enough'}.")
             time.sleep(patience.every_s)
-    return words
+    return ""
 
 
-def what_the_machine_lacks(root: Path, release: str) -> str:
-    """Return why a release's daemon does not start, by its own note, if all of that is its machine's; "" otherwise."""
+class ExcusedStarts:
+    """Starts of a release that fail for what is its machine's alone, by the daemon's own notes.
+
+    So they are for a first release, which has nothing before it that would start, and for a later one that lacks no
+    more than the one before.
+    """
+
+    def __init__(self, root: Path, release: str, *, lacking: str | None) -> None:
+        """Take the codes, in one text, that the release before could not start for; None for a first release."""
+        self._root, self._release, self._lacking = root, release, lacking
+        self._seen = set[int]()
+
+    def words(self, *, is_last: bool) -> str:
+        """Return why, in words, once a second process has said so, or one when no more time is left; else ""."""
+        note = read_note(self._root)
+        if note is None or note.release != self._release or not note.is_of_the_machine or self._has_more(note):
+            self._seen.clear()
+            return ""
+        self._seen.add(note.pid)
+        return str(note) if is_last or len(self._seen) > 1 else ""
+
+    def _has_more(self, note: StartNote) -> bool:
+        return self._lacking is not None and not set(note.codes) <= set(self._lacking.split())
+
+
+def codes_of_failed_start(root: Path, release: str | None) -> str:
+    """Return for which codes a release does not start, in one text, by its own note; "" where there is none."""
     note = read_note(root)
-    if note is None or note.release != release or not all(
-        fault["code"].startswith(OF_THE_MACHINE) for fault in note.faults
-    ):  # fmt: skip
-        return ""
-    return " ".join(f"{fault['code']} {fault['cause']}" for fault in note.faults)
+    return " ".join(note.codes) if note and note.release == release else ""
 
 
 def _require_healthy(health: PartsHealth, release: str, baseline: Baseline | None) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from device.errors import DeviceError, RolledBack, UnfitRelease, UpdateFailed
 from device.files.plain_settings import daemon_address
 from device.update.fits import require_fit, require_readable_data
-from device.update.gate import take_baseline
+from device.update.gate import codes_of_failed_start, take_baseline
 from device.update.manifest import ReleaseManifest, read_installed, read_manifest
 from device.update.progress import StateName, file_id
 from device.update.release_file import ReleaseFile, opened
@@ -145,7 +145,9 @@ class _Steps:
         """Note what does not work before the switch, write the trial down, and carry it through."""
         self._begin("switching", 0.59, "baseline")
         baseline = take_baseline(daemon_address(self._layout.root), self._updater.patience)
-        begin_trial(self._updater, PendingRelease(manifest.name, baseline=baseline))
+        committed = read_state(self._layout).committed
+        lacking = codes_of_failed_start(self._layout.root, committed) if baseline is None else ""
+        begin_trial(self._updater, PendingRelease(manifest.name, baseline=baseline, lacking=lacking))
         carry_through(self._updater)
 
     def refuse(self, error: DeviceError) -> None:

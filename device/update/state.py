@@ -27,6 +27,8 @@ class PendingRelease:
     """How often the machine was started with it."""
     baseline: dict[str, str | None] | None = None
     """The parts that were not ready before the switch, with their codes; None when the daemon did not answer."""
+    lacking: str = ""
+    """For which codes of its machine the daemon before the switch did not start, in one text."""
     is_roll_back: bool = False
     """Whether an operator asked for it: the previous release, not a new one."""
     leaving: str = ""

@@ -14,7 +14,7 @@ from device.errors import RolledBack, UpdateFailed
 from device.files.durable import sync_directory, write_durably
 from device.files.plain_settings import daemon_address
 from device.files.start_note import clear_note
-from device.update.gate import NotHealthy, Patience, wait_for_press, wait_until_healthy, what_the_machine_lacks
+from device.update.gate import ExcusedStarts, NotHealthy, Patience, wait_for_press, wait_until_healthy
 from device.update.layout import UpdateLayout, make_link, point
 from device.update.manifest import read_installed
 from device.update.progress import ENDED, ProgressReport, read_progress
@@ -205,14 +205,14 @@ def _switch(updater: Updater, release: str) -> None:
 
 
 def _watch(updater: Updater, pending: PendingRelease) -> str:
-    """Return when the release is healthy, or is the first one and says why it does not start: that, in words."""
+    """Return when the release is healthy, or does not start for what is its machine's alone: that, in words."""
     layout = updater.layout
     is_first = read_state(layout).committed is None
     updater.report.tell("checking", 0.65, "health")
     return wait_until_healthy(
         daemon_address(layout.root), pending.release, pending.baseline, updater.patience,
         lambda part: updater.report.tell("checking", 0.65 + 0.3 * part, "health"),
-        excuse=lambda: what_the_machine_lacks(layout.root, pending.release) if is_first else "",
+        ExcusedStarts(layout.root, pending.release, lacking=None if is_first else pending.lacking),
     )  # fmt: skip
 
 

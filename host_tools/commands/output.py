@@ -18,6 +18,7 @@ Scheduler = Annotated[
     str | None,
     typer.Option(help="Dask cluster to compute on, tcp://HOST:PORT; a worker uses one thread."),
 ]
+PAGE = ".md"
 note = Console(stderr=True, highlight=False)
 
 
@@ -53,7 +54,10 @@ def require_writable(path: Path | None, suffixes: tuple[str, ...]) -> None:
         raise InvalidQuantity("file", path, f"of type {', '.join(suffixes)}", "give it another name")
     if path and not path.parent.is_dir():
         raise InvalidQuantity("folder", path.parent, "a folder that exists", "make it first")
-    if path:
+    if path and path.suffix.lower() == PAGE:  # written beside, and renamed
+        _require_ours(path.parent)
+        require_writable_folder(path.parent / "results")
+    elif path:
         _require_ours(path if path.exists() else path.parent)
 
 

@@ -189,13 +189,18 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, wo
 
 
 def test_a_page_that_may_not_be_written_is_refused_before_the_work(tmp_path, monkeypatch):
-    """Whoever is root may write everywhere: the system's word is put in."""
-    (tmp_path / "known.md").touch()
-    monkeypatch.setattr(os, "access", lambda path, mode: path.name != "known.md")
-    require_writable(tmp_path / "new.md", (".md",))
+    """Whoever is root may write everywhere: the system's word is put in. A page is renamed into its folder, with
+    results beside it; a picture is written over."""
+    for name in ("mine", "others", "results"):
+        (tmp_path / name / "results").mkdir(parents=True)
+    (tmp_path / "mine" / "known.png").touch()
+    barred = {tmp_path / "others", tmp_path / "results" / "results", tmp_path / "mine" / "known.png"}
+    monkeypatch.setattr(os, "access", lambda path, mode: path not in barred)
+    require_writable(tmp_path / "mine" / "new.md", (".md",))
     require_writable_folder(tmp_path / "folder" / "within")
-    with pytest.raises(InvalidQuantity, match="known.md, but must be writable"):
-        require_writable(tmp_path / "known.md", (".md",))
+    for path in ("others/page.md", "results/page.md", "mine/known.png"):
+        with pytest.raises(InvalidQuantity, match="but must be writable"):
+            require_writable(tmp_path / path, (".md", ".png"))
 
 
 def test_the_first_solve_waits_for_nothing_that_it_does_not_need():

@@ -53,6 +53,14 @@ def test_a_probe_whose_settings_ask_for_a_mode_without_a_model_does_not_start(tm
         open_simulated_probe(config, Scenario())
 
 
+@pytest.mark.parametrize("name", ["standard_model", "quick_model"])
+def test_a_model_that_is_named_and_not_there_stops_the_start(tmp_path, name):
+    """Without the setting a probe does without such a model; a path that leads nowhere is a mistake."""
+    config = replace(simulated_config(), data=tmp_path, **{name: tmp_path / "none"})
+    with pytest.raises(StartFailed, match=rf"E001 {name} is .*none, which holds no model of mode \w+ for SIM-0001"):
+        open_simulated_probe(config, Scenario())
+
+
 def test_the_models_prove_themselves_as_long_as_their_golden_vectors_hold(bundle, calibration, monkeypatch):
     answers = answers_for(simulated_config(), bundle, calibration)
     answers.prove()

@@ -2,17 +2,15 @@
 
 import io
 import zipfile
-from datetime import date, timedelta
+from datetime import date
 
 import pydicom
 import pytest
-from daemon_process import wait_for
 from ordered_step import ordered
 from orthanc import Orthanc, free_port, needs_orthanc
 from pydicom.dataset import Dataset
 from written_exam import measure, needs_dciodvfy, verdict
 
-from device.dicom import sender
 from device.dicom.hospital import Hospital
 from device.dicom.subject import require_writable
 from device.dicom.worklist import _step
@@ -164,20 +162,6 @@ def test_a_name_of_an_exam_that_nobody_sends_does_not_stay(store, hospital):
     exam = hospital.begin_exam(step["id"], SAID)
     assert store.outbox.erase_patients(sent_before="2000", made_before="9999") == 1
     assert store.outbox.ordered(exam["id"])[1] == {}
-
-
-def test_names_are_erased_also_where_there_is_a_worklist_and_no_archive(archive, store, hospital, monkeypatch):
-    """One was queued when there still was an archive: it keeps no name either."""
-    monkeypatch.setattr(sender, "NEVER_SENT", timedelta(0))
-    kept = [hospital.begin_exam(step["id"], SAID) for step in hospital.scheduled(None, None, None)[:2]]
-    measure(store, kept[0])
-    hospital.send(kept[0]["id"], version=1, by="Ada")
-    alone = Hospital(archive.settings(archive_host=None), store, read_picture)
-    alone.start()
-    try:
-        wait_for(lambda: [store.outbox.ordered(exam["id"])[1] for exam in kept], lambda names: names == [{}, {}])
-    finally:
-        alone.close()
 
 
 def test_a_reference_with_a_backslash_is_shown_as_it_was_sent_and_no_exam_is_made_of_it():

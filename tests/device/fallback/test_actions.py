@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 
-from device.errors import BusyError, DeviceError, UnknownResource
+from device.errors import BusyError, DeviceError, NotSetUp
 from device.fallback import actions
 from device.fallback.actions import ROLL_BACK, has_support, roll_back, support_file
 from device.fallback.situation import Situation
@@ -33,7 +33,7 @@ def test_asked_twice_it_says_so(tmp_path, incoming):
 
 @pytest.mark.parametrize("good", ["", "0.2.0+9"])
 def test_without_another_release_nothing_is_asked(tmp_path, incoming, good):
-    with pytest.raises(UnknownResource):
+    with pytest.raises(NotSetUp):
         roll_back(tmp_path, Situation("", "", release="0.2.0+9", last_good=good))
     assert list(incoming.iterdir()) == []
 

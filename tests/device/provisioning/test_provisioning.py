@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from daemon_process import ROOT
 
-from device.errors import CameraError
+from device.errors import CameraError, ModelError
 from device.files.start_note import NOTE, write_note
 from device.files.toml_record import read_table
 from device.provisioning.__main__ import REBOOT, main
@@ -31,7 +31,9 @@ FAKES = {
     "systemd-tmpfiles": 'while read -r kind path mode rest; do [ "$kind" != d ] || '
     '{ mkdir -p "$ROOT$path"; chmod "$mode" "$ROOT$path"; }; done',
     "systemctl": 'echo "systemctl $*" >> "$ROOT/asked"; case $1 in is-active) cat "$ROOT/active" 2> /dev/null;; '
-    'start) printf "active\\n%.0s" 1 2 3 > "$ROOT/active";; esac; true',
+    'start) printf "active\\nactive\\nactive\\n" > "$ROOT/active"; if [ -e "$ROOT/run/tsis/start.json" ]; then '
+    'printf "activating\\nactive\\nactive\\n" > "$ROOT/active"; case $* in *tsis.service*) exit 1;; esac; fi;; esac; '
+    "true",
     "sshd": 'echo "sshd $*" >> "$ROOT/asked"',
     "udevadm": 'echo "udevadm $*" >> "$ROOT/asked"; exit 1',
 }
@@ -105,14 +107,28 @@ def test_a_fresh_machine_becomes_a_probe_and_then_differs_in_nothing(probe, caps
 
 
 def test_a_probe_whose_parts_are_not_wired_yet_is_made_and_says_what_is_missing(probe, capsys):
+    """`systemctl start` fails where the daemon ends with 1; the rest goes all the same."""
     (probe.root / NOTE).parent.mkdir(parents=True)
     write_note(probe.root, [CameraError("No camera at index 0.", "Plug it in.").as_record()])
-    (probe.root / "active").write_text("activating\nactive\nactive\n")
+    (probe.root / "active").unlink()
     capsys.readouterr()
     assert probe.run("--time-zone", "Europe/Berlin") == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[-2] == "next       its daemon does not start yet: E101 No camera at index 0. Plug it in."
     assert "E402" in lines[-1]
+    assert probe.asked().splitlines()[-2] == "systemctl start --no-block tsis-kiosk.service"
+    assert probe.check() == 1
+    assert capsys.readouterr().out == "lacks      E101 No camera at index 0. Plug it in.\n"
+
+
+def test_a_daemon_that_does_not_start_for_its_own_sake_is_a_difference(probe, capsys):
+    (probe.root / NOTE).parent.mkdir(parents=True)
+    write_note(probe.root, [ModelError("The model's hash is wrong.", "Install it again.").as_record()])
+    (probe.root / "active").write_text("activating\nactive\nactive\n")
+    capsys.readouterr()
+    assert probe.check() == 1
+    assert "tsis.service is activating" in capsys.readouterr().out
+    assert probe.run("--time-zone", "Europe/Berlin") == 1
 
 
 def test_what_is_in_place_stays_as_it_is(probe, capsys):
@@ -160,6 +176,7 @@ def test_lines_of_the_boot_hold_for_every_model_and_stand_once(probe):
     assert probe.run("--camera-overlay", "imx296") == REBOOT
     assert probe.text(CONFIG).count("[all]") == 1
     assert "dtoverlay=imx296" in probe.text(CONFIG)
+    assert probe.check() == 0  # what was named stays
     assert "ov9281" not in probe.text(CONFIG)
 
 

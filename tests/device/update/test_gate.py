@@ -7,13 +7,16 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
 
 import pytest
 
 from device.files.plain_settings import DaemonAddress
+from device.files.start_note import NOTE
 from device.update.gate import (
     PARTS,
     DaemonGone,
+    ExcusedStarts,
     NotHealthy,
     Patience,
     ask_parts,
@@ -111,3 +114,40 @@ def test_a_press_under_way_is_waited_for_and_one_that_has_ended_is_not():
 def test_where_nobody_can_tell_no_press_is_waited_for():
     with answering((503, FALLBACK)) as port:
         wait_for_press(DaemonAddress(port), every_s=600.0)
+
+
+class Starts:
+    """A daemon that does not start, again and again, each time as another process, with a note of it."""
+
+    def __init__(self, root: Path) -> None:
+        self._path, self.pid = root / NOTE, 0
+        self._path.parent.mkdir(parents=True)
+
+    def fail(self, *codes: str, release: str = "1.0+10") -> None:
+        self.pid += 1
+        said = {"title": "", "severity": "fault", "cause": "Not there.", "remedy": ""}
+        faults = [{"code": code, **said} for code in codes]
+        record = {"schema": "tsis.start/1", "pid": self.pid, "release": release, "faults": faults}
+        self._path.write_text(json.dumps(record))
+
+
+def test_a_start_is_excused_once_a_second_one_has_failed_for_its_machine_too(tmp_path):
+    """One part may be late once, as a camera that a board has just found."""
+    starts, excused = Starts(tmp_path), ExcusedStarts(tmp_path, "1.0+10", lacking=None)
+    assert excused.words(is_last=True) == ""  # nobody has said why
+    starts.fail("E101")
+    assert excused.words(is_last=False) == excused.words(is_last=False) == ""
+    starts.fail("E101", "E001")
+    assert excused.words(is_last=False) == "E101 Not there. E001 Not there."
+
+
+@pytest.mark.parametrize(
+    ("codes", "release", "lacking"),
+    [(("E401",), "1.0+10", None), (("E101", "E603"), "1.0+10", None), (("E101",), "0.9+9", None),
+     (("E101",), "1.0+10", ""), (("E101", "E201"), "1.0+10", "E101 E301")],
+)  # fmt: skip
+def test_a_start_is_not_excused_for_more_than_its_machine_lacks(tmp_path, codes, release, lacking):
+    starts, excused = Starts(tmp_path), ExcusedStarts(tmp_path, "1.0+10", lacking=lacking)
+    for _ in range(3):
+        starts.fail(*codes, release=release)
+        assert excused.words(is_last=True) == ""

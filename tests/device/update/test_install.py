@@ -16,7 +16,7 @@ def test_a_first_release_is_installed_committed_and_runs(probe):
 @pytest.mark.parametrize("codes", [["E101"], ["E001", "E201", "E301"]])
 def test_a_first_release_is_committed_on_a_machine_whose_parts_are_not_wired_yet(probe, codes):
     """Nothing is there that it would be better to go back to, and its commands are what parts are looked for with."""
-    done = probe.run("install", probe.write("1.0", 10, {"lacks": codes}))
+    done = probe.run(*IMPATIENT, "install", probe.write("1.0", 10, {"lacks": codes}))
     assert (done.returncode, done.stderr) == (0, "")
     assert probe.require_whole() == probe.state.committed == "1.0+10"
     assert probe.state.history[-1].reason == " ".join(f"{code} It is not there." for code in codes)
@@ -27,6 +27,14 @@ def test_a_first_release_that_does_not_start_for_its_own_sake_leaves_nothing_beh
     done = probe.run(*IMPATIENT, "install", probe.write("1.0", 10, {"lacks": codes}))
     assert done.returncode == 1
     assert (probe.state.committed, probe.current, probe.releases()) == (None, None, [])
+
+
+@pytest.mark.parametrize(("lacks", "is_committed"), [(["E101"], True), ([], True), (["E101", "E201"], False)])
+def test_the_next_one_may_lack_what_the_first_lacked_and_no_more(probe, lacks, is_committed):
+    assert probe.run(*IMPATIENT, "install", probe.write("1.0", 10, {"lacks": ["E101", "E301"]})).returncode == 0
+    done = probe.run(*IMPATIENT, "install", probe.write("1.1", 11, {"lacks": lacks}))
+    assert done.returncode == (0 if is_committed else 1), done.stderr
+    assert probe.require_whole() == ("1.1+11" if is_committed else "1.0+10")
 
 
 def test_the_next_one_is_left_where_the_one_before_had_the_part(probe):

@@ -1,0 +1,59 @@
+"""Who a patient of the worklist is does not stay, whether there is an archive or not. Neither is asked here."""
+
+from datetime import timedelta
+
+import pytest
+from daemon_process import wait_for
+from written_exam import OF_A_PATIENT
+
+from device.config import DicomSection
+from device.dicom import sender
+from device.dicom.hospital import Hospital
+from device.files.recording_file import read_picture
+from device.records.exams import exam_content
+from device.records.outbox import OutboxItem
+from device.records.store import Store
+
+
+@pytest.fixture
+def store(tmp_path):
+    opened = Store(tmp_path / "var")
+    yield opened
+    opened.close()
+
+
+def made_of_a_step(store):
+    """Make an exam as one of the worklist is made."""
+    outbox = store.outbox
+    order = lambda db, exam_id: outbox.order(db, exam_id, {}, {"name": "Müller^Ana"})  # noqa: E731
+    return store.exams.make(exam_content(OF_A_PATIENT), None, order)
+
+
+def names(store, *exams):
+    return [store.outbox.ordered(exam["id"])[1] for exam in exams]
+
+
+def test_with_a_worklist_and_no_archive_names_are_erased_in_time(store, monkeypatch):
+    """One was queued when there still was an archive: nothing waits any more, and it keeps no name either."""
+    kept, queued = made_of_a_step(store), made_of_a_step(store)
+    store.outbox.add([OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    hospital = Hospital(DicomSection(worklist_host="127.0.0.1"), store, read_picture)
+    monkeypatch.setattr(sender, "NEVER_SENT", timedelta(0))
+    hospital.start()
+    try:
+        wait_for(lambda: names(store, kept, queued), lambda found: found == [{}, {}])
+    finally:
+        hospital.close()
+
+
+def test_with_an_archive_what_waits_keeps_its_name_and_what_nobody_sends_does_not(store):
+    kept, queued = made_of_a_step(store), made_of_a_step(store)
+    store.outbox.add([OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    assert store.outbox.erase_patients(sent_before="2000", made_before="9999") == 1
+    assert names(store, kept, queued) == [{}, {"name": "Müller^Ana"}]
+
+
+def test_before_their_time_names_stay(store):
+    kept = made_of_a_step(store)
+    assert store.outbox.erase_patients(sent_before="2000", made_before="2000", has_archive=False) == 0
+    assert names(store, kept) == [{"name": "Müller^Ana"}]
