@@ -53,7 +53,6 @@ def provisioned(stage: Stage) -> Iterator[Claim]:
     """A fresh system becomes a probe."""
     probe = stage.probe
     until("sshd answers", lambda: probe.inside("true").code == 0, 60)
-    probe.put(HERE / "simulated.conf", f"{UNITS}/tsis.service.d/simulated.conf")
     probe.put(HERE / "headless.conf", f"{UNITS}/tsis-kiosk.service.d/headless.conf")
     found = probe.provision(stage.files["first"], "--check")
     yield Claim(
@@ -62,10 +61,16 @@ def provisioned(stage: Stage) -> Iterator[Claim]:
     yield Claim("and changes nothing", probe.inside("test ! -e /etc/tsis && ! id tsis").code == 0)
     done = probe.provision(stage.files["first"])
     yield Claim(
-        "make provision makes it a probe", done.code == 0, f"{done.took_s:.0f} s" if not done.code else done.said
+        "make provision makes it a probe, with no part wired", done.code == 0, f"{done.took_s:.0f} s: {done.last}"
     )
     yield Claim("with a reboot between", "rebooting" in done.said)
-    yield Claim("every part works", probe.is_ready(), asked(URL + "health/parts"))
+    yield Claim("it says what is missing", "its daemon does not start yet: E" in done.said, done.said)
+    found = probe.provision(stage.files["first"], "--check")
+    yield Claim("and so does --check", found.code == 1 and "lacks      E" in found.said, found.said)
+    probe.put(HERE / "simulated.conf", f"{UNITS}/tsis.service.d/simulated.conf")
+    probe.root("systemctl daemon-reload && systemctl restart tsis")
+    took_s = until("every part works", probe.is_ready, 90)
+    yield Claim("once its parts are there every one works", True, f"after {took_s:.1f} s")
     seen = asked(URL + "updates")
     yield Claim("it runs the first release", seen["running"].endswith("+1000"), seen["running"])
     found = probe.provision(stage.files["first"], "--check")
