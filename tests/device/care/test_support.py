@@ -132,7 +132,7 @@ def test_it_says_what_a_maintainer_needs(root: Path) -> None:
     assert found["release"]["state"]["committed"] == "0.2.0+412"
     assert found["release"]["progress"] == {"state": "rolled_back", "reason": "The camera is not ready."}
     assert found["settings"]["set"] == {"serial": SERIAL, "server.port": daemon.port, "press.target_n": 0.6}
-    assert found["settings"]["in_use"]["press.target_n"] == 0.5
+    assert found["settings"]["in_use"]["press.contact_n"] == 0.05  # which no file says
     assert found["services"]["tsis"] == {"ActiveState": "failed", "NRestarts": "7"}
     assert found["daemon"]["faults"][0]["code"] == "E101"
     assert found["daemon"]["parts"]["parts"]["camera"] == {"ready": False, "code": "E101"}
