@@ -26,7 +26,7 @@ LABELS = {
     "face_modulus_log_ratio": "face layer: ln of modulus over design",
     "middle_modulus_log_ratio": "middle layer: ln of modulus over design",
     "backing_modulus_log_ratio": "backing layer: ln of modulus over design",
-    "cell_span_ratio": "load cell: force over reading, less 1",
+    "cell_span_ratio": "load cell: reading over force, less 1",
     "face_motion_ratio": "face motion seen, part of its own",
 }
 """Directions of the probe in words."""

@@ -184,7 +184,7 @@ def test_a_probe_is_held_against_its_own_file(fit):
     assert gates_of(fit, [answered])[2].problem is None
     stated = replace(fit, prior=OF_DESIGN._replace(mean=OF_DESIGN.mean + 0.7, std=OF_DESIGN.std))
     problem = gates_of(stated, [answered])[2].problem
-    assert problem.quantity == "tolerances from what was expected of load cell: force over reading, less 1"
+    assert problem.quantity == "tolerances from what was expected of load cell: reading over force, less 1"
     assert list(probe_lines(stated, PROBE))[2].split()[-2:] == ["0.7000", "0.1"]
 
 
