@@ -260,7 +260,9 @@ def test_a_commissioned_probe_has_a_bundle_of_its_own(ramps, model, derivatives,
         own.answer_to(ramps[0].seen),
         done.answers.answer_to(ramps[0].seen, own.first_guesses(ramps[0].seen.rows)),
     )
-    assert answer.mean == pytest.approx(before.mean, abs=1e-3)
+    assert answer.fit.best == pytest.approx(before.fit.best, abs=2e-3)  # the file has single precision
+    # A sampler amplifies that: 400 effective samples know a mean to a twentieth of its spread.
+    assert np.all(np.abs(answer.mean - before.mean) < before.spread / 5)
     card = json.loads((out / "model.json").read_text())
     assert "recorded" not in card["modes"]["standard"]  # those are of the design's probe
     one, scans = own.bundle.worth("standard"), own.bundle.worth("precise")

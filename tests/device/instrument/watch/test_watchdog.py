@@ -1,7 +1,7 @@
 """When the watchdog is fed, and what screen, log and disk say when it is not. No thread: a test looks itself."""
 
 import socket
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 
 import pytest
 
@@ -126,11 +126,19 @@ def test_a_systemd_that_does_not_read_keeps_neither_the_screen_nor_a_stop_waitin
 
 
 def fill(path, unread):
-    """Bind a socket there and send to it until it takes no more; return what sends."""
+    """Bind a socket there and send to it until it takes no more of anybody; return what closes those that sent.
+
+    One sender is stopped by its own buffer where the machine's net.unix.max_dgram_qlen is large, as under systemd.
+    """
     unread.bind(str(path))
-    sending = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    sending.setblocking(False)
-    with suppress(BlockingIOError):
-        while True:
-            sending.sendto(b"WATCHDOG=1", str(path))
-    return sending
+    senders = ExitStack()
+    is_taken = True
+    while is_taken:
+        sending = senders.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+        sending.setblocking(False)
+        is_taken = False
+        with suppress(BlockingIOError):
+            while True:
+                sending.sendto(b"WATCHDOG=1", str(path))
+                is_taken = True
+    return senders
