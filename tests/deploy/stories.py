@@ -64,9 +64,9 @@ def provisioned(stage: Stage) -> Iterator[Claim]:
         "make provision makes it a probe, with no part wired", done.code == 0, f"{done.took_s:.0f} s: {done.last}"
     )
     yield Claim("with a reboot between", "rebooting" in done.said)
-    yield Claim("it says what is missing", "its daemon does not start yet: E" in done.said, done.said)
+    yield Claim("it says what is missing", "its daemon does not start yet: E" in done.said, done.last)
     found = probe.provision(stage.files["first"], "--check")
-    yield Claim("and so does --check", found.code == 1 and "lacks      E" in found.said, found.said)
+    yield Claim("and so does --check", found.code == 1 and "lacks      E" in found.said, found.last)
     probe.put(HERE / "simulated.conf", f"{UNITS}/tsis.service.d/simulated.conf")
     probe.root("systemctl daemon-reload && systemctl restart tsis")
     took_s = until("every part works", probe.is_ready, 90)
