@@ -10,14 +10,15 @@ import re
 import socket
 from dataclasses import dataclass
 
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
+LOOPBACK_ADDRESS = "127.0.0.1"
+LOOPBACK = ("localhost", LOOPBACK_ADDRESS, "::1")
 ANYWHERE = ("0.0.0.0", "::", "")
 """What a listener is bound to that serves every network: no address of a machine."""
 
 
 def asked_at(host: str) -> str:
     """Return the address at which a program of this machine asks what listens at a host."""
-    return "127.0.0.1" if host in ANYWHERE else host
+    return LOOPBACK_ADDRESS if host in ANYWHERE else host
 
 
 AUTHORITY = re.compile(r"(?:\[(?P<ip6>[0-9a-f:.]+)\]|(?P<name>[^\s:/@\[\],]+))(?::(?P<port>\d{1,5}))?")

@@ -10,6 +10,7 @@ import http.client
 import json
 from typing import Any
 
+from device.access.known_hosts import LOOPBACK_ADDRESS
 from device.access.scopes import PAIRING, SCOPES
 from device.config import Config
 from device.errors import DeviceError
@@ -49,7 +50,7 @@ def run(options: argparse.Namespace, config: Config) -> int:
 def ask(config: Config, method: str, path: str, body: object = None) -> dict[str, Any]:
     """Return what the daemon of this machine answers; raise `DeviceError` with what it refuses by."""
     port = config.server.port
-    line = http.client.HTTPConnection("127.0.0.1", port, timeout=ASK_S)
+    line = http.client.HTTPConnection(LOOPBACK_ADDRESS, port, timeout=ASK_S)
     try:
         line.request(method, path, None if body is None else json.dumps(body), {"Content-Type": "application/json"})
         answer = line.getresponse()

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from device import __version__
-from device.access.known_hosts import ANYWHERE
+from device.access.known_hosts import ANYWHERE, LOOPBACK_ADDRESS
 from device.config import Config
 from device.errors import ConfigError, DeviceError, ModelError, StorageError
 from device.fallback.handover import ask_for_port, is_fallback
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 HANDOVER_S, HANDOVER_LOOK_S = 10.0, 0.05
-LOOPBACK_ADDRESS = "127.0.0.1"
 START_AGAIN = "Then start the daemon again."
 SWITCH_S = 0.0005
 """A thread of the web that answers gives Python's lock up so soon to one that takes frames; Python's own 5 ms, waited

@@ -49,13 +49,13 @@ class BootSettingsItem:
         _rewrite(target, CONFIG, self._with_ours)
 
     def _with_ours(self, text: str) -> str:
-        found = re.search(rf"{BEGIN}\n.*?^dtoverlay=(\S+)$.*?{END}", text, re.MULTILINE | re.DOTALL)
+        before, _, rest = text.partition(f"{BEGIN}\n")
+        ours, _, after = rest.partition(f"{END}\n")
+        found = re.search(r"^dtoverlay=(\S+)$", ours, re.MULTILINE)
         overlay = self.camera_overlay or (found[1] if found else "ov9281")
         camera = ["camera_auto_detect=0", f"dtoverlay={overlay}"]
         # Else the kernel leaves the LEDs' enable line as it was when the process that held it was killed.
         lines = ["[all]", "dtparam=i2c_arm=on", "dtparam=strict_gpiod", *camera]
-        before, begin, rest = text.partition(f"{BEGIN}\n")
-        after = rest.partition(f"{END}\n")[2] if begin else ""
         kept = before.rstrip("\n") + "\n" + after
         return "\n".join([kept.rstrip("\n"), "", BEGIN, *lines, END, ""]).lstrip("\n")
 

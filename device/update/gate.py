@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from device.access.known_hosts import asked_at
+from device.access.known_hosts import LOOPBACK_ADDRESS, asked_at
 from device.files.plain_settings import DaemonAddress
 from device.files.start_note import StartNote, read_note
 
@@ -30,7 +30,6 @@ UNDER_WAY = ("waiting", "capturing", "computing", "running")
 LONGEST_PRESS_S = 180.0
 PARTS = ("camera", "light", "force", "answers", "store")
 ALWAYS = ("answers", "store")
-LOOPBACK_ADDRESS = "127.0.0.1"
 ANSWER_WITHIN_S, MOST_BYTES = 5.0, 2**16
 Baseline = dict[str, str | None]
 """The parts that were not ready before the switch, each with its fault's code."""

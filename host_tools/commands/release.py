@@ -149,7 +149,9 @@ def provision(
     ssh: Ssh = "",
     signers: Signers = SIGNERS,
     time_zone: Annotated[str, typer.Option(help="As Europe/Berlin; as it is unless given.")] = "",
-    camera_overlay: Annotated[str, typer.Option(help="The sensor's, as imx296; ov9281 unless given.")] = "",
+    camera_overlay: Annotated[
+        str, typer.Option(help="The sensor's, as imx296; as it is unless given, at first ov9281.")
+    ] = "",
     check: Annotated[
         bool, typer.Option("--check", help="Only tell what differs, exit code 1 when something does.")
     ] = False,

@@ -12,7 +12,7 @@ import urllib.request
 from typing import Any
 from urllib.error import HTTPError, URLError
 
-from device.access.known_hosts import is_loopback
+from device.access.known_hosts import LOOPBACK_ADDRESS, is_loopback
 from device.config import Config
 from device.errors import DeviceError, StorageError
 from device.records.store import Store
@@ -46,7 +46,8 @@ def run(options: argparse.Namespace, config: Config) -> int:
 def _asked(config: Config) -> dict[str, Any] | None:
     """Return what the daemon says, None when there is none; raise `DeviceError` when it refuses to."""
     stated = config.server.host  # a daemon for other machines is served by loopback, too, where no token is needed
-    address = f"http://{stated if is_loopback(stated) else '127.0.0.1'}:{config.server.port}/api/v1/status"
+    host = stated if is_loopback(stated) else LOOPBACK_ADDRESS
+    address = f"http://{host}:{config.server.port}/api/v1/status"
     try:
         with urllib.request.urlopen(address, timeout=ANSWER_S) as answer:
             status: dict[str, Any] = json.load(answer)
