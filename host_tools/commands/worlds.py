@@ -109,6 +109,7 @@ def robustness(
     if out:
         counts = f" --probes {probes}" if "tolerances" in measured else ""
         counts += f" --presses {presses}" if presses else ""
+        counts += f" --seed {seed}" if seed != 1 else ""
         chosen = "".join(f' --only "{name}"' for name in only or [])
         command = f"host_tools robustness{counts}{chosen} --out {shown(out)}"
         write_page(out, Results("robustness", command, measured).in_chapters(out, list(chapters)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import platform
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_n
 from device.measurement.ramp_modes.commissioned.own_probe import Place, turned_columns
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
-from device.measurement.ramp_modes.surrogate import OFFSET
+from device.measurement.ramp_modes.surrogate import DEPTH, OFFSET, SIZE
 from host_tools.commissioning.left_out import CheckedAnswer, checked_answer
 from host_tools.press_models.mode_outcome import EvaluatedPresses, evaluated
 from host_tools.press_models.press_samples import draw_parameters
@@ -44,15 +44,37 @@ class BelievedAnswers:
     is_answered: NDArray[np.bool_]
     seconds: Array
 
+    @property
+    def answered(self) -> EvaluatedPresses:
+        """Return the answers of what has numbers."""
+        return self.evaluated.part(self.is_answered)
+
+    @property
+    def as_shown(self) -> EvaluatedPresses:
+        """Return all answers; of what has no numbers an interval is the whole range."""
+        nothing = ~self.is_answered[:, None]
+        low, high = (
+            np.where(nothing, end, one) for end, one in ((-1.0, self.evaluated.low), (1.0, self.evaluated.high))
+        )
+        return replace(self.evaluated, low=low, high=high, is_known=self.evaluated.is_known & ~nothing)
+
 
 def believed_presses(
-    answers: OwnAnswers, count: int, seed: int, *, are_scans: bool = False
+    answers: OwnAnswers, count: int, seed: int, *, are_scans: bool = False, are_inclusion_free: bool = False
 ) -> tuple[list[SeenPresses], Array]:
     """Return what is seen of presses or scans drawn from what is believed, and their coordinates [n, 9]."""
     rng = np.random.default_rng(seed)
     truth = normalise(draw_parameters(count, rng))
+    truth = inclusion_free(truth) if are_inclusion_free else truth
     further = further_offsets_mm(count, rng) if are_scans else [np.zeros(0)] * count
     return [_drawn(answers, at, mm, rng) for at, mm in zip(truth, further, strict=True)], truth
+
+
+def inclusion_free(normalised: Array) -> Array:
+    """Return coordinates [n, 9] with the smallest inclusion at the largest depth, which nobody sees."""
+    at = np.array(normalised)
+    at[:, SIZE], at[:, DEPTH] = -1.0, 1.0
+    return at
 
 
 def _drawn(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.random.Generator) -> SeenPresses:

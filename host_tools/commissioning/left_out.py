@@ -83,9 +83,10 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
 
 
 class CheckedAnswer(NamedTuple):
-    """An answer to one press or scan, whether a limit refuses it, and whether anything stands out from the noise.
+    """An answer to one press or scan, whether a limit refuses it, and whether an inclusion stands out.
 
-    The noise is that of whoever answers: a probe that believes in more of it says sooner that nothing stands out.
+    It does from the noise, and where hand and skin may be other than the design's from what these make: a probe that
+    believes in more of both says sooner that nothing stands out.
     """
 
     answer: RampAnswer
@@ -105,7 +106,7 @@ def checked_answer(
     answer = answer_to_seen(answers, model.first_guesses, seen)
     found = found_values(answer, seen, answers, model.ranges.log_odds)
     shown = any(stands_out(row, answers.noise) for row in seen.rows)
-    return CheckedAnswer(answer, bool(rejections(found, critical)), shown)
+    return CheckedAnswer(answer, bool(rejections(found, critical)), shown and answer.needs_inclusion)
 
 
 def answer_to_seen(answers: RampAnswers, guess: Guess, seen: SeenPresses) -> RampAnswer:

@@ -81,7 +81,7 @@ def write_own_bundle(
     of_modes: dict[Mode, BelievedAnswers] = {"standard": done.presses, "precise": done.scans}
     for mode, presses in of_modes.items():
         kept = {name: value for name, value in card["modes"][mode].items() if name not in OF_DESIGN}
-        card["modes"][mode] = kept | asdict(done.critical) | _worth(mode, presses)
+        card["modes"][mode] = kept | asdict(done.critical[mode]) | _worth(mode, presses)
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
     page = commissioning_page(done, card, advice, is_simulated=is_simulated).encode()
     names = (*(name for name in files if name.endswith(".onnx")),)
@@ -124,12 +124,12 @@ def write_own_quick(made: OwnQuick, ramps: Path) -> None:
 def _worth(mode: Mode, found: BelievedAnswers) -> dict[str, Any]:
     """Return what the card says of a mode's answers: to presses that are as commissioning believes."""
     dial = believed_dial(mode, found)
-    worth = {"simulated": statistics(found.evaluated)} | ({"dial": dial} if dial else {})
+    worth = {"simulated": statistics(found.answered)} | ({"dial": dial} if dial else {})
     if not FRAMES[mode].is_scan:
         return worth
     return worth | {
-        "reachable_half_width": reachable_half_width(found.evaluated),
-        "half_width_by_ramps": half_width_by_ramps(found.evaluated, found.ramps),
+        "reachable_half_width": reachable_half_width(found.as_shown),
+        "half_width_by_ramps": half_width_by_ramps(found.as_shown, found.ramps),
     }
 
 

@@ -24,10 +24,10 @@ from device.measurement.quick_mode.profile import QUICK_FORCES_N, quick_press
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import COLUMNS
-from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, SIZE
+from device.measurement.ramp_modes.surrogate import MODULUS
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.virtual_probe import ProbeTables
-from host_tools.commissioning.believed_presses import BelievedAnswers, without_noise
+from host_tools.commissioning.believed_presses import BelievedAnswers, inclusion_free, without_noise
 from host_tools.press_models.confidence_belts import confidence_belts
 from host_tools.press_models.press_samples import draw_parameters
 from host_tools.press_models.quick_training import (
@@ -127,7 +127,7 @@ def believed_holds(
 ) -> BelievedHolds:
     """Return presses at random forces of mode quick, of a probe and of hands as they are believed.
 
-    Those that `are_inclusion_free` have the smallest inclusion at the largest depth, which nobody sees.
+    Those that `are_inclusion_free` are as of `inclusion_free`.
     """
     blocks = [min(BLOCK, count - start) for start in range(0, count, BLOCK)]
 
@@ -147,8 +147,7 @@ def believed_holds(
 
 def _block(answers: OwnAnswers, count: int, rng: np.random.Generator, *, are_inclusion_free: bool) -> BelievedHolds:
     normalised = normalise(draw_parameters(count, rng))
-    if are_inclusion_free:
-        normalised[:, SIZE], normalised[:, DEPTH] = -1.0, 1.0
+    normalised = inclusion_free(normalised) if are_inclusion_free else normalised
     each = [without_noise(answers, at, NOWHERE, rng)[0] for at in normalised]
     seen, force_n = np.concatenate(each), rng.uniform(*QUICK_FORCES_N, count)
     return BelievedHolds(normalised, quick_rows(seen[:, :COLUMNS], force_n), held_harmonics(seen, force_n))

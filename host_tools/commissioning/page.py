@@ -24,7 +24,6 @@ from host_tools.commissioning.commission import WORST_PHANTOM, CommissionedProbe
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
 from host_tools.commissioning.probe_prior import LABELS
 from host_tools.commissioning.report import SILICONE
-from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.press_models.mode_statistics import statistics
 
 PAGE_FILE = "commissioning.html"
@@ -63,11 +62,12 @@ def commissioning_page(
         floor=FLOOR,
         levels=done.fit.levels,
         believed=done.fit.believed,
-        critical=done.critical,
+        critical=done.critical["standard"],
+        misfit_of_scans=done.critical["precise"].misfit_ratio,
         phantoms=done.phantoms,
         unknown_labels=list(pictures.UNKNOWN_LABELS.values()),
         has_quick=done.held is not None,
-        modes=[_mode(name, answers.evaluated) for name, answers in _believed(done)],
+        modes=[_mode(name, answers) for name, answers in _believed(done)],
         silicone=SILICONE,
         advice=list(advice) or [NOTHING_MORE],
         pictures=dict(_pictures(done)),
@@ -80,8 +80,8 @@ def _pictures(done: CommissionedProbe) -> Iterator[tuple[str, str]]:
         yield "lacking", pictures.lacking_maps(done.fit.discrepancy)
     yield "posterior", pictures.probe_posterior(done.fit)
     yield "left_out", pictures.left_out_intervals(done.phantoms)
-    yield "misfits", pictures.left_out_misfits(done.phantoms, done.critical.misfit_ratio, WORST_PHANTOM)
-    coverage = [(name.partition(",")[0], answers.evaluated) for name, answers in _believed(done)]
+    yield "misfits", pictures.left_out_misfits(done.phantoms, done.critical["standard"].misfit_ratio, WORST_PHANTOM)
+    coverage = [(name.partition(",")[0], answers.answered) for name, answers in _believed(done)]
     yield "coverage", pictures.believed_coverage(coverage)
 
 
@@ -127,6 +127,6 @@ def _directions(fit: ProbeFit) -> Iterator[dict[str, Any]]:
         }
 
 
-def _mode(name: str, presses: EvaluatedPresses) -> dict[str, Any]:
-    both = presses.is_known[:, :2].all(axis=1).mean()
-    return {"name": name, "both": float(both), "statistics": statistics(presses)}
+def _mode(name: str, found: BelievedAnswers) -> dict[str, Any]:
+    both = float(found.answered.is_known[:, :2].all(axis=1).mean())
+    return {"name": name, "drawn": len(found.is_answered), "both": both, "statistics": statistics(found.answered)}

@@ -17,6 +17,7 @@ import numpy as np
 
 from device.measurement.arrays import Array
 from device.measurement.parameters import PARAMETERS, RANGES, Range, box_of, denormalise
+from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_posterior import seen_with_noise, to_bright_side
 from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.radial_profile import RESPONSE, SeenPresses
@@ -106,13 +107,18 @@ def foreign_presses(
     seed: int,
     jobs: int = -1,
     are_scans: bool = False,
+    have_inclusion: bool = True,
 ) -> ForeignPresses:
     """Return random presses of a probe on patients, in tissue that people have, or scans of two of them.
 
-    Parameters of a scan are those of its first press; the second lies beside the inclusion.
+    Parameters of a scan are those of its first press; the second lies beside the inclusion, where there is one.
     """
-    of_truths, of_presses = (3, 4) if are_scans else (0, 1)  # no draw is of both, nor of phantoms
+    of_truths, of_presses = {  # no draw is of two of these, nor of phantoms or holds
+        (False, True): (0, 1), (True, True): (3, 4), (False, False): (7, 8), (True, False): (9, 10),
+    }[are_scans, have_inclusion]  # fmt: skip
     parameters = draw_parameters(count, np.random.default_rng([seed, of_truths]), ranges=OF_PATIENTS)
+    if not have_inclusion:
+        parameters[:, : len(UNKNOWNS)] = NO_INCLUSION.as_tuple()
 
     def pressed(number: int) -> SeenPresses:
         rng = np.random.default_rng([seed, of_presses, number])
@@ -136,7 +142,7 @@ def foreign_phantoms(
         stated, std, has_inclusion = stated_coordinates(phantom)
         values = _true_values(stated, std, number, rng)
         if not has_inclusion:
-            values[: len(NO_INCLUSION.as_tuple())] = NO_INCLUSION.as_tuple()
+            values[: len(UNKNOWNS)] = NO_INCLUSION.as_tuple()
         seen = _seen(tables, values[None], [press_part(probe, rng, on_phantom=True)], noise, rng)
         return PhantomRamp(phantom.name, seen, stated, std, has_inclusion)
 

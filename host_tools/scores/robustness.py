@@ -21,12 +21,13 @@ from device.measurement.arrays import Array
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, STD, RowDerivatives
+from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from device.simulation.physics.world import AS_BELIEVED, World
 from device.simulation.virtual_probe import ProbeTables
 from host_tools.commissioning.commission import limits
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, Design, ProbeFit, fit_probe
-from host_tools.commissioning.left_out import answers_of
+from host_tools.commissioning.left_out import answers_of, checked_answer
 from host_tools.optics.other_light import other_optics
 from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_least, at_most
 from host_tools.press_models.recorded_presses import in_parallel
@@ -56,6 +57,8 @@ GOALS = {"pooled": 0.86, "each probe": 0.80, "joint": 0.84, "answered": 0.95, "r
 OTHER_GOALS = {"pooled": 0.83, "answered": 0.90, "rmse": 1.6}
 """Of other optics nothing is asked of each probe, nor of both at once."""
 OTHER_PROBES = 4
+FALSE_ALARMS = 0.015
+"""Share of presses without an inclusion that may have numbers; mode quick's own limit is set to it."""
 LEAST_MM = 1e-9
 """Errors below are none: nothing is divided by them."""
 
@@ -125,12 +128,29 @@ def other_optics_chapter(
     )
 
 
+class InclusionFree(NamedTuple):
+    """Of so many presses or scans where there is no inclusion: in how many the contrast stands out, and which of them
+    have numbers."""
+
+    presses: int
+    stand_out: int
+    answered: int
+
+    def row(self) -> tuple[str, ...]:
+        """Return the cells of a table."""
+        return (*map(str, self), f"{100 * self.answered / self.presses:.1f} %")
+
+
 class TriedProbe(NamedTuple):
-    """Answers to presses of one probe, by who answers them, and what commissioning found."""
+    """Answers to presses of one probe, by who answers them, and what commissioning found.
+
+    `inclusion_free`: what `COMMISSIONED` and `SCANS` make of tissue without an inclusion.
+    """
 
     number: int
     scores: dict[str, ScoredPresses]
     fit: ProbeFit
+    inclusion_free: dict[str, InclusionFree]
 
     def of_group(self, group: str) -> TriedProbe:
         """Return the same with inclusions of one of `GROUPS` alone."""
@@ -145,7 +165,7 @@ def of_group(found: ScoredPresses, group: str) -> ScoredPresses:
 def _trials(setup: TrialSetup, lit: ProbeTables, probes: int, presses: int) -> list[TriedProbe]:
     """Return how presses of foreign probes are answered, each probe on a core of its own."""
     allowing = tolerant(setup.design)
-    critical = limits(allowing, setup.model, setup.seed)
+    critical = limits(allowing, setup.model, setup.seed)["standard"]
 
     def tried(place: int) -> TriedProbe:
         return _tried(setup, lit, place + 1, presses, (allowing, critical))
@@ -173,12 +193,29 @@ def _tried(
     scores = {
         SHIPPED: scored(model.answers, model, model.critical["standard"], few, jobs),
         TOLERANCES: scored(allowing[0], model, allowing[1], few, jobs),
-        COMMISSIONED: scored(answers, model, critical, taken, jobs),
-        KNOWN: scored(known, model, critical_of_known, of_design, jobs),
-        SCANS: scored(answers, model, critical, scans, jobs),
-        KNOWN_SCANS: scored(known, model, critical_of_known, scans_of_design, jobs),
+        COMMISSIONED: scored(answers, model, critical["standard"], taken, jobs),
+        KNOWN: scored(known, model, critical_of_known["standard"], of_design, jobs),
+        SCANS: scored(answers, model, critical["precise"], scans, jobs),
+        KNOWN_SCANS: scored(known, model, critical_of_known["precise"], scans_of_design, jobs),
     }
-    return TriedProbe(number, scores, fit)
+    nothing, of_two = (
+        foreign_presses(lit, probe, noise, count, seed=own, jobs=jobs, are_scans=are_scans, have_inclusion=False)
+        for count, are_scans in ((presses, False), ((presses + 1) // 2, True))
+    )
+    free = {
+        COMMISSIONED: inclusion_free(answers, model, critical["standard"], nothing),
+        SCANS: inclusion_free(answers, model, critical["precise"], of_two),
+    }
+    return TriedProbe(number, scores, fit, free)
+
+
+def inclusion_free(
+    answers: OwnAnswers, model: RampModel, critical: CriticalValues, taken: ForeignPresses
+) -> InclusionFree:
+    """Return how often presses or scans where there is no inclusion have numbers."""
+    shown = [one for one in taken.seen if any(stands_out(row, answers.noise) for row in one.rows)]
+    answered = sum(checked_answer(answers, model, critical, one).has_numbers for one in shown)
+    return InclusionFree(len(taken.seen), len(shown), answered)
 
 
 def _as_lit(
@@ -227,7 +264,8 @@ def _of_design(setup: TrialSetup, count: int) -> ScoredPresses:
     own = derived_seed(setup.seed, "presses of a known probe")
     taken = foreign_presses(setup.tables, probe, setup.model.answers.noise, count, seed=own, jobs=setup.jobs)
     known = known_probe(setup.design, probe)
-    return scored(known, setup.model, limits(known, setup.model, setup.seed), taken, setup.jobs)
+    critical = limits(known, setup.model, setup.seed)["standard"]
+    return scored(known, setup.model, critical, taken, setup.jobs)
 
 
 def _chapter(
@@ -245,6 +283,12 @@ def _chapter(
         for group, of_one in pressed.items()
         for table in (_table_of_all(group, of_one, of_group(of_design, group)), _table_of_each(group, of_one))
     ]
+    free = {name: _all_free(trials, name) for name in (COMMISSIONED, SCANS)}
+    tables.append(Table(
+        "Presses and scans where there is no inclusion",
+        ("answered by", "presses", "contrast stands out", "have numbers", "share"),
+        tuple((name, *one.row()) for name, one in free.items()),
+    ))  # fmt: skip
     return Chapter(
         title=title,
         claim=claim,
@@ -253,15 +297,25 @@ def _chapter(
             one
             for group, of_one in pressed.items()
             for one in benchmarks(group, of_one, goals if group == GROUPS[0] else _of_soft(goals))
+        )
+        + tuple(
+            at_most(name, "presses without an inclusion that have numbers", one.answered / one.presses, FALSE_ALARMS)
+            for name, one in free.items()
         ),
         tables=tuple(tables),
         facts={
             "probes": len(trials),
             "presses": [len(one.scores[COMMISSIONED].is_answered) for one in trials],
+            "inclusion_free": {name: one._asdict() for name, one in free.items()},
             "refused_as_it_ships": round(1 - _whole(trials, SHIPPED).share_answered(), 3),
             "groups": {group: _facts(of_one) for group, of_one in pressed.items()},
         },
     )
+
+
+def _all_free(trials: Sequence[TriedProbe], name: str) -> InclusionFree:
+    """Return the counts of all probes together."""
+    return InclusionFree(*(sum(counts) for counts in zip(*(one.inclusion_free[name] for one in trials), strict=True)))
 
 
 def _of_soft(goals: Mapping[str, float]) -> dict[str, float]:

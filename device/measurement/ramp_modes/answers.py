@@ -31,6 +31,8 @@ class UnlikeDesign:
 
     `row` [P]: the best fit's without the shift; `second_across` [Q]: second harmonics across the bright side, with it.
     `skin_texture_ratio`: texture of the skin by which intervals are told, over the one that is believed.
+    `inclusion_deviations`: by how many standard deviations all presses are explained better with an inclusion than by
+    hand, skin and tissue alone; more than `needed_deviations` say that there is one.
     """
 
     row: Array
@@ -38,6 +40,8 @@ class UnlikeDesign:
     factor: Array
     second_across: Array
     skin_texture_ratio: float = 1.0
+    inclusion_deviations: float = np.inf
+    needed_deviations: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,11 @@ class RampAnswer:
         """
         low_kpa, high_kpa = LOW[TISSUE], HIGH[TISSUE]
         return float(abs(np.log(self.tissue_kpa[0] ** 2 / (low_kpa * high_kpa))) / np.log(high_kpa / low_kpa))
+
+    @property
+    def needs_inclusion(self) -> bool:
+        """Whether hand and skin alone do not explain the presses; those of the design's own probe are as believed."""
+        return self.unlike is None or self.unlike.inclusion_deviations > self.unlike.needed_deviations
 
     @property
     def spread(self) -> Array:

@@ -128,12 +128,18 @@ def _judged(
     features = with_critical(asdict(found), asdict(critical)) | {"residual": residual} | tissue
     if answer.unlike:
         features["skin_texture_ratio"] = answer.unlike.skin_texture_ratio
+        features |= with_critical(
+            {"inclusion_deviations": answer.unlike.inclusion_deviations},
+            {"inclusion_deviations": answer.unlike.needed_deviations},
+        )
     block = departure.block if departure else None
     if departure:
         features |= _figures_of(departure)
     if reasons := rejections(found, critical, block):
         action = CAUSES[block].action if block else ACTIONS.get(tuple(exceeded(found, critical)), NO_NUMBERS)
         return without_numbers("outside_range", " ".join([*reasons, action]), origin, features)
+    if not answer.needs_inclusion:
+        return without_numbers("not_identifiable", NOTHING_STANDS_OUT, origin, features)
     return with_numbers(numbers_in(answer.mean, answer.spread, answer.intervals), features, origin)
 
 

@@ -12,12 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from device.measurement.arrays import Array
+from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.profile import QuickPress
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.simulation.physics.world import World
+from device.simulation.scenario import NO_INCLUSION
 from host_tools.commissioning.joint_fit import fit_probe
 from host_tools.commissioning.left_out import answers_of
-from host_tools.pages.benchmark import Benchmark, Chapter, Table
+from host_tools.pages.benchmark import Benchmark, Chapter, Table, at_most
 from host_tools.press_models.press_samples import PressedScene, draw_parameters
 from host_tools.press_models.quick_training import QuickBudget, camera_of_a_hold
 from host_tools.press_models.recorded_presses import in_parallel
@@ -29,11 +31,12 @@ from host_tools.scores.one_thing.press_answers import (
     COMMISSIONED,
     SHIPPED,
     DesignToTry,
+    has_quick_numbers,
     own_quick_model,
     quick_scores,
 )
 from host_tools.scores.one_thing.tried_presses import held_press
-from host_tools.scores.robustness import GROUPS, of_group
+from host_tools.scores.robustness import FALSE_ALARMS, GROUPS, of_group
 from host_tools.scores.scored_presses import FIGURES, ScoredPresses, covered_at_least, figures_of, joined
 
 PROBES, PRESSES, CAMERA = 6, 100, 100
@@ -41,6 +44,13 @@ PROBES, PRESSES, CAMERA = 6, 100, 100
 COVERED = 0.86
 """What is asked of what mode quick answers; it may refuse the rest."""
 HeldScores = dict[str, ScoredPresses]
+
+
+class TriedHolds(NamedTuple):
+    """Answers to held presses of one probe, and how many have numbers of as many without an inclusion."""
+
+    scores: HeldScores
+    false_alarms: int
 
 
 class ForeignHolds(NamedTuple):
@@ -63,24 +73,31 @@ def held_presses_chapter(
     """Return how held presses of the first of the foreign probes are answered, a core for each probe."""
     camera = camera_of_a_hold(design.tables, CAMERA, derived_seed(seed, "camera of held presses"), jobs)
 
-    def tried(place: int) -> HeldScores:
+    def tried(place: int) -> TriedHolds:
         number = place + 1
         probe, own = probe_part(foreign_world(seed, number)), derived_seed(seed, f"probe {number}")
         quick = own_quick_model(design, own_answers(design, probe, phantoms, own), seed, jobs=1, budget=budget)
         parameters, held = foreign_holds(design, probe, camera, presses, own)
-        return {
+        free = foreign_holds(design, probe, camera, presses, own, have_inclusion=False).held
+        scores = {
             SHIPPED: quick_scores(parameters, held, design.quick),
             COMMISSIONED: quick_scores(parameters, held, quick),
         }
+        return TriedHolds(scores, sum(has_quick_numbers(one, quick) for one in free))
 
-    found = in_parallel(tried, probes, jobs, smallest_batch=1)
+    trials = in_parallel(tried, probes, jobs, smallest_batch=1)
+    found, false_alarms = [one.scores for one in trials], sum(one.false_alarms for one in trials)
+    share = false_alarms / (probes * presses)
     return Chapter(
         title="Held presses of probes of random tolerances",
         claim=f"Mode quick on {probes} of these probes, {presses} random presses each; phantoms as {phantoms.serial}.",
         source="host_tools/scores/one_thing/held_presses.py; probes: those of the chapter before",
-        benchmarks=tuple(_benchmarks(found)),
+        benchmarks=(
+            *_benchmarks(found),
+            at_most(COMMISSIONED, "presses without an inclusion that have numbers", share, FALSE_ALARMS),
+        ),
         tables=tuple(_tables(found)),
-        facts={"probes": probes, "presses": presses},
+        facts={"probes": probes, "presses": presses, "false_alarms": false_alarms},
     )
 
 
@@ -90,13 +107,18 @@ def own_answers(design: DesignToTry, probe: World, phantoms: PhantomSet, seed: i
     return answers_of(design.shared, fit_probe(ramps, design.shared))
 
 
-def foreign_holds(design: DesignToTry, probe: World, camera: Array, count: int, seed: int) -> ForeignHolds:
+def foreign_holds(
+    design: DesignToTry, probe: World, camera: Array, count: int, seed: int, *, have_inclusion: bool = True
+) -> ForeignHolds:
     """Return presses of a probe on patients, held at 0.5 N; no draw is of `foreign_presses`."""
-    parameters = draw_parameters(count, np.random.default_rng([seed, 5]), ranges=OF_PATIENTS)
+    of_truths, of_presses = (5, 6) if have_inclusion else (11, 12)
+    parameters = draw_parameters(count, np.random.default_rng([seed, of_truths]), ranges=OF_PATIENTS)
+    if not have_inclusion:
+        parameters[:, : len(UNKNOWNS)] = NO_INCLUSION.as_tuple()
     noise = design.model.answers.noise
 
     def held(number: int) -> QuickPress:
-        rng = np.random.default_rng([seed, 6, number])
+        rng = np.random.default_rng([seed, of_presses, number])
         scene = PressedScene(design.tables, world=press_part(probe, rng))
         return held_press(scene.press(parameters[number], float(rng.uniform(0, 2 * np.pi))), noise, rng, camera)
 

@@ -76,7 +76,7 @@ def named_blocks_chapter(
     own, model = with_tolerances(design, seed), design.model
     answering = (
         Answering(SHIPPED, model.answers, model.critical["standard"]),
-        Answering(TOLERANT, own.answers, own.critical),
+        Answering(TOLERANT, own.answers, own.critical["standard"]),
     )
     truths = random_design(presses, 0, seed)
     rows: list[tuple[str, ...]] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -14,6 +14,7 @@ from device.files.bundle_file import read_quick_model
 from device.measurement.arrays import Array
 from device.measurement.confidence_belt import ends_in_belts
 from device.measurement.estimate import outside_training
+from device.measurement.mode import Mode
 from device.measurement.parameters import normalise, normalise_unknowns
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.quick_mode.model import SEEN_BY, QuickModel, visible_contrast
@@ -61,7 +62,7 @@ class OwnLimits(NamedTuple):
     """What answers presses of a probe of one's own, and above what they are refused."""
 
     answers: OwnAnswers
-    critical: CriticalValues
+    critical: Mapping[Mode, CriticalValues]
 
 
 def with_tolerances(design: DesignToTry, seed: int) -> OwnLimits:
@@ -115,7 +116,7 @@ def ramp_scores(tried: TriedPresses, design: DesignToTry, own: OwnLimits, jobs: 
     for mode, taken in zip(RAMP_MODES, (tried.single, tried.scans), strict=True):
         few = taken.first(FEW[mode])
         found[f"{mode} {SHIPPED}"] = scored(model.answers, model, model.critical[mode], few, jobs)
-        found[f"{mode} after"] = scored(own.answers, model, own.critical, taken, jobs)
+        found[f"{mode} after"] = scored(own.answers, model, own.critical[mode], taken, jobs)
     return found
 
 
@@ -128,13 +129,19 @@ def quick_scores(parameters: Array, held: Sequence[QuickPress], model: QuickMode
     ends = [ends_in_belts(at, spread, model.belts) for at, spread in zip(mean, raw.spread, strict=True)]
     low, high, known = (np.array([one[part] for one in ends]).reshape(mean.shape) for part in range(3))
     truth = normalise(parameters[shown])[:, : len(UNKNOWNS)]
-    answered = [
-        held[number].elongation_ratio <= model.elongation_ratio and not outside_training(model.bundle, held[number].row)
-        for number in shown
-    ]
+    answered = [_is_usual(held[number], model) for number in shown]
     nothing, number = np.full(len(shown), np.nan), np.array(shown, int)
     evaluated, all_stand_out = EvaluatedPresses(truth, mean, low, high, known), np.ones(len(shown), bool)
     return ScoredPresses(evaluated, nothing, all_stand_out, np.array(answered, bool), number)
+
+
+def has_quick_numbers(press: QuickPress, model: QuickModel) -> bool:
+    """Return whether mode quick gives numbers, as if it had been trained for the press's probe."""
+    return _shows(press.row, model) and _is_usual(press, model)
+
+
+def _is_usual(press: QuickPress, model: QuickModel) -> bool:
+    return press.elongation_ratio <= model.elongation_ratio and not outside_training(model.bundle, press.row)
 
 
 def _shows(row: Array, model: QuickModel) -> bool:

@@ -73,7 +73,7 @@ def solved_skins_chapter(
         skin: scored(
             own.answers,
             design.model,
-            own.critical,
+            own.critical["standard"],
             ForeignPresses(parameters[solved], [pressed[number][place] for number in solved]),
             jobs,
         )

@@ -71,8 +71,8 @@ def presses(covered):
     return EvaluatedPresses(truth, middle, middle - 0.2, middle + 0.2, known)
 
 
-def answered(count):
-    return BelievedAnswers(presses(count), np.ones(count, int), np.ones(count, bool), np.ones(count))
+def answered(covered):
+    return BelievedAnswers(presses(covered), np.ones(10, int), np.ones(10, bool), np.ones(10))
 
 
 def found(names=("A1", "A2", "block"), **believed):
@@ -93,7 +93,8 @@ def found(names=("A1", "A2", "block"), **believed):
     )
     missed = replace(left_out(names[1]), low=1.05 * TRUTH, value=1.2 * TRUTH, high=1.3 * TRUTH, misfit_ratio=1.1)
     gates = [Gate("largest misfit", 1.1, Bound(0.0, 2.5, ""), "record it again")]
-    critical = CriticalValues(1.43, 3.21, 4.56, 0.87)
+    of_press = CriticalValues(1.43, 3.21, 4.56, 0.87)
+    critical = {"standard": of_press, "precise": replace(of_press, misfit_ratio=1.29)}
     left_alone = [left_out(names[0]), missed]
     return CommissionedProbe(fit, None, critical, left_alone, answered(9), answered(7), gates, list(names))
 
@@ -149,7 +150,7 @@ def test_phantoms_left_out_limits_and_levels_are_told():
     shown = page()
     assert "A1 8: 7.2 to 8.8 6: 5.4 to 6.6 80: 72 to 88 0.80" in shown.words["answers"]
     assert "A2 8: 8.4 to 10.4 misses" in shown.words["answers"]
-    for told in ("0.40 %", "0.60 %", "1.43", "3.21", "4.56", "0.87", "above 1.43 a press is refused"):
+    for told in ("0.40 %", "0.60 %", "1.43", "3.21", "4.56", "0.87", "1.29", "above 1.43 a press is refused"):
         assert told in shown.words["all"]
     assert "standard, one press 10 100 % 90 %" in shown.words["all"]
     assert "precise, a scan 10 100 % 70 %" in shown.words["all"]

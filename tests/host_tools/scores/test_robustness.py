@@ -33,6 +33,7 @@ from host_tools.scores.robustness import (
     OTHER_GOALS,
     SCANS,
     SHIPPED,
+    InclusionFree,
     TriedProbe,
     _chapter,
     benchmarks,
@@ -55,7 +56,7 @@ def tried(found, known, number=1, scans=None):
         SCANS: found if scans is None else scans,
         KNOWN_SCANS: known,
     }
-    return TriedProbe(number, scores, FIT)
+    return TriedProbe(number, scores, FIT, {COMMISSIONED: InclusionFree(40, 6, 1), SCANS: InclusionFree(20, 4, 0)})
 
 
 def by_quantity(trials, goals=GOALS, group=GROUPS[0]):
@@ -132,19 +133,24 @@ def test_soft_inclusions_stand_apart_in_tables_and_bounds():
     assert cases.count(f"commissioned, {GROUPS[0]}") == 9
     assert cases.count(f"commissioned, {GROUPS[1]}") == 7
     assert [cases.count(f"{SCANS}, {group}") for group in GROUPS] == [7, 0]
-    assert [table.caption for table in chapter.tables] == [
+    *of_groups, free = chapter.tables
+    assert [table.caption for table in of_groups] == [
         f"{what}, inclusions of {group}"
         for group in GROUPS
         for what in ("All probes together", "Each probe, commissioned")
     ]
     stand_out = 1 + FIGURES.index("stand out")
-    assert {row[stand_out] for table in chapter.tables for row in table.rows} == {"3"}
+    assert {row[stand_out] for table in of_groups for row in table.rows} == {"3"}
+    assert free.rows == ((COMMISSIONED, "40", "6", "1", "2.5 %"), (SCANS, "20", "4", "0", "0.0 %"))
+    judged = {one.case: one.passed for one in chapter.benchmarks if "without an inclusion" in one.quantity}
+    assert judged == {COMMISSIONED: False, SCANS: True}
 
 
 def test_a_group_that_nobody_pressed_has_no_bound():
     hard = told_presses(4)
     chapter = _chapter("Probes", "Claim.", "source", [tried(hard, hard)], hard, GOALS)
-    assert {one.case for one in chapter.benchmarks} == {f"{name}, {GROUPS[0]}" for name in (COMMISSIONED, SCANS)}
+    of_nothing = {COMMISSIONED, SCANS}
+    assert {one.case for one in chapter.benchmarks} == of_nothing | {f"{name}, {GROUPS[0]}" for name in of_nothing}
     assert list(chapter.facts["groups"]) == [GROUPS[0]]
     assert chapter.facts["groups"][GROUPS[0]][KNOWN] == {"size": 1.0, "depth": 1.0, "both": 1.0, "region": 1.0}
     assert chapter.facts["refused_as_it_ships"] == 1.0
@@ -217,7 +223,7 @@ def test_presses_of_its_own_fit_it_better_than_the_probe_beside_it(model, design
     taken = foreign_presses(tables, world, model.answers.noise, 6, seed=2, jobs=1)
     own = known_probe(design, world)
     other = known_probe(design, replace(world, contact=probe_part(foreign_world(1, 4)).contact, cell_span_ratio=1.02))
-    critical = limits(own, model, seed=1)
+    critical = limits(own, model, seed=1)["standard"]
     misfits = [scored(answers, model, critical, taken, 1).misfit_ratio.mean() for answers in (own, other)]
     assert misfits[0] < misfits[1]
     assert misfits[0] == pytest.approx(1.0, abs=0.5)

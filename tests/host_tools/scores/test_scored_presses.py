@@ -92,7 +92,7 @@ def test_presses_are_scored_where_they_are_answered(tables):
     design = Design(model.answers, load_derivatives(SIMULATED_PROBE))
     taken = foreign_presses(tables, AS_BELIEVED, model.answers.noise, 6, seed=5, jobs=1)
     known = known_probe(design, AS_BELIEVED)
-    critical = limits(known, model, seed=1)
+    critical = limits(known, model, seed=1)["standard"]
     found = scored(known, model, critical, taken, 1)
     assert found.is_answered.sum() >= 3
     assert 0 <= found.region_holds() <= 1

@@ -29,7 +29,7 @@ from device.measurement.ramp_modes.noise import PressNoise
 from device.measurement.ramp_modes.posterior import sample_press
 from device.measurement.ramp_modes.radial_profile import COLUMNS, RESPONSE, SeenPresses
 from device.measurement.ramp_modes.scan import bound_of, scan_starts
-from device.measurement.ramp_modes.surrogate import OFFSET, ScanSurrogate
+from device.measurement.ramp_modes.surrogate import DEPTH, MODULUS, OFFSET, SIZE, ScanSurrogate
 
 LOOKED_AGAIN = 2
 """How often what the probe changes is taken anew, where the fit has come to."""
@@ -40,6 +40,14 @@ COARSER_SKINS = 1.6, 2.5, 3.7
 """Textures of skin over the believed one, of 0.3 % mostly, that are weighed for presses that it explains badly."""
 BADLY_EXPLAINED = 1.0
 """Misfit from which on they are: below it hardly any is likelier."""
+APART, MOST_BEGUN = 0.1, 3
+"""Fits whose coordinates lie nearer to each other than the first are one; of so many the likeliest is kept. Where what
+the probe changes is taken anew, another than the best before may come to explain the press better: in one press of
+twenty-five it is more than exp(5) times as likely."""
+NEEDED_VARIANCE, FURTHER_VARIANCE = 9.0, 5.0
+"""Squared deviations by which an inclusion has to explain a press better than none, and what each further press of a
+scan adds, whose place is two unknowns more. Of presses where there is none the contrast stands out in one of ten; so
+much better as well it explains fewer than one of a hundred, and two of scans (docs/robustness.md)."""
 BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
 
@@ -58,6 +66,19 @@ class _Settled(NamedTuple):
     def log_evidence(self) -> float:
         return self.posterior.log_evidence(self.best)
 
+    @property
+    def inclusion_deviations(self) -> float:
+        """By how many standard deviations the presses are explained better with an inclusion than without any.
+
+        The root of the likelihood ratio's statistic, of Wilks, Ann. Math. Stat. 9 (1938).
+        """
+        without, free = np.array(self.best), np.ones(len(self.best), dtype=bool)
+        free[[SIZE, DEPTH, MODULUS]] = free[OFFSET:] = False
+        without[[SIZE, MODULUS]], without[DEPTH], without[OFFSET:] = -1.0, 1.0, 0.0  # the faintest: nobody sees it
+        fits = np.array([self.best, *best_fits(self.posterior, without[None], free, tolerance=WELL)])
+        found, nothing = np.sum(self.posterior.residuals(fits) ** 2, axis=1)
+        return float(np.sqrt(max(nothing - found, 0.0)))
+
 
 class OwnAnswers(RampAnswers):
     """Forward model, noise, and what is believed of a commissioned probe."""
@@ -73,16 +94,20 @@ class OwnAnswers(RampAnswers):
         inclusion: a second one looks like coarse skin, too. All else is told on the likeliest skin.
         """
         reach_mm = self.reach_mm(len(seen.rows))
-        at = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
-        for _ in range(LOOKED_AGAIN):
-            at = best_fit(self._posterior(seen, at, reach_mm), at, tolerance=ROUGHLY)
-        believed = self._settled(seen, at, reach_mm)
+        begun = self._begun(seen, np.clip(estimates, -WELL_INSIDE, WELL_INSIDE), reach_mm)
+        believed = max((self._followed(seen, at, reach_mm) for at in begun), key=lambda one: one.log_evidence)
         best, misfit_ratio = believed.best, believed.posterior.misfit_ratio(believed.best)
         likeliest = believed if misfit_ratio < BADLY_EXPLAINED else self._on_likeliest_skin(seen, believed, reach_mm)
         fit = replace(sample_press(likeliest.posterior, likeliest.best), best=best)
         offset_mm = reach_mm * np.linalg.norm(best[OFFSET:].reshape(-1, AXES), axis=1)
         unlike = believed.posterior.unlike(best, int(np.argmin(offset_mm)))
-        return answer_of(fit, misfit_ratio, offset_mm, replace(unlike, skin_texture_ratio=likeliest.skin_texture_ratio))
+        told = replace(
+            unlike,
+            skin_texture_ratio=likeliest.skin_texture_ratio,
+            inclusion_deviations=likeliest.inclusion_deviations,
+            needed_deviations=float(np.sqrt(NEEDED_VARIANCE + FURTHER_VARIANCE * (len(seen.rows) - 1))),
+        )
+        return answer_of(fit, misfit_ratio, offset_mm, told)
 
     def ordinary_shift(self, rows: Array) -> Array:
         """Return what is believed to move rows [n, P] of presses on an inclusion in the middle of all ranges [n, P]."""
@@ -115,6 +140,12 @@ class OwnAnswers(RampAnswers):
         posterior = self._posterior(seen, best, self.reach_mm(len(seen.rows)))
         return Departure(posterior.misfit_by_block(best), posterior.tilt_deviations(best))
 
+    def _followed(self, seen: SeenPresses, at: Array, reach_mm: float) -> _Settled:
+        """Return the posterior and best fit that coordinates [8 + 2 N] lead to."""
+        for _ in range(LOOKED_AGAIN):
+            at = best_fit(self._posterior(seen, at, reach_mm), at, tolerance=ROUGHLY)
+        return self._settled(seen, at, reach_mm)
+
     def _settled(self, seen: SeenPresses, at: Array, reach_mm: float, skin_texture_ratio: float = 1.0) -> _Settled:
         """Return the posterior on skin of so many times the texture, linear about coordinates [8 + 2 N], and fit."""
         posterior = self._posterior(seen, at, reach_mm, self._on_skin(skin_texture_ratio))
@@ -144,12 +175,16 @@ class OwnAnswers(RampAnswers):
     ) -> OwnPosterior:
         return OwnPosterior(seen, self.surrogate, noise or self.noise, self.own, reach_mm, at)
 
-    def _begun(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:
-        """Return coordinates [8 + 2 N] to begin at: of several the one that explains the presses best."""
+    def _begun(self, seen: SeenPresses, inside: Array, reach_mm: float) -> list[Array]:
+        """Return coordinates [8 + 2 N] to begin at, first those that explain the presses best."""
         starts = self._scan_starts(seen, inside, reach_mm) if len(seen.rows) > 1 else _single_starts(inside)
         posterior = self._posterior(seen, starts[0], reach_mm)
         found = best_fits(posterior, starts, np.ones(posterior.dimensions, dtype=bool), tolerance=WELL)
-        return np.asarray(found[np.argmin(np.sum(posterior.residuals(found) ** 2, axis=1))])
+        different: list[Array] = []
+        for at in found[np.argsort(np.sum(posterior.residuals(found) ** 2, axis=1))]:
+            if all(np.abs(at - other).max() > APART for other in different):
+                different.append(at)
+        return different[:MOST_BEGUN]
 
     def _scan_starts(self, seen: SeenPresses, inside: Array, reach_mm: float) -> Array:
         """Return starts [n, 8 + 2 N] of a scan, each inclusion on its bright side."""

@@ -8,6 +8,7 @@ from told_answers import told_presses
 
 from device.files.bundle_file import read_quick_model, read_ramp_model
 from device.files.shipped import MODELS, SIMULATED_PROBE
+from device.measurement.ramp_modes.model import RAMP_MODES
 from device.measurement.recording.ring_means import RINGS
 from device.simulation.physics.layer_table import LayerRatios
 from device.simulation.physics.skin import SkinTexture
@@ -70,7 +71,8 @@ def with_tolerances_on(world_of, tables, quick, presses):
     own = with_tolerances(DesignToTry(model, quick, load_derivatives(SIMULATED_PROBE), tables), 1)
     truths = random_design(presses, presses, seed=4)
     taken = tried_presses(truths, lambda number, rng: [Setting(tables, world_of(rng))] * 2, model.answers.noise)
-    return [scored(own.answers, model, own.critical, one, -1) for one in (taken.single, taken.scans)]
+    each = zip(RAMP_MODES, (taken.single, taken.scans), strict=True)
+    return [scored(own.answers, model, own.critical[mode], one, -1) for mode, one in each]
 
 
 @pytest.mark.long
