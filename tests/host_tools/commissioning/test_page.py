@@ -152,14 +152,14 @@ def test_phantoms_left_out_limits_and_levels_are_told():
     assert "A2 8: 8.4 to 10.4 misses" in shown.words["answers"]
     for told in ("0.40 %", "0.60 %", "1.43", "3.21", "4.56", "0.87", "1.29", "above 1.43 a press is refused"):
         assert told in shown.words["all"]
-    assert "standard, one press 10 100 % 90 %" in shown.words["all"]
-    assert "precise, a scan 10 100 % 70 %" in shown.words["all"]
+    assert "standard, one press 10 100 % 100 % 90 %" in shown.words["all"]
+    assert "precise, a scan 10 100 % 100 % 70 %" in shown.words["all"]
 
 
 def test_a_mode_quick_of_its_own_stands_beside_the_others():
     shown = page(replace(found(), held=answered(8)))
     assert "modes quick, standard and precise of serial number TSIS-0007" in shown.words["verdict"]
-    assert "quick, one hold 10 100 % 80 %" in shown.words["all"]
+    assert "quick, one hold 10 100 % 100 % 80 %" in shown.words["all"]
     assert shown.words["all"].count("quick: size") == 1  # in the picture
     assert "not trained" not in shown.words["verdict"]
     assert "mode quick, which was not trained" in page().words["verdict"]
