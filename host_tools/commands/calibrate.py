@@ -181,6 +181,7 @@ def commission(
     from host_tools.commissioning.commission import commission as run_commission
     from host_tools.commissioning.own_bundle import quick_folder, require_new, write_own_bundle, write_own_quick
     from host_tools.commissioning.own_quick import train_own_quick
+    from host_tools.commissioning.report import levels_at_their_end
     from host_tools.press_models.press_derivatives import load_derivatives
     from host_tools.scenes.probe_file import simulated_probe
 
@@ -207,6 +208,7 @@ def commission(
             raise
         print(json.dumps({"accepted": False, "problems": [problem_record(one) for one in rejection.problems]}))
         raise typer.Exit(1) from rejection
+    advice = [*levels_at_their_end(done.fit), *bench.phantoms.advice()]
     write_own_bundle(
         done,
         design,
@@ -217,7 +219,7 @@ def commission(
         command=command,
         origin={"phantoms": bench.phantoms.serial, "design": model.bundle.name},
         certificate=certificate,
-        advice=list(bench.phantoms.advice()),
+        advice=advice,
         is_simulated=any(recording.simulated for recording in bench.recordings),
     )
     if own_quick:
@@ -226,7 +228,7 @@ def commission(
         print(json.dumps(_commissioned_record(done, out, quick_out, certificate)))
     else:
         _show_commissioned(done, out, quick_out, certificate)
-        for line in bench.phantoms.advice():
+        for line in advice:
             print(line)
 
 

@@ -22,8 +22,8 @@ from device.measurement.ramp_modes.estimate import stands_out
 from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from host_tools.calibration.gates import Gate, require_all
 from host_tools.commissioning.believed_presses import BelievedAnswers, believed_answers, believed_presses
-from host_tools.commissioning.joint_fit import PROBE, Design, ProbeFit, fit_probe
-from host_tools.commissioning.left_out import LeftOut, answers_of, left_out
+from host_tools.commissioning.joint_fit import MOST_STEPS, PROBE, Design, ProbeFit, fit_probe
+from host_tools.commissioning.left_out import LeftOut, answers_of, left_out, told_blocks
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.commissioning.probe_prior import LABELS, OF_DESIGN, ProbePrior
 from host_tools.press_models.mode_outcome import CRITICAL_RATIO
@@ -82,10 +82,11 @@ def commission(
     fit = fit_probe(ramps, design)
     say("each phantom left out")
     phantoms = left_out(ramps, design, model.first_guesses, fit, jobs)
-    gates = list(gates_of(fit, phantoms))
-    require_all(gates)
     answers = answers_of(design, fit)
     critical = limits(answers, model, derived_seed(seed, "odds of a commissioned probe"))
+    told = told_blocks(ramps, answers, model, critical["standard"])
+    gates = [*gates_of(fit, phantoms), steps_gate(fit), blocks_gate(told)]
+    require_all(gates)
     say(f"{PRESSES} presses and {SCANS} scans of the probe that is believed in")
     presses = believed_answers(
         answers, model, critical["standard"], PRESSES, derived_seed(seed, "believed presses"), jobs=jobs
@@ -130,6 +131,26 @@ def gates_of(fit: ProbeFit, phantoms: Sequence[LeftOut]) -> list[Gate]:
             "measure what its file states; if that holds, the probe is not of this design",
         ),
     ]
+
+
+def steps_gate(fit: ProbeFit) -> Gate:
+    """Return whether the fit of all ramps ended by itself: one that was stopped is no fit."""
+    return Gate(
+        "steps of the fit of all ramps",
+        fit.steps,
+        Bound(1, MOST_STEPS - 1, ""),
+        "record the ramps of the largest misfits again, and measure those phantoms",
+    )
+
+
+def blocks_gate(told: Sequence[str]) -> Gate:
+    """Return whether bare blocks are told as such; `told` are the names of those in which there is an inclusion."""
+    return Gate(
+        "bare blocks in which the probe tells of an inclusion",
+        len(told),
+        Bound(0, 0, ""),
+        f"wipe the face, hold the probe straight, and record {', '.join(told)} again",
+    )
 
 
 def limits(answers: OwnAnswers, model: RampModel, seed: int) -> dict[Mode, CriticalValues]:

@@ -84,7 +84,7 @@ class ProbeFit:
 
     `misfit_ratio` [n] of each ramp: squared residuals over their number. `left_ratio` [n, contrast and response]: by
     how much ring means of each are seen above what is explained, of the light; NaN where a bare block says nothing.
-    `prior` is what its builder stated.
+    `prior` is what its builder stated. `steps`: of the last least squares, which end by themselves below `MOST_STEPS`.
     """
 
     mean: Array
@@ -96,6 +96,7 @@ class ProbeFit:
     discrepancy: Discrepancy
     believed: BelievedErrors
     prior: ProbePrior = OF_DESIGN
+    steps: int = 0
 
     @property
     def tolerances_away(self) -> Array:
@@ -271,7 +272,16 @@ class _JointFit:
         misfit = np.array([np.mean(one**2) for one in unexplained])
         of_light, mean = self._left_ratio(unexplained, explained), at[: len(PROBE)]
         return ProbeFit(
-            mean, covariance, evidence, misfit, of_light, self._levels, discrepancy, self._believed, self._prior
+            mean,
+            covariance,
+            evidence,
+            misfit,
+            of_light,
+            self._levels,
+            discrepancy,
+            self._believed,
+            self._prior,
+            found.nfev,
         )
 
     def _left_ratio(self, unexplained: Sequence[Array], explained: Sequence[_Ramp]) -> Array:

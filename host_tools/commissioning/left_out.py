@@ -82,6 +82,18 @@ def _answered(ramp: PhantomRamp, answers: OwnAnswers, guess: Guess) -> LeftOut:
     return LeftOut(ramp.name, truth, tolerance, value, low, high, answer.intervals.is_identifiable, answer.misfit_ratio)
 
 
+def told_blocks(
+    ramps: Sequence[PhantomRamp], answers: OwnAnswers, model: RampModel, critical: CriticalValues
+) -> list[str]:
+    """Return the names of the bare blocks in which the probe tells of an inclusion.
+
+    Of a block the fit reads the reference response alone: its contrast and harmonics have taught nothing.
+    """
+    of_castings = OwnAnswers(answers.surrogate, answers.noise, on_castings(answers.own))
+    blocks = [ramp for ramp in ramps if not ramp.has_inclusion]
+    return [ramp.name for ramp in blocks if checked_answer(of_castings, model, critical, ramp.seen).has_numbers]
+
+
 class CheckedAnswer(NamedTuple):
     """An answer to one press or scan, whether a limit refuses it, and whether an inclusion stands out.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from device.measurement.quantities import UNKNOWNS
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
-from host_tools.commissioning.joint_fit import ProbeFit
+from host_tools.commissioning.joint_fit import DISCREPANCY_RATIOS, FLAT_FIELD_RATIOS, MODEL_RATIOS, ProbeFit
 from host_tools.commissioning.left_out import LeftOut
 from host_tools.commissioning.probe_prior import LABELS
 
@@ -28,6 +28,20 @@ def probe_lines(fit: ProbeFit, directions: NDArray[np.intp]) -> Iterator[str]:
     yield f"{'model error of a press':{WIDTH}} {fit.levels.model_ratio:8.2%}"
     yield f"{'skin and flat field':{WIDTH}} {fit.levels.flat_field_ratio:8.2%}"
     yield SILICONE
+
+
+def levels_at_their_end(fit: ProbeFit) -> Iterator[str]:
+    """Yield a sentence on each level of errors that is the largest of those weighed: it may be larger still."""
+    for name, level, largest in (
+        ("what the forward model lacks", fit.believed.discrepancy_ratio, DISCREPANCY_RATIOS[-1]),
+        ("the model error of a press", fit.believed.model_ratio, MODEL_RATIOS[-1]),
+        ("skin and flat field", fit.believed.flat_field_ratio, FLAT_FIELD_RATIOS[-1]),
+    ):
+        if level >= largest:
+            yield (
+                f"Of {name} the largest level that is weighed is the likeliest, {level:.1%}: it may be larger still, "
+                "and intervals too narrow. Look for what differs from the design, and commission again."
+            )
 
 
 def phantom_lines(phantoms: Sequence[LeftOut]) -> Iterator[str]:

@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from functools import partial
 
 import numpy as np
 import pytest
@@ -28,25 +29,29 @@ from host_tools.commissioning.believed_presses import believed_dial
 from host_tools.commissioning.commission import (
     MISFIT_LIMIT,
     WORST_PHANTOM,
+    blocks_gate,
     commission,
     gates_of,
+    steps_gate,
 )
 from host_tools.commissioning.joint_fit import (
     DISCREPANCY_RATIOS,
     FLAT_FIELD_RATIO,
     FLOOR,
+    MODEL_RATIOS,
+    MOST_STEPS,
     PROBE,
     UNLIKE_CASTINGS,
     BelievedErrors,
     Design,
     fit_probe,
 )
-from host_tools.commissioning.left_out import LeftOut, left_out
+from host_tools.commissioning.left_out import LeftOut, answers_of, left_out, told_blocks
 from host_tools.commissioning.own_bundle import write_own_bundle
 from host_tools.commissioning.page import PAGE_FILE
 from host_tools.commissioning.phantom_ramps import phantom_ramps
 from host_tools.commissioning.probe_prior import LAYERS, OF_DESIGN, ProbePrior
-from host_tools.commissioning.report import SILICONE, phantom_lines, probe_lines
+from host_tools.commissioning.report import SILICONE, levels_at_their_end, phantom_lines, probe_lines
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scores.foreign_presses import foreign_phantoms
@@ -195,6 +200,28 @@ def test_phantoms_of_which_nothing_is_determined_prove_nothing(fit):
     assert gates_of(fit, [replace(told, is_determined=np.full(3, False))])[1].value == 0.0
     assert gates_of(fit, [told, missed])[1].value == 0.5
     assert gates_of(fit, [told, replace(missed, is_determined=np.full(3, False))])[1].value == 1.0
+
+
+def test_an_inclusion_in_a_block_that_is_stated_bare_is_told(ramps, model, derivatives, fit):
+    design, hidden = Design(model.answers, derivatives), ramps[0]
+    told = partial(told_blocks, answers=answers_of(design, fit), model=model, critical=model.critical["standard"])
+    found = told([*ramps, replace(hidden, name="C1", has_inclusion=False)])
+    assert found == ["C1"]
+    assert blocks_gate([]).problem is None
+    assert "record C1 again" in str(blocks_gate(found).problem)
+
+
+def test_a_fit_that_was_stopped_is_none(fit):
+    assert steps_gate(fit).problem is None
+    assert "the fit of all ramps is 40" in str(steps_gate(replace(fit, steps=MOST_STEPS)).problem)
+
+
+def test_a_level_of_errors_that_may_be_larger_still_is_told(fit):
+    assert not list(levels_at_their_end(fit))
+    largest = fit.believed._replace(model_ratio=MODEL_RATIOS[-1], discrepancy_ratio=2 * DISCREPANCY_RATIOS[-1])
+    lacking, of_press = levels_at_their_end(replace(fit, believed=largest))
+    assert "40.0%" in lacking
+    assert of_press.startswith("Of the model error of a press the largest level that is weighed is the likeliest, 1.3%")
 
 
 def test_a_second_ramp_of_a_phantom_is_left_out_with_it(ramps, model, derivatives, fit, monkeypatch):
