@@ -377,6 +377,22 @@ class UnsteadyTareError(LoadCellError):
     title = "Zero not taken"
 
 
+class ZeroOffWarning(LoadCellError):  # noqa: N818 - the name is what the operator reads
+    """The load cell does not read zero unloaded, by less than a touch; the probe still measures."""
+
+    code = "E309"
+    title = "Zero is off"
+    severity = "warning"
+    is_lasting = True
+
+
+class SlowCellError(LoadCellError):
+    """The load cell's amplifier gives too few readings a second to say what the force was at a frame."""
+
+    code = "E310"
+    title = "Load cell too slow"
+
+
 class ModelError(DeviceError):
     """A model bundle is missing, tampered with, or not made for this probe."""
 

@@ -46,7 +46,7 @@ def emulated_amplifier(config: Config, probe: VirtualProbe, faults: FaultTimelin
     )
     if config.cell.protocol == "mantracourt":
         return EmulatedMantracourt(bridge, station=config.cell.station, faults=faults)
-    return EmulatedOpenScale(bridge, faults=faults)
+    return EmulatedOpenScale(bridge, rate_hz=cell.rate_hz, faults=faults)
 
 
 def commissioned(config: Config) -> Config:

@@ -6,12 +6,15 @@ from collections.abc import Callable
 
 import serial
 
-from device.errors import UnsteadyTareError
+from device.errors import SlowCellError, UnsteadyTareError
 from device.hardware.cell_line import CellLine
 from device.hardware.interfaces import CellCounts, CellSample, LoadCell
 from device.hardware.mantracourt import Mantracourt
 from device.hardware.openscale import OpenScale
 from device.measurement.quantities import Bound, require
+
+LEAST_RATE_HZ = 20.0
+"""Three readings in the 0.15 s by which a steady hand is told: an OpenScale as it is delivered gives five a second."""
 
 
 def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", station: int = 1) -> LoadCell:
@@ -31,12 +34,17 @@ def open_load_cell(device: str, baud: int = 9600, protocol: str = "openscale", s
 def measure_tare(read: Callable[[], CellSample], *, samples: int, max_spread_counts: float) -> CellCounts:
     """Return the mean of `samples` readings (counts) of the unloaded probe, each of them by `read`.
 
-    Raises `UnsteadyTareError` when largest minus smallest exceeds `max_spread_counts`: the probe was touched.
+    Raises `UnsteadyTareError` when largest minus smallest exceeds `max_spread_counts`: the probe was touched. And
+    `SlowCellError` when there were fewer than `LEAST_RATE_HZ` a second.
     """
     action = "ask for at least one reading and a positive spread"
     require("samples", samples, Bound(1, 100_000, ""), action)
     require("max_spread_counts", max_spread_counts, Bound(0.0, 2.0**24, "counts", low_included=False), action)
-    counts = [read().counts for _ in range(samples)]
+    readings = [read() for _ in range(samples)]
+    took_s, counts = readings[-1].t_s - readings[0].t_s, [one.counts for one in readings]
+    if took_s * LEAST_RATE_HZ > samples - 1:
+        cause = f"Load cell gives {(samples - 1) / took_s:.3g} readings a second, fewer than {LEAST_RATE_HZ:g}."
+        raise SlowCellError(cause, "Set its amplifier to its fastest rate and to no averaging.")
     spread_counts = max(counts) - min(counts)
     if spread_counts > max_spread_counts:
         cause = f"Load cell varies by {spread_counts:g} counts during tare, above the {max_spread_counts:g} allowed."

@@ -25,8 +25,9 @@ LINE = re.compile(rb"(?P<millis>\d{1,10}),-?\d+(?:\.\d+)?,(?:kg|lbs),(?P<raw24>-
 RAW24_LOW_COUNTS, RAW24_HIGH_COUNTS = -(2**23), 2**23 - 1
 MOST_ALIKE = 20
 """A converter that is there makes this many equal readings running once in 10^30: its noise is tens of counts."""
-MOST_DRIFT_RATIO = 0.005
-"""How fast the sender's clock may lose on ours: a ceramic resonator's half per cent."""
+MOST_DRIFT_RATIO = 0.01
+"""How fast the sender's clock may lose on ours: a ceramic resonator's half per cent when new, and as much again by
+temperature and age. One that loses more is stamped early by up to `RESTART_S`."""
 RESTART_S = 0.5
 """A line this much earlier or later than the sender's clock lets expect comes from a clock that began anew."""
 

@@ -21,14 +21,14 @@ from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
 from device.instrument.acquisition.light_check import DimmingWatch
-from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
+from device.instrument.press.capture import CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.probe_answers import ProbeAnswers
 from device.instrument.press.record import SAVE_LIGHT_EVERY_S, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.scan import Scan, ScanTaken
-from device.instrument.press.states import Guidance, PressState, before_contact
+from device.instrument.press.states import CANCELLED, Guidance, PressState, before_contact
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.self_test.requests import SelfTestRequests
 from device.instrument.self_test.run import SelfTestRun
@@ -40,6 +40,7 @@ from device.instrument.watch.progress import ProgressBoard
 from device.instrument.watch.readiness import HealthPart, PartHealth, parts_health
 from device.instrument.watch.recordings_watch import RecordingsWatch, retention_rule
 from device.instrument.watch.space_watch import SpaceWatch
+from device.instrument.watch.zero_watch import ZeroWatch
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import Bound, Inclusion, InvalidQuantity, require
 from device.measurement.recording.tactile_image import Frame
@@ -94,6 +95,7 @@ class Procedure:
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
         self._computer, self._recordings = computer, RecordingsWatch(store, retention_rule(config))
         self._space = SpaceWatch(store, config)
+        self._zero = ZeroWatch(config.press.contact_n)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)
         self._brightness = BrightnessLoop(self._capture.lit, config.light.target_counts)
         self._requests = PressRequests(
@@ -207,7 +209,7 @@ class Procedure:
         self._requests.on_request(listener)
 
     def cancel(self, press_id: str) -> None:
-        """Cancel the press under way; see `PressRequests.cancel`."""
+        """Cancel the press that waits or is under way; see `PressRequests.cancel`."""
         self._requests.cancel(press_id)
 
     def finish(self, press_id: str) -> None:
@@ -285,9 +287,10 @@ class Procedure:
         self.calibration.require_valid(self._clock.now())
         self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
-        unloaded = self._capture.unloaded()
+        unloaded = self._capture.unloaded(self._while_touched)
         if self._capture.stopping.is_set():
             return  # it may have too few frames to judge
+        self._follow_zero(unloaded)
         self._require_no_drift(unloaded)
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.mode)
@@ -296,6 +299,13 @@ class Procedure:
             self._measure(job, unloaded)
             self._used_s = time.monotonic()
 
+    def _follow_zero(self, unloaded: list[Frame]) -> None:
+        """Let the cell's zero be where it reads now, or say by how much it is off."""
+        try:
+            self._zero.saw(unloaded, self.bench.force)
+        finally:
+            self.board.update(warnings=self._zero.warned(self.board.now.warnings))
+
     def _require_no_drift(self, unloaded: list[Frame]) -> None:
         """Compare the untouched face with the certificate's, under the light of then: the loop may have moved ours."""
         ratio = self.calibration.lit_ratio or self._capture.lit
@@ -303,6 +313,12 @@ class Procedure:
             self.calibration.require_no_drift(self._capture.relit(unloaded, ratio))
         finally:
             self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
+
+    def _while_touched(self) -> None:
+        """End a press that has waited too long for the probe to be lifted; forget a fault that is over."""
+        self._requests.give_up_waiting(self.config.press.timeout_s)
+        if self.board.now.step == "fault":  # the cell reads again, and all that comes before it has passed
+            self.board.update(step="starting", fault=None)
 
     def _next_job(self, until_s: float) -> PressJob | None:
         away = (self._capture.stopping, self._capture.called_away)

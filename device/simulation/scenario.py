@@ -31,12 +31,14 @@ NO_INCLUSION = Inclusion(size_mm=0.0, depth_mm=5.0, youngs_modulus_kpa=80.0)
 
 @dataclass(frozen=True)
 class CellSettings:
-    """The emulated load cell: counts per newton, counts at no load, noise of one sample, and drift of the zero."""
+    """The emulated load cell: counts per newton, counts at no load, noise of one sample, drift of the zero, and how
+    many readings a second its amplifier streams."""
 
     counts_per_n: float = 100_000.0
     zero_counts: float = 8_200.0
     noise_counts: float = 40.0
     drift_counts_per_s: float = 0.0
+    rate_hz: float = 80.0
 
     def __post_init__(self) -> None:
         action = "use a real cell's data sheet"
@@ -44,6 +46,7 @@ class CellSettings:
         require("cell.zero_counts", self.zero_counts, Bound(-8e6, 8e6, "counts"), action)
         require("cell.noise_counts", self.noise_counts, Bound(0.0, 1e6, "counts"), action)
         require("cell.drift_counts_per_s", self.drift_counts_per_s, Bound(-1e4, 1e4, "counts/s"), action)
+        require("cell.rate_hz", self.rate_hz, Bound(1.0, 1000.0, "Hz"), action)
 
 
 @dataclass(frozen=True)

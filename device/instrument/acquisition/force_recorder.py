@@ -12,6 +12,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ SILENCE_S = 1.0
 REST_PAUSE_S = 0.06
 """While nobody presses, five samples of 80 Hz are taken at a time; waking the thread for each is most of its work."""
 RETRY_S = 0.2
+FEWEST_IN_WINDOW = 3
+"""Fewer samples leave nothing of a straight line, and of a trembling hand they may see no difference."""
 
 Zero = tuple[ForceScale, LoadLimit]
 TareOf = Callable[[Callable[[], CellSample]], Zero]
@@ -163,6 +166,14 @@ class ForceRecorder:
             self._zero = scale, limit
         return before.newtons(scale.tare_counts)
 
+    def move_zero(self, read_n: Newtons) -> None:
+        """Let what is read as a force (N) be zero from now on; raises `ZeroShiftError` where that is too far."""
+        with self._news:
+            scale, limit = self._tared()
+            tare_counts = CellCounts(scale.tare_counts + read_n * scale.sensitivity_counts_per_n)
+            limit.require_tare(tare_counts)
+            self._zero = replace(scale, tare_counts=tare_counts), limit
+
     def _next(self) -> CellSample:
         """Return the next sample that is recorded; raise the `LoadCellError` that comes instead."""
         with self._news:
@@ -239,12 +250,17 @@ class ForceRecorder:
         return limit.commissioned.newtons(scale.tare_counts)
 
     def range_n(self, t_s: float, *, window_s: float, around_line: bool = False) -> Newtons:
-        """Return by how much the force varied in a window that ends at a time, or around a straight line through it."""
+        """Return by how much the force varied in a window that ends at a time, or around a straight line through it.
+
+        Infinite where too few samples say nothing of it.
+        """
         with self._news:
             times_s, counts = self._samples.times_s, self._samples.counts
             inside = slice(np.searchsorted(times_s, t_s - window_s), np.searchsorted(times_s, t_s, side="right"))
             times_s, forces_n = times_s[inside] - t_s, self._forces_n(counts[inside])
-        return force_range_n(times_s, forces_n, around_line=around_line) if len(times_s) else Newtons(float("inf"))
+        if len(times_s) < FEWEST_IN_WINDOW:
+            return Newtons(float("inf"))
+        return force_range_n(times_s, forces_n, around_line=around_line)
 
     def peak_n(self, since_s: float, t_s: float) -> Newtons:
         """Return the largest force of the samples after one time and until another, and of that time itself.

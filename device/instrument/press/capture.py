@@ -31,8 +31,8 @@ from device.instrument.acquisition.light_check import (
 )
 from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.frame_choice import WantedFrames, wanted_frames
-from device.instrument.press.machine import Ending, FrameSeen, PressRules, PressUnderWay
-from device.instrument.press.states import ACTIVE, Guidance, PressState, before_contact
+from device.instrument.press.machine import PRESSED_RATIO, Ending, FrameSeen, PressRules, PressUnderWay
+from device.instrument.press.states import ACTIVE, CANCELLED, Guidance, PressState, before_contact
 from device.instrument.status import StatusBoard
 from device.instrument.watch.progress import ProgressBoard
 from device.measurement.mode import Mode
@@ -47,10 +47,11 @@ from device.measurement.recording.tactile_image import Frame, Role, TactileImage
 
 UNLOADED_FRAMES = 4
 POLL_S = 0.02
-CANCELLED = "Cancelled by the operator."
 BINNED_MM = 0.25
 HARD_RATIO = 0.7
 """Press frames from this part of the largest force on are looked at."""
+TELL_AFTER_S = 2.0
+"""A hand that rests on the probe for so long after a press is told to lift: by then it has read how that went."""
 WOKEN_S = 1.0
 """A face that has waited in the dark is lit for so long by what is less than a contact."""
 SPOT_CONTRAST = 0.02
@@ -100,8 +101,10 @@ class Capture:
         self._is_enough: Callable[[bool], bool] = _never
         self._dark_counts = self._before_s = self._untouched_s = 0.0
 
-    def unloaded(self) -> list[Frame]:
+    def unloaded(self, while_touched: Callable[[], None] = lambda: None) -> list[Frame]:
         """Return dark and lit frames of the untouched probe; waits until it is, and takes them again if it was not.
+
+        `while_touched` is called again and again as long as the wait goes on.
 
         Raises `CalledAway` when something else is to be done meanwhile, `StuckLightError` or `AmbientLightError` when
         the dark ones are not dark, `OpenLedError` or `HotLedDriverError` when the LED chip says that current does not
@@ -110,7 +113,7 @@ class Capture:
         guidance = self.board.now.guidance
         try:
             while True:
-                self._wait_until_untouched()
+                self._wait_until_untouched(while_touched)
                 began_s = time.monotonic()
                 frames = self._untouched_frames()
                 # A flat field under load would be wrong in every pixel, and nothing else would tell.
@@ -121,13 +124,15 @@ class Capture:
             # Not before the frames are there: whoever is told to press as soon as he lifts never gets beyond them.
             self.board.update(guidance=guidance)
 
-    def _wait_until_untouched(self) -> None:
+    def _wait_until_untouched(self, while_touched: Callable[[], None]) -> None:
+        began_s = time.monotonic()
         self.bench.light(DARK)
         while not self.stopping.is_set() and self.bench.force.latest_n >= self.press.contact_n:
             self._progress.beat()
             if self.called_away.is_set():
                 raise CalledAway
-            if self.board.now.guidance is Guidance.WAIT:  # of the start: nothing else has told the operator
+            while_touched()
+            if self.board.now.guidance is Guidance.WAIT or time.monotonic() - began_s >= TELL_AFTER_S:
                 self.board.update(guidance=Guidance.LIFT)
             time.sleep(POLL_S)
 
@@ -157,7 +162,7 @@ class Capture:
 
         Raises `PressEnded` when it fails, is too hard or is cancelled, `NoContrastError` when the image does not
         depend on it, `DarkSideError` when it shows no light at all, `OpenLedError` or `HotLedDriverError` when the
-        light fails before it, `LightBudgetError` when it was on for too long. A face that nobody touches is not kept
+        light fails before it, `LightBudgetError` when it was on for too long. A face that nobody presses is not kept
         lit: the press waits for the touch in the dark.
         """
         wanted = wanted_frames(mode, role, self.press, self._tears)
@@ -178,7 +183,8 @@ class Capture:
             frame = self._numbered(self.bench.take(role), ramp)
             self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
             before_s, lit_s = lit_s, self.bench.budget.on_s
-            self._untouched_s = 0.0 if self.machine.is_touching else self._untouched_s + lit_s - before_s
+            is_pressed = frame.force_n >= PRESSED_RATIO * self.press.contact_n
+            self._untouched_s = 0.0 if is_pressed else self._untouched_s + lit_s - before_s
             if self.machine.is_touching:
                 guidance = wanted.see(frame, self.machine.state)
                 self._drop_outliers(wanted)
@@ -202,11 +208,11 @@ class Capture:
     def _wait_in_the_dark(self, rules: PressRules) -> None:
         """Return once the force says that the probe is about to touch; raises `PressEnded` when that takes too long.
 
-        A zero that is off by less than a contact does not keep it lit: then it takes a rise.
+        A zero that is off does not keep it lit: then it takes a rise.
         """
         self.bench.light(DARK)
         lowest_n = force_n = self.bench.force.latest_n
-        while force_n < rules.contact_n and force_n - lowest_n < rules.contact_n / 2:
+        while force_n < PRESSED_RATIO * rules.contact_n and force_n - lowest_n < rules.contact_n / 2:
             self._require_wanted()
             self._become(self.machine.see(FrameSeen(time.monotonic(), force_n, force_n, 0.0, 0.0), rules))
             time.sleep(POLL_S)

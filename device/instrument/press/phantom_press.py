@@ -16,12 +16,13 @@ from device.config import Config
 from device.errors import DeviceError, NoContrastError
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.light_check import DimmingWatch
-from device.instrument.press.capture import CANCELLED, CalledAway, Capture, PressEnded
+from device.instrument.press.capture import CalledAway, Capture, PressEnded
 from device.instrument.press.record import recording_of
-from device.instrument.press.states import Guidance
+from device.instrument.press.states import CANCELLED, Guidance
 from device.instrument.status import StatusBoard
 from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.computer_watch import ComputerWatch
+from device.instrument.watch.zero_watch import ZeroWatch
 from device.measurement.mode import Mode
 from device.measurement.quantities import Inclusion, InvalidQuantity
 from device.measurement.recording.recording import Recording
@@ -119,9 +120,14 @@ class PhantomPress:
         try:
             if capture.cancelled.is_set():
                 raise CalledAway
-            return capture.unloaded()
+            unloaded = capture.unloaded()
         except CalledAway:
             raise PressEnded("cancelled", CANCELLED) from None
+        zero = ZeroWatch(self._config.press.contact_n)
+        zero.saw(unloaded, self._bench.force)
+        for warning in zero.warned(()):
+            self._warn(warning)
+        return unloaded
 
     def _pressed(self, capture: Capture, mode: Mode) -> list[Frame]:
         """Return the frames beside the inclusion and on it; each side's light is looked at as in any press."""

@@ -7,13 +7,15 @@ of it. Without a request a press begins in the mode of the settings.
 from __future__ import annotations
 
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from typing import Literal
 
 from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
-from device.instrument.press.states import before_contact
+from device.instrument.press.states import CANCELLED, before_contact
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.mode import FRAMES, Mode
@@ -48,6 +50,7 @@ class PressRequests:
         self._now = now
         self._waiting: PressJob | None = None
         self._before: PressJob | None = None
+        self._asked_s = 0.0
         self._listeners: list[Callable[[Mode], None]] = []
         self._lock = threading.Lock()
 
@@ -82,7 +85,7 @@ class PressRequests:
             self._require_idle()
             job = replace(self._new_job(mode, wanted), exam_id=exam.id if exam else None)
             self._store.save_press(job.as_record(), once, exam)
-            self._waiting, self._before = job, status.press
+            self._waiting, self._before, self._asked_s = job, status.press, time.monotonic()
             self._board.update(press=job, measurement_id=None, answer=None, scan=None, frames_taken=0, wanted_n=())
         for listener in self._listeners:
             listener(mode)
@@ -96,7 +99,24 @@ class PressRequests:
                 raise UnknownResource(f"Press {press_id} is not under way.", "Only a running press can be cancelled.")
             if job.state == "computing":
                 raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
-            self._cancelled.set()
+            if self._waiting:
+                self._end_waiting("cancelled", CANCELLED)
+            else:
+                self._cancelled.set()
+
+    def give_up_waiting(self, after_s: float) -> None:
+        """End the press that has waited for so long: whoever takes the probe up later did not ask for it."""
+        with self._lock:
+            if self._waiting and time.monotonic() - self._asked_s >= after_s:
+                reason = f"The probe was not lifted for {after_s:.0f} s: lift it, or tare it if nothing touches it."
+                self._end_waiting("rejected", reason)
+
+    def _end_waiting(self, state: Literal["cancelled", "rejected"], reason: str) -> None:
+        """Keep and show how the press that waits has ended; the lock is held."""
+        assert self._waiting
+        ended, self._waiting = replace(self._waiting, state=state, reason=reason), None
+        self._store.save_press(ended.as_record())
+        self._board.update(press=ended)
 
     def finish(self, press_id: str) -> None:
         """Let the scan under way be answered with the presses that are complete.

@@ -13,6 +13,8 @@ from math import hypot
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.recording.tactile_image import Role
 
+CANCELLED = "Cancelled by the operator."
+
 
 class PressState(Enum):
     """Where a press is: a code for machines and one sentence for the documents."""

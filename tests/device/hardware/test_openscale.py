@@ -83,7 +83,7 @@ def test_samples_that_are_read_late_are_as_far_apart_as_the_amplifier_says(line)
     time.sleep(0.1)  # the reader is busy with something else
     line.send(b"1012,0.5,kg,2,\r\n1025,0.5,kg,3,\r\n")
     times_s = [first.t_s, *(line.cell.read(timeout_s=10.0).t_s for _ in range(2))]
-    assert times_s == pytest.approx([first.t_s, first.t_s + 0.012, first.t_s + 0.025], abs=2e-4)
+    assert times_s == pytest.approx([first.t_s, first.t_s + 0.012, first.t_s + 0.025], abs=3e-4)
 
 
 def test_lines_that_gather_are_read_at_once_and_keep_their_own_times(line, monkeypatch):
@@ -103,7 +103,7 @@ def test_lines_that_gather_are_read_at_once_and_keep_their_own_times(line, monke
     samples = [line.cell.read(timeout_s=10.0) for _ in range(2)]
     assert set(pauses_s) == {0.04}
     assert [one.counts for one in samples] == [2.0, 3.0]
-    assert [one.t_s - first.t_s for one in samples] == pytest.approx([0.012, 0.025], abs=2e-4)
+    assert [one.t_s - first.t_s for one in samples] == pytest.approx([0.012, 0.025], abs=3e-4)
 
 
 def test_the_banner_is_skipped_and_counted(line):

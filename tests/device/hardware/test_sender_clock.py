@@ -15,7 +15,7 @@ def stamped(sent_s: np.ndarray, arrivals_s: np.ndarray) -> np.ndarray:
 
 
 def test_a_line_that_comes_late_is_stamped_when_it_was_measured():
-    """Every tenth line waits for 80 ms: it moves by no more than the drift that is allowed for, 5 us a line."""
+    """Every tenth line waits for 80 ms: it moves by no more than the drift that is allowed for, 0.1 ms a line."""
     late_s = np.where(np.arange(2000) % 10 == 9, 0.08, 0.0)
     error_s = stamped(SENT_S, SENT_S + AHEAD_S + late_s) - (SENT_S + AHEAD_S)
     assert error_s.min() >= -1e-9
@@ -23,21 +23,21 @@ def test_a_line_that_comes_late_is_stamped_when_it_was_measured():
 
 
 def test_random_lateness_of_tens_of_milliseconds_leaves_two():
-    """Waits of 15 ms on average: in fifty lines one comes at once, and the drift allowed for meanwhile is 3 ms."""
+    """Waits of 15 ms on average: in fifty lines one comes at once, and the drift allowed for meanwhile is 6 ms."""
     late_s = np.random.default_rng(1).exponential(0.015, len(SENT_S))
     error_s = (stamped(SENT_S, SENT_S + AHEAD_S + late_s) - (SENT_S + AHEAD_S))[200:]
-    assert error_s.max() < 0.006
+    assert error_s.max() < 0.007
     assert np.sqrt(np.mean(error_s**2)) < 0.002
     assert np.sqrt(np.mean(late_s**2)) > 0.02
 
 
-@pytest.mark.parametrize("drift", [-0.004, 0.004])
+@pytest.mark.parametrize("drift", [-0.009, 0.009])
 def test_a_clock_that_drifts_is_followed(drift):
-    """25 s at 0.4 % are 100 ms; half of the lines are 10 ms late."""
+    """25 s at 0.9 % are 225 ms; half of the lines are 10 ms late."""
     true_s = AHEAD_S + SENT_S * (1 + drift)
     late_s = 0.01 * (np.arange(len(SENT_S)) % 2)
     error_s = stamped(SENT_S, true_s + late_s) - true_s
-    assert np.abs(error_s).max() < 2e-4
+    assert np.abs(error_s).max() < 2 * PERIOD_S * (MOST_DRIFT_RATIO + abs(drift))
 
 
 def test_a_sender_that_begins_anew_is_believed_anew():

@@ -75,6 +75,9 @@ class ObedientBench:
     def rest(self):
         self.rests += 1
 
+    def move_zero(self, read_n):
+        self.zero_n -= read_n
+
     def retare(self):
         moved_n, self.zero_n = self.zero_n, 0.0
         return moved_n
@@ -596,7 +599,7 @@ def test_a_press_that_is_asked_for_while_the_probe_fails_ends_with_the_fault(rig
     """The fault comes between the request and the press: nobody waits for it in vain."""
     broken = pytest.MonkeyPatch()
 
-    def fail_when_asked():
+    def fail_when_asked(*told):
         rig.until(lambda: rig.procedure._requests._waiting)
         broken.undo()
         raise CameraError("No frame came.", "Check the ribbon cable.")
@@ -731,11 +734,57 @@ def test_a_zero_that_looks_like_a_touch_is_tared_and_the_probe_takes_presses_aga
     assert rig.press()["state"] == "done"
 
 
+def test_a_zero_that_creeps_is_taken_off_before_each_press(rig):
+    """By 4 mN, which would move a depth by more than its interval."""
+    rig.bench.zero_n = 0.004
+    rig.press()  # the unloaded frames of this one were taken before
+    rig.until(lambda: rig.bench.zero_n == 0.0)
+    job = rig.press()
+    recording = read_recording(rig.store.recording_path(rig.store.measurement(job["measurement_id"])["recording_id"]))
+    assert {round(frame.force_n, 9) for frame in recording.with_role("press")} == {0.5}
+    assert [one.code for one in rig.board.now.warnings] == []
+
+
+def test_a_zero_that_may_be_a_touch_is_told_and_left_as_it_is(rig):
+    rig.bench.zero_n = 0.02
+    rig.press()
+    rig.until(lambda: "E309" in [one.code for one in rig.board.now.warnings])
+    assert rig.bench.zero_n == 0.02
+    rig.procedure.tare()
+    rig.until(lambda: "E309" not in [one.code for one in rig.board.now.warnings])
+
+
+def test_a_tare_that_was_taken_under_a_load_is_a_fault_until_the_next(rig):
+    rig.estimator = lambda recording: (setattr(rig.bench, "zero_n", -0.15), ANSWER)[1]
+    rig.press()
+    rig.estimator = lambda recording: ANSWER
+    rig.until(lambda: rig.board.now.fault is not None)
+    assert rig.board.now.fault.code == "E306"
+    assert "-0.150 N: its zero was taken under a load" in str(rig.board.now.fault)
+    rig.procedure.tare()
+    rig.until(lambda: rig.board.now.fault is None)
+    assert rig.press()["state"] == "done"
+
+
+def test_a_press_that_waits_for_a_probe_that_is_never_lifted_is_cancelled_and_tared(rig):
+    """Nothing touches it: its zero has come past a touch, so that it waits to be lifted for ever."""
+    rig.estimator = lambda recording: (setattr(rig.bench, "zero_n", 0.06), ANSWER)[1]
+    rig.press()
+    job = rig.procedure.request()
+    with pytest.raises(BusyError, match="A press is under way"):
+        rig.procedure.tare()
+    rig.procedure.cancel(job.id)
+    assert rig.store.press(job.id)["state"] == "cancelled"
+    rig.estimator = lambda recording: ANSWER
+    rig.procedure.tare()
+    assert rig.press()["state"] == "done"
+
+
 def test_the_untouched_face_of_a_press_after_a_tare_is_taken_anew(rig, monkeypatch):
     """The forces of its frames would count from the zero of before."""
     taken, unloaded = [], rig.procedure._capture.unloaded
-    monkeypatch.setattr(rig.procedure._capture, "unloaded", lambda: taken.append(unloaded()) or taken[-1])
-    rig.bench.zero_n = 0.01
+    monkeypatch.setattr(rig.procedure._capture, "unloaded", lambda *told: taken.append(unloaded(*told)) or taken[-1])
+    rig.bench.zero_n = 0.02
     rig.press()
     rig.until(lambda: taken)
     rig.procedure.tare()
@@ -745,7 +794,7 @@ def test_the_untouched_face_of_a_press_after_a_tare_is_taken_anew(rig, monkeypat
 
 
 def test_a_tare_is_refused_during_a_press_and_a_self_test(rig, held_self_test):
-    rig.is_away, rig.bench.zero_n = True, 0.01
+    rig.is_away, rig.bench.zero_n = True, 0.02
     job = rig.procedure.request()
     with pytest.raises(BusyError, match="A press is under way"):
         rig.procedure.tare()
@@ -754,7 +803,7 @@ def test_a_tare_is_refused_during_a_press_and_a_self_test(rig, held_self_test):
     rig.procedure.request_self_test()
     with pytest.raises(BusyError, match="self-test"):
         rig.procedure.tare()
-    assert rig.bench.zero_n == 0.01
+    assert rig.bench.zero_n == 0.02
     held_self_test.set()
 
 

@@ -57,6 +57,14 @@ def test_what_rests_on_the_face_with_less_than_a_contact_does_not_keep_it_lit(pr
     assert pressed.light_on_s < CONFIG.light.untouched_s + WOKEN_S + 2 * FRAME_S
 
 
+def test_a_zero_just_above_a_contact_does_not_keep_it_lit(pressing):
+    resting = HandSettings(held_n=0.06, aim_n=0.06, tremor_n=0.0, drift_n=0.0)
+    pressed = pressing.press(resting, "paper")
+    assert "stayed below" in pressed.reason
+    assert pressed.seconds > CONFIG.press.timeout_s
+    assert pressed.light_on_s < CONFIG.light.untouched_s + WOKEN_S + 2 * FRAME_S
+
+
 def test_presses_that_nobody_touches_light_the_face_once_for_all_of_them(pressing):
     """As an endless loop of requests does: the next one finds the light of those before spent, until a touch."""
     capture, first_s = None, 0.0

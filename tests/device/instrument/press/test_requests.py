@@ -145,19 +145,36 @@ def test_a_probe_at_fault_answers_a_request_with_the_fault(requests, board):
     assert refusal.value is fault
 
 
-def test_a_press_that_waits_can_be_cancelled_and_no_other(requests, cancelled):
+def test_a_press_that_waits_can_be_cancelled_and_no_other(requests, board, store, cancelled):
     job = requests.ask(None)
     with pytest.raises(UnknownResource):
         requests.cancel("another")
-    assert not cancelled.is_set()
     requests.cancel(job.id)
-    assert cancelled.is_set()
+    assert not cancelled.is_set()  # no press is under way that would see it
+    assert (board.now.press.state, store.press(job.id)["state"]) == ("cancelled", "cancelled")
+    assert requests.begin(is_touched=False) is None
+    with requests.idle():
+        pass
+
+
+def test_a_press_that_waits_for_too_long_ends_and_says_what_to_do(requests, board, store):
+    job = requests.ask(None)
+    requests.give_up_waiting(3600.0)
+    assert board.now.press.state == "waiting"
+    requests.give_up_waiting(0.0)
+    assert store.press(job.id)["state"] == "rejected"
+    assert "lift it, or tare it" in board.now.press.reason
+    assert requests.begin(is_touched=False) is None
+    requests.give_up_waiting(0.0)
 
 
 def test_the_end_of_one_press_by_its_operator_does_not_end_the_next(requests, board, cancelled, finished):
-    requests.cancel(requests.ask(None).id)
+    requests.ask(None)
+    job = requests.begin(is_touched=False)
+    requests.cancel(job.id)
+    assert cancelled.is_set()
     finished.set()
-    board.update(press=replace(requests.withdraw(), state="cancelled"))
+    board.update(press=replace(job, state="cancelled"))
     requests.ask(None)
     assert [event.is_set() for event in (cancelled, finished)] == [False, False]
 

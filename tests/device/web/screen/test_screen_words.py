@@ -13,9 +13,8 @@ from daemon_process import ROOT
 
 from device.config import PressSection
 from device.fault_table import FAULTS
-from device.instrument.press.capture import CANCELLED
 from device.instrument.press.machine import FrameSeen, PressRules, PressUnderWay
-from device.instrument.press.states import Guidance, PressState, off_centre, too_hard
+from device.instrument.press.states import CANCELLED, Guidance, PressState, off_centre, too_hard
 from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OUT, SHADE, UNKNOWN_IMAGE
 from device.measurement.mode import MODES
 from device.measurement.quantities import Bound
