@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import rayleigh
 
 from device.measurement.mode import Mode
-from device.measurement.quantities import Bound, require
+from device.measurement.quantities import Bound
 from device.measurement.ramp_modes.commissioned.own_answers import OwnAnswers
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES, RowDerivatives
 from device.measurement.ramp_modes.estimate import stands_out
@@ -74,8 +74,8 @@ def commission(
 ) -> CommissionedProbe:
     """Return the probe that recorded the ramps, from the design's model of ramps and its derivatives.
 
-    `prior` is what the probe's file says of it. Raises `CalibrationRejected` with every gate that is not passed,
-    and `InvalidQuantity` where hardly any of the presses that it believes in would have numbers.
+    `prior` is what the probe's file says of it. Raises `CalibrationRejected` with every gate that is not passed;
+    those of what is drawn from the belief are looked at once all others are.
     """
     design = Design(model.answers, derivatives, prior)
     say(f"{len(ramps)} ramps together")
@@ -94,9 +94,8 @@ def commission(
     scans = believed_answers(
         answers, model, critical["precise"], SCANS, derived_seed(seed, "believed scans"), jobs=jobs, are_scans=True
     )
-    for what, found in (("presses", presses), ("scans", scans)):
-        share, action = float(found.is_answered.mean()), "measure the phantoms again, or look at what refuses them"
-        require(f"share of believed {what} that have numbers", share, Bound(LEAST_ANSWERED, 1.0, ""), action)
+    gates += [answered_gate("presses", presses), answered_gate("scans", scans)]
+    require_all(gates)
     names = [ramp.name for ramp in ramps]
     return CommissionedProbe(fit, answers, critical, phantoms, presses, scans, gates, names)
 
@@ -144,12 +143,25 @@ def steps_gate(fit: ProbeFit) -> Gate:
 
 
 def blocks_gate(told: Sequence[str]) -> Gate:
-    """Return whether bare blocks are told as such; `told` are the names of those in which there is an inclusion."""
+    """Return whether bare blocks are told as such; `told` are the names of those in which there is an inclusion.
+
+    One may be: of blocks as they are believed one in a hundred is, so that of three an honest probe tells one in 2 %.
+    """
     return Gate(
         "bare blocks in which the probe tells of an inclusion",
         len(told),
-        Bound(0, 0, ""),
-        f"wipe the face, hold the probe straight, and record {', '.join(told)} again",
+        Bound(0, 1, ""),
+        f"wipe the face, hold the probe straight, and record {', '.join(told) or 'the blocks'} again",
+    )
+
+
+def answered_gate(what: str, found: BelievedAnswers) -> Gate:
+    """Return whether enough of what is drawn from the belief has numbers."""
+    return Gate(
+        f"share of believed {what} that have numbers",
+        float(found.is_answered.mean()),
+        Bound(LEAST_ANSWERED, 1.0, ""),
+        "state tolerances as small as they are, and record the ramps of the largest misfits again",
     )
 
 

@@ -24,7 +24,6 @@ from host_tools.commissioning.commission import WORST_PHANTOM, CommissionedProbe
 from host_tools.commissioning.joint_fit import FLOOR, PROBE, ProbeFit
 from host_tools.commissioning.probe_prior import LABELS
 from host_tools.commissioning.report import SILICONE
-from host_tools.press_models.mode_statistics import statistics
 
 PAGE_FILE = "commissioning.html"
 TEMPLATE = "commissioning.html.jinja"
@@ -128,5 +127,15 @@ def _directions(fit: ProbeFit) -> Iterator[dict[str, Any]]:
 
 
 def _mode(name: str, found: BelievedAnswers) -> dict[str, Any]:
-    both = float(found.answered.is_known[:, :2].all(axis=1).mean())
-    return {"name": name, "drawn": len(found.is_answered), "both": both, "statistics": statistics(found.answered)}
+    """Return what the table says of a mode; `both` is None where nothing has numbers."""
+    answered, drawn = found.answered, len(found.is_answered)
+    if not len(answered.truth):
+        return {"name": name, "drawn": drawn, "numbers": 0.0, "both": None, "held": None}
+    known, held = (np.asarray(one[:, :2].all(axis=1)) for one in (answered.is_known, answered.is_covered))
+    return {
+        "name": name,
+        "drawn": drawn,
+        "numbers": len(known) / drawn,
+        "both": float(known.mean()),
+        "held": float(held[known].mean()) if known.any() else None,
+    }

@@ -2,7 +2,7 @@
 
 Where nothing stands out from noise, every mode says so and gives no numbers. Presses in which nothing does by the
 design's noise are left out for all who answer, so that they answer the same ones. A commissioned probe believes in more
-noise: what it says of faint ones is no answer, and counts as none where it is held against a probe known exactly.
+than noise: what it says of faint ones is no answer, and counts as none where it is held against a probe known exactly.
 """
 
 from __future__ import annotations

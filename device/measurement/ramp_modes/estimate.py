@@ -72,11 +72,12 @@ def advise_scan(
     """Return the estimate of all ramps of a scan so far, and where the next one would tell most.
 
     Raises as `estimate_ramp`. None is asked for where a further ramp would narrow nothing by `WORTH_A_RAMP`, or a scan
-    has no more of them.
+    has no more of them. Where hand and skin may explain all so far, a further one may tell that they do not.
     """
     estimate, answered = _answered(recording, "precise", model, calibration, read)
     now = half_widths(estimate)
-    if answered is None or not now or len(recording.ramps()) >= FRAMES["precise"].most_ramps:
+    may_be_none = answered is not None and estimate.reason == NOTHING_STANDS_OUT
+    if answered is None or not (now or may_be_none) or len(recording.ramps()) >= FRAMES["precise"].most_ramps:
         return ScanAdvice(estimate, now, None, now)
     seen, answer = answered
     parts = model.answers.worth(seen, answer, PLACES_MM)

@@ -25,10 +25,11 @@ from host_tools.calibration.phantom import PhantomProtocol, phantom_recording
 from host_tools.calibration.phantom_sets import of_file
 from host_tools.commissioning import commission as commission_module
 from host_tools.commissioning import left_out as left_out_module
-from host_tools.commissioning.believed_presses import believed_dial
+from host_tools.commissioning.believed_presses import BelievedAnswers, believed_dial
 from host_tools.commissioning.commission import (
     MISFIT_LIMIT,
     WORST_PHANTOM,
+    answered_gate,
     blocks_gate,
     commission,
     gates_of,
@@ -52,6 +53,7 @@ from host_tools.commissioning.page import PAGE_FILE
 from host_tools.commissioning.phantom_ramps import phantom_ramps
 from host_tools.commissioning.probe_prior import LAYERS, OF_DESIGN, ProbePrior
 from host_tools.commissioning.report import SILICONE, levels_at_their_end, phantom_lines, probe_lines
+from host_tools.press_models.mode_outcome import EvaluatedPresses
 from host_tools.scenes.phantom_set import read_phantoms
 from host_tools.scenes.probe_file import simulated_probe
 from host_tools.scores.foreign_presses import foreign_phantoms
@@ -205,10 +207,18 @@ def test_phantoms_of_which_nothing_is_determined_prove_nothing(fit):
 def test_an_inclusion_in_a_block_that_is_stated_bare_is_told(ramps, model, derivatives, fit):
     design, hidden = Design(model.answers, derivatives), ramps[0]
     told = partial(told_blocks, answers=answers_of(design, fit), model=model, critical=model.critical["standard"])
-    found = told([*ramps, replace(hidden, name="C1", has_inclusion=False)])
-    assert found == ["C1"]
-    assert blocks_gate([]).problem is None
-    assert "record C1 again" in str(blocks_gate(found).problem)
+    found = told([*ramps, *(replace(hidden, name=name, has_inclusion=False) for name in ("C1", "C2"))])
+    assert found == ["C1", "C2"]
+    assert [blocks_gate(one).problem for one in ([], ["C1"])] == [None, None]
+    assert "record C1, C2 again" in str(blocks_gate(found).problem)
+
+
+def test_a_probe_of_whose_presses_hardly_any_has_numbers_is_refused():
+    truth, seconds = np.zeros((10, 3)), np.ones(10)
+    nothing = EvaluatedPresses(truth, truth, truth - 1, truth + 1, np.zeros((10, 3), bool))
+    few, enough = (BelievedAnswers(nothing, np.ones(10, int), np.arange(10) < n, seconds) for n in (1, 2))
+    assert answered_gate("scans", enough).problem is None
+    assert "share of believed scans that have numbers is 0.1" in str(answered_gate("scans", few).problem)
 
 
 def test_a_fit_that_was_stopped_is_none(fit):

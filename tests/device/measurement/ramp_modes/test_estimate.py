@@ -10,6 +10,7 @@ from device.measurement.estimate import NO_NUMBERS, NOTHING_STANDS_OUT
 from device.measurement.mode import FRAMES
 from device.measurement.quantities import UNKNOWNS, Inclusion, InvalidQuantity
 from device.measurement.ramp_modes import answers as answers_module
+from device.measurement.ramp_modes.answers import RampAnswer
 from device.measurement.ramp_modes.ellipticity import elongation_deviations
 from device.measurement.ramp_modes.estimate import (
     AWAY_FROM_BONE,
@@ -355,6 +356,19 @@ def test_where_there_are_no_numbers_nothing_is_advised(pressed, ramp_model, cali
         advice = advise_scan(recording, ramp_model, calibration)
         assert advice.estimate.size_mm.value is None
         assert (advice.next_offset_mm, dict(advice.half_width), dict(advice.expected_half_width)) == (None, {}, {})
+
+
+def test_what_hand_and_skin_may_explain_has_no_numbers_and_is_looked_at_again(
+    ramp, ramp_model, calibration, monkeypatch
+):
+    """As on a commissioned probe; the next ramp of a scan may say that they do not."""
+    monkeypatch.setattr(RampAnswer, "needs_inclusion", property(lambda answer: False))
+    estimate = estimate_ramp(ramp, "standard", ramp_model, calibration)
+    assert (estimate.status, estimate.reason) == ("not_identifiable", NOTHING_STANDS_OUT)
+    assert estimate.features["misfit_ratio"] < estimate.features["critical_misfit_ratio"]
+    advice = advise_scan(ramp, ramp_model, calibration)
+    assert advice.next_offset_mm in PLACES_MM
+    assert (dict(advice.half_width), dict(advice.expected_half_width)) == ({}, {})
 
 
 def test_after_the_last_ramp_of_a_scan_none_is_asked_for(ramp, ramp_model, calibration, monkeypatch):
