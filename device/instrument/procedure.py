@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from device.config import Config
-from device.errors import DeviceError, InterruptedPress, LightError, LightRestError, NoContrastError
+from device.errors import DeviceError, InterruptedPress, LightError, LightRestError, LoadCellError, NoContrastError
 from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
@@ -315,9 +315,9 @@ class Procedure:
             self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
 
     def _while_touched(self) -> None:
-        """End a press that has waited too long for the probe to be lifted; forget a fault that is over."""
+        """End a press that has waited too long for the probe to be lifted; forget a fault of the cell, which reads."""
         self._requests.give_up_waiting(self.config.press.timeout_s)
-        if self.board.now.step == "fault":  # the cell reads again, and all that comes before it has passed
+        if isinstance(self.board.now.fault, LoadCellError):
             self.board.update(step="starting", fault=None)
 
     def _next_job(self, until_s: float) -> PressJob | None:

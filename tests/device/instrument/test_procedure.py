@@ -19,6 +19,7 @@ from device.errors import (
     LastGoodConfigError,
     LightError,
     LightRestError,
+    LoadCellError,
     ModeUnavailable,
     StaleVersion,
     StorageError,
@@ -752,6 +753,18 @@ def test_a_zero_that_may_be_a_touch_is_told_and_left_as_it_is(rig):
     assert rig.bench.zero_n == 0.02
     rig.procedure.tare()
     rig.until(lambda: "E309" not in [one.code for one in rig.board.now.warnings])
+
+
+def test_a_fault_of_the_cell_is_over_when_it_reads_again_though_the_probe_is_touched(rig):
+    """Its cable was pulled, and is plugged in again while something rests on the face."""
+    rig.bench.breaks = [LoadCellError("The load cell is silent.", "Check its cable.")]
+    rig.bench.is_at_work, step_of = False, lambda: (rig.board.now.step, rig.board.now.guidance)
+    rig.board.on_guidance(lambda guidance: setattr(rig.bench, "zero_n", 0.2) if guidance is Guidance.FAULT else None)
+    rig.press()
+    rig.until(lambda: step_of() == ("starting", Guidance.LIFT))
+    assert rig.board.now.fault is None
+    rig.bench.zero_n = 0.0
+    rig.until(lambda: rig.board.now.step == "ready")
 
 
 def test_a_tare_that_was_taken_under_a_load_is_a_fault_until_the_next(rig):
