@@ -40,5 +40,7 @@ class ClockWatch:
         jump_s, self._offset_s = offset_s - self._offset_s, offset_s
         if abs(jump_s) <= self._max_jump_s:
             return None
-        cause = f"The clock was set by {jump_s:+.1f} s: the time of this press may be wrong."
+        cause = (
+            f"The clock was set by {jump_s:+.1f} s: presses of before, or those since, have times that are wrong by it."
+        )
         return ClockJumpError(cause, "Check the board's clock and its time server.")
