@@ -41,6 +41,6 @@ class ClockWatch:
         if abs(jump_s) <= self._max_jump_s:
             return None
         cause = (
-            f"The clock was set by {jump_s:+.1f} s: presses of before, or those since, have times that are wrong by it."
+            f"The clock was set by {jump_s:+.1f} s: times of presses before it, or since, are wrong by that."
         )
         return ClockJumpError(cause, "Check the board's clock and its time server.")

@@ -28,8 +28,9 @@ KINDS: dict[HealthPart, tuple[Part, tuple[str, ...]]] = {
     "store": ("storage", ("E6",)),
 }
 """Whose progress tells of each, and how the codes of its faults begin. A certificate is no matter of the software."""
-ELSEWHERE = {"E205", "E209", "E305", "E306", "E308"}
-"""Foreign light, light for too long, too much load, a moved zero, an unsteady tare: the part that tells it works."""
+ELSEWHERE = {"E205", "E209", "E305", "E306", "E308", "E310"}
+"""Foreign light, light for too long, too much load, a moved zero, an unsteady tare, a slow amplifier: the part that
+tells it works."""
 
 
 @dataclass(frozen=True)
