@@ -16,7 +16,15 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
 from device.config import Config
-from device.errors import DeviceError, InterruptedPress, LightError, LightRestError, LoadCellError, NoContrastError
+from device.errors import (
+    DeviceError,
+    InterruptedPress,
+    LightError,
+    LightRestError,
+    LoadCellError,
+    NoContrastError,
+    ZeroShiftError,
+)
 from device.hardware.interfaces import Newtons
 from device.instrument.acquisition.bench import DARK, Bench
 from device.instrument.acquisition.brightness_loop import BrightnessLoop
@@ -288,9 +296,9 @@ class Procedure:
         self.bench.budget.require_for_press()
         self._capture.lit = self._brightness.ratio
         unloaded = self._capture.unloaded(self._while_touched)
-        if self._capture.stopping.is_set():
-            return  # it may have too few frames to judge
-        self._follow_zero(unloaded)
+        if self._capture.stopping.is_set() or self._capture.called_away.is_set():
+            return  # it may have too few frames to judge, or they count from the zero of before a tare
+        unloaded = self._follow_zero(unloaded)
         self._require_no_drift(unloaded)
         if self.board.now.step in ("starting", "fault"):
             guidance = before_contact("reference", self.mode)
@@ -299,10 +307,10 @@ class Procedure:
             self._measure(job, unloaded)
             self._used_s = time.monotonic()
 
-    def _follow_zero(self, unloaded: list[Frame]) -> None:
-        """Let the cell's zero be where it reads now, or say by how much it is off."""
+    def _follow_zero(self, unloaded: list[Frame]) -> list[Frame]:
+        """Let the cell's zero come to where it reads now; return the frames by it, or say by how much it is off."""
         try:
-            self._zero.saw(unloaded, self.bench.force)
+            return self._zero.saw(unloaded, self.bench.force)
         finally:
             self.board.update(warnings=self._zero.warned(self.board.now.warnings))
 
@@ -315,9 +323,13 @@ class Procedure:
             self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
 
     def _while_touched(self) -> None:
-        """End a press that has waited too long for the probe to be lifted; forget a fault of the cell, which reads."""
+        """End a press that has waited too long for the probe to be lifted; forget a fault of the cell, which reads.
+
+        A zero that is wrong is told by an untouched probe alone.
+        """
         self._requests.give_up_waiting(self.config.press.timeout_s)
-        if isinstance(self.board.now.fault, LoadCellError):
+        fault = self.board.now.fault
+        if isinstance(fault, LoadCellError) and not isinstance(fault, ZeroShiftError):
             self.board.update(step="starting", fault=None)
 
     def _next_job(self, until_s: float) -> PressJob | None:

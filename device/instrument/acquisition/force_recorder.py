@@ -161,7 +161,14 @@ class ForceRecorder:
             if self.fault:
                 raise self.fault
             before, limit = self._tared()
-            scale, _ = self._tare(self._next)
+            last = self._samples.newest
+
+            def following() -> CellSample:
+                nonlocal last
+                last = self._after(last.t_s)
+                return last
+
+            scale, _ = self._tare(following)
             limit.require_tare(scale.tare_counts)
             self._zero = scale, limit
         return before.newtons(scale.tare_counts)
@@ -174,12 +181,14 @@ class ForceRecorder:
             limit.require_tare(tare_counts)
             self._zero = replace(scale, tare_counts=tare_counts), limit
 
-    def _next(self) -> CellSample:
-        """Return the next sample that is recorded; raise the `LoadCellError` that comes instead."""
+    def _after(self, t_s: float) -> CellSample:
+        """Return the first sample after a time, of several that came at once; raise what comes instead of one."""
         with self._news:
-            if not self._news.wait(SILENCE_S) or self.fault:
+            if not self._news.wait_for(lambda: self._samples.newest.t_s > t_s or self.fault, SILENCE_S) or self.fault:
                 raise self.fault or _no_sample(SILENCE_S)
-            return self._samples.newest
+            first = int(np.searchsorted(self._samples.times_s, t_s, side="right"))
+            time_s, counts = float(self._samples.times_s[first]), float(self._samples.counts[first])
+            return CellSample(time_s, CellCounts(counts))
 
     def _tared(self) -> Zero:
         if self._zero is None:

@@ -122,7 +122,8 @@ class Capture:
                 self.board.update(guidance=Guidance.LIFT)
         finally:
             # Not before the frames are there: whoever is told to press as soon as he lifts never gets beyond them.
-            self.board.update(guidance=guidance)
+            is_over = guidance is Guidance.FAULT and self.board.now.fault is None
+            self.board.update(guidance=Guidance.WAIT if is_over else guidance)
 
     def _wait_until_untouched(self, while_touched: Callable[[], None]) -> None:
         began_s = time.monotonic()
@@ -133,8 +134,15 @@ class Capture:
                 raise CalledAway
             while_touched()
             if self.board.now.guidance is Guidance.WAIT or time.monotonic() - began_s >= TELL_AFTER_S:
-                self.board.update(guidance=Guidance.LIFT)
+                self._ask_to_lift()
             time.sleep(POLL_S)
+
+    def _ask_to_lift(self) -> None:
+        """Tell to lift where that is awaited; how a press went stays until another one is asked for."""
+        now = self.board.now
+        is_awaited = now.press is not None and now.press.state == "waiting"
+        if now.guidance not in (Guidance.DONE, Guidance.REJECTED) or is_awaited:
+            self.board.update(guidance=Guidance.LIFT)
 
     def _untouched_frames(self) -> list[Frame]:
         self.bench.check_lights()

@@ -124,7 +124,7 @@ class PhantomPress:
         except CalledAway:
             raise PressEnded("cancelled", CANCELLED) from None
         zero = ZeroWatch(self._config.press.contact_n)
-        zero.saw(unloaded, self._bench.force)
+        unloaded = zero.saw(unloaded, self._bench.force)
         for warning in zero.warned(()):
             self._warn(warning)
         return unloaded

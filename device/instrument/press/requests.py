@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Literal
 
 from device.errors import BusyError, DeviceError, ModeUnavailable, UnknownResource
-from device.instrument.press.states import CANCELLED, before_contact
+from device.instrument.press.states import CANCELLED, before_contact, never_lifted
 from device.instrument.self_test.report import SelfTestJob
 from device.instrument.status import PressJob, StatusBoard
 from device.measurement.mode import FRAMES, Mode
@@ -108,15 +108,16 @@ class PressRequests:
         """End the press that has waited for so long: whoever takes the probe up later did not ask for it."""
         with self._lock:
             if self._waiting and time.monotonic() - self._asked_s >= after_s:
-                reason = f"The probe was not lifted for {after_s:.0f} s: lift it, or tare it if nothing touches it."
-                self._end_waiting("rejected", reason)
+                self._end_waiting("rejected", never_lifted(after_s))
 
     def _end_waiting(self, state: Literal["cancelled", "rejected"], reason: str) -> None:
         """Keep and show how the press that waits has ended; the lock is held."""
         assert self._waiting
-        ended, self._waiting = replace(self._waiting, state=state, reason=reason), None
+        ended = replace(self._waiting, state=state, reason=reason)
         self._store.save_press(ended.as_record())
-        self._board.update(press=ended)
+        self._waiting = None
+        step = "rejected" if self._board.now.step == "result" else self._board.now.step
+        self._board.update(press=ended, step=step)
 
     def finish(self, press_id: str) -> None:
         """Let the scan under way be answered with the presses that are complete.

@@ -107,6 +107,11 @@ def spoken(guidance: Guidance, aside_mm: float | None) -> str:
     return guidance.text
 
 
+def never_lifted(waited_s: float) -> str:
+    """Return why a press that was asked for has ended before it began."""
+    return f"The probe was not lifted for {waited_s:.0f} s: lift it, or tare it if nothing touches it."
+
+
 def before_contact(role: Role, mode: Mode, ramp: int = 0) -> Guidance:
     """Return how a press begins; a ramp begins with a touch, so that its small forces are not missed.
 

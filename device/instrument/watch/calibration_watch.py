@@ -37,10 +37,7 @@ COMMISSION = (
     "then start the daemon again."
 )
 WIPE = "Wipe the face and keep it from touching anything; if it stays, calibrate the probe."
-FREE = (
-    "Let nothing touch the probe; if the force stays, the load cell's zero is off by it: "
-    "start the probe again, untouched, for a new zero."
-)
+FREE = "Let nothing touch the probe; if the force stays, the load cell's zero is off by it: tare it, untouched."
 
 
 class CalibrationWatch:

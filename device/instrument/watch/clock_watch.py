@@ -40,7 +40,5 @@ class ClockWatch:
         jump_s, self._offset_s = offset_s - self._offset_s, offset_s
         if abs(jump_s) <= self._max_jump_s:
             return None
-        cause = (
-            f"The clock was set by {jump_s:+.1f} s: times of presses before it, or since, are wrong by that."
-        )
+        cause = f"The clock was set by {jump_s:+.1f} s: times of presses before it, or since, are wrong by that."
         return ClockJumpError(cause, "Check the board's clock and its time server.")

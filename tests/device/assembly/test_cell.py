@@ -55,6 +55,14 @@ def test_a_zero_near_that_of_commissioning_is_the_zero_of_force(opened, protocol
     assert abs(opened(20_000.0, protocol=protocol).bench.force.latest_n) < 0.004
 
 
+@pytest.mark.parametrize("protocol", ["openscale", "mantracourt"])
+def test_a_cell_whose_samples_gather_while_nobody_presses_is_tared_as_any_other(opened, protocol):
+    """They come five at a time then, and each counts."""
+    force = opened(20_000.0, protocol=protocol).bench.force
+    force.take_time()
+    assert abs(force.retare()) < 0.002
+
+
 def test_a_cell_that_is_plugged_in_after_the_start_is_tared_then(tmp_path):
     """The path is a link, as udev's is: it comes with the amplifier."""
     bridge = EmulatedBridge(lambda _t_s: 20_000.0, noise_counts=40.0, seed=1)

@@ -14,7 +14,7 @@ from daemon_process import ROOT
 from device.config import PressSection
 from device.fault_table import FAULTS
 from device.instrument.press.machine import FrameSeen, PressRules, PressUnderWay
-from device.instrument.press.states import CANCELLED, Guidance, PressState, off_centre, too_hard
+from device.instrument.press.states import CANCELLED, Guidance, PressState, never_lifted, off_centre, too_hard
 from device.measurement.estimate import NO_NUMBERS, NOT_ROUND, NOTHING_STANDS_OUT, SHADE, UNKNOWN_IMAGE
 from device.measurement.mode import MODES
 from device.measurement.quantities import Bound
@@ -107,6 +107,7 @@ def daemon_sentences() -> list[str]:
     by_code.append(held.see(lifted, rules).reason)
     by_code.append(started.see(replace(lifted, t_s=late_s), rules).reason)
     by_code.append(held.check(lifted, press).reason)
+    by_code.append(never_lifted(press.timeout_s))
     by_code.append(replace(held, state=PressState.RELEASING).wait(late_s, 1.0, press).reason)
     by_code.append(held.replace_frame(0.123).reason)
     by_code.append(held.see(FrameSeen(1.0, 0.5, 0.5, 0.0, 0.0, 0.012), rules).reason)
