@@ -323,7 +323,7 @@ class Procedure:
             self.board.update(warnings=self.calibration.warned(self.board.now.warnings))
 
     def _while_touched(self) -> None:
-        """End a press that has waited too long for the probe to be lifted; forget a fault of the cell, which reads.
+        """End a press that waits in vain for the probe to be lifted; forget a fault of the cell, which reads.
 
         A zero that is wrong is told by an untouched probe alone.
         """

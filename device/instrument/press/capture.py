@@ -35,6 +35,7 @@ from device.instrument.press.machine import PRESSED_RATIO, Ending, FrameSeen, Pr
 from device.instrument.press.states import ACTIVE, CANCELLED, Guidance, PressState, before_contact
 from device.instrument.status import StatusBoard
 from device.instrument.watch.progress import ProgressBoard
+from device.instrument.watch.zero_watch import STEADY_N
 from device.measurement.mode import Mode
 from device.measurement.paper_mode.features import FeatureSettings, extract_features
 from device.measurement.ramp_modes.radial_profile import FLOOR_COUNTS, contrast_and_valid
@@ -52,6 +53,8 @@ HARD_RATIO = 0.7
 """Press frames from this part of the largest force on are looked at."""
 TELL_AFTER_S = 2.0
 """A hand that rests on the probe for so long after a press is told to lift: by then it has read how that went."""
+LIFTED_WITHIN_S = 1.0
+"""A hand that lifts takes so long at most from a contact's force to none."""
 WOKEN_S = 1.0
 """A face that has waited in the dark is lit for so long by what is less than a contact."""
 SPOT_CONTRAST = 0.02
@@ -114,6 +117,7 @@ class Capture:
         try:
             while True:
                 self._wait_until_untouched(while_touched)
+                self._wait_until_settled()
                 began_s = time.monotonic()
                 frames = self._untouched_frames()
                 # A flat field under load would be wrong in every pixel, and nothing else would tell.
@@ -135,6 +139,17 @@ class Capture:
             while_touched()
             if self.board.now.guidance is Guidance.WAIT or time.monotonic() - began_s >= TELL_AFTER_S:
                 self._ask_to_lift()
+            time.sleep(POLL_S)
+
+    def _wait_until_settled(self) -> None:
+        """Return once the force is that of a probe that nothing touches, and not of one that is being lifted.
+
+        What still rests on it by then is for the zero's watch.
+        """
+        until_s = time.monotonic() + LIFTED_WITHIN_S
+        while not self.stopping.is_set() and (now_s := time.monotonic()) < until_s:
+            if self.bench.range_n(now_s, around_line=False) <= STEADY_N:
+                return
             time.sleep(POLL_S)
 
     def _ask_to_lift(self) -> None:

@@ -99,15 +99,17 @@ class PressRequests:
                 raise UnknownResource(f"Press {press_id} is not under way.", "Only a running press can be cancelled.")
             if job.state == "computing":
                 raise BusyError("The frames are taken and the result is being computed.", "Wait a second for it.")
-            if self._waiting:
-                self._end_waiting("cancelled", CANCELLED)
-            else:
-                self._cancelled.set()
+            self._cancelled.set()
 
     def give_up_waiting(self, after_s: float) -> None:
-        """End the press that has waited for so long: whoever takes the probe up later did not ask for it."""
+        """End the press that waits for the probe to be lifted, if it is cancelled or has waited for so long (s).
+
+        Whoever takes the probe up later did not ask for it.
+        """
         with self._lock:
-            if self._waiting and time.monotonic() - self._asked_s >= after_s:
+            if self._waiting and self._cancelled.is_set():
+                self._end_waiting("cancelled", CANCELLED)
+            elif self._waiting and time.monotonic() - self._asked_s >= after_s:
                 self._end_waiting("rejected", never_lifted(after_s))
 
     def _end_waiting(self, state: Literal["cancelled", "rejected"], reason: str) -> None:

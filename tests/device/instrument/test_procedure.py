@@ -789,7 +789,7 @@ def test_a_press_that_waits_for_a_probe_that_is_never_lifted_is_cancelled_and_ta
     with pytest.raises(BusyError, match="A press is under way"):
         rig.procedure.tare()
     rig.procedure.cancel(job.id)
-    assert rig.store.press(job.id)["state"] == "cancelled"
+    rig.until(lambda: rig.store.press(job.id)["state"] == "cancelled")
     rig.estimator = lambda recording: ANSWER
     rig.procedure.tare()
     assert rig.press()["state"] == "done"

@@ -204,7 +204,7 @@ def test_phantoms_of_which_nothing_is_determined_prove_nothing(fit):
     assert gates_of(fit, [told, replace(missed, is_determined=np.full(3, False))])[1].value == 1.0
 
 
-def test_an_inclusion_in_a_block_that_is_stated_bare_is_told(ramps, model, derivatives, fit):
+def test_an_inclusion_in_a_block_that_is_stated_without_one_is_told(ramps, model, derivatives, fit):
     design, hidden = Design(model.answers, derivatives), ramps[0]
     told = partial(told_blocks, answers=answers_of(design, fit), model=model, critical=model.critical["standard"])
     found = told([*ramps, *(replace(hidden, name=name, has_inclusion=False) for name in ("C1", "C2"))])
