@@ -357,7 +357,7 @@ class OverloadedCellError(LoadCellError):
 
 
 class ZeroShiftError(LoadCellError):
-    """The load cell's zero is far from that of commissioning, or was taken under a load: at the start, or bent."""
+    """The load cell's zero is far from that of commissioning, as of a bent cell, or was taken under a load."""
 
     code = "E306"
     title = "Load cell's zero has moved"

@@ -29,8 +29,7 @@ from host_tools.commissioning.probe_prior import LABELS, OF_DESIGN, ProbePrior
 from host_tools.press_models.mode_outcome import CRITICAL_RATIO
 from host_tools.press_models.seeds import derived_seed
 
-MISFIT_LIMIT, WORST_PHANTOM = 1.8, 2.5
-SCAN_MISFIT_LIMIT = 1.6
+MISFIT_LIMIT, SCAN_MISFIT_LIMIT, WORST_PHANTOM = 1.8, 1.6, 2.5
 """In believed noise and discrepancy. Tilts are not linear: one press in twenty of a known probe has 1.5 and more. A
 limit by the largest of nine phantoms left out, 1.4 to 1.8, is by chance: it refused 3 % more of the presses on single
 inclusions and none more on two that lie close together, which are told by their shape. A scan has more columns:

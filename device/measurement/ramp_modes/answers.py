@@ -31,8 +31,8 @@ class UnlikeDesign:
 
     `row` [P]: the best fit's without the shift; `second_across` [Q]: second harmonics across the bright side, with it.
     `skin_texture_ratio`: texture of the skin by which intervals are told, over the one that is believed.
-    `inclusion_deviations`: by how many standard deviations all presses are explained better with an inclusion than by
-    hand, skin and tissue alone; more than `needed_deviations` say that there is one.
+    `inclusion_deviations`: the root of how much an inclusion lowers the squared residuals of all presses, beside hand,
+    skin and tissue alone; more than `needed_deviations` say that there is one.
     """
 
     row: Array

@@ -47,7 +47,7 @@ twenty-five it is more than exp(5) times as likely."""
 NEEDED_VARIANCE, FURTHER_VARIANCE = 9.0, 5.0
 """Squared deviations by which an inclusion has to explain a press better than none, and what each further press of a
 scan adds, whose place is two unknowns more. Of presses where there is none the contrast stands out in one of ten; so
-much better as well it explains fewer than one of a hundred, and of scans one in fifty (docs/robustness.md). A scan's
+much better as well it explains fewer than one of a hundred, and of scans of two (docs/robustness.md). A scan's
 residuals count in part (`SCAN_VARIANCE`), which raises its limit by as much again."""
 BEGUN_AT = np.array([[0.25, 0.0], [-0.25, 0.0], [0.05, 0.25], [0.05, -0.25]])
 """Where the inclusion of a single press may lie at first, of the reach: the bright side may be a tilt's."""
