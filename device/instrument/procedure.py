@@ -101,7 +101,7 @@ class Procedure:
         )
         self._capture = Capture(bench, config, self.board, self.progress, self._encoded)
         self._clock = clock or ClockWatch(config.clock.max_jump_s)
-        self._computer, self._recordings = computer, RecordingsWatch(store, retention_rule(config))
+        self._computer, self._recordings = computer, RecordingsWatch(store, self._clock, retention_rule(config))
         self._space = SpaceWatch(store, config)
         self._zero = ZeroWatch(config.press.contact_n)
         self._dimming = DimmingWatch(config.light.max_dimming_ratio, config.light.commissioned_counts)

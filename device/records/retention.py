@@ -2,7 +2,8 @@
 
 A recording is most of what a press takes; its measurement, picture of numbers and audit stay for ever. First it is
 written down that a recording is deleted, and why, in one transaction with the audit; then its file goes. Without a
-rule nothing is ever deleted.
+rule nothing is ever deleted. A recording is as old as it says, or as one that was kept before it says, if that is less:
+a clock may have shown 1970, an order cannot.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from device.records.audit import append
 from device.records.manifest import manifest_of, note_removed, utc_now
@@ -64,6 +65,14 @@ class RetentionPlan:
         return {**asdict(self), "size_bytes": size_bytes, "removals": [asdict(one) for one in self.removals]}
 
 
+class _Kept(NamedTuple):
+    """A recording that is kept, its measurement's number, and since when at most (RFC 3339, empty: nobody knows)."""
+
+    seq: int
+    recording: Removal
+    not_before: str
+
+
 class Retention:
     """Plans and deletes on a store's recordings. All methods may be called from any thread."""
 
@@ -78,11 +87,12 @@ class Retention:
 
     def plan(self, rule: RetentionRule) -> RetentionPlan:
         """Return what the rule deletes now; changes nothing. Raises `StorageError` when nobody can say."""
+        now = utc_now()
         with self._transaction() as db:
-            kept, saved = _kept_recordings(db), self._saved(db)
+            kept, saved = _kept_recordings(db, now), self._saved(db)
         free_mb = self._free_mb() if rule.free_mb is not None else 0.0
-        may = [(one, not rule.saved_first or _is_saved(seq, one, saved)) for seq, one in kept]
-        removals, held_back = _due(may, rule, utc_now(), free_mb)
+        may = [(one, not rule.saved_first or _is_saved(one, saved)) for one in kept]
+        removals, held_back = _due(may, rule, now, free_mb)
         return RetentionPlan(rule, saved.made_at if saved else None, tuple(removals), held_back)
 
     def carry_out(self, rule: RetentionRule) -> RetentionPlan:
@@ -104,23 +114,33 @@ class Retention:
         return saved if row and row[0] == saved.newest_id else None
 
 
-def _kept_recordings(db: sqlite3.Connection) -> list[tuple[int, Removal]]:
-    """Return every recording that is kept and not needed for the archive, by its measurement's number, oldest first."""
-    manifest = manifest_of(db)
-    query = (
-        "SELECT seq, id, json_extract(record, '$.recording_id'), json_extract(record, '$.taken_at') "
-        "FROM measurement WHERE id NOT IN "
-        "(SELECT measurement_id FROM outbox WHERE state IN ('queued', 'sent', 'refused')) ORDER BY seq"
+KEPT = """
+SELECT seq, id, recording_id, taken_at, not_before FROM (
+    SELECT *, max(CASE WHEN taken_at <= ? THEN taken_at END) OVER (ORDER BY seq) AS not_before FROM (
+        SELECT seq, id, json_extract(record, '$.recording_id') AS recording_id,
+            json_extract(record, '$.taken_at') AS taken_at
+        FROM measurement
     )
+)
+WHERE id NOT IN (SELECT measurement_id FROM outbox WHERE state IN ('queued', 'sent', 'refused')) ORDER BY seq
+"""
+
+
+def _kept_recordings(db: sqlite3.Connection, now: str) -> list[_Kept]:
+    """Return every recording that is kept and not needed for the archive, by its measurement's number, oldest first.
+
+    What was taken after `now` was so by another clock, and says nothing of those kept after it.
+    """
+    manifest = manifest_of(db)
     return [
-        (seq, Removal(recording, name, taken_at or "", manifest[recording].fingerprint.size_bytes, ""))
-        for seq, name, recording, taken_at in db.execute(query)
+        _Kept(seq, Removal(recording, name, taken_at or "", manifest[recording].fingerprint.size_bytes, ""), at or "")
+        for seq, name, recording, taken_at, at in db.execute(KEPT, (now,))
         if recording in manifest and not manifest[recording].removed
     ]
 
 
 def _due(
-    kept: Sequence[tuple[Removal, bool]], rule: RetentionRule, now: str, free_mb: float
+    kept: Sequence[tuple[_Kept, bool]], rule: RetentionRule, now: str, free_mb: float
 ) -> tuple[list[Removal], int]:
     """Return what a rule deletes, with the reason: what is too old, and then the oldest until there is space.
 
@@ -128,8 +148,8 @@ def _due(
     """
     before = _days_before(now, rule.keep_days) if rule.keep_days is not None else ""
     due, held_back, wanted_bytes = list[Removal](), 0, ((rule.free_mb or 0.0) - free_mb) * 1e6
-    for one, may_go in kept:
-        if one.taken_at and one.taken_at < before:
+    for (_, one, not_before), may_go in kept:
+        if not_before and not_before < before:
             why = f"older than {rule.keep_days:g} days"
         elif wanted_bytes > 0.0:
             why = f"less than {rule.free_mb:g} MB left"
@@ -148,5 +168,5 @@ def _days_before(now: str, days: float) -> str:
     return then.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
-def _is_saved(seq: int, one: Removal, saved: SavedUntil | None) -> bool:
-    return saved is not None and seq <= saved.newest_seq and one.recording_id not in saved.left_out
+def _is_saved(one: _Kept, saved: SavedUntil | None) -> bool:
+    return saved is not None and one.seq <= saved.newest_seq and one.recording.recording_id not in saved.left_out

@@ -3,7 +3,8 @@
 A thread of its own reads and hashes them, one after the other, so that no start and no press waits for it: a start
 looks at names and sizes only. A recording of before there were hashes gets its own first. One that is damaged is told
 with the next press, or while nobody presses, and is not handed out. Once an hour, and while there is too little space,
-it deletes what the settings' rule lets it: see device/records/retention.py.
+it deletes what the settings' rule lets it: see device/records/retention.py. By age it deletes nothing until the wall
+clock has run for a while as it is: a board without a battery starts at some old date, and a server may be wrong.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ import math
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 from device.config import Config
 from device.errors import DamagedRecordingError, DeviceError
+from device.instrument.watch.clock_watch import ClockWatch
 from device.records.recordings import damaged_recordings
 from device.records.retention import RetentionRule
 from device.records.store import Store
@@ -23,6 +26,8 @@ from device.records.store import Store
 log = logging.getLogger(__name__)
 NEWEST = 20
 RETAIN_EVERY_S = 3600.0
+STEADY_S = 900.0
+"""So long has nobody set the wall clock when ages are believed: a time server answers within a minute."""
 SOON_S, LATER_S = 0.05, 60.0
 """Between two recordings: of the newest and of those without a hash, and of all others."""
 
@@ -36,8 +41,9 @@ def retention_rule(config: Config) -> RetentionRule:
 class RecordingsWatch:
     """Looks from its start until it is closed. `taken` may be called from any thread."""
 
-    def __init__(self, store: Store, rule: RetentionRule | None = None) -> None:
-        self._store, self._rule, self._stopping = store, rule or RetentionRule(), threading.Event()
+    def __init__(self, store: Store, clock: ClockWatch, rule: RetentionRule | None = None) -> None:
+        self._store, self._clock, self._rule = store, clock, rule or RetentionRule()
+        self._stopping = threading.Event()
         self._retained_s = -math.inf
         self._damaged = dict.fromkeys((*store.findings.missing, *store.findings.resized))
         self._told = len(self._damaged)
@@ -69,12 +75,12 @@ class RecordingsWatch:
 
     def retain(self) -> None:
         """Delete what the rule deletes now, unless that was looked at within the hour and there is space."""
-        free_mb, now_s = self._rule.free_mb, time.monotonic()
-        is_short = free_mb is not None and self._store.free_mb < free_mb
-        if self._rule.is_any and (is_short or now_s - self._retained_s >= RETAIN_EVERY_S):
+        rule = self._rule if self._clock.steady_s >= STEADY_S else replace(self._rule, keep_days=None)
+        now_s = time.monotonic()
+        is_short = rule.free_mb is not None and self._store.free_mb < rule.free_mb
+        if is_short or (rule.keep_days is not None and now_s - self._retained_s >= RETAIN_EVERY_S):
             self._retained_s = now_s
-            plan = self._store.retention.carry_out(self._rule)
-            for one in plan.removals:
+            for one in self._store.retention.carry_out(rule).removals:
                 log.info("the recording %s was deleted: %s", one.recording_id, one.why)
 
     def _run(self) -> None:

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
 
 import pytest
 from probe_card import RECORDING
@@ -26,8 +27,7 @@ def taken_at(days_old):
 def store(tmp_path):
     opened = Store(tmp_path)
     for number, days_old in DAYS_OLD.items():
-        record = {"id": f"m-{number}", "recording_id": f"r-{number}", "taken_at": taken_at(days_old)}
-        opened.add_measurement(record, replace(RECORDING, id=f"r-{number}"))
+        take(opened, number, taken_at(days_old))
     yield opened
     opened.close()
 
@@ -35,6 +35,15 @@ def store(tmp_path):
 def save(store, until=4, left_out=()):
     said = {"made_at": taken_at(0), "newest_seq": until, "newest_id": f"m-{until}", "left_out": list(left_out)}
     (store.folder / SAVED).write_text(json.dumps(said))
+
+
+def steady_clock(for_s=3600.0):
+    return SimpleNamespace(steady_s=for_s)
+
+
+def take(store, number, at):
+    record = {"id": f"m-{number}", "recording_id": f"r-{number}", "taken_at": at}
+    store.add_measurement(record, replace(RECORDING, id=f"r-{number}"))
 
 
 def names(plan):
@@ -145,9 +154,47 @@ def test_a_start_finishes_what_a_kill_left_of_it_and_misses_nothing(store, monke
 
 def test_the_daemon_carries_the_rule_out_by_itself_once_an_hour(store):
     save(store)
-    watch = RecordingsWatch(store, RetentionRule(keep_days=200))
+    watch = RecordingsWatch(store, steady_clock(), RetentionRule(keep_days=200))
     watch.retain()
     assert files(store) == ["r-2", "r-3", "r-4"]
     store._db.execute("UPDATE measurement SET record = json_set(record, '$.taken_at', '2000-01-01T00:00:00.000Z')")
     watch.retain()
     assert files(store) == ["r-2", "r-3", "r-4"]
+
+
+def test_by_age_nothing_goes_until_the_clock_has_been_steady_for_a_while(store):
+    """A board without a battery starts at an old date; a wrong time server makes everything old at once."""
+    save(store)
+    clock = steady_clock(for_s=60.0)
+    watch = RecordingsWatch(store, clock, RetentionRule(keep_days=200))
+    watch.retain()
+    assert files(store) == ["r-1", "r-2", "r-3", "r-4"]
+    clock.steady_s = 900.0
+    watch.retain()
+    assert files(store) == ["r-2", "r-3", "r-4"]
+
+
+def test_while_the_clock_is_doubted_the_oldest_still_make_space(store):
+    save(store)
+    watch = RecordingsWatch(store, steady_clock(for_s=0.0), RetentionRule(keep_days=1, free_mb=store.free_mb + 0.001))
+    left_bytes = store._disk.free_bytes(store.folder)
+    store._disk.free_bytes = lambda folder: left_bytes
+    watch.retain()
+    assert files(store) == ["r-2", "r-3", "r-4"]
+
+
+def test_what_was_taken_while_the_clock_showed_1970_is_no_older_than_what_was_kept_before_it(store):
+    take(store, 5, "1970-01-01T00:03:00.000Z")
+    save(store, until=5)
+    assert names(store.retention.plan(RetentionRule(keep_days=10))) == ["r-1", "r-2", "r-3"]
+
+
+def test_a_clock_that_once_ran_ahead_keeps_nothing_for_ever(store):
+    take(store, 5, taken_at(-9000))
+    take(store, 6, taken_at(0))
+    save(store, until=6)
+    assert names(store.retention.plan(RetentionRule(keep_days=10))) == ["r-1", "r-2", "r-3"]
+    store._db.execute(
+        "UPDATE measurement SET record = json_set(record, '$.taken_at', ?) WHERE id = 'm-6'", (taken_at(50),)
+    )
+    assert names(store.retention.plan(RetentionRule(keep_days=0.5))) == ["r-1", "r-2", "r-3", "r-4", "r-5", "r-6"]

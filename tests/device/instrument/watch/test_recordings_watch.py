@@ -13,6 +13,7 @@ from daemon_process import wait_for
 from probe_card import add_measurement
 
 from device.instrument.watch import recordings_watch
+from device.instrument.watch.clock_watch import ClockWatch
 from device.instrument.watch.recordings_watch import RecordingsWatch
 from device.records import recordings
 from device.records.store import Store
@@ -36,7 +37,7 @@ def spoil(store: Store, name: str) -> None:
 
 def test_a_bit_that_has_flipped_since_the_last_start_is_found_soon_and_told_once(store: Store) -> None:
     spoil(store, "r-2")
-    watch = RecordingsWatch(store)
+    watch = RecordingsWatch(store, ClockWatch(2.0))
     assert watch.taken() == ()
     watch.start()
     [warning] = wait_for(watch.taken, bool)
@@ -51,7 +52,7 @@ def test_one_more_is_told_together_with_those_that_the_start_has_found(store: St
     store.close()
     again = Store(store.folder)
     with closing(again):
-        watch = RecordingsWatch(again)
+        watch = RecordingsWatch(again, ClockWatch(2.0))
         assert watch.taken() == ()
         spoil(again, "r-3")
         for name in again.recordings.newest():
@@ -64,7 +65,7 @@ def test_recordings_of_before_there_were_hashes_get_theirs_without_being_asked(s
     with sqlite3.connect(store.folder / "tsis.sqlite") as db:
         db.execute("DELETE FROM kept_recording")
     db.close()
-    watch = RecordingsWatch(store)
+    watch = RecordingsWatch(store, ClockWatch(2.0))
     watch.start()
     wait_for(store.recordings.unnoted, lambda names: not names)
     watch.close()
@@ -82,7 +83,7 @@ def test_a_disk_that_cannot_be_read_once_is_looked_at_again(store: Store, monkey
 
     monkeypatch.setattr(store.recordings, "newest", newest)
     spoil(store, "r-2")
-    watch = RecordingsWatch(store)
+    watch = RecordingsWatch(store, ClockWatch(2.0))
     watch.start()
     [warning] = wait_for(watch.taken, bool)
     watch.close()
