@@ -45,7 +45,10 @@ def measure_tare(read: Callable[[], CellSample], *, samples: int, max_spread_cou
     took_s, counts = readings[-1].t_s - readings[0].t_s, [one.counts for one in readings]
     if took_s * LEAST_RATE_HZ > samples - 1:
         cause = f"Load cell gives {(samples - 1) / took_s:.3g} readings a second, fewer than {LEAST_RATE_HZ:g}."
-        raise SlowCellError(cause, "Set its amplifier to its fastest rate and to no averaging.")
+        raise SlowCellError(
+            cause,
+            "Set its amplifier to its fastest rate, to no averaging, and a mantracourt's line to 38400 baud or more.",
+        )
     spread_counts = max(counts) - min(counts)
     if spread_counts > max_spread_counts:
         cause = f"Load cell varies by {spread_counts:g} counts during tare, above the {max_spread_counts:g} allowed."

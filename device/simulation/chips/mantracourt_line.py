@@ -1,6 +1,7 @@
 """Load on the probe to the replies of a Mantracourt DCell or DSC, on a pseudo-terminal that real pyserial opens.
 
 A station that is not asked, a broadcast and half a request get no reply at all; what cannot be read gets `?` and CR.
+Request and reply take the time that their bytes take at the speed which the line was opened with.
 Source: Mantracourt DCell & DSC user manual, appendix B (ASCII protocol) and STAT; what to check: docs/contracts.md.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import select
+import termios
 import time
 from collections.abc import Callable
 
@@ -21,6 +23,17 @@ RANGE_MV_V = 3.0
 STAT_UNDER_RANGE, STAT_OVER_RANGE, STAT_INTEGRITY = 1 << 4, 1 << 5, 1 << 11
 REFUSAL = b"?"
 LISTEN_S = 0.02
+BITS_A_BYTE = 10
+"""8N1: with a start and a stop bit."""
+BAUD = {
+    termios.B9600: 9600,
+    termios.B19200: 19_200,
+    termios.B38400: 38_400,
+    termios.B57600: 57_600,
+    termios.B115200: 115_200,
+    termios.B230400: 230_400,
+}
+"""Speeds of a unit, as a terminal names them."""
 
 
 class EmulatedMantracourt(EmulatedAmplifier):
@@ -45,7 +58,13 @@ class EmulatedMantracourt(EmulatedAmplifier):
         if readable:
             *requests, self._heard = (self._heard + os.read(self._master, 256)).split(b"\r")
             for request in requests:
-                self._send(self._reply(request, self._clock()))
+                reply = self._reply(request, self._clock())
+                time.sleep((len(request) + 1 + len(reply)) * BITS_A_BYTE / self._baud)
+                self._send(reply)
+
+    @property
+    def _baud(self) -> int:
+        return BAUD.get(termios.tcgetattr(self._master)[5], max(BAUD.values()))
 
     def _reply(self, request: bytes, t_s: float) -> bytes:
         # A request begins at its "!", whatever the line held before.
