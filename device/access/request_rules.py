@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from device.access.known_hosts import LOOPBACK, KnownHosts, is_loopback, split_authority
-from device.errors import BodyTooLarge, ForeignRequest, UnknownHost, WrongContentType
+from device.errors import BodyTooLarge, ForeignRequest, UnknownHost, UnknownPath, WrongContentType
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 """What asks and changes nothing."""
@@ -99,10 +99,11 @@ def joined(headers: Iterable[tuple[str, str]]) -> dict[str, str]:
 def require_allowed(request: AskedRequest, hosts: KnownHosts) -> None:
     """Raise the fault of a request that must not be answered.
 
-    `UnknownHost` for any request; `ForeignRequest` and `WrongContentType` for one that would change something;
-    `BodyTooLarge` by what it says of its body's size.
+    `UnknownHost` and `UnknownPath` for any request; `ForeignRequest` and `WrongContentType` for one that would change
+    something; `BodyTooLarge` by what it says of its body's size.
     """
     _require_known_host(request, hosts)
+    _require_plain_path(request)
     if not request.is_safe:
         _require_own_origin(request)
         _require_content_type(request)
@@ -135,6 +136,16 @@ def _require_known_host(request: AskedRequest, hosts: KnownHosts) -> None:
             f"Host is {host[:100]!r}, which is no name of this probe.",
             "Use its address or its host name, or add the name to the setting server.hosts.",
         )
+
+
+def _require_plain_path(request: AskedRequest) -> None:
+    """Refuse a path with a line's end in it, and all else that no text shows.
+
+    Rules compare a path as it is, but routes match it with `$`, which passes over a line feed at the end: what a token
+    may must not depend on it. Source: Python's `re`, "$".
+    """
+    if not request.path.isprintable():
+        raise UnknownPath(f"No path of this probe is {request.path[:100]!a}.", "Ask for a path of docs/openapi.json.")
 
 
 def _require_own_origin(request: AskedRequest) -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from device.access.known_hosts import KnownHosts
 from device.access.request_rules import BODY_RULES, AskedRequest, joined, require_allowed
-from device.errors import BodyTooLarge, DeviceError, ForeignRequest, UnknownHost, WrongContentType
+from device.errors import BodyTooLarge, DeviceError, ForeignRequest, UnknownHost, UnknownPath, WrongContentType
 
 HOSTS = KnownHosts(frozenset({"127.0.0.1", "probe.local"}))
 OWN = {"host": "127.0.0.1:8000", "content-type": "application/json"}
@@ -29,6 +29,13 @@ def code(**asked):
 @pytest.mark.parametrize("host", [None, "evil.example", "evil.example:8000", "127.0.0.1.evil.example"])
 def test_a_name_that_is_none_of_this_machines_is_refused_for_any_method(method, host):
     assert code(method=method, host=host) == "E806" == UnknownHost.code
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS", *UNSAFE])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\x00", "\x85", "\u2028"])
+def test_a_path_with_a_lines_end_is_none_for_any_method(method, end):
+    for path in ("/api/v1/presses", "/api/v1/pairing", "/api/v1/updates/roll-back"):
+        assert code(method=method, path=path + end) == "E804" == UnknownPath.code
 
 
 @pytest.mark.parametrize("method", UNSAFE)

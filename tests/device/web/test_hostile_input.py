@@ -1,7 +1,10 @@
 """Numbers that are none, text that is none, and ids of nobody: refused alike, and the store stays as it was."""
 
 import asyncio
+import json
+import re
 import types
+from pathlib import Path
 
 import httpx
 import pytest
@@ -81,3 +84,16 @@ def test_whatever_is_not_there_is_not_there_in_the_same_words(ask, path):
 @pytest.mark.parametrize("query", ["limit=0", "limit=201", "limit=9223372036854775808", "limit=NaN", "limit=1.5"])
 def test_a_bound_that_is_none_is_refused(ask, query):
     assert ask("GET", f"exams?{query}").status_code == 422
+
+
+def test_no_operation_is_reached_by_its_path_and_a_line_feed(ask, store):
+    """Routes match a path with `$`, which a line feed at the end passes; what a token may is told by the letter."""
+    document = json.loads(Path("docs/openapi.json").read_text(encoding="utf-8"))
+    operations = [(method, path) for path, methods in document["paths"].items() for method in methods]
+    assert ("get", "/api/v1/pairing") in operations
+    before = everything(store)
+    for method, path in operations:
+        plain = re.sub(r"{\w+}", "1", path.removeprefix("/api/v1/"))
+        answer = ask(method.upper(), f"{plain}%0A", "{}")
+        assert (answer.status_code, answer.json()["code"]) == (404, "E804"), path
+    assert everything(store) == before
