@@ -188,9 +188,13 @@ class Listing:
 
 _TOLD = (
     "(json_extract(record, '$.what') IN ('exam_made', 'exam_changed', 'measurement_moved', 'measurement_voided')"
-    " OR json_extract(record, '$.after.measurement_id') IS NOT NULL)"
+    " OR json_extract(record, '$.what') = 'press_ended'"
+    " AND json_extract(record, '$.after.measurement_id') IS NOT NULL)"
 )
-"""The audit's entries of exams and measurements: the end of a press names the measurement that it made."""
+"""The audit's entries of exams and measurements: the end of a press names the measurement that it made.
+
+So does that of a recording which a rule deleted; its measurement is as it was.
+"""
 
 _IS_THERE = (
     "(subject IN (SELECT id FROM exam) OR"

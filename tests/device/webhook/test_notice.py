@@ -2,12 +2,15 @@
 
 import base64
 import json
+from typing import get_args
 
 import pytest
 from notice_receiver import SECRET, write_secret
 from written_exam import begin, measure
 
 from device.errors import WebhookFailed
+from device.records.audit import AuditedAct, append
+from device.records.retention import RetentionRule
 from device.records.store import Store
 from device.webhook.notice import TYPES, Notice, notice_of, read_secret, signed_headers
 
@@ -97,3 +100,21 @@ def test_a_secret_that_is_missing_or_that_everybody_may_read_is_refused(tmp_path
     file.chmod(0o644)
     with pytest.raises(WebhookFailed, match="Everybody may read"):
         read_secret(file)
+
+
+def test_whatever_act_names_a_measurement_is_one_with_a_name_or_told_to_nobody(store):
+    measured = measure(store, begin(store))
+    with store._transaction() as db:
+        for what in get_args(AuditedAct):
+            if not what.startswith("exam_"):
+                append(db, what, measured["id"], after={"measurement_id": measured["id"]})
+    told = [change.what for change in store.listing.changes(after=0, limit=99)]
+    assert set(told) == {"exam_made", "measurement_moved", "measurement_voided", "press_ended"}
+    assert set(told) <= set(TYPES)
+
+
+def test_a_recording_that_a_rule_deleted_is_no_change_of_its_measurement(store):
+    measured = measure(store, begin(store))
+    [gone] = store.retention.carry_out(RetentionRule(free_mb=1e9, saved_first=False)).removals
+    assert gone.measurement_id == measured["id"]
+    assert [change.what for change in store.listing.changes(after=0, limit=99)] == ["exam_made"]
