@@ -33,7 +33,7 @@ from device.instrument.press.capture import CalledAway, Capture, PressEnded
 from device.instrument.press.cost import AnswerTimes, ModeOffer, press_cost
 from device.instrument.press.encoded_frames import EncodedFrames
 from device.instrument.press.probe_answers import ProbeAnswers
-from device.instrument.press.record import SAVE_LIGHT_EVERY_S, PressAnswers, PressBook
+from device.instrument.press.record import SAVE_LIGHT_EVERY_S, PressAnswer, PressAnswers, PressBook
 from device.instrument.press.requests import PressRequests
 from device.instrument.press.scan import Scan, ScanTaken
 from device.instrument.press.states import CANCELLED, Guidance, PressState, before_contact
@@ -361,7 +361,7 @@ class Procedure:
             answer = self._answers.answer([*beside, *frames], job, started_at, self.board.now.warnings, scan)
             self.board.update(answer=answer.shown)  # the operator need not wait for the disk
             answered_s = time.monotonic() - frames[-1].t_s - (scan.idle_s if scan else 0.0)
-            measurement = self._answers.keep(answer)
+            self._keep(answer, job)
         except PressEnded as end:
             self._reject(job, end.state, end.reason)
         except (LightRestError, NoContrastError) as error:
@@ -369,11 +369,6 @@ class Procedure:
         except InvalidQuantity as error:
             self._reject(job, "rejected", str(error))
         else:
-            self._capture.done()
-            # The screen first: whoever is told that the press has ended finds its result there.
-            identifier = measurement["id"]
-            self.board.update(step="result", guidance=Guidance.DONE, measurement_id=identifier, answer=None)
-            self._book.note(job, state="done", progress=1.0, measurement_id=identifier)
             self._answer_times.note(job.mode, answered_s)
             if scan and scan.fault:
                 raise scan.fault
@@ -381,6 +376,20 @@ class Procedure:
             self._capture.forget_frames()
             if self.board.now.answer:  # it could not be kept
                 self.board.update(answer=None)
+
+    def _keep(self, answer: PressAnswer, job: PressJob) -> None:
+        """Keep a measurement and that its press has ended with it, both or none, and then show them.
+
+        Nobody reads that it has ended before the screen shows the result.
+        """
+        identifier = answer.measurement_id
+        done = self._book.changed(job, state="done", progress=1.0, measurement_id=identifier)
+
+        def show() -> None:
+            self._capture.done()
+            self.board.update(step="result", guidance=Guidance.DONE, press=done, measurement_id=identifier, answer=None)
+
+        self._answers.keep(answer, done, show)
 
     def _frames_beside(self, job: PressJob) -> list[Frame]:
         """Lead the hand through the press beside the lesion; return its frames once the probe is lifted."""

@@ -13,7 +13,7 @@ import logging
 import os
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -123,10 +123,13 @@ class Store:
             raise self._damage
 
     @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
+    def _transaction(self, on_kept: Callable[[], None] = lambda: None) -> Iterator[sqlite3.Connection]:
+        """Keep all that is done with it or nothing; `on_kept` is called before anybody else reads what was kept."""
         try:
-            with self._lock, self._db:
-                yield self._db
+            with self._lock:
+                with self._db:
+                    yield self._db
+                on_kept()
             self.revision = self._db.total_changes
         except (OSError, sqlite3.Error) as error:
             self.require_whole()
@@ -195,9 +198,7 @@ class Store:
         with self._transaction() as db:
             if exam:
                 exam_of(db, exam.id, exam.version)
-            _note_press(db, job)
-            row = job["id"], job["state"] in ENDED, json.dumps(job)
-            db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
+            _keep_press(db, job)
             if once:
                 keep_answer(db, once, job)
 
@@ -226,23 +227,28 @@ class Store:
         exam_id: str | None = None,
         encode: FrameEncoder = png_of,
         picture: bytes = b"",
+        ended: StoredRecord | None = None,
+        on_kept: Callable[[], None] = lambda: None,
     ) -> StoredRecord:
         """Keep a recording, its picture and its measurement, of an exam if given; return it with its sequence number.
 
-        `encode` may know PNGs of the frames that were made before.
+        `encode` may know PNGs of the frames that were made before. `ended` is the press that the measurement ends: both
+        are kept or none, so that no measurement is of a press that failed. `on_kept` is called before anybody reads it.
         """
         self.require_whole()
         path = self.recordings.place_of(recording.id)
         self.write_out(recording, path, encode=encode, picture=picture)
         try:
             written = _fingerprint(path)
-            with self._transaction() as db:
+            with self._transaction(on_kept) as db:
                 cursor = db.execute("INSERT INTO measurement (id, record) VALUES (?, ?)", (record["id"], "{}"))
                 whole = {"id": record["id"], "seq": cursor.lastrowid, **record}
                 db.execute("UPDATE measurement SET record = ? WHERE id = ?", (json.dumps(whole), record["id"]))
                 note_kept(db, recording.id, written)
                 if exam_id:
                     db.execute("INSERT INTO filing VALUES (?, ?, NULL, 1)", (record["id"], exam_id))
+                if ended:
+                    _keep_press(db, ended)
         except StorageError:
             remove_recording(path)
             raise
@@ -321,8 +327,8 @@ def _broken_off(job: StoredRecord) -> StoredRecord:
     }
 
 
-def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
-    """Write into the audit that a press began, and how it ended."""
+def _keep_press(db: sqlite3.Connection, job: StoredRecord) -> None:
+    """Keep the state of a press, and write into the audit that it began, and how it ended."""
     kept = db.execute("SELECT ended FROM press WHERE id = ?", (job["id"],)).fetchone()
     if kept is None:
         log.info("press id=%s state=%s mode=%s", job["id"], job["state"], job.get("mode"))
@@ -333,6 +339,8 @@ def _note_press(db: sqlite3.Connection, job: StoredRecord) -> None:
         append(
             db, "press_ended", job["id"], after={name: job.get(name) for name in ("state", "code", "measurement_id")}
         )
+    row = job["id"], job["state"] in ENDED, json.dumps(job)
+    db.execute("INSERT OR REPLACE INTO press VALUES (?, ?, ?)", row)
 
 
 def _is_full(error: Exception) -> bool:

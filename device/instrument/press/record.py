@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,11 +45,15 @@ class PressBook:
 
     def note(self, job: PressJob, **changes: Any) -> None:
         """Keep and show what has changed of a press, with the warnings and the light until now."""
-        warnings = tuple(warning.as_record() for warning in self._board.now.warnings)
-        light_on_s = round(self._budget.press_s, 2)
-        changed = replace(self._board.now.press or job, warnings=warnings, light_on_s=light_on_s, **changes)
+        changed = self.changed(job, **changes)
         self._store.save_press(changed.as_record())
         self._board.update(press=changed)
+
+    def changed(self, job: PressJob, **changes: Any) -> PressJob:
+        """Return a press with what has changed of it, with the warnings and the light until now."""
+        warnings = tuple(warning.as_record() for warning in self._board.now.warnings)
+        light_on_s = round(self._budget.press_s, 2)
+        return replace(self._board.now.press or job, warnings=warnings, light_on_s=light_on_s, **changes)
 
     def warn(self, warning: DeviceError | None) -> None:
         """Show what does not end a press; the next `note` keeps it with the press."""
@@ -85,6 +89,11 @@ class PressAnswer:
     recording: Recording
     record: dict[str, Any]
     exam_id: str | None = None
+
+    @property
+    def measurement_id(self) -> str:
+        """What the measurement will be called."""
+        return str(self.record["id"])
 
     @property
     def shown(self) -> dict[str, Any]:
@@ -151,15 +160,21 @@ class PressAnswers:
             simulated_truth=self._truth,
         )
 
-    def keep(self, answer: PressAnswer) -> dict[str, Any]:
-        """Return the measurement with its number, once it, its recording and its picture are on the disk.
+    def keep(self, answer: PressAnswer, ended: PressJob, on_kept: Callable[[], None] = lambda: None) -> dict[str, Any]:
+        """Return the measurement with its number, once it, its recording, its picture and its press are on the disk.
 
-        Raises `StorageError` when it cannot be kept.
+        `on_kept` is called before anybody can ask for it. Raises `StorageError` when it cannot be kept.
         """
         picture = _picture_of(answer.recording)
         with self._progress.inside("storage"):
             return self._store.add_measurement(
-                answer.record, answer.recording, exam_id=answer.exam_id, encode=self._encode, picture=picture
+                answer.record,
+                answer.recording,
+                exam_id=answer.exam_id,
+                encode=self._encode,
+                picture=picture,
+                ended=ended.as_record(),
+                on_kept=on_kept,
             )
 
 

@@ -442,18 +442,22 @@ def test_frames_are_encoded_before_the_answer_and_forgotten_after_it(rig):
 def test_a_store_at_fault_does_not_leave_the_press_under_way_for_ever(rig, monkeypatch):
     """From the middle of a press the store takes nothing: on the board the press still ends."""
 
-    disk_is_full, save = threading.Event(), rig.store.save_press
+    disk_is_full = threading.Event()
 
-    def save_if_there_is_space(record, once=None, exam=None):
-        if disk_is_full.is_set():
-            raise StorageError("The disk is full.", "Free space.")
-        save(record, once, exam)
+    def if_there_is_space(keep):
+        def keeping(*arguments, **named):
+            if disk_is_full.is_set():
+                raise StorageError("The disk is full.", "Free space.")
+            return keep(*arguments, **named)
+
+        return keeping
 
     def fill_disk(recording):
         disk_is_full.set()
         return ANSWER
 
-    monkeypatch.setattr(rig.store, "save_press", save_if_there_is_space)
+    for name in ("save_press", "add_measurement"):
+        monkeypatch.setattr(rig.store, name, if_there_is_space(getattr(rig.store, name)))
     rig.estimator = fill_disk
     rig.press()
     assert rig.board.now.press.state == "failed"

@@ -12,10 +12,10 @@ from small_certificate import small_certificate
 from stand_in_adviser import advice, no_advice
 
 from device.config import CameraSection, Config
-from device.errors import DeviceError, DimLightError
+from device.errors import DeviceError, DimLightError, StorageError
 from device.files.recording_file import read_picture, read_recording
 from device.instrument.press.probe_answers import Adviser, Estimator, ProbeAnswers
-from device.instrument.press.record import PressAnswers
+from device.instrument.press.record import PressAnswer, PressAnswers
 from device.instrument.press.scan import ScanTaken
 from device.instrument.status import PressJob
 from device.instrument.watch.calibration_watch import CalibrationWatch
@@ -43,7 +43,11 @@ def answers(
 
 
 def kept_by(probe: PressAnswers, *warnings: DeviceError) -> dict[str, Any]:
-    return probe.keep(probe.answer(FRAMES, JOB, STARTED_AT, warnings))
+    return keep(probe, probe.answer(FRAMES, JOB, STARTED_AT, warnings), JOB)
+
+
+def keep(probe: PressAnswers, answer: PressAnswer, job: PressJob) -> dict[str, Any]:
+    return probe.keep(answer, replace(job, state="done", measurement_id=answer.measurement_id))
 
 
 def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Path) -> None:
@@ -54,6 +58,23 @@ def test_a_measurement_is_kept_with_its_recording_mode_and_warnings(tmp_path: Pa
     recording = read_recording(store.recording_path(kept["recording_id"]))
     assert [frame.role for frame in recording.frames] == ["dark", "reference", "press"]
     assert recording.calibration_id == small_certificate().id
+    store.close()
+
+
+def test_a_press_ends_with_its_measurement_or_both_are_not_kept(tmp_path: Path) -> None:
+    store, shown = Store(tmp_path), []
+    probe = answers(store, lambda recording, mode: ANSWER)
+    answer = probe.answer(FRAMES, JOB, STARTED_AT, [])
+    done = replace(JOB, state="done", measurement_id=answer.measurement_id)
+    store.save_press(JOB.as_record())
+    store._db.execute("CREATE TRIGGER full BEFORE INSERT ON press BEGIN SELECT RAISE(ABORT, 'full'); END")
+    with pytest.raises(StorageError, match="full"):
+        probe.keep(answer, done, lambda: shown.append("kept"))
+    assert (shown, store.press("p-1")["state"], store.measurements(before_seq=9, limit=9)) == ([], "waiting", [])
+    store._db.execute("DROP TRIGGER full")
+    kept = probe.keep(answer, done, lambda: shown.append("kept"))
+    assert (shown, store.press("p-1")["measurement_id"]) == (["kept"], kept["id"])
+    assert store.audit.entries(before_seq=99, limit=1)[0]["after"]["measurement_id"] == kept["id"]
     store.close()
 
 
@@ -72,7 +93,7 @@ def test_the_picture_is_kept_with_the_measurement_and_a_press_without_one_is_kep
     probe = answers(store, lambda recording, mode: ANSWER)
     paths = [store.recording_path(kept_by(probe)["recording_id"])]
     untouched = [replace(frame, force_n=0.0) for frame in FRAMES]
-    kept = probe.keep(probe.answer(untouched, JOB, STARTED_AT, []))
+    kept = keep(probe, probe.answer(untouched, JOB, STARTED_AT, []), JOB)
     paths.append(store.recording_path(kept["recording_id"]))
     assert [(read_picture(path) or b"")[1:4] for path in paths] == [b"PNG", b""]
     store.close()
@@ -86,7 +107,7 @@ def test_a_scan_is_kept_with_its_last_advice_what_was_asked_for_and_how_often_it
     assert probe.advise(frames, STARTED_AT) is last
     assert {ramp: len(of_ramp) for ramp, of_ramp in seen[0].ramps().items()} == {0: 1, 1: 2}
     job = PressJob("p-2", "precise", until={"size_mm": 1.0}, within_s=30.0)
-    kept = probe.keep(probe.answer(frames, job, STARTED_AT, [], ScanTaken(frames[2:], last, False, 0.0, None)))
+    kept = keep(probe, probe.answer(frames, job, STARTED_AT, [], ScanTaken(frames[2:], last, False, 0.0, None)), job)
     assert (kept["mode"], kept["ramps"], kept["frames"]) == ("precise", 2, 3)
     assert (kept["until"], kept["within_s"], kept["reached"]) == ({"size_mm": 1.0}, 30.0, False)
     assert kept["estimate"] == last.estimate.as_record()
