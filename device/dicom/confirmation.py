@@ -35,7 +35,7 @@ from device.dicom.subject import uid_of
 REPORT_S = 60.0
 """So long a report of commitment is awaited; later ones are asked for anew."""
 REQUEST = 1
-PENDING = (0xFF00, 0xFF01)
+SUCCESS, PENDING = 0x0000, (0xFF00, 0xFF01)
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,8 @@ def _found(archive: RemoteProgram, settings: DicomSection, objects: Sequence[Sen
                 status = status_of(answer)
                 if status is None:
                     raise unreachable(archive, "broke the connection off")
+                if status not in (*PENDING, SUCCESS):
+                    raise unreachable(archive, f"does not say what it keeps: status {status:#06x} of the query")
                 if status in PENDING and data is not None:
                     found.add(str(data.get("SOPInstanceUID", "")))
     return found & {one.uid for one in objects}

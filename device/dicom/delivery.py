@@ -81,14 +81,19 @@ class Delivery:
         self._store.outbox.settle(uid, "sent" if status in TAKEN else "refused", problem)
 
     def _confirm(self, rows: list[StoredRecord]) -> None:
-        """Ask for objects that were sent; one that the archive has lost is queued again."""
+        """Ask for objects that were sent; one that the archive has lost, or says nothing of, is queued again."""
         found, lost = confirmed_uids(self._archive, self._settings, [_sent(row) for row in rows])
+        silent = [row["uid"] for row in rows if row["uid"] not in found | lost and _is_old(row["sent_at"])]
         for row in rows:
             uid = row["uid"]
             if uid in found:
                 self._store.outbox.settle(uid, "confirmed")
-            elif uid in lost or _is_old(row["sent_at"]):
+            elif uid in lost or uid in silent:
                 self._store.outbox.settle(uid, "queued", "The archive does not have it any more.")
+        if silent:
+            raise unreachable(
+                self._archive, f"has not said for an hour that it keeps what it took, {len(silent)} objects"
+            )
 
 
 def _sent(row: StoredRecord) -> SentObject:

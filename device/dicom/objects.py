@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from pydicom.dataset import Dataset
 
 from device.dicom.image import image_of
 from device.dicom.report import report_of
-from device.dicom.subject import DicomSubject, OrderedStudy, require_writable
+from device.dicom.subject import WRITTEN, DicomSubject, OrderedStudy, object_uid, require_writable
 from device.files.recording_file import read_head
 from device.records.store import Store
 
@@ -35,7 +36,16 @@ class DicomWriter:
         require_writable(exam)
         measurement = self._store.measurement(measurement_id)
         head = read_head(self._store.recording_path(measurement["recording_id"]))
-        return DicomSubject(measurement, exam, head, self._institution, order)
+        generation = self._generation(measurement_id, exam, order)
+        return DicomSubject(measurement, exam, head, self._institution, order, generation=generation)
+
+    def _generation(self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> int:
+        """Return how often what an exam says of a measurement was taken back from the archive."""
+        for generation in count():
+            uids = [object_uid(kind, measurement_id, exam, order, generation) for kind in WRITTEN]
+            if not self._store.outbox.is_any_recalled(uids):
+                return generation
+        raise AssertionError("counting has no end")
 
     def image(self, subject: DicomSubject) -> Dataset:
         """Return the image of a measurement."""

@@ -7,13 +7,13 @@ archive as if it were right: each of its objects there gets a note that it is re
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from typing import Any, get_args
+from typing import Any
 
 from pydicom.dataset import Dataset
 
 from device.dicom.objects import DicomWriter
 from device.dicom.rejection import rejection_of
-from device.dicom.subject import DicomSubject, ObjectKind, OrderedStudy, object_uid, require_writable, uid_of
+from device.dicom.subject import WRITTEN, DicomSubject, ObjectKind, OrderedStudy, object_uid, require_writable, uid_of
 from device.errors import InvalidRequest
 from device.files.recording_file import RecordingHead
 from device.measurement.recording.recording import CameraSettings
@@ -21,8 +21,6 @@ from device.records.audit import utc_now
 from device.records.outbox import OutboxItem
 from device.records.store import Store, StoredRecord
 
-WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
-"""What is written of each measurement, in the order in which it is sent: a report refers to its image."""
 AT_ONCE = 200
 """So many measurements are read of an exam at a time."""
 
@@ -35,19 +33,20 @@ class Outgoing:
         self._store, self._writer, self._with_phantoms = store, writer, with_phantoms
 
     def queue(self, exam_id: str, *, version: int, by: str) -> None:
-        """Queue all of an exam that counts.
+        """Queue all of an exam that counts, and again what was refused: also notes that recall what does not.
 
-        Raises as `Exams.exam`, and `InvalidRequest` when nothing of it counts, it is a phantom's, or an identifier of
-        it cannot be written.
+        Raises as `Exams.exam`, and `InvalidRequest` when there is nothing of it to send, it is a phantom's, or an
+        identifier of it cannot be written.
         """
         exam = self._store.exams.exam(exam_id, version)
         if exam["kind"] == "phantom" and not self._with_phantoms:
             raise InvalidRequest("Exams of phantoms are not sent.", "Set dicom.send_phantoms if they are to be.")
         require_writable(exam)
-        counting = counting_measurements(self._store, exam_id)
+        is_note_left = self._store.outbox.has_refused(exam_id)
+        counting = counting_measurements(self._store, exam_id, may_be_none=is_note_left)
         order = ordered_study(self._store, exam_id)
         items = [self._item(kind, one, exam, order) for one in counting for kind in WRITTEN]
-        self._store.outbox.add(items, by=by, exam_version=version)
+        self._store.outbox.add(exam_id, items, by=by, exam_version=version)
 
     def _item(
         self, kind: ObjectKind, measurement: StoredRecord, exam: StoredRecord, order: OrderedStudy | None
@@ -74,7 +73,8 @@ class Outgoing:
         head = RecordingHead(**{**about["head"], "camera": CameraSettings(**about["head"]["camera"])})
         measurement = self._store.measurement(row["measurement_id"])
         rejected_at = about.get("rejected_at") or about.get("written_at", "")  # as it was called before
-        return DicomSubject(measurement, about["exam"], head, about["institution"], order, rejected_at)
+        said = measurement, about["exam"], head, about["institution"], order, rejected_at
+        return DicomSubject(*said, about.get("generation", 0))
 
     def take_back_what_is_wrong(self) -> int:
         """Withdraw or recall every object that is not right any more; return how many."""
@@ -98,9 +98,9 @@ class Outgoing:
             return f"The measurement does not count: {filing['voided']['reason']}"
         if filing["exam_id"] != row["exam_id"]:
             return "The measurement belongs to another exam."
-        order = ordered_study(self._store, row["exam_id"])
-        is_same = object_uid(row["about"]["kind"], row["measurement_id"], exam, order) == row["uid"]
-        return "" if is_same else "The exam was corrected."
+        order, about = ordered_study(self._store, row["exam_id"]), row["about"]
+        uid = object_uid(about["kind"], row["measurement_id"], exam, order, about.get("generation", 0))
+        return "" if uid == row["uid"] else "The exam was corrected."
 
 
 def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:
@@ -115,6 +115,7 @@ def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:
         "head": asdict(subject.head),
         "institution": subject.institution,
         "rejected_at": subject.rejected_at,
+        "generation": subject.generation,
         "study_uid": subject.study_uid,
         "series_uid": subject.series_uid(kind),
     }
@@ -126,12 +127,12 @@ def ordered_study(store: Store, exam_id: str) -> OrderedStudy | None:
     return OrderedStudy(**kept[0], patient=kept[1]) if kept else None
 
 
-def counting_measurements(store: Store, exam_id: str) -> list[dict[str, Any]]:
-    """Return the measurements of an exam that are not void; raise `InvalidRequest` when there is none."""
+def counting_measurements(store: Store, exam_id: str, *, may_be_none: bool = False) -> list[dict[str, Any]]:
+    """Return the measurements of an exam that are not void; raise `InvalidRequest` when there is and may be none."""
     counting, before_seq = list[dict[str, Any]](), 2**63 - 1
     while found := store.measurements(before_seq=before_seq, limit=AT_ONCE, exam_id=exam_id):
         counting += [one for one in found if not one["voided"]]
         before_seq = found[-1]["seq"]
-    if not counting:
+    if not counting and not may_be_none:
         raise InvalidRequest(f"The exam {exam_id} has no measurement that counts.", "Measure first.")
     return counting

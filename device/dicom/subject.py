@@ -10,13 +10,15 @@ from __future__ import annotations
 import json
 import uuid
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from device.errors import InvalidRequest
 from device.files.recording_file import RecordingHead
 from device.records.exams import ExamContent
 
 ObjectKind = Literal["image", "report", "rejection"]
+WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
+"""What is written of each measurement, in the order in which it is sent: a report refers to its image."""
 NAMESPACE = uuid.UUID("5f0d5a53-6c1c-4c5f-9a8e-5b6a3e2d7c41")
 """Makes identifiers of this program differ from all others' that are computed of the same names. Never changed."""
 PATIENT_LENGTH, ACCESSION_LENGTH = 64, 16
@@ -54,7 +56,8 @@ class DicomSubject:
     """One measurement of an exam, as it is written: records of both, and what is not in them.
 
     `rejected_at`: when it was found that its objects are not right, RFC 3339; "" while they are. Other objects say when
-    the press was measured, so that they are the same whenever they are written.
+    the press was measured, so that they are the same whenever they are written. `generation`: how often objects that
+    say the same were taken back before: a correction that was itself corrected is said again under new identifiers.
     """
 
     measurement: dict[str, Any]
@@ -63,6 +66,7 @@ class DicomSubject:
     institution: str = ""
     order: OrderedStudy | None = None
     rejected_at: str = ""
+    generation: int = 0
 
     @property
     def is_of_patient(self) -> bool:
@@ -86,7 +90,7 @@ class DicomSubject:
 
     def uid(self, kind: ObjectKind) -> str:
         """Return the identifier of one of its objects."""
-        return object_uid(kind, self.measurement["id"], self.exam, self.order)
+        return object_uid(kind, self.measurement["id"], self.exam, self.order, self.generation)
 
     def series_uid(self, kind: ObjectKind) -> str:
         """Return the series that an object belongs to: what is said of a whole series is the same in all of it."""
@@ -107,10 +111,13 @@ def study_uid(exam: dict[str, Any], order: OrderedStudy | None) -> str:
     return uid_of("study", exam["id"], exam["patient_ref"], exam["order_number"])
 
 
-def object_uid(kind: ObjectKind, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> str:
-    """Return the identifier of an object: one for a measurement and all that its exam says."""
+def object_uid(
+    kind: ObjectKind, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None, generation: int = 0
+) -> str:
+    """Return the identifier of an object: one for a measurement, all that its exam says, and each time of saying so."""
     said = {name: exam[name] for name in ExamContent.model_fields}
-    return uid_of(kind, measurement_id, study_uid(exam, order), said)
+    again = (generation,) if generation else ()
+    return uid_of(kind, measurement_id, study_uid(exam, order), said, *again)
 
 
 def require_writable(exam: dict[str, Any]) -> None:

@@ -33,6 +33,7 @@ CREATE INDEX IF NOT EXISTS outbox_by_state ON outbox (state);
 CREATE INDEX IF NOT EXISTS outbox_by_exam ON outbox (exam_id);
 CREATE TABLE IF NOT EXISTS ordered_study (exam_id TEXT PRIMARY KEY, record TEXT NOT NULL, patient TEXT);
 """
+REFUSED_NOTES = "exam_id = ? AND state = 'refused' AND json_extract(record, '$.about.kind') = 'rejection'"
 NOT_NEEDED = "no longer needed for the archive"
 _ROWS = "SELECT record, state FROM outbox"
 
@@ -59,19 +60,34 @@ class Outbox:
         """Take how a transaction of the store is begun."""
         self._transaction = transaction
 
-    def add(self, items: Sequence[OutboxItem], *, by: str, exam_version: int) -> None:
-        """Queue the objects of one exam that are not there yet, and again those that were refused.
+    def add(self, exam_id: str, items: Sequence[OutboxItem], *, by: str, exam_version: int) -> None:
+        """Queue the objects of one exam that are not there yet, and again those that were refused or withdrawn.
 
+        So are notes of it that were refused: without them what is wrong stays at the archive as if it were right.
         Raises `StaleVersion` when the exam was changed since that version.
         """
         with self._transaction() as db:
-            exam_of(db, items[0].exam_id, exam_version)
+            exam_of(db, exam_id, exam_version)
             new = [item.uid for item in items if self._insert(db, item)]
-            append(db, "exam_sent", items[0].exam_id, by=by, after={"objects": new})
+            notes = [uid for (uid,) in db.execute(f"SELECT uid FROM outbox WHERE {REFUSED_NOTES}", (exam_id,))]
+            for uid in notes:
+                db.execute("UPDATE outbox SET state = 'queued' WHERE uid = ?", (uid,))
+            append(db, "exam_sent", exam_id, by=by, after={"objects": [*new, *notes]})
+
+    def has_refused(self, exam_id: str) -> bool:
+        """Return whether the archive has refused to be told that something of an exam is not right."""
+        with self._transaction() as db:
+            return bool(db.execute(f"SELECT 1 FROM outbox WHERE {REFUSED_NOTES} LIMIT 1", (exam_id,)).fetchone())
+
+    def is_any_recalled(self, uids: Sequence[str]) -> bool:
+        """Return whether the archive was told that one of these objects is not to be used: that is for good."""
+        with self._transaction() as db:
+            query = f"SELECT 1 FROM outbox WHERE state = 'recalled' AND uid IN ({','.join('?' * len(uids))}) LIMIT 1"
+            return bool(db.execute(query, tuple(uids)).fetchone())
 
     def _insert(self, db: sqlite3.Connection, item: OutboxItem) -> bool:
         kept = db.execute("SELECT state FROM outbox WHERE uid = ?", (item.uid,)).fetchone()
-        if kept and kept[0] != "refused":
+        if kept and kept[0] not in ("refused", "withdrawn"):
             return False
         record = {
             "uid": item.uid, "exam_id": item.exam_id, "measurement_id": item.measurement_id, "tries": 0, "problem": "",
@@ -79,7 +95,8 @@ class Outbox:
         }  # fmt: skip
         row = item.uid, item.exam_id, item.measurement_id, item.exam_version, item.filing_version, json.dumps(record)
         if kept:
-            db.execute("UPDATE outbox SET state = 'queued' WHERE uid = ?", (item.uid,))
+            seen = item.exam_version, item.filing_version, item.uid
+            db.execute("UPDATE outbox SET state = 'queued', exam_version = ?, filing_version = ? WHERE uid = ?", seen)
         else:
             columns = "uid, exam_id, measurement_id, exam_version, filing_version, state, record"
             db.execute(f"INSERT INTO outbox ({columns}) VALUES (?, ?, ?, ?, ?, 'queued', ?)", row)

@@ -1,10 +1,12 @@
 """What is queued gets to a real archive, once, is confirmed there, and is taken back when it is not right any more."""
 
 import io
+from datetime import timedelta
 
 import pydicom
 import pytest
 from orthanc import Orthanc, free_port, needs_orthanc
+from pynetdicom.association import Association
 from written_exam import begin, measure, needs_dciodvfy, verdict
 
 from device.config import DicomSection
@@ -156,6 +158,82 @@ def test_a_corrected_patient_takes_all_back_and_is_sent_anew(store, outgoing, de
     for one in archive.kept():
         of_studies.setdefault(one["StudyInstanceUID"], set()).add(one["PatientID"])
     assert sorted(map(tuple, of_studies.values())) == [("B-18",), ("Ä-17",)]
+
+
+def test_a_correction_that_is_corrected_back_is_at_the_archive_under_new_identifiers(
+    store, outgoing, deliver, archive, exam
+):
+    """What was recalled is so for good: an archive never takes a note back."""
+    for version, side in ((1, None), (2, "right"), (3, "left"), (4, "right")):
+        if side:
+            store.exams.change(exam["id"], {"side": side}, version=version - 1, **ACT)
+        outgoing.queue(exam["id"], version=version, by="Ada")
+        deliver()
+    kept = archive.kept()
+    named = {item["ReferencedSOPInstanceUID"] for one in kept if one["Modality"] == "KO"
+             for item in one["CurrentRequestedProcedureEvidenceSequence"][0]["ReferencedSeriesSequence"][0][
+                 "ReferencedSOPSequence"]}  # fmt: skip
+    valid = [one for one in kept if one["Modality"] != "KO" and one["SOPInstanceUID"] not in named]
+    assert sorted(one["Modality"] for one in valid) == ["OT", "OT", "SR", "SR"]
+    assert len(named) == 3 * 4
+    live = [row for row in store.outbox.of_exam(exam["id"]) if row["state"] == "confirmed"]
+    assert {one["SOPInstanceUID"] for one in valid} <= {row["uid"] for row in live}
+    assert store.outbox.is_idle()
+
+
+def test_what_was_withdrawn_is_sent_once_it_is_right_again(store, outgoing, deliver, archive, exam):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    other = begin(store)
+    moved = store.measurements(before_seq=2**62, limit=9)
+    for one in moved:
+        store.exams.move(one["id"], other["id"], version=1, **ACT)
+    deliver()
+    for one in moved:
+        store.exams.move(one["id"], exam["id"], version=2, **ACT)
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    assert states(store) == ["confirmed"] * 4
+    assert len(archive.ask("instances")) == 4
+
+
+def test_a_note_that_was_refused_is_sent_again_with_its_exam_also_where_nothing_else_is_left(
+    store, outgoing, deliver, archive, exam, monkeypatch
+):
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    no_notes = {kind: uid for kind, uid in delivery.SOP_CLASSES.items() if kind != "rejection"}
+    monkeypatch.setattr(delivery, "SOP_CLASSES", no_notes)
+    for one in store.measurements(before_seq=2**62, limit=9):
+        store.exams.void(one["id"], version=1, by="Ada", reason="Another patient")
+    deliver()
+    assert sorted(states(store)) == ["recalled"] * 4 + ["refused"] * 4
+    monkeypatch.undo()
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    deliver()
+    assert sorted(states(store)) == ["confirmed"] * 4 + ["recalled"] * 4
+    assert sum(one["Modality"] == "KO" for one in archive.kept()) == 4
+    with pytest.raises(InvalidRequest, match="no measurement that counts"):
+        outgoing.queue(exam["id"], version=1, by="Ada")
+
+
+def test_an_archive_that_cannot_say_what_it_keeps_is_told(store, outgoing, deliver, exam, monkeypatch):
+    failed = pydicom.Dataset()
+    failed.Status = 0xC001
+    monkeypatch.setattr(Association, "send_c_find", lambda *_: iter([(failed, None)]))
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    with pytest.raises(ArchiveUnreachable, match="does not say what it keeps: status 0xc001"):
+        deliver()
+    assert states(store) == ["sent"] * 4
+
+
+def test_an_archive_that_never_confirms_is_told_after_an_hour(store, outgoing, deliver, exam, monkeypatch):
+    monkeypatch.setattr(Association, "send_c_find", lambda *_: iter([]))
+    outgoing.queue(exam["id"], version=1, by="Ada")
+    assert deliver() is True
+    monkeypatch.setattr(delivery, "LOST_AFTER", timedelta(0))
+    with pytest.raises(ArchiveUnreachable, match="has not said for an hour that it keeps what it took, 4 objects"):
+        deliver()
+    assert states(store) == ["queued"] * 4
 
 
 def test_what_was_never_sent_is_withdrawn_and_never_is(store, outgoing, deliver, archive, exam):

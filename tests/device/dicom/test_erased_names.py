@@ -36,7 +36,7 @@ def names(store, *exams):
 def test_with_a_worklist_and_no_archive_names_are_erased_in_time(store, monkeypatch):
     """One was queued when there still was an archive: nothing waits any more, and it keeps no name either."""
     kept, queued = made_of_a_step(store), made_of_a_step(store)
-    store.outbox.add([OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    store.outbox.add(queued["id"], [OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
     hospital = Hospital(DicomSection(worklist_host="127.0.0.1"), store, read_picture)
     monkeypatch.setattr(sender, "NEVER_SENT", timedelta(0))
     hospital.start()
@@ -48,7 +48,7 @@ def test_with_a_worklist_and_no_archive_names_are_erased_in_time(store, monkeypa
 
 def test_with_an_archive_what_waits_keeps_its_name_and_what_nobody_sends_does_not(store):
     kept, queued = made_of_a_step(store), made_of_a_step(store)
-    store.outbox.add([OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    store.outbox.add(queued["id"], [OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
     assert store.outbox.erase_patients(sent_before="2000", made_before="9999") == 1
     assert names(store, kept, queued) == [{}, {"name": "Müller^Ana"}]
 

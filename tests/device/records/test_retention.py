@@ -63,7 +63,7 @@ def test_without_a_rule_nothing_is_ever_deleted(store):
 def test_what_the_hospitals_archive_has_not_got_yet_stays(store):
     save(store)
     exam = store.exams.make(ExamContent(kind="patient", patient_ref="A-17", operator="Ada"))
-    store.outbox.add([OutboxItem("2.25.1", exam["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
+    store.outbox.add(exam["id"], [OutboxItem("2.25.1", exam["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
     rule = RetentionRule(keep_days=90)
     assert names(store.retention.plan(rule)) == ["r-2"]
     store.outbox.settle("2.25.1", "confirmed")
