@@ -28,6 +28,7 @@ from device.errors import BusyError, DiskFullError, StorageError
 from device.files.durable import sync_directory
 from device.files.plain_settings import LOCAL
 from device.measurement.quantities import InvalidQuantity
+from device.records.audit import append, utc_now
 from device.records.schema import STORE_READS
 from device.settings.catalogue import SETTINGS
 
@@ -37,6 +38,7 @@ STATE_FOLDERS = (Path("/var/lib"), Path("/srv"))
 """Only below these may a backup bring files of its own accord; anywhere else this machine's settings must say so."""
 SETTINGS_FILES = re.compile(r"config\.toml|config\.d/[^./][^/]*\.toml")
 SPARE_BYTES = 1 << 20
+RESTORED = "restored from a backup: pair again"
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,8 @@ class _Targets:
             self._places = {"data": stated["data"], "calibration": stated["calibration"], **stated["models"]}
         except (KeyError, TypeError) as error:
             raise InvalidQuantity("backup.places", "missing", "given", "take another backup") from error
-        if records_only:  # this probe's own folder, wherever the other one has its own
-            self._places["data"] = str(own.get("data", SETTINGS["data"].default))
+        if records_only:  # this probe's own folder, wherever the other one has its own; nothing else is restored
+            self._places = {"data": str(own.get("data", SETTINGS["data"].default))}
         for name, place in self._places.items():
             if place is not None:
                 _require_place(name, Path(place), own)
@@ -221,6 +223,7 @@ def _restored(archive: Archive, targets: _Targets, wanted: Mapping[str, BackupEn
         for entry in wanted.values():
             _stage(archive, entry, staged / entry.name)
         facts = _facts(staged / database, manifest)
+        _revoke_tokens(staged / database)
         for name in sorted(wanted.keys() - {database}):
             aside += _placed(staged / name, targets.of(name), data)
         _give_all_to_daemon(data)
@@ -269,6 +272,19 @@ def _facts(database: Path, manifest: Mapping[str, Any]) -> StoreFacts:
         bound = f"{manifest.get('measurements')}, as its manifest says"
         raise InvalidQuantity("measurements in the backup", facts.measurements, bound, "take another backup")
     return facts
+
+
+def _revoke_tokens(database: Path) -> None:
+    """Let no token of a backup hold: one that was revoked since would hold again, and another probe's on this one."""
+    with closing(sqlite3.connect(database)) as db, db:
+        if not db.execute("SELECT 1 FROM sqlite_master WHERE name = 'token'").fetchone():
+            return  # of a release that had none
+        for (token_id,) in db.execute("SELECT id FROM token WHERE revoked_at IS NULL").fetchall():
+            now = utc_now()
+            db.execute("UPDATE token SET revoked_at = ? WHERE id = ?", (now, token_id))
+            append(
+                db, "token_revoked", token_id, reason=RESTORED, before={"revoked_at": None}, after={"revoked_at": now}
+            )
 
 
 def _placed(staged: Path, target: Path, data: Path) -> list[Path]:

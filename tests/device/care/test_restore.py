@@ -7,6 +7,7 @@ import shutil
 import sqlite3
 import stat
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,21 @@ def test_the_settings_of_another_probe_are_refused_its_measurements_are_not(back
     assert {name for name in kept_files(fresh) if "/recordings/" not in name} == set(before)
     assert kept_files(fresh).items() >= before.items()
     assert len(records(data_of(fresh))) == 3
+
+
+@pytest.mark.parametrize("records_only", [False, True])
+def test_no_token_of_a_backup_holds_after_it(card: Path, fresh: Path, tmp_path: Path, records_only: bool) -> None:
+    """One that was revoked after the backup would hold again, and another probe's here."""
+    store = Store(data_of(card))
+    made, secret = store.tokens.make("Stolen laptop", "admin", days=90)
+    store.close()
+    write_backup(read_layers(layer_files(card)).config(), tmp_path / "b.backup", card)
+    restored(tmp_path / "b.backup", fresh, records_only=records_only)
+    with closing(Store(data_of(fresh))) as again:
+        assert again.tokens.of(secret) is None
+        [revoked, *_] = again.audit.entries(subject=made.id, before_seq=99, limit=9)
+        assert (revoked["what"], revoked["reason"]) == ("token_revoked", "restored from a backup: pair again")
+        assert again.audit.warning() is None
 
 
 def test_records_alone_go_to_this_probes_own_data_folder(backup: Path, fresh: Path) -> None:
