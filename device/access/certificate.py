@@ -13,6 +13,7 @@ import ssl
 import subprocess
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from device.errors import CertificateRefused
@@ -20,6 +21,8 @@ from device.errors import CertificateRefused
 FOLDER = "tls"
 """Where it lies in the data folder; a backup leaves it out."""
 DAYS = 3650
+NOT_BEFORE = datetime(2025, 1, 1, tzinfo=UTC)
+"""Older than this software: a clock that shows less is wrong, and the certificate holds `DAYS` from here on."""
 OPENSSL_S = 60.0
 CIPHERS = "ECDHE+AESGCM:ECDHE+CHACHA20"
 """Of TLS 1.2: those with forward secrecy that authenticate what they encrypt. TLS 1.3 has no others."""
@@ -90,9 +93,15 @@ def _command(made: ServerCertificate, names: list[str]) -> list[str]:
     extensions = [*EXTENSIONS, *([f"subjectAltName={subject}"] if subject else [])]
     return [
         *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-noenc"),
-        *("-keyout", str(made.key), "-out", str(made.certificate), "-days", str(DAYS), "-subj", "/CN=TSIS probe"),
+        *("-keyout", str(made.key), "-out", str(made.certificate), "-subj", "/CN=TSIS probe"),
+        *("-days", str(days_from(datetime.now(UTC)))),
         *(part for one in extensions for part in ("-addext", one)),
     ]
+
+
+def days_from(now: datetime) -> int:
+    """Return for how many days a certificate is made at a time by the board's clock, which may show 1970."""
+    return DAYS + max(0, (NOT_BEFORE - now).days)
 
 
 def _alternative(name: str) -> str:

@@ -212,6 +212,7 @@ def _hospital(procedure: Procedure) -> Hospital:
         kept_or_drawn,
         _telling("archive", procedure),
         lambda: _is_pressed(procedure),
+        lambda: procedure.is_clock_steady,
     )
 
 

@@ -36,13 +36,14 @@ class Hospital:
         picture_of: Callable[[Path], bytes],
         tell: Callable[[DeviceError | None], None] = lambda fault: None,
         is_busy: Callable[[], bool] = lambda: False,
+        is_clock_steady: Callable[[], bool] = lambda: True,
     ) -> None:
         """Take the settings, the store, who returns the picture (a PNG) of a kept recording, and whom to tell faults.
 
-        Nothing is sent before `start`, nor while the probe is busy with a press.
+        Nothing is sent before `start`, nor while the probe is busy with a press; names are erased by a steady clock.
         """
         self._settings, self._store, self._picture_of = settings, store, picture_of
-        self._tell, self._is_busy = tell, is_busy
+        self._tell, self._is_busy, self._is_clock_steady = tell, is_busy, is_clock_steady
         self._shown: dict[str, OrderedStudy] = {}
 
     def start(self) -> None:
@@ -130,7 +131,14 @@ class Hospital:
             self._settings.demographics_days,
             self._delivery if self._settings.archive_host is not None else None,
         )
-        return Sender(self._store.outbox, deliver, keep_patients_days=days, tell=self._tell, is_busy=self._is_busy)
+        return Sender(
+            self._store.outbox,
+            deliver,
+            keep_patients_days=days,
+            tell=self._tell,
+            is_busy=self._is_busy,
+            is_clock_steady=self._is_clock_steady,
+        )
 
     @cached_property
     def _writer(self) -> DicomWriter:

@@ -41,7 +41,7 @@ def local_time(subject: DicomSubject, text: str) -> datetime:
     An object names one offset from UTC for all of its times, and every object of a study the same time of the study,
     so what is written after the clocks were put back still has the exam's offset.
     """
-    begun_at = datetime.fromisoformat(subject.exam["made_at"]).astimezone()
+    begun_at = datetime.fromisoformat(subject.study_at).astimezone()
     return datetime.fromisoformat(text).astimezone(begun_at.tzinfo)
 
 
@@ -103,7 +103,7 @@ def _set_patient(data: Dataset, subject: DicomSubject) -> None:
 
 def _set_study(data: Dataset, subject: DicomSubject) -> None:
     data.StudyInstanceUID, data.StudyID = subject.study_uid, str(subject.exam["seq"])
-    set_time(data, "Study", local_time(subject, subject.exam["made_at"]))
+    set_time(data, "Study", local_time(subject, subject.study_at))
     data.AccessionNumber = subject.exam["order_number"] or ""
     data.ReferringPhysicianName = ""
     data.StudyDescription = "Tactile imaging" if subject.is_of_patient else "Tactile imaging, no patient"

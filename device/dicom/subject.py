@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import uuid
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from typing import Any, Literal, get_args
 
 from device.errors import InvalidRequest
@@ -21,6 +22,8 @@ WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
 """What is written of each measurement, in the order in which it is sent: a report refers to its image."""
 NAMESPACE = uuid.UUID("5f0d5a53-6c1c-4c5f-9a8e-5b6a3e2d7c41")
 """Makes identifiers of this program differ from all others' that are computed of the same names. Never changed."""
+LONGEST_EXAM = timedelta(days=7)
+"""Further from its exam no press is taken."""
 PATIENT_LENGTH, ACCESSION_LENGTH = 64, 16
 """Characters of VR LO and SH, PS3.5 section 6.2."""
 CORRECT = "Correct the exam with its reason, then send it again."
@@ -82,6 +85,17 @@ class DicomSubject:
     def demographics(self) -> dict[str, str]:
         """Who the patient is, if the worklist has said so of this very one."""
         return self.order.patient if self.order and is_ordered(self.exam, self.order) else {}
+
+    @property
+    def study_at(self) -> str:
+        """When the study began (RFC 3339): with the exam, unless the probe's clock was another one then.
+
+        A board without a clock battery may begin an exam in 1970; the press after the time server has answered, and
+        not the exam, then says when it was.
+        """
+        made_at, taken_at = self.exam["made_at"], self.measurement["taken_at"]
+        apart = abs(datetime.fromisoformat(taken_at) - datetime.fromisoformat(made_at))
+        return str(made_at if apart <= LONGEST_EXAM else taken_at)
 
     @property
     def study_uid(self) -> str:

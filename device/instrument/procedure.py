@@ -377,6 +377,11 @@ class Procedure:
             if self.board.now.answer:  # it could not be kept
                 self.board.update(answer=None)
 
+    @property
+    def is_clock_steady(self) -> bool:
+        """Whether ages by the wall clock are believed; may be asked from any thread."""
+        return self._clock.is_steady
+
     def _keep(self, answer: PressAnswer, job: PressJob) -> None:
         """Keep a measurement and that its press has ended with it, both or none, and then show them.
 

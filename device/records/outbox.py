@@ -182,20 +182,28 @@ class Outbox:
             row = db.execute("SELECT record, patient FROM ordered_study WHERE exam_id = ?", (exam_id,)).fetchone()
         return (json.loads(row[0]), json.loads(row[1] or "{}")) if row else None
 
-    def erase_patients(self, *, sent_before: str, made_before: str, has_archive: bool = True) -> int:
+    def newest_exam(self) -> int:
+        """Return the number of the exam that was made last, 0 when there is none."""
+        with self._transaction() as db:
+            return int(db.execute("SELECT coalesce(max(seq), 0) FROM exam").fetchone()[0])
+
+    def erase_patients(
+        self, *, sent_before: str, made_before: str, up_to: int | None = None, has_archive: bool = True
+    ) -> int:
         """Erase who patients are, from the file as well; return of how many exams. Times are RFC 3339 UTC.
 
         Erased are those whose exam the archive has had since before the first time, or that was made before the other
-        one, unless any of it waits to be sent: where there is no archive nothing does.
+        one and has no number above `up_to`, unless any of it waits to be sent: where there is no archive nothing does.
         """
         query = """
             SELECT exam_id FROM ordered_study WHERE patient IS NOT NULL
             AND NOT (:waits AND exam_id IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent')))
-            AND (exam_id IN (SELECT id FROM exam WHERE json_extract(record, '$.made_at') < :made)
+            AND (exam_id IN (SELECT id FROM exam WHERE json_extract(record, '$.made_at') < :made AND seq <= :up_to)
               OR exam_id IN (SELECT exam_id FROM outbox WHERE state = 'confirmed')
               AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE json_extract(record, '$.confirmed_at') >= :sent))"""
         with self._transaction() as db:
-            of_query = {"made": made_before, "sent": sent_before, "waits": has_archive}
+            last = 2**63 - 1 if up_to is None else up_to
+            of_query = {"made": made_before, "sent": sent_before, "waits": has_archive, "up_to": last}
             erased = db.execute(query, of_query).fetchall()
             for (exam_id,) in erased:
                 db.execute("UPDATE ordered_study SET patient = NULL WHERE exam_id = ?", (exam_id,))

@@ -12,6 +12,9 @@ from datetime import UTC, datetime
 
 from device.errors import ClockJumpError
 
+STEADY_S = 900.0
+"""So long has nobody set the wall clock when ages are believed: a time server answers within a minute."""
+
 
 class ClockWatch:
     """The daemon's one source of wall time. All methods may be called from any thread."""
@@ -51,6 +54,11 @@ class ClockWatch:
         """For how long nobody has set the clock, since the daemon began."""
         self._look()
         return self._monotonic_s() - self._steady_from_s
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether nobody has set the clock for so long that ages are believed."""
+        return self.steady_s >= STEADY_S
 
     def _look(self) -> None:
         with self._lock:

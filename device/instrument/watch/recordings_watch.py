@@ -26,8 +26,6 @@ from device.records.store import Store
 log = logging.getLogger(__name__)
 NEWEST = 20
 RETAIN_EVERY_S = 3600.0
-STEADY_S = 900.0
-"""So long has nobody set the wall clock when ages are believed: a time server answers within a minute."""
 SOON_S, LATER_S = 0.05, 60.0
 """Between two recordings: of the newest and of those without a hash, and of all others."""
 
@@ -75,7 +73,7 @@ class RecordingsWatch:
 
     def retain(self) -> None:
         """Delete what the rule deletes now, unless that was looked at within the hour and there is space."""
-        rule = self._rule if self._clock.steady_s >= STEADY_S else replace(self._rule, keep_days=None)
+        rule = self._rule if self._clock.is_steady else replace(self._rule, keep_days=None)
         now_s = time.monotonic()
         is_short = rule.free_mb is not None and self._store.free_mb < rule.free_mb
         if is_short or (rule.keep_days is not None and now_s - self._retained_s >= RETAIN_EVERY_S):

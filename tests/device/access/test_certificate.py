@@ -4,10 +4,11 @@ import shutil
 import ssl
 import stat
 import subprocess
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from device.access.certificate import ServerCertificate, own_certificate
+from device.access.certificate import ServerCertificate, days_from, own_certificate
 from device.errors import CertificateRefused
 
 NAMES = ["probe-7", "probe-7.local", "192.0.2.20", "::1", "no name/CN=evil", "a,DNS:evil.example"]
@@ -36,6 +37,13 @@ def test_it_has_a_key_of_a_curve_and_nobody_else_reads_that(own):
     assert stat.S_IMODE(own.key.stat().st_mode) == 0o600
     assert stat.S_IMODE(own.key.parent.stat().st_mode) == 0o700
     assert {path.name for path in own.key.parent.iterdir()} == {"certificate.pem", "key.pem"}
+
+
+@pytest.mark.parametrize("year", [1970, 2024, 2026, 2099])
+def test_it_holds_for_ten_years_also_where_the_clock_shows_1970(year):
+    made_at = datetime(year, 1, 1, tzinfo=UTC)
+    assert made_at + timedelta(days=days_from(made_at)) >= datetime(2034, 12, 30, tzinfo=UTC)
+    assert days_from(made_at) == 3650 or year < 2025
 
 
 def test_its_fingerprint_is_the_one_that_openssl_says(own):

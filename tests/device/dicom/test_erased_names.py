@@ -1,5 +1,6 @@
 """Who a patient of the worklist is does not stay, whether there is an archive or not. Neither is asked here."""
 
+import threading
 from datetime import timedelta
 
 import pytest
@@ -44,6 +45,25 @@ def test_with_a_worklist_and_no_archive_names_are_erased_in_time(store, monkeypa
         wait_for(lambda: names(store, kept, queued), lambda found: found == [{}, {}])
     finally:
         hospital.close()
+
+
+def test_a_clock_that_is_put_right_erases_no_name_of_an_exam_that_was_begun_before(store, monkeypatch):
+    """A board without a battery comes out of a cupboard; its time server answers after the exam was begun."""
+    monkeypatch.setattr(sender, "NEVER_SENT", timedelta(days=60))
+    older = made_of_a_step(store)
+    is_steady = threading.Event()
+    hospital = Hospital(DicomSection(worklist_host="127.0.0.1"), store, read_picture, is_clock_steady=is_steady.is_set)
+    since_start = hospital._sender
+    begun = made_of_a_step(store)
+    store._db.execute("UPDATE exam SET record = json_set(record, '$.made_at', '1970-01-01T00:00:00.000Z')")
+    since_start._delivered()
+    assert names(store, older, begun) == [{"name": "Müller^Ana"}] * 2
+    is_steady.set()
+    since_start._delivered()
+    assert names(store, older, begun) == [{}, {"name": "Müller^Ana"}]
+    since_start._began_s -= 60 * 86_400.0
+    since_start._delivered()
+    assert names(store, begun) == [{}]
 
 
 def test_with_an_archive_what_waits_keeps_its_name_and_what_nobody_sends_does_not(store):

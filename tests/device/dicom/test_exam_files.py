@@ -145,19 +145,19 @@ def test_both_objects_say_whose_they_are_and_who_took_them(store, files_of):
 
 
 def test_all_times_of_an_object_have_the_one_offset_that_it_names(store, files_of, monkeypatch):
-    monkeypatch.setattr(exams, "utc_now", lambda: "2026-07-01T22:30:00.000Z")
+    monkeypatch.setattr(exams, "utc_now", lambda: "2026-10-24T22:30:00.000Z")
     monkeypatch.setenv("TZ", "Europe/Berlin")
     time.tzset()
     try:
         exam = begin(store)
-        measure(store, exam, taken_at="2026-11-23T10:00:00.000Z")  # after the clocks were put back
+        measure(store, exam, taken_at="2026-10-25T10:00:00.000Z")  # after the clocks were put back
         for path in files_of(exam).values():
             data = pydicom.dcmread(path)
             assert data.TimezoneOffsetFromUTC == "+0200"
-            assert (data.StudyDate, data.StudyTime[:6]) == ("20260702", "003000")
+            assert (data.StudyDate, data.StudyTime[:6]) == ("20261025", "003000")
             for what in ("InstanceCreation", "Content", "Acquisition"):
                 if f"{what}Date" in data and data.Modality == "OT":
-                    assert (data[f"{what}Date"].value, data[f"{what}Time"].value[:6]) == ("20261123", "120000")
+                    assert (data[f"{what}Date"].value, data[f"{what}Time"].value[:6]) == ("20261025", "120000")
     finally:
         monkeypatch.undo()
         time.tzset()
@@ -223,6 +223,18 @@ def test_an_object_is_the_same_one_until_the_exam_says_something_else(store, fil
     assert all(re.fullmatch(r"2\.25\.[1-9]\d*", uid) and len(uid) <= 64 for uid in first.values())
     store.exams.change(exam["id"], {"patient_ref": "B-18"}, version=1, by="Ada", reason="Mixed up")
     assert not set(uids().values()) & set(first.values())
+
+
+@pytest.mark.parametrize(
+    ("made_at", "date"), [("1970-01-01T00:02:00.000Z", "20260102"), ("2026-01-01T10:00:00.000Z", "20260101")]
+)
+def test_an_exam_that_was_begun_in_1970_is_of_the_day_of_its_press(store, files_of, monkeypatch, made_at, date):
+    """The board's clock had no battery, and its time server answered after that."""
+    monkeypatch.setattr(exams, "utc_now", lambda: made_at)
+    exam = begin(store)
+    measure(store, exam, taken_at="2026-01-02T10:00:00.000Z")
+    for path in files_of(exam).values():
+        assert pydicom.dcmread(path).StudyDate == date
 
 
 def test_a_corrected_patient_gets_a_study_of_his_own(store):

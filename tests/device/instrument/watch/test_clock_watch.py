@@ -34,11 +34,13 @@ def test_a_clock_that_was_set_is_warned_of_once_with_the_step(clocks, watch, ste
 
 def test_it_is_steady_since_it_was_set_whoever_looks_first(clocks, watch):
     clocks.wall_s, clocks.monotonic_s = clocks.wall_s + 600.0, clocks.monotonic_s + 600.0
-    assert watch.steady_s == 600.0
+    assert (watch.steady_s, watch.is_steady) == (600.0, False)
     clocks.wall_s += 86_400.0
     assert watch.steady_s == 0.0
     clocks.wall_s, clocks.monotonic_s = clocks.wall_s + 60.0, clocks.monotonic_s + 60.0
     assert watch.steady_s == 60.0
+    clocks.wall_s, clocks.monotonic_s = clocks.wall_s + 840.0, clocks.monotonic_s + 840.0
+    assert watch.is_steady
     assert "set by +86400.0 s" in watch.warning().cause
     assert watch.warning() is None
 
