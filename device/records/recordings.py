@@ -7,6 +7,7 @@ written one is removed; a whole one that no measurement names, for the kill came
 
 from __future__ import annotations
 
+import errno
 import logging
 import sqlite3
 from collections.abc import Callable
@@ -21,6 +22,8 @@ from device.records.manifest import Fingerprint, ManifestEntry, fingerprint_of, 
 
 log = logging.getLogger(__name__)
 RECORDINGS, ORPHANS = "recordings", "orphans"
+OF_THE_DAEMON = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+"""What the daemon lacks just now, and no recording does."""
 RESTORE = "Restore it from a backup."
 MOST_NAMED = 3
 """So many ids are named of many; the log has them all."""
@@ -168,10 +171,12 @@ class KeptRecordings:
 
 
 def _read(path: Path, *, from_disk: bool = False) -> Fingerprint | None:
-    """Return the fingerprint of a recording, None where it cannot be read."""
+    """Return the fingerprint of a recording, None where it cannot be read; raise `OSError` where that says nothing."""
     try:
         return fingerprint_of(path, from_disk=from_disk)
     except OSError as error:
+        if error.errno in OF_THE_DAEMON:
+            raise
         log.error("%s cannot be read: %s", path, error)
         return None
 

@@ -24,6 +24,7 @@ from device.instrument.procedure import Procedure
 from device.records.updates import Updates
 from device.web.app import create_app
 from device.web.entrance.connection import PatientProtocol
+from device.web.entrance.counted_port import CountedPort, ServerLoop
 from device.web.entrance.door import Door
 from device.web.entrance.network import NetworkPort
 from device.web.entrance.open_answers import OpenAnswers
@@ -65,7 +66,8 @@ def run_server(
         servers.append(DarkeningServer(_encrypted(app, network, stated), procedure, answers, [network.listening]))
     servers[0].others = servers[1:]
     signal.signal(signal.SIGTERM, servers[0].handle_exit)  # until the server has its own
-    asyncio.run(_serve(servers))
+    with asyncio.Runner(loop_factory=ServerLoop) as runner:
+        runner.run(_serve(servers))
 
 
 async def _serve(servers: Sequence[DarkeningServer]) -> None:
@@ -115,7 +117,8 @@ class DarkeningServer(uvicorn.Server):
         listening: Sequence[socket.socket] = (),
     ) -> None:
         super().__init__(settings)
-        self.listening, self.others = list(listening), list[DarkeningServer]()
+        self.listening: list[socket.socket] = [CountedPort(one) for one in listening]
+        self.others: list[DarkeningServer] = []
         self._procedure, self._answers, self._signal = procedure, answers, 0
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:

@@ -1,19 +1,16 @@
 """One connection of the server, with an end to patience: uvicorn's own protocol waits for ever for a request.
 
 A client that connects and sends nothing, or its request drop by drop, is let go, and so is one that does not read what
-it asked for. Other machines have a number of connections each and in all; the own screen always gets in.
+it asked for.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections import Counter
-from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from device.access.known_hosts import is_loopback
 from device.access.request_rules import BODY_RULES, JSON_BODY
 
 HEAD_S = 10.0
@@ -25,8 +22,6 @@ BODY_S = 30.0
 UNREAD_S = 30.0
 """So long an answer may wait for its client to read on."""
 LOOK_S = 2.0
-MOST_OF_ONE, MOST_IN_ALL = 32, 512
-"""Connections of other machines; a browser has six."""
 
 
 class PatientProtocol(H11Protocol):
@@ -37,12 +32,9 @@ class PatientProtocol(H11Protocol):
     _unread: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection, or refuse it when its machine has enough."""
+        """Take a connection."""
         super().connection_made(transport)
         self._idle_since_s = self._heard_s = self.loop.time()
-        if self._is_one_too_many():
-            transport.abort()
-            return
         self._look = self.loop.call_later(LOOK_S, self._look_again)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -98,15 +90,3 @@ class PatientProtocol(H11Protocol):
         rule = BODY_RULES.get(str(self.scope["path"]), JSON_BODY)
         is_slow = not rule.streamed and now_s - self._idle_since_s > HEAD_S + BODY_S
         return is_slow or now_s - self._heard_s > SILENT_S
-
-    def _is_one_too_many(self) -> bool:
-        own = _address(self)
-        if is_loopback(own):
-            return False
-        others = Counter(found for one in self.connections if not is_loopback(found := _address(one)))
-        return others[own] > MOST_OF_ONE or others.total() > MOST_IN_ALL
-
-
-def _address(connection: Any) -> str | None:
-    client = getattr(connection, "client", None)
-    return str(client[0]) if client else None

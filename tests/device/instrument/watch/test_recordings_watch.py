@@ -90,6 +90,19 @@ def test_a_disk_that_cannot_be_read_once_is_looked_at_again(store: Store, monkey
     assert "r-2" in warning.cause
 
 
+def test_a_recording_that_no_descriptor_was_left_for_is_not_called_damaged(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, **_: bool) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    watch = RecordingsWatch(store, ClockWatch(2.0))
+    monkeypatch.setattr(recordings, "fingerprint_of", fail)
+    with pytest.raises(OSError, match="Too many open files"):
+        watch.look("r-1")
+    assert watch.taken() == ()
+
+
 def test_a_recording_of_before_there_were_hashes_that_cannot_be_read_is_damaged(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -132,26 +132,3 @@ def test_a_connection_is_used_again_and_then_let_go(port):
             assert said.startswith(b"HTTP/1.1 200 OK")
             line.sendall(request)
         is_let_go(line)
-
-
-class Stranger:
-    """A connection as the bound on their number sees it."""
-
-    def __init__(self, address):
-        self.client = (address, 1)
-
-
-def one_too_many(address, others):
-    protocol = PatientProtocol.__new__(PatientProtocol)
-    protocol.client = (address, 9)
-    protocol.connections = {protocol, *map(Stranger, others)}
-    return protocol._is_one_too_many()
-
-
-def test_a_machine_has_some_connections_and_all_have_a_bound_but_the_own_screen_always_gets_in():
-    full = [f"192.0.2.{number % 250}" for number in range(connection.MOST_IN_ALL)]
-    assert not one_too_many("192.0.2.1", ["192.0.2.1"] * (connection.MOST_OF_ONE - 1))
-    assert one_too_many("192.0.2.1", ["192.0.2.1"] * connection.MOST_OF_ONE)
-    assert not one_too_many("192.0.2.2", ["192.0.2.1"] * connection.MOST_OF_ONE)
-    assert one_too_many("198.51.100.1", full)
-    assert not one_too_many("127.0.0.1", full + ["127.0.0.1"] * 1000)
