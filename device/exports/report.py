@@ -196,7 +196,7 @@ def _interval(name: str, quantity: dict[str, Any]) -> str:
         (False, False): f"{low} to {high} {UNITS[name]}",
         (True, False): f"{high} {UNITS[name]} or less",
         (False, True): f"{low} {UNITS[name]} or more",
-        (True, True): "beyond what the probe can tell",
+        (True, True): "any value",
     }
     return of_ends[opens]
 

@@ -87,7 +87,7 @@ def test_a_day(page: Page, tmp_path: Path):
     nurse.press()
     nurse.look("result")
     nurse.press()
-    expect(page.locator("#repeats")).to_contain_text("2 measurements here · Size ")
+    expect(page.locator("#repeats")).to_contain_text("2 measurements here, ")
     # the third press is rejected: the face is wet
     nurse.tap("press-button")
     expect(page.locator("#status-reason")).to_contain_text("Wipe gel and sweat off face and skin")

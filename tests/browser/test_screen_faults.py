@@ -74,6 +74,41 @@ def test_warnings_take_room_of_their_own_in_every_step(
     assert {state: found for state, found in wrong.items() if found} == {}
 
 
+def test_beside_a_press_and_a_fault_a_warning_says_what_it_is_and_not_what_to_do(browser: Browser, probe: ServedProbe):
+    """What it says to do contradicts what press or fault say: nobody could follow both."""
+    page, warning = opened(browser, probe), ERRORS["E309"]
+    press = PressJob("p", "standard", "capturing")
+    page.locator("#exam-button").click()
+    page.locator("#free-press").click()
+    page.locator("#free-yes").click()
+    board = probe.procedure.board
+    board.update(step="lesion", guidance=Guidance.PRESS_SLOWLY, fault=None, warnings=(warning,), press=press)
+    expect(page.locator(".fault-title")).to_have_text(["The load cell does not read zero"])
+    expect(page.locator(".fault-remedy")).to_have_count(0)
+    shoot(page, "faults/warning-beside-press")
+    board.update(step="fault", guidance=Guidance.FAULT, fault=ERRORS["E310"], warnings=(warning,), press=None)
+    expect(page.locator(".fault-remedy")).to_have_text(["Do not measure. Call service: its amplifier is set too slow."])
+    expect(page.locator("#press-button")).to_have_text("Try again")
+    shoot(page, "faults/warning-beside-fault")
+    board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, fault=None, warnings=(), press=None)
+    page.context.close()
+
+
+def test_after_a_press_without_light_the_screen_does_not_invite_to_the_next(browser: Browser, probe: ServedProbe):
+    page, dark = opened(browser, probe), ERRORS["E203"]
+    failed = PressJob("p", "standard", "failed", reason=str(dark), code="E203")
+    page.locator("#exam-button").click()
+    page.locator("#free-press").click()
+    page.locator("#free-yes").click()
+    probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, fault=None, warnings=(), press=failed)
+    expect(page.locator("#instruction")).to_have_text("Not measured")
+    expect(page.locator("#status-reason")).to_have_text("No light, or one side is dark. Do not measure. Call service.")
+    shoot(page, "faults/after-a-dark-press")
+    probe.procedure.board.update(step="ready", guidance=Guidance.TOUCH_BESIDE, press=None)
+    expect(page.locator("#instruction")).to_have_text("Touch beside the lesion")
+    page.context.close()
+
+
 def test_what_service_needs_is_one_tap_away(browser: Browser, probe: ServedProbe):
     page = opened(browser, probe)
     probe.procedure.board.update(step="fault", guidance=Guidance.FAULT, fault=ERRORS["E304"], warnings=WARNINGS[:4])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
-from kept_measurements import keep
+from kept_measurements import ESTIMATE, keep
 from opened_screen import opened, shoot
 from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
@@ -18,6 +20,12 @@ def exam_of(page: Page, probe: ServedProbe, **changes: object) -> str:
     answer = page.request.post(f"{probe.url}/api/v1/exams", data=EXAM | changes)
     assert answer.ok, answer.text()
     return str(answer.json()["id"])
+
+
+def of_size(size_mm: float) -> dict[str, Any]:
+    """Return an estimate of a size, with an interval of 0.3 mm on both sides."""
+    size = ESTIMATE["size_mm"] | {"value": size_mm, "low": size_mm - 0.3, "high": size_mm + 0.3}
+    return {**ESTIMATE, "size_mm": size, "status": "partly_identifiable", "mode": "standard", "model": "standard"}
 
 
 def open_history(page: Page, words: str) -> None:
@@ -90,3 +98,57 @@ def test_what_another_screen_does_is_shown_in_an_open_history_and_result(browser
     probe.procedure.board.update(measurement_id=None)
     for one in (page, other):
         one.context.close()
+
+
+def test_what_is_shown_from_the_history_has_its_own_patients_name(browser: Browser, probe: ServedProbe):
+    """Another patient's figures never stand under the name of the exam that is open."""
+    page = opened(browser, probe)
+    other = exam_of(page, probe, patient_ref="E-9", side="right", clock_position=2)
+    exam_of(page, probe, patient_ref="D-7")
+    keep(probe.procedure.store, 31, exam_id=other)
+    keep(probe.procedure.store, 32)
+    open_history(page, "D-7")
+    page.locator("#history-all").click()
+    header = page.locator("#exam-button")
+    for measurement_id, who in (("m-31", "E-9Right 2 o'clock"), ("m-32", "free press")):
+        page.locator(f'.kept[data-id="{measurement_id}"] .kept-open').click()
+        expect(header).to_have_attribute("data-who", "other")
+        expect(header).to_contain_text(who)
+        expect(header).not_to_contain_text("D-7")
+        shoot(page, f"history-other-{measurement_id}")
+        assert wrong_in(page) == []
+        page.locator("#act-now").click()
+        expect(header).to_contain_text("D-7")
+        page.locator("#history-open").click()
+        page.locator("#history-all").click()
+    page.context.close()
+
+
+def test_a_difference_is_told_of_one_lesion_alone_and_between_its_ends(browser: Browser, probe: ServedProbe):
+    page = opened(browser, probe)
+    here = exam_of(page, probe, patient_ref="F-1")
+    later = exam_of(page, probe, patient_ref="F-1", nipple_distance_mm=30.0)
+    elsewhere = exam_of(page, probe, patient_ref="F-1", side="right", clock_position=2)
+    for number, exam_id, size_mm in ((21, here, 10.2), (22, later, 12.2), (23, elsewhere, 12.2), (24, here, 10.3)):
+        keep(probe.procedure.store, number, exam_id=exam_id, estimate=of_size(size_mm))
+    probe.procedure.store.exams.void("m-24", version=1, by="Ada", reason="Slipped")
+    open_history(page, "F-1")
+    page.locator("#history-patient").click()
+    expect(page.locator(".kept")).to_have_count(4)
+    marks = {id: page.locator(f'.kept[data-id="m-{id}"] input') for id in (21, 22, 23, 24)}
+    size = page.locator("#comparison tr").nth(2).locator("td").nth(2)
+    marks[21].check()
+    marks[22].check()
+    expect(size).to_have_text("+1.6 – +2.4 mm")
+    expect(page.locator("#comparison tr").nth(3).locator("td").nth(2)).to_have_text("none can be told")
+    expect(page.locator("#comparison tr").first).to_contain_text("· F-1 Left 10 o'clock, 30 mm")
+    marks[23].check()
+    expect(page.locator("#comparison tr").first).to_contain_text("· F-1 Right 2 o'clock")
+    expect(size).to_have_text("–")
+    marks[24].check()
+    marks[21].check()
+    expect(page.locator("#comparison tr").first).to_contain_text("void")
+    expect(size).to_have_text("–")
+    shoot(page, "history-comparison")
+    assert wrong_in(page) == []
+    page.context.close()

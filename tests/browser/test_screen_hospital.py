@@ -98,6 +98,13 @@ def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc
     expect(second.locator(".archive-state")).to_have_text("In the archive: 2 objects, confirmed.")
     second.context.close()
     look(page, "archive-confirmed")
+    page.locator("#history-close").click()
+    page.locator("#press-button").click()
+    expect(page.locator("#image-title")).to_have_text("Measurement 2, Quick")
+    page.locator("#history-open").click()
+    expect(state).to_have_text("Not sent yet: 1 of 2 measurements.")
+    expect(state).to_have_attribute("data-tone", "caution")
+    look(page, "archive-unsent")
     assert sorted(one["PatientName"] for one in archive.kept()) == ["Müller^Ana"] * 2
     page.locator("#history-all").click()
     expect(page.locator("#archive")).to_be_hidden()

@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 from screen_layout import wrong_in
 from served_probe import ServedProbe
 
+from device.errors import ArchiveUnreachable, ClockJumpError, DeviceError
 from device.instrument.press.states import Guidance
 from device.instrument.status import PressJob
 from device.measurement.mode import ModeWorth
@@ -18,6 +19,8 @@ from device.measurement.mode import ModeWorth
 pytestmark = [pytest.mark.browser, pytest.mark.real_time]
 SMALLEST = SIZES[1]
 EXAM = {"kind": "patient", "patient_ref": "A-17", "side": "left", "clock_position": 10, "operator": "Ada"}
+CLOCK = ClockJumpError("The clock was set by +86400.0 s.", "Check the board's clock and its time server.")
+ARCHIVE = ArchiveUnreachable("The archive at 192.0.2.9:104 does not answer.", "Check the network.")
 PICTURE = cv2.imencode(".png", np.full((358, 480), 90, np.uint8))[1].tobytes()
 CUT_OFF = """(box) => [...box.querySelectorAll(".button")].filter((one) => one.offsetParent).flatMap((one) => {
   const [outer, inner] = [box.getBoundingClientRect(), one.getBoundingClientRect()];
@@ -80,6 +83,30 @@ def test_every_button_below_a_result_is_in_reach(browser: Browser, probe: Served
     page.wait_for_function("() => document.querySelector('#details-picture img').complete")
     shoot(page, f"small/details-{language[:2]}-{number % 10}")
     assert wrong_in(page) == []
+    page.context.close()
+
+
+@pytest.mark.parametrize("language", ["en-GB", "de-DE"])
+@pytest.mark.parametrize("warnings", [(CLOCK,), (CLOCK, ARCHIVE)], ids=["one", "two"])
+def test_beside_a_warning_every_figure_keeps_its_interval(
+    browser: Browser, probe: ServedProbe, language: str, warnings: tuple[DeviceError, ...]
+):
+    """E030 stays as long as the hospital's archive is down, which may be all day."""
+    number = 60 + 2 * len(warnings) + (language == "de-DE")
+    probe.procedure.board.update(measurement_id=None)
+    page = opened(browser, probe, SMALLEST, locale=language)
+    exam_id = open_exam(page, probe)
+    keep(probe.procedure.store, number, exam_id=exam_id)
+    show(page, probe, f"m-{number}", exam_id)
+    probe.procedure.board.update(warnings=warnings)
+    expect(page.locator("#faults .fault")).to_have_count(1)
+    shoot(page, f"small/warned-{language[:2]}-{len(warnings)}")
+    for name in ("size", "depth", "modulus"):
+        tile = page.locator(f"#{name}-tile")
+        assert tile.evaluate("(one) => one.scrollHeight <= one.clientHeight"), name
+        expect(page.locator(f"#{name}-interval")).to_be_in_viewport(ratio=0.99)
+    assert wrong_in(page) == []
+    probe.procedure.board.update(warnings=())
     page.context.close()
 
 

@@ -55,9 +55,10 @@ def require_lit(press: Sequence[Frame], dark_counts: float) -> None:
     if light < FEWEST_COUNTS:
         cause = (
             f"No light from any side although all are switched on: "
-            f"{light:.1f} counts above dark at {darkest.force_n:.2f} N, below {FEWEST_COUNTS:g}."
+            f"{light:.1f} counts above dark at {darkest.force_n:.2f} N, below {FEWEST_COUNTS:g}; "
+            f"or nothing touches the face, and the load cell is wrong."
         )
-        raise DarkSideError(cause, "Check the LED board's cable; have the LEDs replaced.")
+        raise DarkSideError(cause, "Check the LED board's cable and the load cell's zero; have the LEDs replaced.")
 
 
 def _are_alike(frames: Sequence[Frame]) -> bool:

@@ -23,7 +23,7 @@ import { asChosen, chosenMode, modeName, offerModes, onChoice, showModes } from 
 import { chosenAccuracy, scanHint, scanTrouble, showAccuracy, showScan } from "./press/scan.js";
 import { openDetails } from "./result/details.js";
 import { describeMeasurement } from "./result/result.js";
-import { dismiss, followAnswer, isMissing, isOlder, loadNewest, refreshShown, replace, showNow, showOlder, shownResult } from "./result/shown.js";
+import { dismiss, followAnswer, isMissing, isOfOther, isOlder, loadNewest, olderOwner, refreshShown, replace, showNow, showOlder, shownResult } from "./result/shown.js";
 import { showSelfTest } from "./service/self_test.js";
 import { absenceWords, updateLine } from "./service/software.js";
 
@@ -53,13 +53,16 @@ const shown = () => shownResult(status);
 /** Whether nothing is under way and no result is shown: the next press may be chosen. */
 const isIdle = () => ["ready", "result"].includes(status.step) && !pressUnderWay() && shown() === null;
 
+/** Whose it is that stands below: what is shown from the history, and a press of another screen, are not of the open exam. */
 function showWho() {
-  const exam = openExam();
-  const free = isFreeChosen() ? say("exam.free") : say("exam.choose");
-  setText(byId("exam-who"), exam ? whoWords(exam) : free);
-  const isElsewhere = pressUnderWay() && (status.press.exam_id ?? null) !== (exam?.id ?? null);
+  const isElsewhere = pressUnderWay() && (status.press.exam_id ?? null) !== (openExam()?.id ?? null);
+  const isOther = isElsewhere || isOfOther();
+  const exam = isOther ? olderOwner() : openExam();
+  const free = isOther ? say("history.free") : isFreeChosen() ? say("exam.free") : say("exam.choose");
+  const who = isElsewhere ? say("exam.elsewhere") : exam ? whoWords(exam) : free;
+  setText(byId("exam-who"), who);
   setText(byId("exam-where"), isElsewhere ? say("hint.another_screen") : exam ? placeWords(exam) : "");
-  byId("exam-button").dataset.who = exam ? exam.kind : isFreeChosen() ? "free" : "none";
+  byId("exam-button").dataset.who = isOther ? "other" : exam ? exam.kind : isFreeChosen() ? "free" : "none";
 }
 
 function showSteps() {
@@ -107,8 +110,14 @@ function sayResult(measurement) {
   service = told?.service ?? "";
 }
 
+/** How the last press ended, where that comes before what to do next: at once, and as long as its light is in doubt. */
+function endFirst() {
+  const isDark = status.press?.state === "failed" && status.press.code?.startsWith("E2") && isIdle();
+  return status.step === "rejected" || isDark ? endWords(status) : null;
+}
+
 function sayState() {
-  const end = status.step === "rejected" ? endWords(status) : null;
+  const end = endFirst();
   const line = end && !told ? end : lineNow();
   service = line.service ?? "";
   if (!end) return showInstruction(guidanceNow().code, guidanceNow().words, line);
@@ -131,6 +140,7 @@ function showProgress(seen) {
 
 function pressWords(measurement) {
   if (pressUnderWay()) return say("press.cancel");
+  if (status.step === "fault") return say("press.try");
   if (!isChosen()) return say("exam.choose");
   if (status.simulated) return say("press.simulated");
   return say(measurement ? "press.again" : "press.new");
@@ -176,7 +186,7 @@ function show() {
   if (panel.dataset.view === "result") sayResult(measurement);
   else sayState();
   showProgress(seen);
-  showFaults(status);
+  showFaults(status, pressUnderWay());
   showButtons(measurement);
   showActs(measurement);
   showModes(!pressUnderWay());
@@ -246,9 +256,9 @@ function tell(next) {
   show();
 }
 
-/** Say why a command was refused; what stands among the faults is not said again. */
+/** Say why a command was refused; of what stands among the faults only that it still does. */
 function tellRefusal({ message, code, service: words }) {
-  if (status.faults.some((fault) => fault.code === code)) tell(null);
+  if (status.faults.some((fault) => fault.code === code)) tell({ word: say("not_done"), reason: say("still", { code }), tone: "caution" });
   else tell({ word: say("not_done"), reason: message, tone: "caution", service: words });
 }
 

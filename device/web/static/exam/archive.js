@@ -10,11 +10,13 @@ import { openExam, refresh } from "./current.js";
 const LOOK_MS = 2000;
 const GLANCE_MS = 5000; // while nothing is on its way: another screen may send it
 const ON_ITS_WAY = new Set(["queued", "sent"]);
+const TAKEN_BACK = new Set(["withdrawn", "recalled"]);
 const box = byId("archive");
 const state = element("p", "archive-state");
 const sendButton = button("button button-quiet", "", send);
 let hospital = null;
 let shown = null; // the exam whose way is shown
+let counting = []; // the ids of its measurements that count
 let looking = null;
 
 state.setAttribute("role", "status");
@@ -30,13 +32,21 @@ export const hasWorklist = () => Boolean(hospital?.worklist);
 
 const count = (objects, one) => objects.filter(({ state: is }) => is === one).length;
 
+/** Which measurements that count nobody has sent since they were taken, moved here or corrected. */
+function unsent(objects) {
+  const there = new Set(objects.filter(({ state: is }) => !TAKEN_BACK.has(is)).map(({ measurement_id: id }) => id));
+  return counting.filter((id) => !there.has(id));
+}
+
 /** What has become of an exam, in words: what is wrong first, then what is under way, then what is done. */
 function words(objects, { fault, next_try_at: next }) {
   const n = objects.length;
+  const left = unsent(objects);
   if (n === 0) return say("archive.not_sent");
   if (count(objects, "refused")) return say("archive.refused", { some: count(objects, "refused"), n });
   if (count(objects, "queued") && fault) return say("archive.waits", { at: next ? clock(next) : "–" });
   if (count(objects, "queued")) return say("archive.queued", { some: count(objects, "queued"), n });
+  if (left.length) return say("archive.unsent", { n: left.length, all: counting.length });
   if (count(objects, "sent")) return say("archive.sent");
   const confirmed = count(objects, "confirmed");
   return confirmed ? say("archive.confirmed", { some: confirmed }) : say("archive.taken_back");
@@ -48,8 +58,9 @@ function tell(text, tone = "calm") {
 }
 
 function show(objects) {
-  const isWrong = objects.some(({ state: is }) => is === "refused");
+  const isWrong = objects.some(({ state: is }) => is === "refused") || (objects.length > 0 && unsent(objects).length > 0);
   tell(words(objects, hospital), isWrong ? "caution" : "calm");
+  box.hidden = !counting.length && !objects.length;
   setText(sendButton, say(objects.length ? "archive.again" : "archive.send"));
   setEnabled(sendButton, !objects.some(({ state: is }) => is === "queued"));
   clearTimeout(looking);
@@ -82,14 +93,14 @@ async function send() {
   }
 }
 
-/** Show how far the open exam is, if there is an archive; phantoms, and what holds nothing that counts, are not sent. */
+/** Show how far the open exam is, if there is an archive; phantoms are not sent, nor what counts nothing and never was. */
 export function showArchive(isOfExam, measurements) {
   const exam = openExam();
-  const counts = measurements.some(({ voided }) => !voided);
   const before = shown?.id;
   clearTimeout(looking);
-  shown = hospital?.archive && isOfExam && exam?.kind === "patient" && counts ? exam : null;
-  box.hidden = !shown;
+  counting = measurements.filter(({ voided }) => !voided).map(({ id }) => id);
+  shown = hospital?.archive && isOfExam && exam?.kind === "patient" && measurements.length ? exam : null;
+  box.hidden = !shown || !counting.length;
   if (!shown) return;
   if (shown.id === before) return look();
   setText(sendButton, say("archive.send"));

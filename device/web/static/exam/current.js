@@ -52,5 +52,14 @@ export function placeWords({ kind, side, clock_position: hour, nipple_distance_m
   return say(mm === null ? "exam.place_no_mm" : "exam.place", told);
 }
 
+const NEAR_MM = 10; // distances from the nipple are said by hand
+
+/** Whether two exams are of one lesion, as far as anybody has said: of one patient, side and hour, and no other distance. */
+export function areOfOnePlace(one, other) {
+  const isSame = ["kind", "patient_ref", "side", "clock_position"].every((name) => one?.[name] === other?.[name]);
+  const [near, far] = [one, other].map((exam) => exam?.nipple_distance_mm ?? null);
+  return isSame && (near === null || far === null || Math.abs(near - far) <= NEAR_MM);
+}
+
 /** Whose exam it is, in words. */
 export const whoWords = (one) => (one.kind === "phantom" ? say("exam.phantom") : one.patient_ref);

@@ -8,7 +8,7 @@ import { modeName } from "../press/modes.js";
 import { UNKNOWNS, shortWords } from "../result/quantities.js";
 import { showArchive } from "./archive.js";
 import { showComparison } from "./comparison.js";
-import { openExam, placeWords, whoWords } from "./current.js";
+import { areOfOnePlace, openExam, placeWords, whoWords } from "./current.js";
 import { thumbnail } from "./row.js";
 import { showTrend } from "./trend.js";
 
@@ -35,7 +35,7 @@ function mark(measurement, isMarked) {
   marked = marked.filter(({ id }) => id !== measurement.id);
   if (isMarked) marked = [...marked, measurement].slice(-2);
   for (const box of list.querySelectorAll("input")) box.checked = marked.some(({ id }) => id === box.value);
-  showComparison(marked);
+  showComparison(marked, ({ exam_id: id }) => exams.get(id) ?? null);
 }
 
 function marker(measurement) {
@@ -88,10 +88,7 @@ async function examsInScope() {
 }
 
 /** Whether a measurement is of the place of the open exam: two lesions of one patient have a trend each. */
-function isOfThisPlace({ exam_id: id }) {
-  const [one, other] = [exams.get(id), openExam()];
-  return one?.side === other?.side && one?.clock_position === other?.clock_position;
-}
+const isOfThisPlace = ({ exam_id: id }) => areOfOnePlace(exams.get(id), openExam());
 
 async function page(beforeSeq, limit) {
   const inScope = await examsInScope();

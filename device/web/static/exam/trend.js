@@ -1,5 +1,5 @@
-// Size and depth of one lesion over a patient's exams of its place: a point and its 90 % interval for each measurement
-// that counts.
+// Size and depth of one lesion over time, of a patient's exams of its place: a point and its 90 % interval for each
+// measurement that counts.
 
 import { byId, drawn, element } from "../base/dom.js";
 import { day, figure, say } from "../base/words.js";
@@ -26,13 +26,14 @@ function chart({ name, key, unit }, measurements, place) {
   const svg = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
   const most = Math.max(...told.map(({ estimate }) => estimate[key].high));
   const bottom = HEIGHT - BELOW;
-  const at = (index) => LEFT + 20 + (index * (WIDTH - LEFT - 48)) / (told.length - 1);
+  const [first, last] = [told[0], told.at(-1)].map(({ taken_at: taken }) => Date.parse(taken));
+  const at = (taken) => LEFT + 20 + ((Date.parse(taken) - first) * (WIDTH - LEFT - 48)) / Math.max(last - first, 1);
   const up = (value) => bottom - (Math.max(value, 0) / most) * (bottom - 12);
   axis(svg, most, told[0].taken_at, told.at(-1).taken_at);
-  told.forEach(({ estimate: { [key]: quantity } }, index) => {
-    svg.append(drawn("path", { class: "trend-interval", d: `M${at(index)} ${up(quantity.low)}V${up(quantity.high)}` }));
-    svg.append(drawn("circle", { class: "trend-value", cx: at(index), cy: up(quantity.value), r: 4 }));
-  });
+  for (const { taken_at: taken, estimate: { [key]: quantity } } of told) {
+    svg.append(drawn("path", { class: "trend-interval", d: `M${at(taken)} ${up(quantity.low)}V${up(quantity.high)}` }));
+    svg.append(drawn("circle", { class: "trend-value", cx: at(taken), cy: up(quantity.value), r: 4 }));
+  }
   const figureNode = element("figure", "trend");
   figureNode.append(element("figcaption", "", title), svg);
   return figureNode;

@@ -21,11 +21,13 @@ export function remedyOf({ code, remedy }) {
 
 export const meaningOf = ({ code }) => part(code, "is");
 
-function item(fault) {
+/** One row; of a warning beside a press that is under way, or beside a fault, only what it is: both say what to do. */
+function item(fault, isRemedySaid) {
   const node = element("div", "fault");
   node.dataset.severity = fault.severity;
   const words = element("p", "fault-words");
-  words.append(element("strong", "fault-title", meaningOf(fault)), " ", element("span", "fault-remedy", remedyOf(fault)));
+  words.append(element("strong", "fault-title", meaningOf(fault)));
+  if (isRemedySaid || fault.severity === "fault") words.append(" ", element("span", "fault-remedy", remedyOf(fault)));
   node.append(element("span", "fault-code", fault.code), words);
   return node;
 }
@@ -48,16 +50,17 @@ export function openService(words) {
 byId("fault-close").addEventListener("click", () => dialog.close());
 
 /** Show the faults of a status, worst first; without one nothing is there. */
-export function showFaults({ faults, step }) {
+export function showFaults({ faults, step }, isPressUnderWay) {
   const rowsThatFit = AT_MOST[lowScreen.matches ? "low" : "high"];
-  const key = JSON.stringify([faults, step === "fault", rowsThatFit]);
+  const isRemedySaid = step !== "fault" && !isPressUnderWay;
+  const key = JSON.stringify([faults, step === "fault", isRemedySaid, rowsThatFit]);
   if (key === shown) return;
   shown = key;
   known = [...faults].sort((a, b) => (a.severity > b.severity) - (a.severity < b.severity));
   const most = rowsThatFit[step === "fault" ? "fault" : "warning"];
   const first = known.slice(0, most);
   const rows = element("div", "fault-rows");
-  rows.append(...first.map(item));
+  rows.append(...first.map((one) => item(one, isRemedySaid)));
   const more = button("button button-quiet fault-open", say("details"), open);
   more.setAttribute("aria-label", say("faults.details"));
   const side = element("div", "fault-side");

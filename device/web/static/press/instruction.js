@@ -21,7 +21,8 @@ export function guidanceWords({ guidance: { code }, scan }) {
 }
 
 /** What helps in a step of a press, "" where nothing has to be said. */
-export function stepHint({ step, kind }) {
+export function stepHint({ step, kind, guidance }) {
+  if (step === "starting" && guidance?.code === "lift") return say("hint.starting_lift");
   if (kind === "ramp" && isSaid(`hint.ramp_${step}`)) return say(`hint.ramp_${step}`);
   return isSaid(`hint.${step}`) ? say(`hint.${step}`) : "";
 }

@@ -1,30 +1,25 @@
-// How far the measurements of one place agree: mean and scatter of each unknown over those that count.
+// How far the measurements of one place agree: from which value to which each unknown goes over those that count, and were
+// taken in the mode of the newest: a quick press and a scan differ by what each can tell.
 
 import { byId, setText } from "../base/dom.js";
 import { figure, say } from "../base/words.js";
+import { modeName } from "../press/modes.js";
 import { UNKNOWNS, isDetermined } from "./quantities.js";
-
-const mean = (numbers) => numbers.reduce((sum, one) => sum + one, 0) / numbers.length;
-
-/** Standard deviation of a sample of two or more. */
-function spread(numbers) {
-  const middle = mean(numbers);
-  return Math.sqrt(numbers.reduce((sum, one) => sum + (one - middle) ** 2, 0) / (numbers.length - 1));
-}
 
 function words({ name, key, unit }, measurements) {
   const values = measurements.filter(({ estimate }) => isDetermined(estimate, key)).map(({ estimate }) => estimate[key].value);
   if (values.length < 2) return "";
-  const scatter = spread(values);
-  const decimals = scatter >= 9.5 ? 0 : scatter >= 0.095 ? 1 : 2;
-  const said = { name: say(name), mean: figure(mean(values), decimals), spread: figure(scatter, decimals), unit };
-  return say("repeats.of", said);
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const decimals = high - low >= 9.5 ? 0 : 1;
+  return say("repeats.of", { name: say(name), low: figure(low, decimals), high: figure(high, decimals), unit });
 }
 
-/** Say how far the measurements of an exam agree; void ones do not count. */
+/** Say how far the measurements of an exam agree, the newest first; void ones do not count. */
 export function showRepeats(measurements) {
-  const counted = measurements.filter(({ voided }) => !voided);
+  const valid = measurements.filter(({ voided }) => !voided);
+  const counted = valid.filter(({ mode }) => mode === valid[0].mode);
   const told = UNKNOWNS.map((unknown) => words(unknown, counted)).filter(Boolean);
-  const many = counted.length > 1 ? [say("repeats", { n: counted.length }), ...told].join(" · ") : say("repeats.one");
+  const said = { n: counted.length, mode: counted.length ? modeName(counted[0].mode) : "" };
+  const many = counted.length > 1 ? [say("repeats", said), ...told].join(" · ") : say("repeats.one");
   setText(byId("repeats"), counted.length ? many : "");
 }

@@ -1,7 +1,7 @@
 // Which measurement the screen shows: the newest of the open exam, one from the history, or an answer that the probe is
-// still keeping. A result of somebody else is never shown under this exam's name.
+// still keeping. A result of somebody else is never shown under this exam's name: one from the history has its own.
 
-import { fetchMeasurement, fetchMeasurements } from "../base/probe.js";
+import { fetchExam, fetchMeasurement, fetchMeasurements } from "../base/probe.js";
 import { openExam } from "../exam/current.js";
 import { showRepeats } from "./repeats.js";
 import { showMeasurement } from "./result.js";
@@ -10,6 +10,7 @@ const ENDED_WITHOUT = new Set(["rejected", "cancelled", "failed"]);
 let measurement = null;
 let answer = null; // what the press says while the probe keeps it; from then on the measurement takes its place
 let older = null;
+let olderExam = null; // whose it is; null of a free press
 let dismissed = null;
 
 function isOfThisExam({ exam_id: id }) {
@@ -27,6 +28,10 @@ export function shownResult(status) {
 }
 
 export const isOlder = () => older !== null;
+/** Whether what is shown is another exam's than the one that is open. */
+export const isOfOther = () => older !== null && older.exam_id !== (openExam()?.id ?? null);
+/** The exam of what is shown from the history, null of a free press. */
+export const olderOwner = () => olderExam;
 export const isMissing = ({ measurement_id: id }) => id !== null && id !== measurement?.id;
 
 async function loadRepeats() {
@@ -54,7 +59,9 @@ export async function refreshShown() {
 
 /** Show a measurement from the history. */
 export async function showOlder(id) {
-  older = await fetchMeasurement(id);
+  const found = await fetchMeasurement(id);
+  olderExam = found.exam_id === null ? null : await fetchExam(found.exam_id);
+  older = found;
   showMeasurement(older);
   showRepeats([]);
 }
