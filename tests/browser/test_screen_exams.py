@@ -47,6 +47,30 @@ def open_exam(page: Page, daemon: Daemon, patient: str) -> None:
     expect(page.locator("#exam-who")).to_have_text(patient)
 
 
+def test_what_was_missing_on_the_map_is_said_until_it_is_there_and_a_distance_can_be_taken_back(
+    page: Page, daemon: Daemon
+):
+    page.goto(daemon.url)
+    expect(page.locator("#modes")).to_be_visible()
+    page.locator("#exam-button").click()
+    page.locator("#patient-ref").fill("G-3")
+    page.locator("#operator").fill("Ada")
+    page.locator("#patient-ref").press("Enter")
+    page.locator("#begin-exam").click()
+    expect(page.locator("#chooser-problem")).to_have_text("Choose side and clock position.")
+    page.locator('.hour[data-side="left"][data-hour="10"]').click()
+    expect(page.locator("#chooser-problem")).to_have_text("")
+    not_said = page.locator("#distance").inner_text()
+    page.locator("#farther").click()
+    expect(page.locator("#distance")).to_have_text("30 mm")
+    for _ in range(7):
+        page.locator("#nearer").click()
+    expect(page.locator("#distance")).to_have_text(not_said)
+    page.locator("#begin-exam").click()
+    expect(page.locator("#exam-where")).to_have_text("Left 10 o'clock")
+    assert daemon.ask("/api/v1/exams").json["exams"][0]["nipple_distance_mm"] is None
+
+
 def test_a_page_that_shows_an_old_exam_does_not_measure_but_shows_it_anew(page: Page, daemon: Daemon):
     exam = make(daemon)
     open_exam(page, daemon, "A-17")

@@ -32,11 +32,11 @@ function clock(side) {
   return node;
 }
 
-/** Move the distance by whole steps; the first step says what is usual. */
+/** Move the distance by whole steps; the first step says what is usual, one below nothing takes it back. */
 function move(steps) {
   const before = place.nipple_distance_mm;
   const mm = before === null ? USUAL_MM : before + steps * STEP_MM;
-  choose({ nipple_distance_mm: Math.min(Math.max(mm, LEAST_MM), MOST_MM) });
+  choose({ nipple_distance_mm: mm < LEAST_MM ? null : Math.min(mm, MOST_MM) });
 }
 
 function show() {

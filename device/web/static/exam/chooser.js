@@ -91,7 +91,7 @@ export function chooseAnotherPlace() {
 function showMap() {
   page("where");
   setText(byId("where-of"), say("exam.where_of", { patient: whole(step ? nameWords(step) : typed("patient_ref")) }));
-  beginMap();
+  beginMap({}, () => setText(byId("chooser-problem"), "")); // what was missing may be there now
 }
 
 function toMap() {
