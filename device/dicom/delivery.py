@@ -37,6 +37,8 @@ class Delivery:
     def __init__(self, settings: DicomSection, archive: RemoteProgram, store: Store, outgoing: Outgoing) -> None:
         """Take the archive and what there is for it."""
         self._settings, self._archive, self._store, self._outgoing = settings, archive, store, outgoing
+        self.doubt: DeviceError | None = None
+        """That the archive has taken objects and never says that it keeps them, until it does so of any."""
 
     def turn(self, is_stopping: Callable[[], bool] = lambda: False) -> bool:
         """Send what is queued and ask for what was sent; return whether anything is left to ask for or to send.
@@ -88,12 +90,15 @@ class Delivery:
             uid = row["uid"]
             if uid in found:
                 self._store.outbox.settle(uid, "confirmed")
-            elif uid in lost or uid in silent:
+            elif uid in lost:
                 self._store.outbox.settle(uid, "queued", "The archive does not have it any more.")
+            elif uid in silent:
+                self._store.outbox.settle(uid, "queued", "The archive has not said that it keeps it.")
         if silent:
-            raise unreachable(
-                self._archive, f"has not said for an hour that it keeps what it took, {len(silent)} objects"
-            )
+            what = f"has not said for an hour that it keeps what it took, {len(silent)} objects"
+            self.doubt = unreachable(self._archive, what)
+        elif found:
+            self.doubt = None
 
 
 def _sent(row: StoredRecord) -> SentObject:

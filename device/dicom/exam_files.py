@@ -6,7 +6,7 @@ import io
 import zipfile
 
 from device.dicom.objects import DicomWriter, as_file
-from device.dicom.outgoing import counting_measurements, ordered_study
+from device.dicom.outgoing import counting_measurements, ordered_study, study_time
 from device.records.store import Store
 
 
@@ -17,10 +17,10 @@ def exam_zip(store: Store, writer: DicomWriter, exam_id: str) -> bytes:
     """
     exam = store.exams.exam(exam_id)
     order, counting = ordered_study(store, exam_id), counting_measurements(store, exam_id)
-    content = io.BytesIO()
+    study_at, content = study_time(store, exam, counting), io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for measurement in counting:
-            subject = writer.subject(measurement["id"], exam, order)
+            subject = writer.subject(measurement["id"], exam, order, study_at)
             archive.writestr(f"image-{measurement['seq']}.dcm", as_file(writer.image(subject)))
             archive.writestr(f"report-{measurement['seq']}.dcm", as_file(writer.report(subject)))
     return content.getvalue()

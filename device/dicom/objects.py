@@ -28,8 +28,10 @@ class DicomWriter:
         """Take the store, who draws pictures, and the hospital's name."""
         self._store, self._picture_of, self._institution = store, picture_of, institution
 
-    def subject(self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> DicomSubject:
-        """Return what is written of a measurement as it was measured, of an exam as it is given.
+    def subject(
+        self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None, study_at: str
+    ) -> DicomSubject:
+        """Return what is written of a measurement as it was measured, of an exam as it is given, begun at `study_at`.
 
         Raises `InvalidRequest` when an identifier of the exam cannot be written.
         """
@@ -37,7 +39,7 @@ class DicomWriter:
         measurement = self._store.measurement(measurement_id)
         head = read_head(self._store.recording_path(measurement["recording_id"]))
         generation = self._generation(measurement_id, exam, order)
-        return DicomSubject(measurement, exam, head, self._institution, order, generation=generation)
+        return DicomSubject(measurement, exam, head, self._institution, order, generation=generation, study_at=study_at)
 
     def _generation(self, measurement_id: str, exam: dict[str, Any], order: OrderedStudy | None) -> int:
         """Return how often what an exam says of a measurement was taken back from the archive."""

@@ -6,6 +6,7 @@ archive as if it were right: each of its objects there gets a note that it is re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -13,7 +14,16 @@ from pydicom.dataset import Dataset
 
 from device.dicom.objects import DicomWriter
 from device.dicom.rejection import rejection_of
-from device.dicom.subject import WRITTEN, DicomSubject, ObjectKind, OrderedStudy, object_uid, require_writable, uid_of
+from device.dicom.subject import (
+    WRITTEN,
+    DicomSubject,
+    ObjectKind,
+    OrderedStudy,
+    begun_at,
+    object_uid,
+    require_writable,
+    uid_of,
+)
 from device.errors import InvalidRequest
 from device.files.recording_file import RecordingHead
 from device.measurement.recording.recording import CameraSettings
@@ -45,13 +55,19 @@ class Outgoing:
         is_note_left = self._store.outbox.has_refused(exam_id)
         counting = counting_measurements(self._store, exam_id, may_be_none=is_note_left)
         order = ordered_study(self._store, exam_id)
-        items = [self._item(kind, one, exam, order) for one in counting for kind in WRITTEN]
+        study_at = study_time(self._store, exam, counting)
+        items = [self._item(kind, one, exam, order, study_at) for one in counting for kind in WRITTEN]
         self._store.outbox.add(exam_id, items, by=by, exam_version=version)
 
     def _item(
-        self, kind: ObjectKind, measurement: StoredRecord, exam: StoredRecord, order: OrderedStudy | None
+        self,
+        kind: ObjectKind,
+        measurement: StoredRecord,
+        exam: StoredRecord,
+        order: OrderedStudy | None,
+        study_at: str,
     ) -> OutboxItem:
-        subject = self._writer.subject(measurement["id"], exam, order)
+        subject = self._writer.subject(measurement["id"], exam, order, study_at)
         about = _about(kind, subject)
         return OutboxItem(
             subject.uid(kind), exam["id"], measurement["id"], exam["version"], measurement["version"], about
@@ -74,7 +90,7 @@ class Outgoing:
         measurement = self._store.measurement(row["measurement_id"])
         rejected_at = about.get("rejected_at") or about.get("written_at", "")  # as it was called before
         said = measurement, about["exam"], head, about["institution"], order, rejected_at
-        return DicomSubject(*said, about.get("generation", 0))
+        return DicomSubject(*said, about.get("generation", 0), about.get("study_at", ""))
 
     def take_back_what_is_wrong(self) -> int:
         """Withdraw or recall every object that is not right any more; return how many."""
@@ -116,6 +132,7 @@ def _about(kind: ObjectKind, subject: DicomSubject) -> dict[str, Any]:
         "institution": subject.institution,
         "rejected_at": subject.rejected_at,
         "generation": subject.generation,
+        "study_at": subject.study_at,
         "study_uid": subject.study_uid,
         "series_uid": subject.series_uid(kind),
     }
@@ -125,6 +142,12 @@ def ordered_study(store: Store, exam_id: str) -> OrderedStudy | None:
     """Return what the worklist has said of an exam, None when it was not made from it."""
     kept = store.outbox.ordered(exam_id)
     return OrderedStudy(**kept[0], patient=kept[1]) if kept else None
+
+
+def study_time(store: Store, exam: StoredRecord, counting: Sequence[StoredRecord]) -> str:
+    """Return when the study of an exam began: as it was first sent, for all objects of a study say the same."""
+    sent = [row["about"].get("study_at", exam["made_at"]) for row in store.outbox.of_exam(exam["id"])]
+    return str(sent[0]) if sent else begun_at(exam, (one["taken_at"] for one in counting))
 
 
 def counting_measurements(store: Store, exam_id: str, *, may_be_none: bool = False) -> list[dict[str, Any]]:

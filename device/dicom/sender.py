@@ -1,12 +1,11 @@
 """The thread that brings the outbox to the archive, if there is one, and erases who patients are in time.
 
 Times of exams are by the wall clock, which a board without a battery starts at some old date: so nothing is erased
-until that has been steady for a while, and an exam that was made since this start is not older than the start.
+until that has been steady for a while, and an exam is as old as since a steady clock first saw it.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
@@ -45,29 +44,23 @@ class Sender(PersistentSender):
         super().__init__(tell, is_busy)
         self._outbox, self._deliver = outbox, deliver
         self._keep_patients, self._is_clock_steady = timedelta(days=keep_patients_days), is_clock_steady
-        self._began_s, self._newest_at_start = time.monotonic(), outbox.newest_exam()
         self._delivery: Delivery | None = None
 
     def _delivered(self) -> tuple[bool, DeviceError | None]:
         """Send and ask; only when there is anything to are DICOM's libraries loaded."""
         if self._is_clock_steady():
-            self._erase_patients()
+            self._outbox.erase_patients(
+                sent_before=_ago(self._keep_patients),
+                seen_before=_ago(NEVER_SENT),
+                has_archive=self._deliver is not None,
+            )
         if self._deliver is None:
             return False, None
         is_left = False
         if not self._outbox.is_idle():
             self._delivery = self._delivery or self._deliver()
             is_left = self._delivery.turn(self._is_to_pause)
-        return is_left, self._refused()
-
-    def _erase_patients(self) -> None:
-        has_run_long = time.monotonic() - self._began_s >= NEVER_SENT.total_seconds()
-        self._outbox.erase_patients(
-            sent_before=_ago(self._keep_patients),
-            made_before=_ago(NEVER_SENT),
-            up_to=None if has_run_long else self._newest_at_start,
-            has_archive=self._deliver is not None,
-        )
+        return is_left, self._refused() or (self._delivery.doubt if self._delivery else None)
 
     def _refused(self) -> DeviceError | None:
         refused = self._outbox.in_state("refused", limit=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import uuid
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from typing import Any, Literal, get_args
@@ -23,7 +24,7 @@ WRITTEN: tuple[ObjectKind, ...] = get_args(ObjectKind)[:2]
 NAMESPACE = uuid.UUID("5f0d5a53-6c1c-4c5f-9a8e-5b6a3e2d7c41")
 """Makes identifiers of this program differ from all others' that are computed of the same names. Never changed."""
 LONGEST_EXAM = timedelta(days=7)
-"""Further from its exam no press is taken."""
+"""Longer after its exam no press is taken."""
 PATIENT_LENGTH, ACCESSION_LENGTH = 64, 16
 """Characters of VR LO and SH, PS3.5 section 6.2."""
 CORRECT = "Correct the exam with its reason, then send it again."
@@ -61,6 +62,7 @@ class DicomSubject:
     `rejected_at`: when it was found that its objects are not right, RFC 3339; "" while they are. Other objects say when
     the press was measured, so that they are the same whenever they are written. `generation`: how often objects that
     say the same were taken back before: a correction that was itself corrected is said again under new identifiers.
+    `study_at`: when the study began (RFC 3339), the same for all of it: as `begun_at` says, with the exam unless told.
     """
 
     measurement: dict[str, Any]
@@ -70,6 +72,11 @@ class DicomSubject:
     order: OrderedStudy | None = None
     rejected_at: str = ""
     generation: int = 0
+    study_at: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.study_at:
+            object.__setattr__(self, "study_at", self.exam["made_at"])
 
     @property
     def is_of_patient(self) -> bool:
@@ -87,17 +94,6 @@ class DicomSubject:
         return self.order.patient if self.order and is_ordered(self.exam, self.order) else {}
 
     @property
-    def study_at(self) -> str:
-        """When the study began (RFC 3339): with the exam, unless the probe's clock was another one then.
-
-        A board without a clock battery may begin an exam in 1970; the press after the time server has answered, and
-        not the exam, then says when it was.
-        """
-        made_at, taken_at = self.exam["made_at"], self.measurement["taken_at"]
-        apart = abs(datetime.fromisoformat(taken_at) - datetime.fromisoformat(made_at))
-        return str(made_at if apart <= LONGEST_EXAM else taken_at)
-
-    @property
     def study_uid(self) -> str:
         """The study: that of the order, else the exam's own."""
         return study_uid(self.exam, self.order)
@@ -109,6 +105,17 @@ class DicomSubject:
     def series_uid(self, kind: ObjectKind) -> str:
         """Return the series that an object belongs to: what is said of a whole series is the same in all of it."""
         return uid_of("series", kind, self.study_uid, self.exam["side"], self.exam["operator"], self.head.software)
+
+
+def begun_at(exam: dict[str, Any], taken_at: Iterable[str]) -> str:
+    """Return when a study began whose presses were taken at these times (RFC 3339).
+
+    That is with its exam, unless a press lies long after it: a board without a clock battery may begin an exam in 1970,
+    and the first press since its time server has answered then says when it was.
+    """
+    made_at = datetime.fromisoformat(exam["made_at"])
+    late = [one for one in taken_at if datetime.fromisoformat(one) - made_at > LONGEST_EXAM]
+    return min(late, default=str(exam["made_at"]))
 
 
 def is_ordered(exam: dict[str, Any], order: OrderedStudy | None) -> bool:

@@ -33,7 +33,10 @@ CREATE INDEX IF NOT EXISTS outbox_by_state ON outbox (state);
 CREATE INDEX IF NOT EXISTS outbox_by_exam ON outbox (exam_id);
 CREATE TABLE IF NOT EXISTS ordered_study (exam_id TEXT PRIMARY KEY, record TEXT NOT NULL, patient TEXT);
 """
+AGAIN = "state = 'queued', record = json_set(record, '$.problem', '')"
 REFUSED_NOTES = "exam_id = ? AND state = 'refused' AND json_extract(record, '$.about.kind') = 'rejection'"
+NAMED = "named "
+"""Before an exam's id: the counter of when its patient's name was first seen by a clock that is right."""
 NOT_NEEDED = "no longer needed for the archive"
 _ROWS = "SELECT record, state FROM outbox"
 
@@ -71,7 +74,7 @@ class Outbox:
             new = [item.uid for item in items if self._insert(db, item)]
             notes = [uid for (uid,) in db.execute(f"SELECT uid FROM outbox WHERE {REFUSED_NOTES}", (exam_id,))]
             for uid in notes:
-                db.execute("UPDATE outbox SET state = 'queued' WHERE uid = ?", (uid,))
+                db.execute(f"UPDATE outbox SET {AGAIN} WHERE uid = ?", (uid,))
             append(db, "exam_sent", exam_id, by=by, after={"objects": [*new, *notes]})
 
     def has_refused(self, exam_id: str) -> bool:
@@ -96,7 +99,7 @@ class Outbox:
         row = item.uid, item.exam_id, item.measurement_id, item.exam_version, item.filing_version, json.dumps(record)
         if kept:
             seen = item.exam_version, item.filing_version, item.uid
-            db.execute("UPDATE outbox SET state = 'queued', exam_version = ?, filing_version = ? WHERE uid = ?", seen)
+            db.execute(f"UPDATE outbox SET {AGAIN}, exam_version = ?, filing_version = ? WHERE uid = ?", seen)
         else:
             columns = "uid, exam_id, measurement_id, exam_version, filing_version, state, record"
             db.execute(f"INSERT INTO outbox ({columns}) VALUES (?, ?, ?, ?, ?, 'queued', ?)", row)
@@ -182,31 +185,35 @@ class Outbox:
             row = db.execute("SELECT record, patient FROM ordered_study WHERE exam_id = ?", (exam_id,)).fetchone()
         return (json.loads(row[0]), json.loads(row[1] or "{}")) if row else None
 
-    def newest_exam(self) -> int:
-        """Return the number of the exam that was made last, 0 when there is none."""
-        with self._transaction() as db:
-            return int(db.execute("SELECT coalesce(max(seq), 0) FROM exam").fetchone()[0])
-
-    def erase_patients(
-        self, *, sent_before: str, made_before: str, up_to: int | None = None, has_archive: bool = True
-    ) -> int:
+    def erase_patients(self, *, sent_before: str, seen_before: str, has_archive: bool = True) -> int:
         """Erase who patients are, from the file as well; return of how many exams. Times are RFC 3339 UTC.
 
-        Erased are those whose exam the archive has had since before the first time, or that was made before the other
-        one and has no number above `up_to`, unless any of it waits to be sent: where there is no archive nothing does.
+        Erased are those whose exam the archive has had since before the first time, or that was first seen here before
+        the other one, unless any of it waits to be sent: where there is no archive nothing does. To be called while
+        the clock is right: when an exam was made it may not have been.
         """
         query = """
             SELECT exam_id FROM ordered_study WHERE patient IS NOT NULL
             AND NOT (:waits AND exam_id IN (SELECT exam_id FROM outbox WHERE state IN ('queued', 'sent')))
-            AND (exam_id IN (SELECT id FROM exam WHERE json_extract(record, '$.made_at') < :made AND seq <= :up_to)
+            AND (exam_id IN (SELECT substr(name, :mark) FROM counter WHERE name LIKE :named AND value <= :seen)
               OR exam_id IN (SELECT exam_id FROM outbox WHERE state = 'confirmed')
               AND exam_id NOT IN (SELECT exam_id FROM outbox WHERE json_extract(record, '$.confirmed_at') >= :sent))"""
         with self._transaction() as db:
-            last = 2**63 - 1 if up_to is None else up_to
-            of_query = {"made": made_before, "sent": sent_before, "waits": has_archive, "up_to": last}
+            db.execute(
+                "INSERT OR IGNORE INTO counter SELECT ? || exam_id, ? FROM ordered_study WHERE patient IS NOT NULL",
+                (NAMED, utc_now()),
+            )
+            of_query = {
+                "seen": seen_before,
+                "sent": sent_before,
+                "waits": has_archive,
+                "mark": 1 + len(NAMED),
+                "named": f"{NAMED}%",
+            }
             erased = db.execute(query, of_query).fetchall()
             for (exam_id,) in erased:
                 db.execute("UPDATE ordered_study SET patient = NULL WHERE exam_id = ?", (exam_id,))
+                db.execute("DELETE FROM counter WHERE name = ?", (NAMED + exam_id,))
                 append(db, "patient_erased", exam_id, reason=NOT_NEEDED, after={"patient": None})
         if erased:
             with self._transaction() as db:

@@ -105,7 +105,12 @@ def test_an_ordered_exam_is_begun_measured_and_sent(page: Page, archive: Orthanc
     expect(state).to_have_text("Not sent yet: 1 of 2 measurements.")
     expect(state).to_have_attribute("data-tone", "caution")
     look(page, "archive-unsent")
-    assert sorted(one["PatientName"] for one in archive.kept()) == ["Müller^Ana"] * 2
+    exam = daemon.ask("/api/v1/exams").json["exams"][0]
+    change = {"by": "Bo", "reason": "Wrong side", "changes": {"side": "right"}}
+    headers = {"If-Match": f'"{exam["version"]}"'}
+    assert daemon.ask(f"/api/v1/exams/{exam['id']}", "PATCH", change, headers=headers).status == 200
+    expect(state).to_have_text("Not sent yet: 2 of 2 measurements.")  # notes of what was recalled are no measurements
+    assert {one["PatientName"] for one in archive.kept()} == {"Müller^Ana"}
     page.locator("#history-all").click()
     expect(page.locator("#archive")).to_be_hidden()
 

@@ -140,7 +140,7 @@ function showProgress(seen) {
 
 function pressWords(measurement) {
   if (pressUnderWay()) return say("press.cancel");
-  if (status.step === "fault") return say("press.try");
+  if (status.step === "fault" && isChosen()) return say("press.try");
   if (!isChosen()) return say("exam.choose");
   if (status.simulated) return say("press.simulated");
   return say(measurement ? "press.again" : "press.new");

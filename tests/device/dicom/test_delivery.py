@@ -226,14 +226,27 @@ def test_an_archive_that_cannot_say_what_it_keeps_is_told(store, outgoing, deliv
     assert states(store) == ["sent"] * 4
 
 
-def test_an_archive_that_never_confirms_is_told_after_an_hour(store, outgoing, deliver, exam, monkeypatch):
-    monkeypatch.setattr(Association, "send_c_find", lambda *_: iter([]))
-    outgoing.queue(exam["id"], version=1, by="Ada")
-    assert deliver() is True
-    monkeypatch.setattr(delivery, "LOST_AFTER", timedelta(0))
-    with pytest.raises(ArchiveUnreachable, match="has not said for an hour that it keeps what it took, 4 objects"):
-        deliver()
-    assert states(store) == ["queued"] * 4
+def test_an_archive_that_never_confirms_is_told_after_an_hour_and_until_it_does(
+    store, outgoing, archive, exam, monkeypatch
+):
+    settings = archive.settings()
+    one = Delivery(settings, archive_of(settings), store, outgoing)
+    with monkeypatch.context() as silenced:
+        silenced.setattr(Association, "send_c_find", lambda *_: iter([]))
+        outgoing.queue(exam["id"], version=1, by="Ada")
+        assert one.turn() is True
+        assert one.doubt is None
+        silenced.setattr(delivery, "LOST_AFTER", timedelta(0))
+        one.turn()
+        assert "has not said for an hour that it keeps what it took, 4 objects" in one.doubt.cause
+        assert {row["problem"] for row in store.outbox.of_exam(exam["id"])} == {
+            "The archive has not said that it keeps it."
+        }
+        silenced.setattr(delivery, "LOST_AFTER", timedelta(hours=1))
+        one.turn()
+        assert one.doubt is not None  # it was sent again, and nothing is said of it yet
+    assert one.turn() is False
+    assert (one.doubt, states(store)) == (None, ["confirmed"] * 4)
 
 
 def test_what_was_never_sent_is_withdrawn_and_never_is(store, outgoing, deliver, archive, exam):

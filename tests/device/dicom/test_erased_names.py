@@ -47,33 +47,34 @@ def test_with_a_worklist_and_no_archive_names_are_erased_in_time(store, monkeypa
         hospital.close()
 
 
-def test_a_clock_that_is_put_right_erases_no_name_of_an_exam_that_was_begun_before(store, monkeypatch):
-    """A board without a battery comes out of a cupboard; its time server answers after the exam was begun."""
-    monkeypatch.setattr(sender, "NEVER_SENT", timedelta(days=60))
-    older = made_of_a_step(store)
+def test_a_clock_that_is_put_right_erases_no_name_before_its_time(store, monkeypatch):
+    """A board without a battery comes out of a cupboard; its time server answers after the exam was begun, and it is
+    sent after the next start."""
     is_steady = threading.Event()
     hospital = Hospital(DicomSection(worklist_host="127.0.0.1"), store, read_picture, is_clock_steady=is_steady.is_set)
-    since_start = hospital._sender
     begun = made_of_a_step(store)
     store._db.execute("UPDATE exam SET record = json_set(record, '$.made_at', '1970-01-01T00:00:00.000Z')")
-    since_start._delivered()
-    assert names(store, older, begun) == [{"name": "Müller^Ana"}] * 2
+    hospital._sender._delivered()
     is_steady.set()
-    since_start._delivered()
-    assert names(store, older, begun) == [{}, {"name": "Müller^Ana"}]
-    since_start._began_s -= 60 * 86_400.0
-    since_start._delivered()
+    for _ in range(2):
+        Hospital(DicomSection(worklist_host="127.0.0.1"), store, read_picture)._sender._delivered()
+        assert names(store, begun) == [{"name": "Müller^Ana"}]
+    store._db.execute("UPDATE counter SET value = '2020-01-01T00:00:00.000Z' WHERE name LIKE 'named %'")
+    hospital._sender._delivered()
     assert names(store, begun) == [{}]
+    assert store._db.execute("SELECT count(*) FROM counter WHERE name LIKE 'named %'").fetchone() == (0,)
 
 
 def test_with_an_archive_what_waits_keeps_its_name_and_what_nobody_sends_does_not(store):
     kept, queued = made_of_a_step(store), made_of_a_step(store)
     store.outbox.add(queued["id"], [OutboxItem("2.25.1", queued["id"], "m-1", 1, 1, {})], by="Ada", exam_version=1)
-    assert store.outbox.erase_patients(sent_before="2000", made_before="9999") == 1
+    assert store.outbox.erase_patients(sent_before="2000", seen_before="9999-12-31T00:00:00.000Z") == 1
     assert names(store, kept, queued) == [{}, {"name": "Müller^Ana"}]
 
 
 def test_before_their_time_names_stay(store):
     kept = made_of_a_step(store)
-    assert store.outbox.erase_patients(sent_before="2000", made_before="2000", has_archive=False) == 0
+    assert (
+        store.outbox.erase_patients(sent_before="2000", seen_before="2000-01-01T00:00:00.000Z", has_archive=False) == 0
+    )
     assert names(store, kept) == [{"name": "Müller^Ana"}]

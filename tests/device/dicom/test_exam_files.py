@@ -228,13 +228,18 @@ def test_an_object_is_the_same_one_until_the_exam_says_something_else(store, fil
 @pytest.mark.parametrize(
     ("made_at", "date"), [("1970-01-01T00:02:00.000Z", "20260102"), ("2026-01-01T10:00:00.000Z", "20260101")]
 )
-def test_an_exam_that_was_begun_in_1970_is_of_the_day_of_its_press(store, files_of, monkeypatch, made_at, date):
+def test_an_exam_that_was_begun_in_1970_is_of_the_day_of_its_press(store, hospital, monkeypatch, made_at, date):
     """The board's clock had no battery, and its time server answered after that."""
     monkeypatch.setattr(exams, "utc_now", lambda: made_at)
     exam = begin(store)
-    measure(store, exam, taken_at="2026-01-02T10:00:00.000Z")
-    for path in files_of(exam).values():
-        assert pydicom.dcmread(path).StudyDate == date
+    for taken_at in ("1970-01-01T00:04:00.000Z", "2026-01-02T10:00:00.000Z", "2026-01-03T10:05:00.000Z")[
+        made_at > "2" :
+    ]:
+        measure(store, exam, taken_at=taken_at)
+    with zipfile.ZipFile(io.BytesIO(hospital.files_of(exam["id"]))) as archive:
+        written = [pydicom.dcmread(io.BytesIO(archive.read(name))) for name in archive.namelist()]
+    assert len(written) >= 4
+    assert {(one.StudyDate, one.StudyTime) for one in written} == {(date, written[0].StudyTime)}
 
 
 def test_a_corrected_patient_gets_a_study_of_his_own(store):

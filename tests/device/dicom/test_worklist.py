@@ -140,13 +140,13 @@ def test_names_are_erased_from_the_disk_once_the_archive_has_the_exam(tmp_path, 
     on_disk = lambda: b"".join(path.read_bytes() for path in (tmp_path / "var").glob("tsis.sqlite*"))  # noqa: E731
     far, long_ago = "9999", "2000"
     hospital.send(exam["id"], version=1, by="Ada")
-    assert store.outbox.erase_patients(sent_before=far, made_before=far) == 0  # it waits to be sent
+    assert store.outbox.erase_patients(sent_before=far, seen_before=far) == 0  # it waits to be sent
     for row in store.outbox.of_exam(exam["id"]):
         store.outbox.settle(row["uid"], "confirmed")
-    assert store.outbox.erase_patients(sent_before=long_ago, made_before=long_ago) == 0
+    assert store.outbox.erase_patients(sent_before=long_ago, seen_before=long_ago) == 0
     assert "Müller".encode() in on_disk() or b"M\\u00fcller" in on_disk()
-    assert store.outbox.erase_patients(sent_before=far, made_before=long_ago) == 1
-    assert store.outbox.erase_patients(sent_before=far, made_before=far) == 0
+    assert store.outbox.erase_patients(sent_before=far, seen_before=long_ago) == 1
+    assert store.outbox.erase_patients(sent_before=far, seen_before=far) == 0
     entries = store.audit.entries(subject=exam["id"], before_seq=2**62, limit=9)
     assert [one["what"] for one in entries] == ["patient_erased", "exam_sent", "exam_made"]
     assert "ller" not in str(entries)
@@ -160,7 +160,7 @@ def test_names_are_erased_from_the_disk_once_the_archive_has_the_exam(tmp_path, 
 def test_a_name_of_an_exam_that_nobody_sends_does_not_stay(store, hospital):
     [step] = hospital.scheduled(None, "A-17", None)
     exam = hospital.begin_exam(step["id"], SAID)
-    assert store.outbox.erase_patients(sent_before="2000", made_before="9999") == 1
+    assert store.outbox.erase_patients(sent_before="2000", seen_before="9999-12-31T00:00:00.000Z") == 1
     assert store.outbox.ordered(exam["id"])[1] == {}
 
 

@@ -32,9 +32,12 @@ export const hasWorklist = () => Boolean(hospital?.worklist);
 
 const count = (objects, one) => objects.filter(({ state: is }) => is === one).length;
 
+/** Images and reports; a note that one of them is not to be used is none. */
+const ofContent = (objects) => objects.filter(({ kind }) => kind !== "rejection");
+
 /** Which measurements that count nobody has sent since they were taken, moved here or corrected. */
 function unsent(objects) {
-  const there = new Set(objects.filter(({ state: is }) => !TAKEN_BACK.has(is)).map(({ measurement_id: id }) => id));
+  const there = new Set(ofContent(objects).filter(({ state: is }) => !TAKEN_BACK.has(is)).map(({ measurement_id: id }) => id));
   return counting.filter((id) => !there.has(id));
 }
 
@@ -48,7 +51,7 @@ function words(objects, { fault, next_try_at: next }) {
   if (count(objects, "queued")) return say("archive.queued", { some: count(objects, "queued"), n });
   if (left.length) return say("archive.unsent", { n: left.length, all: counting.length });
   if (count(objects, "sent")) return say("archive.sent");
-  const confirmed = count(objects, "confirmed");
+  const confirmed = count(ofContent(objects), "confirmed");
   return confirmed ? say("archive.confirmed", { some: confirmed }) : say("archive.taken_back");
 }
 
@@ -99,7 +102,7 @@ export function showArchive(isOfExam, measurements) {
   const before = shown?.id;
   clearTimeout(looking);
   counting = measurements.filter(({ voided }) => !voided).map(({ id }) => id);
-  shown = hospital?.archive && isOfExam && exam?.kind === "patient" && measurements.length ? exam : null;
+  shown = hospital?.archive && isOfExam && exam?.kind === "patient" ? exam : null;
   box.hidden = !shown || !counting.length;
   if (!shown) return;
   if (shown.id === before) return look();

@@ -26,14 +26,16 @@ function chart({ name, key, unit }, measurements, place) {
   const svg = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title });
   const most = Math.max(...told.map(({ estimate }) => estimate[key].high));
   const bottom = HEIGHT - BELOW;
-  const [first, last] = [told[0], told.at(-1)].map(({ taken_at: taken }) => Date.parse(taken));
-  const at = (taken) => LEFT + 20 + ((Date.parse(taken) - first) * (WIDTH - LEFT - 48)) / Math.max(last - first, 1);
+  const times = told.map(({ taken_at: taken }) => Date.parse(taken));
+  const isRising = times.every((one, index) => index === 0 || one > times[index - 1]); // a clock may have been put back
+  const along = isRising ? times.map((one) => (one - times[0]) / (times.at(-1) - times[0])) : times.map((_, index) => index / (times.length - 1));
+  const at = (index) => LEFT + 20 + along[index] * (WIDTH - LEFT - 48);
   const up = (value) => bottom - (Math.max(value, 0) / most) * (bottom - 12);
   axis(svg, most, told[0].taken_at, told.at(-1).taken_at);
-  for (const { taken_at: taken, estimate: { [key]: quantity } } of told) {
-    svg.append(drawn("path", { class: "trend-interval", d: `M${at(taken)} ${up(quantity.low)}V${up(quantity.high)}` }));
-    svg.append(drawn("circle", { class: "trend-value", cx: at(taken), cy: up(quantity.value), r: 4 }));
-  }
+  told.forEach(({ estimate: { [key]: quantity } }, index) => {
+    svg.append(drawn("path", { class: "trend-interval", d: `M${at(index)} ${up(quantity.low)}V${up(quantity.high)}` }));
+    svg.append(drawn("circle", { class: "trend-value", cx: at(index), cy: up(quantity.value), r: 4 }));
+  });
   const figureNode = element("figure", "trend");
   figureNode.append(element("figcaption", "", title), svg);
   return figureNode;

@@ -50,18 +50,22 @@ export async function loadNewest(id) {
 export async function refreshShown() {
   const [newest, shown] = await Promise.all([measurement, older].map((one) => one && fetchMeasurement(one.id)));
   if (newest?.id === measurement?.id) measurement = newest;
-  if (shown?.id === older?.id) older = shown;
+  if (shown && shown.id === older?.id) await take(shown);
   const seen = older ?? measurement;
   if (!seen) return;
   showMeasurement(seen);
   if (!older) await loadRepeats();
 }
 
-/** Show a measurement from the history. */
-export async function showOlder(id) {
-  const found = await fetchMeasurement(id);
+/** Take a measurement from the history, with the exam that it is kept under now. */
+async function take(found) {
   olderExam = found.exam_id === null ? null : await fetchExam(found.exam_id);
   older = found;
+}
+
+/** Show a measurement from the history. */
+export async function showOlder(id) {
+  await take(await fetchMeasurement(id));
   showMeasurement(older);
   showRepeats([]);
 }
@@ -81,7 +85,7 @@ export function dismiss(status) {
 
 /** Take over a measurement that somebody has moved or voided. */
 export async function replace(after) {
-  if (older?.id === after.id) older = after;
+  if (older?.id === after.id) await take(after);
   if (measurement?.id === after.id) measurement = after;
   showMeasurement(after);
   await loadRepeats();

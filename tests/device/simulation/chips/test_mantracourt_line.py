@@ -129,7 +129,7 @@ def test_a_fault_shows_in_the_replies_and_is_over_when_it_is_over(unit_of, kind,
     cell.close()
 
 
-def test_a_slow_line_gives_fewer_readings_than_a_press_needs(unit_of):
+def test_a_reading_takes_the_time_of_its_bytes(unit_of):
     """The 49 bytes of two requests and replies take 51 ms at 9600 baud."""
     cell = open_load_cell(unit_of(250_000.0).device_path, 9600, "mantracourt", 1)
     samples = [cell.read(timeout_s=5.0) for _ in range(5)]
