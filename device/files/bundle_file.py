@@ -50,6 +50,12 @@ def read_ramp_model(folder: Path) -> RampModel:
     return RampModel(bundle, answers, RangeClassifier(files, bundle.fields, len(RAMP_UNITS)))
 
 
+def read_range_classifier(folder: Path, file: str, entry: str) -> RangeClassifier:
+    """Return networks of a ramp bundle that tell its ranges, by file and card entry; raises `BundleRefused`."""
+    files = _files(folder, file)
+    return RangeClassifier(files, ModelBundle(files, RAMP_UNITS).fields, len(RAMP_UNITS), file, entry)
+
+
 def read_models(paper: ModelBundle, quick: Path, standard: Path) -> ModeModels:
     """Return the bundle of mode paper with the models of two folders, which may be missing.
 

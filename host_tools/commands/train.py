@@ -44,9 +44,11 @@ OWN_OPTIONS = {
     "paper": ("--out", "--data", "--trials"),
     "standard": ("--out", "--table", "--wide", "--dry-run", "--judge-only"),
     "quick": ("--out", "--table"),
+    "commissioned": ("--out", "--table", "--wide", "--dry-run"),
     "all": (),
 }
-"""Options of each mode beside --seed and --scheduler; precise shares the bundle of standard."""
+"""Options of each mode beside --seed and --scheduler; precise shares the bundle of standard, and so does what tells the
+ranges of commissioned probes."""
 PROBE, PHANTOMS = "models/simulated_probe", "build/phantoms"
 CERTIFICATES = {"physical": "calibration.json", "linear": "calibration_linear.json"}
 """By the light that the simulated probe's phantoms are recorded under."""
@@ -56,17 +58,27 @@ ON_A_CLUSTER = ("sweep", "table", "train")
 
 
 def train(
-    mode: Annotated[str, typer.Option(help="paper, standard (and precise), quick (after standard), or all.")] = "paper",
+    mode: Annotated[
+        str,
+        typer.Option(
+            help="paper, standard (and precise), quick or commissioned (after standard: what tells the ranges of "
+            "commissioned probes), or all."
+        ),
+    ] = "paper",
     data: Annotated[Path | None, typer.Option(help="Of paper: data set of `sweep`; swept unless given.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the model bundle; models/MODE unless given.")] = None,
     trials: Annotated[int | None, typer.Option(help="Of paper: networks that are averaged; 100 unless given.")] = None,
     table: Annotated[Path | None, typer.Option(help="Of the others: folder of the probe's tables.")] = None,
     wide: Annotated[
-        Path | None, typer.Option(help="Of standard: folder of the table around the ranges; made unless given.")
+        Path | None,
+        typer.Option(help="Of standard and commissioned: folder of the table around the ranges; made unless given."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of weights, splits, presses and noise.")] = 1,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Of standard: few presses, to try the chain; the model is a poor one.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Of standard and commissioned: few presses, to try the chain; the model is a poor one."
+        ),
     ] = False,
     judge_only: Annotated[
         bool, typer.Option("--judge-only", help="Of standard: train nothing, judge the bundle's answers anew.")
@@ -96,7 +108,7 @@ def train(
     if mode == "all":
         return run_chain(chained_commands(seed, scheduler), source_tree("make everything in models/"))
     command = _command({"--mode": mode, **given, "--out": out, "--seed": seed})
-    folder = out or own_models(mode)
+    folder = out or own_models("standard" if mode == "commissioned" else mode)
     require_writable_folder(folder)
     if mode == "paper" and data is None:
         data = _swept(scheduler)
@@ -107,6 +119,8 @@ def train(
             _judged(table or SIMULATED_PROBE, folder, seed, dry_run)
         elif mode == "standard":
             _standard(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
+        elif mode == "commissioned":
+            _commissioned(table or SIMULATED_PROBE, wide, folder, seed, dry_run, command)
         else:
             _quick(table or SIMULATED_PROBE, folder, seed, command)
 
@@ -178,6 +192,27 @@ def _standard(table: Path, wide: Path | None, out: Path, seed: int, dry_run: boo
             trained, out, serials=(SERIALS["physical"],), software_version=__version__, training_command=command
         )
     _publish_ramp_dial(out, tables, calibration)
+
+
+def _commissioned(table: Path, wide: Path | None, out: Path, seed: int, dry_run: bool, command: str) -> None:
+    from device.files.bundle_file import read_ramp_model
+    from host_tools.commissioning.joint_fit import Design
+    from host_tools.commissioning.own_range import publish_own_range, train_own_range
+    from host_tools.press_models.press_derivatives import load_derivatives
+    from host_tools.press_models.ramp_training import DRY_RUN, TrainingBudget
+    from host_tools.probe_tables.out_of_range_table import load_wide_table
+    from host_tools.scores.scored_presses import tolerant
+
+    model = read_ramp_model(out)
+    answers = tolerant(Design(model.answers, load_derivatives(table)))
+    tables, budget = _simulated_tables(table), (DRY_RUN if dry_run else TrainingBudget()).ranges
+    found = train_own_range(
+        tables, load_wide_table(wide or _wide()), answers, model.ranges, budget=budget, seed=seed, say=note.print
+    )
+    with _refusals():
+        publish_own_range(out, found.trained, command)
+    told = f"{100 * found.noticed:.0f} %, of the design's own {100 * found.noticed_by_design:.0f} %"
+    print(f"{out}: of presses outside these networks notice {told}")
 
 
 def _judged(table: Path, out: Path, seed: int, dry_run: bool) -> None:
@@ -287,6 +322,7 @@ def chained_commands(seed: int = 1, scheduler: str | None = None) -> list[Chaine
         ChainedCommand(("table", "--part", "wide")),
         ChainedCommand(("train", "--mode", "standard", "--out", "models/standard", *trained)),
         ChainedCommand(("train", "--mode", "quick", "--out", "models/quick", *trained)),
+        ChainedCommand(("train", "--mode", "commissioned", "--out", "models/standard", *trained)),
     ]
     if scheduler is None:
         return chain

@@ -93,14 +93,18 @@ def without_noise(answers: OwnAnswers, at: Array, further_mm: Array, rng: np.ran
     direction_rad = rng.uniform(0, 2 * np.pi, len(each))
     rows = answers.surrogate.rows(each, direction_rad)
     rows[1:, RESPONSE] = rows[0, RESPONSE]
-    place, straight = Place(each, np.zeros(len(each)), direction_rad), turned_columns(rows, 0.0)
-    changes = answers.own.changes(place, rows)
+    seen = moved(answers, Place(each, np.zeros(len(each)), direction_rad), rows, rng)
+    seen[1:, RESPONSE] = seen[0, RESPONSE]
+    return seen, direction_rad
+
+
+def moved(answers: OwnAnswers, place: Place, rows: Array, rng: np.random.Generator) -> Array:
+    """Return what is seen [N, S] of rows [N, P] of presses with one reference, by a probe and a hand as believed."""
+    straight, changes = turned_columns(rows, 0.0), answers.own.changes(place, rows)
     drawn = rng.standard_normal(changes.factor.shape[2])
     leaning = straight + changes.shift + changes.factor @ drawn
     changes = answers.own.changes(place, rows, leaning)  # how far each leans tells what its tilts' squares do
-    seen = straight + changes.shift + changes.factor @ drawn
-    seen[1:, RESPONSE] = seen[0, RESPONSE]
-    return seen, direction_rad
+    return np.asarray(straight + changes.shift + changes.factor @ drawn)
 
 
 def believed_answers(

@@ -23,7 +23,7 @@ from device.measurement.ramp_modes.model import CriticalValues, RampModel
 from host_tools.calibration.gates import Gate, require_all
 from host_tools.commissioning.believed_presses import BelievedAnswers, believed_answers, believed_presses
 from host_tools.commissioning.joint_fit import MOST_STEPS, PROBE, Design, ProbeFit, fit_probe
-from host_tools.commissioning.left_out import LeftOut, answers_of, left_out, told_blocks
+from host_tools.commissioning.left_out import LeftOut, answers_of, left_out, log_odds_of, told_blocks
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.commissioning.probe_prior import LABELS, OF_DESIGN, ProbePrior
 from host_tools.press_models.mode_outcome import CRITICAL_RATIO
@@ -169,7 +169,7 @@ def limits(answers: OwnAnswers, model: RampModel, seed: int) -> dict[Mode, Criti
     elongation = max(float(rayleigh.ppf(CRITICAL_RATIO)), model.critical["standard"].elongation_deviations)
     seen, _ = believed_presses(answers, ODDS_PRESSES, seed)
     rows = np.concatenate([one.rows for one in seen if stands_out(one.rows[0], answers.noise)])
-    odds = model.ranges.log_odds(rows - answers.ordinary_shift(rows))
+    odds = log_odds_of(answers, model)(rows - answers.ordinary_shift(rows))
     tissue = max(critical.tissue_from_middle_ratio for critical in model.critical.values())
     of_press = CriticalValues(MISFIT_LIMIT, elongation, float(np.quantile(odds, CRITICAL_RATIO)), tissue)
     return {"standard": of_press, "precise": replace(of_press, misfit_ratio=SCAN_MISFIT_LIMIT)}

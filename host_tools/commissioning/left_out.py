@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from device.files.bundle_file import read_range_classifier
 from device.measurement.arrays import Array
 from device.measurement.parameters import COUNT, denormalise_unknowns
 from device.measurement.ramp_modes.answers import RampAnswer, RampAnswers
@@ -17,6 +20,7 @@ from device.measurement.ramp_modes.estimate import rejections, stands_out
 from device.measurement.ramp_modes.intervals import CHI_SQUARE_90
 from device.measurement.ramp_modes.model import CriticalValues, RampModel, found_values
 from device.measurement.ramp_modes.radial_profile import SeenPresses
+from device.measurement.ramp_modes.range_classifier import OWN_ENTRY, OWN_RANGE_FILE, RangeClassifier
 from host_tools.commissioning.joint_fit import Design, ProbeFit, fit_probe, on_castings
 from host_tools.commissioning.phantom_ramps import PhantomRamp
 from host_tools.press_models.mode_outcome import Guess
@@ -94,6 +98,22 @@ def told_blocks(
     return [ramp.name for ramp in blocks if checked_answer(of_castings, model, critical, ramp.seen).has_numbers]
 
 
+def log_odds_of(answers: RampAnswers, model: RampModel) -> Callable[[Array], Array]:
+    """Return what tells the ranges of the presses that `answers` answer, of the design's `model` or a probe's own.
+
+    Raises `BundleRefused` where the design's bundle lacks the networks for commissioned probes (`own_range`).
+    """
+    is_of_design = not isinstance(model.answers, OwnAnswers)
+    if isinstance(answers, OwnAnswers) and is_of_design:
+        return _own_ranges(model.bundle.folder).log_odds
+    return model.ranges.log_odds
+
+
+@lru_cache(maxsize=4)
+def _own_ranges(folder: Path) -> RangeClassifier:
+    return read_range_classifier(folder, OWN_RANGE_FILE, OWN_ENTRY)
+
+
 class CheckedAnswer(NamedTuple):
     """An answer to one press or scan, whether a limit refuses it, and whether an inclusion stands out.
 
@@ -116,7 +136,7 @@ def checked_answer(
 ) -> CheckedAnswer:
     """Return the answer to what was read of a press or scan; `critical` says what is refused."""
     answer = answer_to_seen(answers, model.first_guesses, seen)
-    found = found_values(answer, seen, answers, model.ranges.log_odds)
+    found = found_values(answer, seen, answers, log_odds_of(answers, model))
     shown = any(stands_out(row, answers.noise) for row in seen.rows)
     return CheckedAnswer(answer, bool(rejections(found, critical)), shown and answer.needs_inclusion)
 

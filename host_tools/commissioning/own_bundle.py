@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 
 from device import __version__
-from device.measurement.bundle import CARD_FILE
+from device.measurement.bundle import CARD_FILE, MODEL_FILE
 from device.measurement.calibration import Calibration, written
 from device.measurement.mode import FRAMES, Mode
 from device.measurement.quantities import Bound, InvalidQuantity, require
 from device.measurement.ramp_modes.commissioned.row_derivatives import NAMES
 from device.measurement.ramp_modes.model import SURROGATE_FILE, surrogate_arrays
-from device.measurement.ramp_modes.range_classifier import RANGE_FILE
+from device.measurement.ramp_modes.range_classifier import ENTRY, OWN_ENTRY, OWN_RANGE_FILE, RANGE_FILE
 from host_tools.commissioning.believed_presses import BelievedAnswers, believed_dial
 from host_tools.commissioning.commission import CommissionedProbe
 from host_tools.commissioning.joint_fit import PROBE
@@ -77,6 +77,7 @@ def write_own_bundle(
         "surrogate_sha256": hashlib.sha256(surrogate).hexdigest(),
         "expires_at": certificate.validity.expires_at if certificate else written(made_at + timedelta(days=valid_days)),
         "commissioned": commissioned_record(done, made_at, origin),
+        ENTRY: card.pop(OWN_ENTRY),
     }
     of_modes: dict[Mode, BelievedAnswers] = {"standard": done.presses, "precise": done.scans}
     for mode, presses in of_modes.items():
@@ -84,9 +85,7 @@ def write_own_bundle(
         card["modes"][mode] = kept | asdict(done.critical[mode]) | _worth(mode, presses)
     text = (json.dumps(card, indent=1, allow_nan=False) + "\n").encode()
     page = commissioning_page(done, card, advice, is_simulated=is_simulated).encode()
-    names = (*(name for name in files if name.endswith(".onnx")),)
-    assert RANGE_FILE in names
-    kept_files = {name: files[name] for name in names}
+    kept_files = {MODEL_FILE: files[MODEL_FILE], RANGE_FILE: files[OWN_RANGE_FILE]}
     kept_files |= {SURROGATE_FILE: surrogate, CARD_FILE: text, PAGE_FILE: page}
     write_folder(folder, kept_files | ({CERTIFICATE_FILE: certificate.to_json().encode()} if certificate else {}))
 

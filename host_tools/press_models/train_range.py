@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,25 @@ def train_range(
 ) -> TrainedRange:
     """Return the networks; `say` hears what begins. The same seed gives the same ones whatever `jobs`."""
     asked = budget or RangeBudget()
+    found = wide_presses(tables, wide, asked, seed, jobs, say)
+    say(f"{asked.members} networks for the ranges")
+    presses = wide_press_set(found.surrogate, noise, asked.trained_on, seed)
+    return TrainedRange(train_network(presses, seed, asked, jobs), found.error, found.sha256, asked)
+
+
+class WidePresses(NamedTuple):
+    """Polynomials of presses in and around the ranges, their error [P] on presses kept apart, and the hash of all
+    rows."""
+
+    surrogate: WideSurrogate
+    error: Array
+    sha256: str
+
+
+def wide_presses(
+    tables: ProbeTables, wide: WideTable, asked: RangeBudget, seed: int, jobs: int, say: Callable[[str], None]
+) -> WidePresses:
+    """Return the polynomials of random presses in and around the ranges; as `train_range`."""
     say(f"{asked.presses} random presses in and around the ranges")
     samples = sample_presses(
         wide.around(tables),
@@ -102,11 +122,8 @@ def train_range(
     )
     learned, kept = samples.split(asked.presses)
     surrogate = wide_surrogate(learned, asked.detail_ratio)
-    say(f"{asked.members} networks for the ranges")
-    presses = wide_press_set(surrogate, noise, asked.trained_on, seed)
-    network = train_network(presses, seed, asked, jobs)
     error = np.sqrt(np.mean((surrogate.rows(kept.parameters, kept.direction_rad) - kept.rows) ** 2, axis=0))
-    return TrainedRange(network, error, hashlib.sha256(samples.rows.tobytes()).hexdigest(), asked)
+    return WidePresses(surrogate, error, hashlib.sha256(samples.rows.tobytes()).hexdigest())
 
 
 def wide_surrogate(samples: PressSamples, detail_ratio: float = 1.0) -> WideSurrogate:

@@ -14,6 +14,8 @@ from device.measurement.ramp_modes.radial_profile import network_rows
 RANGE_FILE, ENTRY = "range.onnx", "range"
 """The file in the folder of a bundle, and its entry in the card: `sha256`, and `golden` log odds for the golden
 features of the bundle."""
+OWN_RANGE_FILE, OWN_ENTRY = "range_commissioned.onnx", "range_commissioned"
+"""Those that have seen what a builder's tolerances allow: in the design's bundle, for commissioning to hand on."""
 OUTPUT = "standard"
 """Of the network: the mode whose noise it has seen."""
 
@@ -21,12 +23,14 @@ OUTPUT = "standard"
 class RangeClassifier:
     """The verified networks of a bundle."""
 
-    def __init__(self, files: BundleFiles, card: ModelCard, features: int) -> None:
+    def __init__(
+        self, files: BundleFiles, card: ModelCard, features: int, file: str = RANGE_FILE, entry: str = ENTRY
+    ) -> None:
         """Verify the networks that read so many features; raises `BundleRefused` when they do not hold."""
-        content = files.verified(RANGE_FILE, card.of(ENTRY, dict).get("sha256"))
+        content = files.verified(file, card.of(entry, dict).get("sha256"))
         outputs = {OUTPUT: 1}
-        self._network = Network(files.folder, RANGE_FILE, content, features, outputs)
-        self._golden = GoldenVectors.of_card(card, f"{ENTRY}.golden", features, outputs, floor=1.0)
+        self._network = Network(files.folder, file, content, features, outputs)
+        self._golden = GoldenVectors.of_card(card, f"{entry}.golden", features, outputs, floor=1.0)
         self.prove()
 
     def log_odds(self, rows: Array) -> Array:

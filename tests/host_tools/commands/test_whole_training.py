@@ -31,7 +31,10 @@ def written(command: ChainedCommand) -> set[str]:
     if verb in ("sweep", "phantom", "calibrate"):
         return {str(out)}
     if verb == "train":
-        more = ("range.onnx", "surrogate.npz") if option(command, "--mode") == "standard" else ()
+        mode = option(command, "--mode")
+        if mode == "commissioned":
+            return {f"{out}/range_commissioned.onnx"}
+        more = ("range.onnx", "surrogate.npz") if mode == "standard" else ()
         return {f"{out}/{name}" for name in (*BUNDLE, *more)}
     if option(command, "--part") == "wide":
         return {str(WIDE)}
@@ -51,6 +54,8 @@ def needed(command: ChainedCommand) -> set[str]:
             return {*tables, certificate, str(WIDE)}
         case "train", "quick", _:
             return {*tables, certificate, "models/standard/surrogate.npz"}
+        case "train", "commissioned", _:
+            return {*tables, "models/simulated_probe/press_derivatives.npz", "models/standard/surrogate.npz", str(WIDE)}
         case "phantom", _, _:
             return tables | paper
         case "calibrate", _, _:
