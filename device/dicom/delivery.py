@@ -37,7 +37,7 @@ class Delivery:
     def __init__(self, settings: DicomSection, archive: RemoteProgram, store: Store, outgoing: Outgoing) -> None:
         """Take the archive and what there is for it."""
         self._settings, self._archive, self._store, self._outgoing = settings, archive, store, outgoing
-        self.doubt: DeviceError | None = None
+        self.silence: DeviceError | None = None
         """That the archive has taken objects and never says that it keeps them, until it does so of any."""
 
     def turn(self, is_stopping: Callable[[], bool] = lambda: False) -> bool:
@@ -96,9 +96,9 @@ class Delivery:
                 self._store.outbox.settle(uid, "queued", "The archive has not said that it keeps it.")
         if silent:
             what = f"has not said for an hour that it keeps what it took, {len(silent)} objects"
-            self.doubt = unreachable(self._archive, what)
+            self.silence = unreachable(self._archive, what)
         elif found:
-            self.doubt = None
+            self.silence = None
 
 
 def _sent(row: StoredRecord) -> SentObject:

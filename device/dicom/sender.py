@@ -60,7 +60,7 @@ class Sender(PersistentSender):
         if not self._outbox.is_idle():
             self._delivery = self._delivery or self._deliver()
             is_left = self._delivery.turn(self._is_to_pause)
-        return is_left, self._refused() or (self._delivery.doubt if self._delivery else None)
+        return is_left, self._refused() or (self._delivery.silence if self._delivery else None)
 
     def _refused(self) -> DeviceError | None:
         refused = self._outbox.in_state("refused", limit=1)

@@ -110,7 +110,7 @@ function sayResult(measurement) {
   service = told?.service ?? "";
 }
 
-/** How the last press ended, where that comes before what to do next: at once, and as long as its light is in doubt. */
+/** How the last press ended, where that comes before what to do next: at once, and where there may be no light. */
 function endFirst() {
   const isDark = status.press?.state === "failed" && status.press.code?.startsWith("E2") && isIdle();
   return status.step === "rejected" || isDark ? endWords(status) : null;

@@ -235,18 +235,18 @@ def test_an_archive_that_never_confirms_is_told_after_an_hour_and_until_it_does(
         silenced.setattr(Association, "send_c_find", lambda *_: iter([]))
         outgoing.queue(exam["id"], version=1, by="Ada")
         assert one.turn() is True
-        assert one.doubt is None
+        assert one.silence is None
         silenced.setattr(delivery, "LOST_AFTER", timedelta(0))
         one.turn()
-        assert "has not said for an hour that it keeps what it took, 4 objects" in one.doubt.cause
+        assert "has not said for an hour that it keeps what it took, 4 objects" in one.silence.cause
         assert {row["problem"] for row in store.outbox.of_exam(exam["id"])} == {
             "The archive has not said that it keeps it."
         }
         silenced.setattr(delivery, "LOST_AFTER", timedelta(hours=1))
         one.turn()
-        assert one.doubt is not None  # it was sent again, and nothing is said of it yet
+        assert one.silence is not None  # it was sent again, and nothing is said of it yet
     assert one.turn() is False
-    assert (one.doubt, states(store)) == (None, ["confirmed"] * 4)
+    assert (one.silence, states(store)) == (None, ["confirmed"] * 4)
 
 
 def test_what_was_never_sent_is_withdrawn_and_never_is(store, outgoing, deliver, archive, exam):

@@ -29,7 +29,7 @@ def test_an_option_of_another_mode_is_refused_before_anything_is_trained(mode, o
 
 
 def test_an_unknown_mode_is_refused_with_the_known_ones():
-    with pytest.raises(InvalidQuantity, match="paper, standard, quick, all"):
+    with pytest.raises(InvalidQuantity, match="paper, standard, quick, commissioned, all"):
         command.train(mode="fast")
 
 
