@@ -201,7 +201,7 @@ class Capture:
         while not wanted.is_complete:
             self._require_wanted()
             if self._untouched_s >= self.light.untouched_s:
-                self._wait_in_the_dark(rules)
+                self._wait_in_the_dark(rules, begin)
             self.bench.light(self.lit)
             frame = self._numbered(self.bench.take(role), ramp)
             self._become(self.machine.see(self._observation(frame, is_ramp=wanted.is_ramp), rules))
@@ -228,16 +228,19 @@ class Capture:
     def _numbered(self, frame: Frame, ramp: int) -> Frame:
         return replace(frame, ramp=ramp) if ramp else frame
 
-    def _wait_in_the_dark(self, rules: PressRules) -> None:
+    def _wait_in_the_dark(self, rules: PressRules, begin: Guidance) -> None:
         """Return once the force says that the probe is about to touch; raises `PressEnded` when that takes too long.
 
-        A zero that is off does not keep it lit: then it takes a rise.
+        A zero that is off does not keep it lit: then it takes a rise. Who came so slowly that the light went out at the
+        first touch is asked for that rise, too.
         """
+        further = Guidance.PRESS_SLOWLY if rules.is_ramp else Guidance.PRESS_HARDER
         self.bench.light(DARK)
         lowest_n = force_n = self.bench.force.latest_n
         while force_n < PRESSED_RATIO * rules.contact_n and force_n - lowest_n < rules.contact_n / 2:
             self._require_wanted()
             self._become(self.machine.see(FrameSeen(time.monotonic(), force_n, force_n, 0.0, 0.0), rules))
+            self.board.update(guidance=further if self.machine.is_touching else begin)
             time.sleep(POLL_S)
             force_n = self.bench.force.latest_n
             lowest_n = min(lowest_n, force_n)

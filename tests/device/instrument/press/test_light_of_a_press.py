@@ -65,6 +65,15 @@ def test_a_zero_just_above_a_contact_does_not_keep_it_lit(pressing):
     assert pressed.light_on_s < CONFIG.light.untouched_s + WOKEN_S + 2 * FRAME_S
 
 
+@pytest.mark.parametrize("reaction_s", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize("ramp_rate_n_per_s", [0.01, 0.0105, 0.012])
+def test_a_hand_so_slow_that_the_light_goes_out_at_its_first_touch_is_led_on(pressing, ramp_rate_n_per_s, reaction_s):
+    """It touches with 0.06 N after 5 to 7 s, when it is dark, and waits to be told to press on."""
+    slow = HandSettings(reaction_s=reaction_s, ramp_rate_n_per_s=ramp_rate_n_per_s, tremor_n=0.0, drift_n=0.0)
+    pressed = pressing.press(slow, "standard")
+    assert pressed.is_accepted, pressed.reason
+
+
 def test_presses_that_nobody_touches_light_the_face_once_for_all_of_them(pressing):
     """As an endless loop of requests does: the next one finds the light of those before spent, until a touch."""
     capture, first_s = None, 0.0
