@@ -28,8 +28,9 @@ from device.errors import BusyError, DiskFullError, StorageError
 from device.files.durable import sync_directory
 from device.files.plain_settings import LOCAL
 from device.measurement.quantities import InvalidQuantity
-from device.records.audit import append, utc_now
+from device.records.audit import utc_now
 from device.records.schema import STORE_READS
+from device.records.tokens import note_revoked
 from device.settings.catalogue import SETTINGS
 
 STAGED, ASIDE = "restore.tmp", "before-restore"
@@ -280,11 +281,7 @@ def _revoke_tokens(database: Path) -> None:
         if not db.execute("SELECT 1 FROM sqlite_master WHERE name = 'token'").fetchone():
             return  # of a release that had none
         for (token_id,) in db.execute("SELECT id FROM token WHERE revoked_at IS NULL").fetchall():
-            now = utc_now()
-            db.execute("UPDATE token SET revoked_at = ? WHERE id = ?", (now, token_id))
-            append(
-                db, "token_revoked", token_id, reason=RESTORED, before={"revoked_at": None}, after={"revoked_at": now}
-            )
+            note_revoked(db, token_id, utc_now(), RESTORED)
 
 
 def _placed(staged: Path, target: Path, data: Path) -> list[Path]:

@@ -60,6 +60,12 @@ class TokenRecord:
         return {name: value for name, value in asdict(self).items() if name != "hash"}
 
 
+def note_revoked(db: sqlite3.Connection, token_id: str, at: str, reason: str = "") -> None:
+    """Keep that a token holds no more since a time (RFC 3339), with its entry in the audit."""
+    db.execute("UPDATE token SET revoked_at = ? WHERE id = ?", (at, token_id))
+    append(db, "token_revoked", token_id, reason=reason, before={"revoked_at": None}, after={"revoked_at": at})
+
+
 class Tokens:
     """The tokens of a store; all methods may be called from any thread."""
 
@@ -105,8 +111,7 @@ class Tokens:
             raise UnknownResource(f"There is no token {token_id} that holds.", "Look at the list: GET tokens.")
         revoked = replace(found, revoked_at=utc_now())
         with self._transaction() as db:
-            db.execute("UPDATE token SET revoked_at = ? WHERE id = ?", (revoked.revoked_at, token_id))
-            append(db, "token_revoked", token_id, before={"revoked_at": None}, after={"revoked_at": revoked.revoked_at})
+            note_revoked(db, token_id, str(revoked.revoked_at))
         with self._lock:
             self._by_hash[revoked.hash] = revoked
         for listener in self._listeners:

@@ -26,7 +26,7 @@ export function intervalWords(quantity, unit) {
   const { low_is_open: lowOpen, high_is_open: highOpen } = quantity;
   const [low, high] = [quantity.low, quantity.high].map((end) => figure(end, decimalsFor(quantity)));
   if (lowOpen && highOpen) return say("result.any");
-  if (Boolean(lowOpen) === Boolean(highOpen)) return say("result.range", { low, high, unit });
+  if (!lowOpen && !highOpen) return say("result.range", { low, high, unit });
   return lowOpen ? say("result.or_less", { value: high, unit }) : say("result.or_more", { value: low, unit });
 }
 
