@@ -13,6 +13,7 @@ SERIAL ?=
 LOGIN ?= pi
 SSH ?=
 TIME_ZONE ?=
+TIME_SERVERS ?=
 CHECK ?=
 KILLS ?= 200
 CUTS ?= 100
@@ -85,12 +86,12 @@ bundle: .venv/all.stamp ## build and sign the file that a probe installs: make b
 
 RELEASE = $(or $(FILE),$(OUT)/tsis-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' device/__init__.py)-$(MACHINE).release)
 
-provision: .venv/all.stamp ## make a fresh Raspberry Pi OS a probe: make provision HOST=NAME SERIAL=TSIS-0007 [CHECK=1] [LOGIN=pi] [TIME_ZONE=Europe/Berlin] [CAMERA=imx296] [SSH="-p 22"] [FILE=RELEASE]
+provision: .venv/all.stamp ## make a fresh Raspberry Pi OS a probe: make provision HOST=NAME SERIAL=TSIS-0007 [CHECK=1] [LOGIN=pi] [TIME_ZONE=Europe/Berlin] [TIME_SERVERS=ntp.hospital.example] [CAMERA=imx296] [SSH="-p 22"] [FILE=RELEASE]
 	@test -n "$(HOST)" || { echo "Name the machine: make provision HOST=raspberrypi.local SERIAL=TSIS-0007"; exit 2; }
 	@$(if $(FILE),true,$(MAKE) --no-print-directory bundle)
 	@$(HOST_TOOLS) provision "$(RELEASE)" --host "$(HOST)" --user "$(LOGIN)" --signers "$(TRUSTED)" --deploy-key "$(DEPLOY_KEY)" \
 	  $(if $(SSH),--ssh "$(SSH)") $(if $(SERIAL),--serial "$(SERIAL)") $(if $(TIME_ZONE),--time-zone "$(TIME_ZONE)") \
-	  $(if $(CAMERA),--camera-overlay "$(CAMERA)") $(if $(CHECK),--check)
+	  $(if $(TIME_SERVERS),--time-servers "$(TIME_SERVERS)") $(if $(CAMERA),--camera-overlay "$(CAMERA)") $(if $(CHECK),--check)
 
 deploy: .venv/all.stamp ## build a release and send it to a probe: make deploy HOST=NAME [SSH="-p 22 -i KEY"] [FILE=RELEASE]
 	@test -n "$(HOST)" || { echo "Name the probe: make deploy HOST=raspberrypi.local"; exit 2; }

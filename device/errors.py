@@ -537,6 +537,14 @@ class ClockJumpError(DeviceError):
     severity = "warning"
 
 
+class ClockNotSetError(DeviceError):
+    """Nothing has set the wall clock since the computer was switched on; `taken_at` may be days or months old."""
+
+    code = "E702"
+    title = "Date not checked"
+    severity = "warning"
+
+
 class BusyError(DeviceError):
     """A press, a self-test or an update is already under way."""
 

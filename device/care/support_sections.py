@@ -302,7 +302,7 @@ def _certificate(file: Path, *, is_active: bool) -> dict[str, Any]:
 
 
 def computer(context: SupportContext) -> dict[str, Any]:
-    """Return supply, temperature, memory, load and how long the computer has been on."""
+    """Return supply, temperature, clock, memory, load and how long the computer has been on."""
     from device.hardware.computer import SysfsComputer
 
     state = SysfsComputer(lambda: context.root).read()
@@ -310,6 +310,7 @@ def computer(context: SupportContext) -> dict[str, Any]:
     return {
         "is_supply_low": state.is_supply_low,
         "temperature_c": state.temperature_c,
+        "is_clock_set": state.is_clock_set,
         "up_s": float(Path("/proc/uptime").read_text(encoding="ascii").split()[0]),
         "load": os.getloadavg(),
         "memory_mb": {name: int(memory[name].split()[0]) // 1000 for name in ("MemTotal", "MemAvailable")},

@@ -59,10 +59,12 @@ class ComputerState:
     """What the probe's computer says of itself; None for what it cannot say.
 
     `is_supply_low`: whether its supply voltage was too low at some time in the last two seconds.
+    `is_clock_set`: whether its clock, since it was switched on, has been set by a time server or a battery clock.
     """
 
     is_supply_low: bool | None = None
     temperature_c: float | None = None
+    is_clock_set: bool | None = None
 
 
 class Computer(Protocol):

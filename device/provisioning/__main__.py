@@ -98,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--signers", type=Path, metavar="FILE", help="keys whose releases are taken (ALLOWED SIGNERS)")
     parser.add_argument("--deploy-key", type=Path, metavar="FILE", help="public key of who may send releases")
     parser.add_argument("--time-zone", default="", metavar="ZONE", help="as Europe/Berlin; as it is unless given")
+    parser.add_argument("--time-servers", default="", metavar="NAMES", help="apart by a space; as it is unless given")
     parser.add_argument("--camera-overlay", default="", metavar="NAME", help="the sensor's (as it is, else ov9281)")
     parser.add_argument("--stand-in", action="store_true", help="a machine that is no Pi, for tests")
     parser.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="the machine's / (default: /)")
@@ -111,6 +112,7 @@ def _wishes(options: argparse.Namespace) -> ProvisioningWishes:
         signers=options.signers.read_text(encoding="utf-8") if options.signers else "",
         deploy_key=options.deploy_key.read_text(encoding="utf-8").strip() if options.deploy_key else "",
         time_zone=options.time_zone,
+        time_servers=options.time_servers,
         camera_overlay=options.camera_overlay,
         is_stand_in=options.stand_in,
     )

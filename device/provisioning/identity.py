@@ -1,4 +1,4 @@
-"""What is a probe's own: its serial number, whose releases it takes, its time zone."""
+"""What is a probe's own: its serial number, whose releases it takes, its time zone and who tells it the time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from device.provisioning.target import ProvisioningFailed, TargetMachine
 SETTINGS = "/etc/tsis/config.toml"
 SIGNERS = "/etc/tsis/release_signers"
 ZONES, ZONE_LINK = "/usr/share/zoneinfo", "/etc/localtime"
+TIME_SERVERS = "/etc/systemd/timesyncd.conf.d/tsis.conf"
+SERVER_NAMES = re.compile(r"[A-Za-z0-9][A-Za-z0-9.:-]*( [A-Za-z0-9][A-Za-z0-9.:-]*)*")
 SERIAL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,62}")
 UNNAMED = "TSIS-0000"
 """The default of the setting `serial`: a probe that nobody has named."""
@@ -110,6 +112,37 @@ class TimeZoneItem:
             raise ProvisioningFailed(f"This machine knows no time zone {self.zone!r}.", "Name one as Europe/Berlin.")
         LinkItem(self.title, {ZONE_LINK: f"{ZONES}/{self.zone}"}).apply(target)
         write_readable(target, "/etc/timezone", f"{self.zone}\n")
+
+
+@dataclass(frozen=True)
+class TimeServersItem:
+    """Who tells the probe the time: names or addresses, apart by a space. Source: timesyncd.conf(5).
+
+    A hospital's network mostly lets nothing through to those of the distribution, and NetworkManager does not hand on
+    to systemd-timesyncd what DHCP names.
+    """
+
+    servers: str
+    title: str = "time servers"
+    wants_reboot: bool = False
+
+    def differs(self, target: TargetMachine) -> str:
+        """Return whether other ones are asked; nothing when none were given."""
+        if not self.servers or target.text(TIME_SERVERS) == self._text:
+            return ""
+        return f"{TIME_SERVERS} does not name {self.servers}"
+
+    def apply(self, target: TargetMachine) -> None:
+        """Name them and ask them at once; raise `ProvisioningFailed` for what is no name."""
+        if not SERVER_NAMES.fullmatch(self.servers):
+            cause = f"{self.servers!r} are no time servers: names or addresses, apart by one space."
+            raise ProvisioningFailed(cause, "Name them as ntp1.hospital.example.")
+        write_readable(target, TIME_SERVERS, self._text)
+        target.run("systemctl", "restart", "systemd-timesyncd.service")
+
+    @property
+    def _text(self) -> str:
+        return f"# Made by provisioning.\n[Time]\nNTP={self.servers}\n"
 
 
 def is_calibrated(target: TargetMachine) -> bool:

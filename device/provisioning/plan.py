@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from device.provisioning.accounts import AccountsItem, DeployKeyItem, FoldersItem, SshItem
 from device.provisioning.boot_files import BootSettingsItem, KernelLineItem, ReadOnlyBootItem
-from device.provisioning.identity import SerialItem, SignersItem, TimeZoneItem
+from device.provisioning.identity import SerialItem, SignersItem, TimeServersItem, TimeZoneItem
 from device.provisioning.installation import FirstReleaseItem, GoingItem, UdevItem, other_links, unit_links
 from device.provisioning.item import ProvisioningItem, TextItem
 from device.provisioning.packages import NEEDED, ONLY_RASPBERRY_PI_OS, PackagesItem
@@ -32,6 +32,7 @@ class ProvisioningWishes:
     signers: str = ""
     deploy_key: str = ""
     time_zone: str = ""
+    time_servers: str = ""
     camera_overlay: str = ""
     is_stand_in: bool = False
 
@@ -49,6 +50,7 @@ def plan_of(wishes: ProvisioningWishes) -> list[ProvisioningItem]:
         DeployKeyItem(wishes.deploy_key),
         SshItem(),
         TimeZoneItem(wishes.time_zone),
+        TimeServersItem(wishes.time_servers),
         TextItem("journal", "/etc/systemd/journald.conf.d/tsis.conf", JOURNAL, RESTART_JOURNAL),
         TextItem("I2C from user space", "/etc/modules-load.d/tsis.conf", "i2c-dev\n"),
         BootSettingsItem(wishes.camera_overlay),

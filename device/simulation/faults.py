@@ -48,6 +48,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "inference_frozen": (),
     "clock_jump": ("step_s",),
     "clock_set": ("date",),
+    "clock_not_set": (),
     "disk_low": (),
     "disk_full": (),
     "disk_read_only": (),

@@ -149,6 +149,9 @@ def provision(
     ssh: Ssh = "",
     signers: Signers = SIGNERS,
     time_zone: Annotated[str, typer.Option(help="As Europe/Berlin; as it is unless given.")] = "",
+    time_servers: Annotated[
+        str, typer.Option(help="Who tells it the time, apart by a space; as it is unless given.")
+    ] = "",
     camera_overlay: Annotated[
         str, typer.Option(help="The sensor's, as imx296; as it is unless given, at first ov9281.")
     ] = "",
@@ -164,6 +167,7 @@ def provision(
     options = [*(["--check"] if check else []), *(["--stand-in"] if stand_in else [])]
     options += [f"--serial={serial}"] if serial else []
     options += [f"--time-zone={time_zone}"] if time_zone else []
+    options += [f"--time-servers={time_servers}"] if time_servers else []
     options += [f"--camera-overlay={camera_overlay}"] if camera_overlay else []
     order = ProvisioningOrder(file, signers, deploy_key, tuple(options))
     try:

@@ -1,4 +1,4 @@
-"""Whether the probe's computer has enough voltage and is cool enough: looked at twice a second, told with each press.
+"""Whether the probe's computer has voltage, is cool and knows the date: looked at twice a second, told with each press.
 
 A thread of its own looks, since a voltage that is too low for two seconds in a press would be missed by whoever looks
 before and after it; and whatever reading does, no press waits for it. What was seen stays seen until it is taken, so
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import threading
 
-from device.errors import ComputerHotError, DeviceError, SupplyLowError
+from device.errors import ClockNotSetError, ComputerHotError, DeviceError, SupplyLowError
 from device.hardware.interfaces import Computer
 
 LOOK_EVERY_S = 0.5
@@ -20,6 +20,10 @@ SLOW_FROM_C = 80.0
 SUPPLY_LOW = SupplyLowError(
     "The computer's supply voltage was too low: the light or a frame may be wrong.",
     "Use the power supply and cable that belong to the probe; if it stays, have them replaced.",
+)
+CLOCK_NOT_SET = ClockNotSetError(
+    "No time server and no battery clock has set this probe's clock since it was switched on: its date may be wrong.",
+    "Compare the date on the screen with another clock, and give the probe a time server.",
 )
 
 
@@ -55,6 +59,8 @@ class ComputerWatch:
                 self._seen[SUPPLY_LOW.code] = SUPPLY_LOW
             if state.temperature_c is not None and state.temperature_c >= SLOW_FROM_C:
                 self._seen[ComputerHotError.code] = _too_hot(state.temperature_c)
+            if state.is_clock_set is False:
+                self._seen[CLOCK_NOT_SET.code] = CLOCK_NOT_SET
 
     def _run(self) -> None:
         self.look()

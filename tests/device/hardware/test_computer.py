@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,24 @@ def test_a_file_that_cannot_be_read_says_nothing(root: Path) -> None:
     (root / TEMPERATURE).unlink()
     (root / TEMPERATURE).mkdir()  # reading it is an OSError, as of a sensor that answers with one
     assert state(root) == ComputerState(is_supply_low=False, temperature_c=None)
+
+
+def test_a_clock_is_set_by_a_time_server_or_by_a_battery_clock_that_still_agrees(root: Path) -> None:
+    """That of a Raspberry Pi 5 without a battery begins in 1970: the kernel began with it, and systemd went on."""
+    assert state(root).is_clock_set is None  # no systemd, which would tell
+    (root / "run/systemd/system").mkdir(parents=True)
+    assert state(root).is_clock_set is False
+    clock = root / "sys/class/rtc/rtc0"
+    clock.mkdir(parents=True)
+    for began_with, since_epoch_s, is_set in (
+        ("1", 1000.0, False),
+        ("0", time.time(), False),
+        ("1", time.time(), True),
+    ):
+        (clock / "hctosys").write_text(f"{began_with}\n")
+        (clock / "since_epoch").write_text(f"{since_epoch_s:.0f}\n")
+        assert state(root).is_clock_set is is_set
+    (clock / "since_epoch").unlink()
+    (root / "run/systemd/timesync").mkdir()
+    (root / "run/systemd/timesync/synchronized").touch()
+    assert state(root).is_clock_set is True

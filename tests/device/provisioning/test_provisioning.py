@@ -246,6 +246,17 @@ def test_a_time_zone_that_the_machine_does_not_know_is_refused(machine, capsys):
     assert "Mars/Olympus" in capsys.readouterr().err
 
 
+def test_a_probe_asks_the_time_servers_that_are_named(probe, capsys):
+    servers = "ntp1.hospital.example 192.0.2.7"
+    assert probe.check("--time-servers", servers) == 1
+    assert probe.run("--time-servers", servers) == 0
+    assert probe.check("--time-servers", servers) == 0
+    assert f"NTP={servers}\n" in (probe.root / "etc/systemd/timesyncd.conf.d/tsis.conf").read_text()
+    assert probe.run("--time-servers", "ntp\nRootDistanceMaxSec=9d") == 1
+    assert "are no time servers" in capsys.readouterr().err
+    assert probe.check("--time-servers", servers) == 0
+
+
 def test_a_stand_in_is_not_asked_for_the_packages_of_a_pi(machine, capsys):
     machine.check("--stand-in")
     assert "python3-picamera2" not in capsys.readouterr().out

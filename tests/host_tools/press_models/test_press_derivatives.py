@@ -65,7 +65,7 @@ def test_the_kept_derivatives_are_those_of_the_virtual_probe(tables):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("slab", [(3.0, 30.0), (5.0, 30.0), (20.0, 40.0)])
+@pytest.mark.parametrize("slab", [(3.0, 30.0), (20.0, 40.0)])
 def test_in_peoples_tissue_what_the_layers_change_is_that_of_fresh_solves(tables, slab):
     """By finite elements: each layer a tenth stiffer, of the contrast of a hard inclusion 6 mm deep."""
     hard, layers = Inclusion(10.0, 6.0, 100.0), Waveguide().layer_moduli_kpa

@@ -84,3 +84,12 @@ def test_a_look_that_hangs_keeps_nobody_waiting() -> None:
     assert watch.taken() == ()
     watch.close()
     let_go.set()
+
+
+def test_a_date_that_nothing_has_set_is_told_with_each_press_until_something_has() -> None:
+    watch = ComputerWatch(TalkingComputer(*[ComputerState(is_clock_set=False)] * 2, ComputerState(is_clock_set=True)))
+    told = []
+    for _ in range(3):
+        watch.look()
+        told.append(codes(watch))
+    assert told == [["E702"], ["E702"], []]
